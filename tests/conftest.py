@@ -1,4 +1,4 @@
-"""Fixtures that every room's tests share."""
+"""Fixtures and settings of all tests."""
 
 from __future__ import annotations
 
@@ -14,53 +14,53 @@ from xdist.scheduler import LoadFileScheduling
 
 from fakes.paths import ROOT
 
-_ONE_BY_ONE = ("tests/e2e/", "tests/client/")
-"""Folders whose tests run in real time, and do not run beside each other."""
+_REAL_TIME_FOLDERS = ("tests/e2e/", "tests/client/")
+"""Folders whose tests run in real time, and therefore not in parallel."""
 
-# How long an example takes is the machine's doing: a test that hangs is ended by its own bound in time.
-# Each run tries the same examples, so that no run fails by chance; `make test-slow` looks for others.
+# No deadline per example, since that depends on the machine; a hanging test hits its timeout.
+# All runs try the same examples, so that no run fails by chance; `make test-slow` tries others.
 settings.register_profile(
-    "the same", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
+    "fixed examples", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
 )
-settings.register_profile("others", settings.get_profile("the same"), derandomize=False)
-settings.load_profile("the same")
+settings.register_profile("new examples", settings.get_profile("fixed examples"), derandomize=False)
+settings.load_profile("fixed examples")
 
-# As in every process of a site: threads that compute what one does as soon wait by turning round and round.
+# As in every process of a site: further threads would only spin.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 if sys.dont_write_bytecode:
-    # Compiling is half of a command's start, and tests start hundreds. What is kept lies in .venv alone.
+    # Compiling takes half of a command's start, and tests start hundreds. The cache is inside .venv.
     sys.dont_write_bytecode = False
     sys.pycache_prefix = str(Path(sys.prefix) / ".bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    # What a shell starts in the background ignores Ctrl-C, and so would the processes that tests interrupt.
+    # A background process of a shell ignores Ctrl-C, and so would the processes that tests interrupt.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with sites and browsers, which take longest, so that they do not run alone in the end."""
-    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in _ONE_BY_ONE])
+    """Start with sites and browsers, which take longest, so that other tests run in parallel."""
+    items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in _REAL_TIME_FOLDERS])
 
 
-class _OneSiteAtATime(LoadFileScheduling):
-    """Keeps a file's tests on one worker, as they share fixtures, and so all sites, and so all browsers."""
+class _RealTimeScheduling(LoadFileScheduling):
+    """Runs the tests of a file, all sites, and all browsers on one worker each."""
 
     def _split_scope(self, nodeid: str) -> str:
         file: str = super()._split_scope(nodeid)
-        return next((folder for folder in _ONE_BY_ONE if file.startswith(folder)), file)
+        return next((folder for folder in _REAL_TIME_FOLDERS if file.startswith(folder)), file)
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _OneSiteAtATime:
-    return _OneSiteAtATime(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _RealTimeScheduling:
+    return _RealTimeScheduling(config, log)
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Return the folder of real multi-view recordings; skip without it: it is not in the repository."""
+    """Return the folder of real multi-view recordings, which are not in the repository; skip without it."""
     default = ROOT.parent / "shared" / "data"
     folder = Path(os.environ.get("MYVIEW_TEST_DATA", default))
     if not folder.is_dir():

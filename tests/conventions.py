@@ -58,10 +58,10 @@ def rooms() -> list[Room]:
     lengths: dict[str, dict[Path, int]] = defaultdict(dict)
     for path in sources(*PRODUCT, "benchmarks", "tests"):
         lengths[room_of(path)][path] = len((ROOT / path).read_text(encoding="utf-8").splitlines())
-    return [_measured(name, sizes) for name, sizes in sorted(lengths.items())]
+    return [_measure(name, sizes) for name, sizes in sorted(lengths.items())]
 
 
-def _measured(name: str, sizes: dict[Path, int]) -> Room:
+def _measure(name: str, sizes: dict[Path, int]) -> Room:
     modules = {path: size for path, size in sizes.items() if path.name != "__init__.py"} or sizes
     largest = max(modules, key=lambda path: modules[path])
     return Room(
@@ -69,10 +69,10 @@ def _measured(name: str, sizes: dict[Path, int]) -> Room:
     )
 
 
-def flat_folders(most: int) -> dict[str, int]:
-    """Return the folders of sources that hold more than ``most`` files, and how many."""
+def flat_folders(limit: int) -> dict[str, int]:
+    """Return the folders of sources with more than ``limit`` files, and their numbers of files."""
     counts = Counter(str(path.parent) for path in sources(*PRODUCT, "benchmarks", "tests"))
-    return {folder: count for folder, count in counts.items() if count > most}
+    return {folder: count for folder, count in counts.items() if count > limit}
 
 
 def parsed(*folders: str) -> Iterator[tuple[Path, ast.Module]]:
@@ -83,7 +83,7 @@ def parsed(*folders: str) -> Iterator[tuple[Path, ast.Module]]:
 
 
 def shared_class_names() -> dict[str, list[str]]:
-    """Return the public classes whose name another class of the same room has: paths by room and name."""
+    """Return the public classes that share a name within a room: paths by room and name."""
     places: dict[str, list[str]] = defaultdict(list)
     for path, tree in parsed(*PRODUCT):
         for node in tree.body:
@@ -105,7 +105,7 @@ def docstrings_beginning_with(words: Iterable[str], *folders: str) -> list[str]:
 
 
 def words_of(*paths: str) -> int:
-    """Count the words of Markdown files, code and tables included, addresses of links not."""
+    """Count the words of Markdown files, including code and tables, without link addresses."""
     text = " ".join(
         (ROOT / path).read_text(encoding="utf-8") for path in tracked(*paths) if path.suffix == ".md"
     )
@@ -124,8 +124,8 @@ def main() -> None:
     print(f"\nlines of product: {product}")
     print(f"folders with more than 20 files: {flat_folders(20) or 'none'}")
     print(f"public classes that share a name within a room: {shared_class_names() or 'none'}")
-    riddles = docstrings_beginning_with(("Give", "Tell", "Say"), ".")
-    print(f"docstrings that begin with Give, Tell or Say: {len(riddles)}")
+    docstrings = docstrings_beginning_with(("Give", "Tell", "Say"), ".")
+    print(f"docstrings that begin with Give, Tell or Say: {len(docstrings)}")
     print(f"words: README {words_of('README.md')}, docs {words_of('docs')}")
 
 

@@ -1,4 +1,4 @@
-"""Find names in docstrings that the code does not have: what a rename has left behind."""
+"""Find stale names in docstrings, which renames have left behind."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def stale_names() -> list[str]:
 
 
 def _stale_in(node: ast.AST, defined: set[str]) -> Iterator[str]:
-    """Yield the stale names of one docstring, and of what stands below an attribute or a constant."""
+    """Yield the stale names of one docstring, or of the text below an attribute or constant."""
     if (
         isinstance(node, ast.Expr)
         and isinstance(node.value, ast.Constant)
@@ -39,8 +39,8 @@ def _stale_in(node: ast.AST, defined: set[str]) -> Iterator[str]:
     docstring = ast.get_docstring(node) or ""
     yield from (name for name in _entries(docstring, "Raises") if not _is_known(name, defined))
     if isinstance(node, ast.ClassDef):
-        own = set(_defined_in(node))
-        yield from (name for name in _entries(docstring, "Attributes") if name not in own)
+        attributes = set(_defined_in(node))
+        yield from (name for name in _entries(docstring, "Attributes") if name not in attributes)
     elif not isinstance(node, ast.Module):
         arguments = {argument.arg for argument in ast.walk(node.args) if isinstance(argument, ast.arg)}
         yield from (name for name in _entries(docstring, "Args") if name.strip("*") not in arguments)
@@ -53,12 +53,12 @@ def _entries(docstring: str, section: str) -> Iterator[str]:
 
 
 def _is_known(name: str, defined: set[str]) -> bool:
-    """Return whether an exception is built in, defined here, or named by the module that it comes from."""
+    """Return whether an exception is built in, defined here, or qualified by its module."""
     return hasattr(builtins, name) or name.split(".", maxsplit=1)[0] in defined
 
 
 def _defined_in(tree: ast.AST) -> Iterator[str]:
-    """Yield what is defined, assigned or imported in a module or class, however deep."""
+    """Yield all names defined, assigned or imported in a module or class, at any depth."""
     for node in ast.walk(tree):
         match node:
             case ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():

@@ -1,8 +1,7 @@
-"""Run the whole suite part by part, and close with one summary: ``make test``.
+"""Run the whole suite part by part, and print one summary: ``make test``.
 
-Every part runs, whatever became of those before it. The last line has the form of pytest's own. ``--runs 20
---at-once 5`` runs everything twenty times, five runs side by side, each of which is load for the others:
-`make test-loaded` shows with it that no test depends on luck.
+All parts run, even after failures. The last line has the format of pytest. ``--runs 20 --at-once 5`` runs
+everything twenty times, five runs in parallel: `make test-loaded` checks that no test fails under load.
 """
 
 from __future__ import annotations
@@ -25,47 +24,47 @@ ROOT = Path(__file__).resolve().parents[1]
 _NODE = Path(sys.executable).parent / "node"
 _TSC = ROOT / "node_modules/typescript/bin/tsc"
 _FETCHED = ROOT / "node_modules/.installed"
-"""Made when npm has fetched the compiler."""
+"""Exists if npm has installed the compiler."""
 _FAST = ("-m", "not slow", "-n", "3", "--dist", "loadfile", "--no-loadscope-reorder")
-"""Three workers for two processors: sites and browsers wait a part of the time, for the next frame."""
+"""Three workers for two processors, since sites and browsers wait for frames part of the time."""
 _SLOW = ("-m", "slow", "--timeout", "1800")
-_OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-profile", "others")
+_OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-profile", "new examples")
 _NO_TESTS = 5
-"""How pytest says that there was nothing to run."""
+"""Exit code of pytest without tests."""
 _INTERRUPTED = 130
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a part: how many tests passed, failed and were skipped, and what was left out."""
+    """The result of a part: numbers of passed, failed and skipped tests."""
 
     name: str
     seconds: float = 0.0
     passed: int = 0
     failed: int = 0
     skipped: Counter[str] = field(default_factory=Counter)
-    """How many, by the reason that they gave."""
-    left_out: str | None = None
-    """Why the part could not run at all."""
+    """Number of skipped tests by reason."""
+    not_run: str | None = None
+    """Why the part could not run; None if it ran."""
 
 
 def main() -> None:
-    """Run the suite as often as asked; exit with 1 if anything failed."""
-    asked = _arguments()
-    if asked.runs > 1:
-        command = [sys.executable, __file__, *["--slow"] * asked.slow]
-        command += [] if asked.may_skip is None else ["--may-skip", asked.may_skip]
-        sys.exit(not run_often(command, asked.runs, asked.at_once))
-    outcomes = run_slow(asked.may_skip) if asked.slow else run_fast(asked.may_skip)
+    """Run the suite; exit with 1 if anything failed."""
+    options = _arguments()
+    if options.runs > 1:
+        command = [sys.executable, __file__, *["--slow"] * options.slow]
+        command += [] if options.may_skip is None else ["--may-skip", options.may_skip]
+        sys.exit(not run_often(command, options.runs, options.at_once))
+    outcomes = run_slow(options.may_skip) if options.slow else run_fast(options.may_skip)
     _print_table(outcomes)
     print("", closing_line(outcomes), sep="\n", flush=True)
     sys.exit(any(outcome.failed for outcome in outcomes))
 
 
 def run_often(command: Sequence[str], runs: int, at_once: int) -> bool:
-    """Run a command several times, some of them side by side; return whether none failed.
+    """Run a command several times, some in parallel; return whether none failed.
 
-    Of a run that failed everything is printed, of others the last line.
+    Prints the whole output of failed runs, and the last line of others.
     """
     closing, failed = [], 0
     with ThreadPoolExecutor(at_once) as pool:
@@ -87,37 +86,37 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--slow", action="store_true", help="run the tests that take minutes, and no others")
+    parser.add_argument("--slow", action="store_true", help="run only the tests that take minutes")
     parser.add_argument("--runs", type=int, default=1, metavar="N", help="run everything N times")
-    parser.add_argument("--at-once", type=int, default=1, metavar="N", help="of these runs, N side by side")
+    parser.add_argument("--at-once", type=int, default=1, metavar="N", help="number of parallel runs")
     parser.add_argument(
-        "--may-skip", metavar="WORD", help="count a test as failed that is skipped for another reason"
+        "--may-skip", metavar="WORD", help="count tests skipped for any other reason as failed"
     )
     return parser.parse_args()
 
 
 def run_fast(may_skip: str | None = None) -> list[Outcome]:
-    """Run everything that takes no minutes."""
+    """Run everything except the tests that take minutes."""
     return [
-        check_page_types(may_be_left_out=may_skip is None),
+        check_page_types(may_be_skipped=may_skip is None),
         run_pytest("tests", _FAST, may_skip),
     ]
 
 
 def run_slow(may_skip: str | None = None) -> list[Outcome]:
-    """Run the tests that take minutes, and the property tests with examples that were not tried before."""
+    """Run the tests that take minutes, and the property tests with new examples."""
     return [
         run_pytest("slow tests", _SLOW, may_skip),
         run_pytest("property tests, other examples", _OTHER_EXAMPLES, may_skip),
     ]
 
 
-def check_page_types(*, may_be_left_out: bool) -> Outcome:
-    """Check the types of the page's JavaScript, where npm could fetch the compiler."""
+def check_page_types(*, may_be_skipped: bool) -> Outcome:
+    """Check the types of the page's JavaScript, if npm could install the compiler."""
     name = "types of the page"
     if not _FETCHED.exists():
-        why = "npm could not fetch the TypeScript compiler; `make node_modules` says how to see why"
-        return Outcome(name, left_out=why, failed=not may_be_left_out)
+        why = "npm could not fetch the TypeScript compiler; see `make node_modules`"
+        return Outcome(name, not_run=why, failed=not may_be_skipped)
     began = time.monotonic()
     code = subprocess.run([_NODE, _TSC], cwd=ROOT, check=False).returncode
     return Outcome(name, time.monotonic() - began, passed=code == 0, failed=code != 0)
@@ -126,7 +125,7 @@ def check_page_types(*, may_be_left_out: bool) -> Outcome:
 def run_pytest(
     name: str, arguments: Sequence[str], may_skip: str | None = None, folder: Path = ROOT
 ) -> Outcome:
-    """Run pytest in a process of its own, and count; a run that dies counts as one failure more."""
+    """Run pytest in a subprocess, and count the results; a crashed run counts as a failure."""
     print(f"\n{name}", flush=True)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="myview-suite-") as reports:
@@ -149,9 +148,11 @@ def run_pytest(
         cases = list(ET.parse(report).iter("testcase")) if reported else []  # noqa: S314 — our own
     failed = sum(case.find("failure") is not None or case.find("error") is not None for case in cases)
     skipped = Counter(element.get("message", "") for case in cases for element in case.iter("skipped"))
-    refused = {reason: n for reason, n in skipped.items() if may_skip is not None and may_skip not in reason}
-    for reason, n in refused.items():
-        print(f"{n} skipped that may not be here: {reason}")
+    refused = {
+        reason: count for reason, count in skipped.items() if may_skip is not None and may_skip not in reason
+    }
+    for reason, count in refused.items():
+        print(f"{count} skipped that must not be: {reason}")
     passed = len(cases) - failed - skipped.total()
     if not reported or code not in {0, 1, _NO_TESTS} or (code == 1 and not failed):
         print(f"pytest ended with exit code {code}")
@@ -166,7 +167,7 @@ def run_pytest(
 
 
 def closing_line(outcomes: Sequence[Outcome]) -> str:
-    """Return the sum of all parts in pytest's words: ``= 1 failed, 3 passed in 259.15s (0:04:19) =``."""
+    """Return the sum of all parts in pytest's format: ``= 1 failed, 3 passed in 259.15s (0:04:19) =``."""
     failed = sum(outcome.failed for outcome in outcomes)
     skipped = sum(outcome.skipped.total() for outcome in outcomes)
     counts = [f"{sum(outcome.passed for outcome in outcomes)} passed"]
@@ -178,8 +179,8 @@ def closing_line(outcomes: Sequence[Outcome]) -> str:
 def _print_table(outcomes: Sequence[Outcome]) -> None:
     print(f"\n{'part':<28}{'passed':>8}{'failed':>8}{'skipped':>9}{'time':>10}")
     for outcome in outcomes:
-        if outcome.left_out is not None:
-            print(f"{outcome.name:<28}left out: {outcome.left_out}")
+        if outcome.not_run is not None:
+            print(f"{outcome.name:<28}not run: {outcome.not_run}")
             continue
         time_taken = str(timedelta(seconds=int(outcome.seconds)))
         print(

@@ -23,7 +23,7 @@ def test_there_is_an_example_of_each_extension() -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_runs_and_its_assertions_hold(name: str, tmp_path: Path) -> None:
-    """In a process of its own, since an example registers what it adds."""
+    """In a subprocess, since an example registers its extension."""
     script = tmp_path / "example.py"
     script.write_text(EXAMPLES[name], encoding="utf-8")
     assert "assert " in EXAMPLES[name]

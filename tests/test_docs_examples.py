@@ -1,4 +1,4 @@
-"""What the documents show runs, and they name everything that there is to name."""
+"""The examples of the documents run, and the reference is complete."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _TEST = re.compile(r"`((?:tests/(?:\w+/)*)?test_\w+\.py)(?:::(test_\w+))?`")
 
 @dataclass(frozen=True)
 class Example:
-    """A block of Python in a document, and what the document says that it prints."""
+    """A block of Python in a document, and its documented output."""
 
     place: str
     code: str
@@ -70,31 +70,34 @@ EXAMPLES = list(examples())
 
 
 @pytest.fixture
-def by_hand() -> Any:
-    """Return the module of test cameras whose every frame and track is scripted."""
+def cameras_module() -> Any:
+    """Return the module of scripted cameras."""
     return scripted_cameras
 
 
 @pytest.fixture
-async def site(by_hand: Any) -> AsyncIterator[str]:
-    """Serve a site in which two people have been seen; give its address."""
-    service = by_hand.FedService(by_hand.small_config())
-    service.decider.people._registry = by_hand.TrackNumbers()
+async def site(cameras_module: Any) -> AsyncIterator[str]:
+    """Serve a site that shows two people; yield its address."""
+    service = cameras_module.FedService(cameras_module.small_config())
+    service.decider.people._registry = cameras_module.TrackNumbers()
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
-        service.come(*by_hand.CAMERAS)
+        service.come(*cameras_module.CAMERAS)
         for epoch in range(3):
-            service.feed(epoch, {"c0": {1: by_hand.SMALL, 2: by_hand.SMALL}, "c1": {1: by_hand.LARGE}})
+            service.feed(
+                epoch,
+                {"c0": {1: cameras_module.SMALL, 2: cameras_module.SMALL}, "c1": {1: cameras_module.LARGE}},
+            )
         yield f"http://127.0.0.1:{port}"
     service.close()
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=[example.place for example in EXAMPLES])
-async def test_an_example_runs_and_prints_what_the_document_says(example: Example, site: str) -> None:
+async def test_an_example_runs_and_prints_the_documented_output(example: Example, site: str) -> None:
     code = compile(example.code.replace(URL, site), example.place, "exec")
     printed = io.StringIO()
 
     def run() -> None:
-        exec(code, {"__name__": "__main__"})  # noqa: S102 — the project's own text
+        exec(code, {"__name__": "__main__"})  # noqa: S102 — the project's documents
 
     with redirect_stdout(printed):
         await asyncio.wait_for(asyncio.to_thread(run), PATIENCE)
@@ -130,13 +133,13 @@ def test_the_commands_of_a_tutorial_run(path: Path, tmp_path: Path) -> None:
     assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
-def test_links_between_the_documents_lead_somewhere() -> None:
+def test_links_between_documents_are_valid() -> None:
     for path in PAGES:
         for target in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
             assert (path.parent / target).exists(), f"{path.name} links to {target}"
 
 
-def test_links_to_headings_name_one() -> None:
+def test_links_to_headings_are_valid() -> None:
     for path in PAGES:
         for target, heading in re.findall(r"\]\(([^)#\s:]*)#([^)]+)\)", path.read_text(encoding="utf-8")):
             other = path.parent / target if target else path
@@ -161,18 +164,18 @@ def test_every_command_and_option_is_described() -> None:
 
 def option_rows(command: str) -> str:
     """Return the rows of the table of a command's options."""
-    rows, mine = [], False
+    rows, belongs = [], False
     for line in reference("cli").splitlines():
         cells = [cell.strip() for cell in line.split("|")]
         if len(cells) == 6:  # a table of four columns
-            mine = command in cells[1].split(", ") if cells[1] else mine
-            if mine:
+            belongs = command in cells[1].split(", ") if cells[1] else belongs
+            if belongs:
                 rows.append(line)
     return "\n".join(rows)
 
 
-async def test_every_path_is_described(by_hand: Any) -> None:
-    app = make_app(BestViewService(BestViewPipeline(by_hand.small_config())))
+async def test_every_path_is_described(cameras_module: Any) -> None:
+    app = make_app(BestViewService(BestViewPipeline(cameras_module.small_config())))
     paths = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
     assert len(paths) > 10
     described = reference("http-api") + reference("streams")
@@ -203,8 +206,8 @@ def test_every_field_of_a_message_is_described() -> None:
             assert f"`{field.encode_name}`" in part, f"{kind.__name__}.{field.encode_name}"
 
 
-async def test_every_metric_is_described(by_hand: Any) -> None:
-    service = BestViewPipeline(by_hand.small_config())
+async def test_every_metric_is_described(cameras_module: Any) -> None:
+    service = BestViewPipeline(cameras_module.small_config())
     metrics: CollectorRegistry = make_app(BestViewService(service))[METRICS]
     names = [
         f"{metric.name}_total" if metric.type == "counter" else metric.name for metric in metrics.collect()
@@ -213,7 +216,7 @@ async def test_every_metric_is_described(by_hand: Any) -> None:
         assert f"`{name}`" in reference("metrics"), name
 
 
-def test_every_test_that_a_document_names_is_there() -> None:
+def test_every_test_that_a_document_names_exists() -> None:
     named = [
         (path.name, file, test)
         for path in (*PAGES, ROOT / "CONTRIBUTING.md")

@@ -1,4 +1,4 @@
-"""The compose files, each way they are put together: every service is held, watched and closed. No engine."""
+"""The compose files in all combinations: limits, health checks and permissions; needs no Docker Engine."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NEEDS_COMPOSE = pytest.mark.skipif(
 
 
 class Loader(yaml.SafeLoader):
-    """The safe loader, which passes over how compose is told to merge."""
+    """The safe loader, which ignores the merge tags of Compose."""
 
 
 Loader.add_constructor("!reset", lambda *_: None)
@@ -54,7 +54,7 @@ def content(name: str) -> dict[str, Any]:
 
 
 def composed(files: tuple[str, ...], tmp_path: Path) -> dict[str, Any]:
-    """Return the files as compose resolves them; it checks them against its schema."""
+    """Return the merged files as resolved and validated by Compose."""
     secrets = tmp_path / "secrets"
     (secrets / "public").mkdir(parents=True)
     (secrets / "web").mkdir()
@@ -76,20 +76,20 @@ def composed(files: tuple[str, ...], tmp_path: Path) -> dict[str, Any]:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert not done.stderr, "compose warns of nothing"
+    assert not done.stderr, "no warnings"
     found = json.loads(done.stdout)
     assert isinstance(found, dict)
     return found
 
 
 @pytest.mark.parametrize("limit", ["mem_limit", "memswap_limit", "cpus", "pids_limit"])
-def test_no_service_can_take_the_whole_host(limit: str) -> None:
+def test_every_service_has_resource_limits(limit: str) -> None:
     for name, service in content(PLAIN)["services"].items():
         assert service.get(limit), name
 
 
 def test_cameras_yield_to_the_best_view_and_the_pulses() -> None:
-    """In containers niceness orders only what is in the same one."""
+    """By CPU shares, since niceness has no effect between containers."""
     cameras = load_config(ROOT / "configs" / "demo.yaml").camera_ids
     default = 1024  # docker run --cpu-shares
     shares = {
@@ -98,7 +98,7 @@ def test_cameras_yield_to_the_best_view_and_the_pulses() -> None:
     assert all(shares[name] < min(shares["bestview"], shares["sync"]) for name in cameras)
 
 
-def test_every_service_is_closed_watched_and_keeps_little_log() -> None:
+def test_every_service_is_read_only_has_a_health_check_and_limits_its_log() -> None:
     for name, service in content(PLAIN)["services"].items():
         assert service["read_only"] is True, name
         assert service["cap_drop"] == ["ALL"], name
@@ -114,16 +114,16 @@ def test_every_service_is_closed_watched_and_keeps_little_log() -> None:
 
 
 @pytest.mark.parametrize("file", [PLAIN, SECURE, SERVER, CAMERAS])
-def test_no_file_gives_a_service_more_than_it_needs(file: str) -> None:
+def test_no_service_has_extra_privileges(file: str) -> None:
     for name, service in content(file)["services"].items():
         assert not {"privileged", "cap_add", "network_mode", "pid", "ipc", "userns_mode"} & set(service), name
         assert "docker.sock" not in json.dumps(service), name
-        if file != PLAIN:  # what goes on top takes nothing of it back
+        if file != PLAIN:  # overrides keep the restrictions
             kept = {"read_only", "cap_drop", "security_opt", "logging", "user", "tmpfs"}
             assert not kept & set(service), name
 
 
-def test_each_service_has_its_own_secrets_alone() -> None:
+def test_each_service_has_only_its_secrets() -> None:
     services, secrets = content(SECURE)["services"], content(SECURE)["secrets"]
     used = {
         name: [
@@ -141,7 +141,7 @@ def test_each_service_has_its_own_secrets_alone() -> None:
     assert all(file.startswith("${MYVIEW_SECRETS:-./secrets}/") for file in files)
 
 
-def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_secure_site_trusts_no_network(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, service in content(SECURE)["services"].items():
         config = _config(
             {**content(PLAIN)["services"][name]["environment"], **service["environment"]}, monkeypatch
@@ -158,8 +158,8 @@ def test_the_secure_site_trusts_nobody_by_where_they_are(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("file", [SERVER, CAMERAS])
-def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(file: str) -> None:
-    """Or the next command of compose, typed in another shell, would not have it."""
+def test_the_documented_env_file_has_all_required_variables(file: str) -> None:
+    """Else Compose commands in another shell would lack them."""
     needed = set(re.findall(r"\$\{(MYVIEW_\w+):\?", (ROOT / file).read_text(encoding="utf-8")))
     assert needed
     text = (ROOT / "docs" / "how-to" / "containers.md").read_text(encoding="utf-8")
@@ -168,7 +168,7 @@ def test_what_a_machine_has_to_be_told_stands_in_the_example_of_its_env_file(fil
     assert needed | {"MYVIEW_CONFIG"} <= {line.partition("=")[0] for line in env.splitlines()}
 
 
-def test_a_port_that_is_published_is_the_one_that_is_listened_on() -> None:
+def test_published_ports_are_the_listening_ones() -> None:
     plain, server = content(PLAIN)["services"], content(SERVER)["services"]
     published = {
         name: [port.rpartition(":")[2] for port in service["ports"]] for name, service in server.items()
@@ -190,21 +190,21 @@ def _config(environment: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> Con
 @pytest.mark.parametrize(
     "files", VARIANTS, ids=lambda variant: "+".join(name.split(".")[-2] for name in variant)
 )
-def test_compose_takes_the_files_together(files: tuple[str, ...], tmp_path: Path) -> None:
+def test_compose_accepts_the_combined_files(files: tuple[str, ...], tmp_path: Path) -> None:
     found = composed(files, tmp_path)
     for name, service in found["services"].items():
         assert service["read_only"], name
         assert service["cap_drop"] == ["ALL"], name
         assert int(service["mem_limit"]) > 0, name
-        given = {SECRETS + secret["target"] for secret in service.get("secrets", ())}
+        mounted_secrets = {SECRETS + secret["target"] for secret in service.get("secrets", ())}
         named = {value for value in service["environment"].values() if value.startswith(SECRETS)}
-        assert name == "sync" or named == given, "what the configuration names is what is there"
+        assert name == "sync" or named == mounted_secrets, "the configured secrets are the mounted ones"
         for mounted in service["volumes"]:
             assert mounted["read_only"], name
 
 
 @NEEDS_COMPOSE
-def test_pulses_and_bus_are_published_where_cameras_are_elsewhere_alone(tmp_path: Path) -> None:
+def test_pulses_and_bus_are_published_only_for_cameras_on_other_hosts(tmp_path: Path) -> None:
     def ports(files: tuple[str, ...], folder: str) -> set[tuple[str, int]]:
         services = composed(files, tmp_path / folder)["services"].values()
         return {
@@ -220,7 +220,7 @@ def test_pulses_and_bus_are_published_where_cameras_are_elsewhere_alone(tmp_path
 
 
 @NEEDS_COMPOSE
-def test_a_machine_of_cameras_starts_cameras_alone(tmp_path: Path) -> None:
+def test_a_camera_host_starts_only_cameras(tmp_path: Path) -> None:
     services = composed((PLAIN, SECURE, CAMERAS), tmp_path)["services"]
     cameras = {name: service for name, service in services.items() if not service.get("profiles")}
     assert set(cameras) == {"c0", "c1", "c2"}

@@ -1,4 +1,4 @@
-"""docker-compose.yml says the same as the configuration it runs; needs no engine."""
+"""docker-compose.yml matches the configuration that it runs; needs no Docker Engine."""
 
 from __future__ import annotations
 
@@ -58,6 +58,6 @@ def test_the_services_find_each_other(services: dict[str, Any], monkeypatch: pyt
         config = load_config(ROOT / "configs" / "demo.yaml")
         assert config.sync.host in services
         assert config.zenoh.connect == "tcp/bestview:7447"
-        assert {config.sync.bind, config.http.host} == {"0.0.0.0"}  # noqa: S104 — a container's own addresses
+        assert {config.sync.bind, config.http.host} == {"0.0.0.0"}  # noqa: S104 — all addresses of a container
         assert config.http.port == 8080
-        assert service["environment"]["MYVIEW_SYNC__PORT"] == 7400, "whatever the configuration says"
+        assert service["environment"]["MYVIEW_SYNC__PORT"] == 7400, "overrides the configuration"

@@ -1,4 +1,4 @@
-"""The wheel and the source distribution: both hold the whole product, and the wheel runs by itself."""
+"""The wheel and the source distribution contain the whole product, and the wheel runs outside the clone."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def product() -> set[str]:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build both from a copy of what is under version control; return their folder."""
+    """Build both from a copy of the tracked files; return their folder."""
     copy, out = tmp_path_factory.mktemp("copy"), tmp_path_factory.mktemp("dist")
     for path in tracked():
         (copy / path).parent.mkdir(parents=True, exist_ok=True)
@@ -41,20 +41,20 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_wheel_holds_the_product_and_nothing_else(built: Path) -> None:
+def test_the_wheel_contains_only_the_product(built: Path) -> None:
     with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
         names = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert names == product()
 
 
-def test_the_source_distribution_holds_the_product_and_no_tests(built: Path) -> None:
+def test_the_source_distribution_contains_the_product_and_no_tests(built: Path) -> None:
     with tarfile.open(next(built.glob("*.tar.gz"))) as archive:
         names = {member.name.partition("/")[2] for member in archive if member.isfile()}
     assert names >= product()
     assert not [name for name in names if name.startswith("tests/")]
 
 
-def test_the_wheel_runs_away_from_the_clone(built: Path, tmp_path: Path) -> None:
+def test_the_wheel_runs_outside_the_clone(built: Path, tmp_path: Path) -> None:
     shutil.unpack_archive(next(built.glob("*.whl")), tmp_path / "site", "zip")
     command = (
         "import runpy, server; print(server.__file__); runpy.run_module('server.cli.main', {}, '__main__')"

@@ -1,4 +1,4 @@
-"""Bytes that nobody meant are refused, or counted and dropped: a short run of `python -m benchmarks.fuzz`."""
+"""Invalid input is refused, or counted and dropped: a short run of `python -m benchmarks.fuzz`."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ ALL = [target for part in PARTS for target in targets_of(part)]
 
 
 @pytest.fixture(autouse=True)
-def _no_settings_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_settings_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in os.environ if name.startswith("MYVIEW_") and "__" in name]:
         monkeypatch.delenv(name)
 
 
 @pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
-def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
+def test_no_input_crashes_a_target(target: type[Target], tmp_path: Path) -> None:
     result = TargetRunner(target, target.name, FuzzPlan(INPUTS, SECONDS, seed=7, out=tmp_path)).run()
     found = "\n\n".join(path.read_text() for path in sorted(tmp_path.glob("*.txt")))
     counts = result.counts
@@ -42,19 +42,19 @@ def test_no_input_makes_it_crash(target: type[Target], tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
-def test_its_inputs_are_the_same_in_every_run(target: type[Target]) -> None:
-    one, other = target(), target()
+def test_the_inputs_of_a_target_are_reproducible(target: type[Target]) -> None:
+    first, second = target(), target()
     try:
-        inputs = [make_input(one, 1, index) for index in range(20)]
-        assert inputs == [make_input(other, 1, index) for index in range(20)]
+        inputs = [make_input(first, 1, index) for index in range(20)]
+        assert inputs == [make_input(second, 1, index) for index in range(20)]
         assert len(set(inputs)) > 1
     finally:
-        one.close()
-        other.close()
+        first.close()
+        second.close()
 
 
 class Broken(Target):
-    """Crashes in every way there is."""
+    """Crashes in every possible way."""
 
     name = "broken-reader"
 
@@ -79,21 +79,21 @@ class Broken(Target):
                 return False
 
 
-def test_whatever_a_reader_does_wrong_is_counted_and_saved(tmp_path: Path) -> None:
+def test_all_kinds_of_crashes_are_counted_and_saved(tmp_path: Path) -> None:
     plan = FuzzPlan(INPUTS_OF_ALL_KINDS, seed=SEED, out=tmp_path, hang_s=0.7)
     counts = TargetRunner(Broken, Broken.name, plan).run().counts
     saved = {path.read_bytes() for path in tmp_path.glob("*.bin")}
-    given = [make_input(Broken(), SEED, index) for index in range(INPUTS_OF_ALL_KINDS)]
+    inputs = [make_input(Broken(), SEED, index) for index in range(INPUTS_OF_ALL_KINDS)]
     assert counts.inputs == counts.messages == INPUTS_OF_ALL_KINDS
-    assert saved == set(given) - {b"right", b"wrong"}
-    assert counts.accepted == given.count(b"right")
-    assert counts.refused == given.count(b"wrong")
+    assert saved == set(inputs) - {b"right", b"wrong"}
+    assert counts.accepted == inputs.count(b"right")
+    assert counts.refused == inputs.count(b"wrong")
     for path in tmp_path.glob("*.bin"):
-        assert path.read_bytes() == given[int(path.stem.rpartition(".")[2])]
+        assert path.read_bytes() == inputs[int(path.stem.rpartition(".")[2])]
 
 
 class Raising(Broken):
-    """Now and then raises."""
+    """Raises for some inputs."""
 
     name = "raising-reader"
 
@@ -101,18 +101,18 @@ class Raising(Broken):
         return rng.choice((b"right", b"wrong", b"raises"))
 
 
-class Sound(Raising):
-    """Takes everything."""
+class Accepting(Raising):
+    """Accepts everything."""
 
-    name = "sound-reader"
+    name = "accepting-reader"
 
     def feed(self, data: bytes) -> bool:
         return len(data) > 0
 
 
-def test_targets_side_by_side_count_as_they_do_one_by_one() -> None:
+def test_parallel_targets_have_the_same_counts_as_sequential_ones() -> None:
     plan = FuzzPlan(INPUTS_OF_ALL_KINDS, seed=SEED)
-    results = dict(run_parallel((Raising, Sound, Sound), plan, jobs=2))
+    results = dict(run_parallel((Raising, Accepting, Accepting), plan, jobs=2))
     alone = TargetRunner(Raising, Raising.name, plan).run().counts
     assert sorted(results) == [0, 1, 2]
     assert results[0].counts == alone
@@ -120,10 +120,10 @@ def test_targets_side_by_side_count_as_they_do_one_by_one() -> None:
     assert results[1].counts.accepted == results[2].counts.accepted == INPUTS_OF_ALL_KINDS
 
 
-class Talking(ScriptTarget):
-    """Is told words one by one, and dies of one of them."""
+class MessageTarget(ScriptTarget):
+    """Receives several messages per input; one sequence kills its process."""
 
-    name = "talking-reader"
+    name = "message-reader"
 
     def make(self, rng: Random) -> bytes:
         return b" ".join(rng.choice((b"right", b"wrong", b"over")) for _ in range(5))
@@ -138,26 +138,30 @@ class Talking(ScriptTarget):
         return True
 
 
-def test_messages_are_counted_that_were_handed_over_though_a_process_dies() -> None:
-    inputs = [make_input(Talking(), SEED, index).split() for index in range(INPUTS)]
+def test_messages_are_counted_even_if_the_process_dies() -> None:
+    inputs = [make_input(MessageTarget(), SEED, index).split() for index in range(INPUTS)]
     handed = [messages.index(b"over") + 1 if b"over" in messages else len(messages) for messages in inputs]
     died = [messages == [b"right"] * 5 for messages in inputs]
     assert any(died)
-    counts = TargetRunner(Talking, Talking.name, FuzzPlan(INPUTS, seed=SEED)).run().counts
+    counts = TargetRunner(MessageTarget, MessageTarget.name, FuzzPlan(INPUTS, seed=SEED)).run().counts
     assert counts.messages == sum(1 if dead else count for count, dead in zip(handed, died, strict=True))
     assert counts.crashes == sum(died)
 
 
-def test_so_many_messages_end_it_and_it_goes_on_from_there() -> None:
-    whole = TargetRunner(Talking, Talking.name, FuzzPlan(messages=300, seed=SEED)).run().counts
-    assert 300 <= whole.messages < 305
-    suffix = TargetRunner(Talking, Talking.name, FuzzPlan(20, seed=SEED)).run().counts
-    rest = TargetRunner(Talking, Talking.name, FuzzPlan(whole.inputs - 20, seed=SEED, first=20)).run().counts
-    assert suffix.messages + rest.messages == whole.messages
-    assert suffix.accepted + rest.accepted == whole.accepted
+def test_a_run_ends_after_a_number_of_messages_and_can_be_resumed() -> None:
+    complete = TargetRunner(MessageTarget, MessageTarget.name, FuzzPlan(messages=300, seed=SEED)).run().counts
+    assert 300 <= complete.messages < 305
+    suffix = TargetRunner(MessageTarget, MessageTarget.name, FuzzPlan(20, seed=SEED)).run().counts
+    rest = (
+        TargetRunner(MessageTarget, MessageTarget.name, FuzzPlan(complete.inputs - 20, seed=SEED, first=20))
+        .run()
+        .counts
+    )
+    assert suffix.messages + rest.messages == complete.messages
+    assert suffix.accepted + rest.accepted == complete.accepted
 
 
-def test_a_saved_input_says_again_what_it_did() -> None:
+def test_an_input_can_be_replayed() -> None:
     feeder = InputFeeder(Broken())
     with feeder.watching():
         assert feeder.feed(b"right") is True
@@ -168,14 +172,14 @@ def test_a_saved_input_says_again_what_it_did() -> None:
 
 
 @pytest.fixture(scope="module")
-def strangers() -> Iterator[UnauthenticatedRequests]:
+def unauthenticated() -> Iterator[UnauthenticatedRequests]:
     target = UnauthenticatedRequests()
     yield target
     target.close()
 
 
 @pytest.mark.parametrize(
-    ("asked", "who"),
+    ("path", "name"),
     [
         ("/api/objects", ""),
         ("/objects/1/best.mp4?from=p0", ""),
@@ -184,30 +188,30 @@ def strangers() -> Iterator[UnauthenticatedRequests]:
         ("/api/operator/people", "hall"),
     ],
 )
-def test_a_site_that_lets_anybody_in_is_found_out(
-    asked: str, who: str, strangers: UnauthenticatedRequests, monkeypatch: pytest.MonkeyPatch
+def test_missing_access_control_is_detected(
+    path: str, name: str, unauthenticated: UnauthenticatedRequests, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    token = f"Authorization: Bearer {SECRETS[who]}\r\n" if who else ""
-    request = f"\0GET {asked} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()
-    assert strangers.feed(request) is False
+    token = f"Authorization: Bearer {SECRETS[name]}\r\n" if name else ""
+    request = f"\0GET {path} HTTP/1.1\r\nHost: x\r\n{token}Connection: close\r\n\r\n".encode()
+    assert unauthenticated.feed(request) is False
     monkeypatch.setattr(authorization, "permission_for", lambda *_: Permission.PUBLIC)
-    with pytest.raises(AssertionError, match=who or r"\[\]"):
-        strangers.feed(request)
+    with pytest.raises(AssertionError, match=name or r"\[\]"):
+        unauthenticated.feed(request)
 
 
 @pytest.mark.parametrize("text", ["", "two\nlines", "x" * 5000, "Traceback (most recent call last)"])
-def test_a_refusal_that_nobody_can_read_is_none(text: str) -> None:
+def test_an_unreadable_refusal_is_a_crash(text: str) -> None:
     with pytest.raises(UnclearError):
         refused(ValueError(text))
 
 
 @pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
-def test_it_leaves_everything_else_as_it_was(target: type[Target]) -> None:
-    """Two at once, and the first ended first: what they foresee or hide must not outlive them."""
+def test_a_target_restores_the_global_state(target: type[Target]) -> None:
+    """Two targets overlap, and the first is closed first: their patches must be undone."""
     before = dict(os.environ), dict(vars(floor_plan))
-    one, other = target(), target()
-    for it in (one, other):
-        it.hand_over(make_input(it, 1, 0))
-    one.close()
-    other.close()
+    first, second = target(), target()
+    for instance in (first, second):
+        instance.hand_over(make_input(instance, 1, 0))
+    first.close()
+    second.close()
     assert (dict(os.environ), dict(vars(floor_plan))) == before

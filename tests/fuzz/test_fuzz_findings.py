@@ -1,4 +1,4 @@
-"""What fuzzing has found, each kind once: it is refused in a line, or counted and dropped."""
+"""Findings of fuzzing: the input is refused with a one-line error, or counted and dropped."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ CAMERA = {"id": "c0", "source": "scene:room"}
         ),
     ],
 )
-def test_a_configuration_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, text: str) -> None:
+def test_an_invalid_configuration_is_refused_with_one_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(text)
     with pytest.raises(UserError) as refused:
@@ -72,7 +72,7 @@ def test_a_configuration_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path
     assert len(str(refused.value)) < 1000
 
 
-def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
+def test_a_key_with_line_breaks_is_named_in_one_line(tmp_path: Path) -> None:
     content = {"cameras": [CAMERA], "site": {"name\u2028hall": 1, "a\nb": 2}}
     with pytest.raises(UserError) as refused:
         build_config(content, where="x", folder=tmp_path)
@@ -80,7 +80,7 @@ def test_a_key_that_breaks_lines_is_named_in_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("end", ["\n", "\nb", "\x85b", "\u2028"])
-def test_a_word_of_two_lines_is_none(tmp_path: Path, end: str) -> None:
+def test_text_with_line_breaks_is_refused(tmp_path: Path, end: str) -> None:
     content = {"cameras": [{**CAMERA, "source": f"hall.mp4{end}"}]}
     with pytest.raises(UserError, match=r"cameras\.0\.source: has more than one line") as refused:
         build_config(content, where="x", folder=tmp_path)
@@ -93,7 +93,7 @@ def test_a_word_of_two_lines_is_none(tmp_path: Path, end: str) -> None:
 
 
 @pytest.mark.parametrize("place", ["site", "track.window"])
-def test_a_key_as_long_as_its_file_is_named_by_its_beginning(tmp_path: Path, place: str) -> None:
+def test_a_very_long_key_is_named_by_its_beginning(tmp_path: Path, place: str) -> None:
     inner: dict[str, Any] = {"stride" + 5000 * "9": 1}
     for name in reversed(place.split(".")):
         inner = {name: inner}
@@ -105,14 +105,14 @@ def test_a_key_as_long_as_its_file_is_named_by_its_beginning(tmp_path: Path, pla
 @pytest.mark.parametrize(
     "value", [float("inf"), 1e300, 10**400, 10**5000], ids=["inf", "1e300", "long", "longer"]
 )
-def test_a_number_beyond_all_measure_is_refused_and_named(tmp_path: Path, value: float) -> None:
+def test_an_excessive_number_is_refused_with_its_key(tmp_path: Path, value: float) -> None:
     content: dict[str, Any] = {"cameras": [CAMERA], "http": {"hls_segment_s": value}}
     with pytest.raises(UserError, match=r"http\.hls_segment_s") as refused:
         build_config(content, where="x", folder=tmp_path)
     assert len(str(refused.value)) < 200
 
 
-def test_a_number_beyond_all_measure_is_none_in_the_environment_either(
+def test_an_excessive_number_in_the_environment_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_HTTP__HLS_SEGMENT_S", "Infinity")
@@ -120,7 +120,7 @@ def test_a_number_beyond_all_measure_is_none_in_the_environment_either(
         build_config({"cameras": [CAMERA]}, where="x", folder=tmp_path)
 
 
-def test_settings_to_try_out_must_be_text() -> None:
+def test_trial_settings_must_be_valid_text() -> None:
     with pytest.raises(UserError, match="has invalid characters"):
         change_view_settings(ViewSettings(), {"\ud800": 1}, "to try out")
 
@@ -139,7 +139,7 @@ def test_settings_to_try_out_must_be_text() -> None:
     ],
     ids=range(8),
 )
-def test_a_ground_file_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, content: str) -> None:
+def test_an_invalid_ground_file_is_refused_with_one_line(tmp_path: Path, content: str) -> None:
     (tmp_path / "ground.json").write_text(content)
     with pytest.raises(UserError, match="ground") as refused:
         build_config({"cameras": [CAMERA], "ground": "ground.json"}, where="site", folder=tmp_path)
@@ -147,20 +147,20 @@ def test_a_ground_file_that_cannot_be_read_is_refused_in_a_line(tmp_path: Path, 
     assert len(str(refused.value)) < 300 + len(str(tmp_path))
 
 
-def test_a_homography_of_numbers_too_large_is_refused() -> None:
+def test_a_homography_with_excessive_numbers_is_refused() -> None:
     with pytest.raises(ValueError, match="not a 3x3 matrix of numbers"):
         validate_homography([[10**400] * 3] * 3, "c0")
 
 
 @pytest.mark.parametrize("name", ["$x$\n", "\ud800", "c" * 65, ""])
-def test_points_of_a_camera_whose_name_cannot_be_written_are_refused(tmp_path: Path, name: str) -> None:
+def test_points_of_a_camera_with_an_unprintable_name_are_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / "points.json"
     path.write_text(json.dumps({"cameras": {name: []}}))
     with pytest.raises(UserError, match="not a printable name"):
         read_points(path)
 
 
-def test_a_number_of_many_digits_is_not_repeated_whole(tmp_path: Path) -> None:
+def test_a_number_of_many_digits_is_truncated_in_the_error(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("camera,image_x,image_y,floor_x,floor_y\nc0,1,2,3," + "9" * 5000 + "\n")
     with pytest.raises(UserError) as refused:
@@ -180,7 +180,7 @@ async def test_an_access_unit_without_a_picture_is_counted_and_dropped(damaged: 
     assert service.frame_buffers["c0"].has(2)
 
 
-def test_parameter_sets_of_pictures_beyond_every_level_are_unfit() -> None:
+def test_parameter_sets_beyond_all_levels_are_unsupported() -> None:
     found = parameter_sets(nal_units(pictures(0, 1)[0].data))
     assert found is not None
     parse_repeatable(found)
@@ -189,11 +189,11 @@ def test_parameter_sets_of_pictures_beyond_every_level_are_unfit() -> None:
         parse_repeatable(ParameterSets(huge, found.pps))
 
 
-def test_parameter_sets_that_no_file_can_hold_are_none() -> None:
+def test_parameter_sets_too_large_for_mp4_are_ignored() -> None:
     assert parameter_sets([b"\x67" + bytes([1]) * 70_000, b"\x68\x01"]) is None
 
 
-def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path) -> None:
+def test_a_playlist_entry_with_an_impossible_offset_is_skipped(tmp_path: Path) -> None:
     path = tmp_path / "c0.m3u8"
     path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@{'9' * 30}\n../cameras/c0/0.mp4\n")
     playlist = RecordingPlaylist(path, "", "", 25.0, None, 60.0)
@@ -202,7 +202,7 @@ def test_a_playlist_that_names_no_place_in_a_file_is_passed_over(tmp_path: Path)
 
 
 @pytest.mark.parametrize("camera", ["../../../precious", "/precious", "a\0b", "c" * 300, "", "..", "c0\n"])
-def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, camera: str) -> None:
+def test_a_recording_session_with_invalid_camera_names_is_not_touched(tmp_path: Path, camera: str) -> None:
     precious = tmp_path / "precious" / "000000000000.mp4"
     precious.parent.mkdir()
     precious.write_bytes(b"nobody's")
@@ -213,8 +213,8 @@ def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, 
     run.parent.mkdir()
     RecordingSession.create(run, head, InitSegments(b""), 60.0)
     (run / "index" / "000000000000.jsonl").write_bytes(b"")
-    told = json.loads((run / "session.json").read_bytes())
-    (run / "session.json").write_text(json.dumps({**told, "cameras": ["c0", camera]}))
+    info = json.loads((run / "session.json").read_bytes())
+    (run / "session.json").write_text(json.dumps({**info, "cameras": ["c0", camera]}))
     store = RecordingFolder(tmp_path / "kept", RetentionLimits(-1e9, 1.0, 60.0))
     store.open()
     store.close()
@@ -223,7 +223,7 @@ def test_a_recorded_run_whose_cameras_no_site_has_is_left_alone(tmp_path: Path, 
 
 
 @pytest.mark.parametrize("camera", ["c\0", "c" * 300, ".."])
-def test_a_playlist_that_leads_to_no_camera_is_passed_over(tmp_path: Path, camera: str) -> None:
+def test_a_playlist_entry_with_an_invalid_camera_is_skipped(tmp_path: Path, camera: str) -> None:
     path = tmp_path / "1.m3u8"
     path.write_text(f"#EXTINF:1,p0+5\n#EXT-X-BYTERANGE:4@0\n../cameras/{camera}/000000000000.mp4\n")
     playlist = RecordingPlaylist(path, "", "", 25.0, None, 60.0)
@@ -231,7 +231,7 @@ def test_a_playlist_that_leads_to_no_camera_is_passed_over(tmp_path: Path, camer
     assert playlist.index.all == ()
 
 
-def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_path: Path) -> None:
+def test_a_playlist_with_an_impossible_date_is_written_without_it(tmp_path: Path) -> None:
     path = tmp_path / "1.m3u8"
     path.write_text(f"#EXTINF:1,p{'9' * 15}+5\n#EXT-X-BYTERANGE:4@0\n../cameras/c0/000000000000.mp4\n")
     playlist = RecordingPlaylist(path, "../cameras/", "", 0.001, 1.7e9, 60.0)
@@ -241,7 +241,7 @@ def test_a_playlist_of_a_time_that_no_calendar_has_is_written_without_it(tmp_pat
     assert "DATE-TIME" not in path.read_text()
 
 
-def test_a_recording_whose_times_leave_all_bounds_becomes_a_film_from_time_0(tmp_path: Path) -> None:
+def test_a_recording_with_excessive_timestamps_is_remuxed_from_time_0(tmp_path: Path) -> None:
     stream_format, (unit, *_) = StreamFormat(), pictures(0, 1)
     stream_format.accept(unit.data)
     head = stream_format.init_segment(site().site.size, site().site.fps, AudioFormat(48_000, 2)) or b""
@@ -257,7 +257,7 @@ def test_a_recording_whose_times_leave_all_bounds_becomes_a_film_from_time_0(tmp
         assert [frame.time for frame in film.decode(video=0)] == [0.0]
 
 
-def test_recorded_sound_that_says_it_is_longer_than_its_file_is_passed_over(tmp_path: Path) -> None:
+def test_recorded_audio_longer_than_its_file_is_skipped(tmp_path: Path) -> None:
     form, path = AudioFormat(48_000, 2), tmp_path / "0.mp4"
     right = audio_fragment(form, [form.silence] * 3, 0)
     path.write_bytes(right)
@@ -267,13 +267,13 @@ def test_recorded_sound_that_says_it_is_longer_than_its_file_is_passed_over(tmp_
     assert read_audio_frames(path, 0, len(right), 0, 9, form) == {}
 
 
-def test_a_cluster_whose_time_is_no_number_has_none() -> None:
+def test_a_cluster_with_an_invalid_time_is_refused() -> None:
     (cluster,) = ElementReader().feed(b"\x1f\x43\xb6\x75\x8c\xe7\x8a" + b"\x01" * 10)
     with pytest.raises(MediaStreamError, match="without a time"):
         cluster_time(cluster)
 
 
-def test_words_nested_without_end_are_counted_and_dropped() -> None:
+def test_deeply_nested_messages_are_counted_and_dropped() -> None:
     exchange = PeerDetectionExchange(site(), "c0", None, 50)
     payload = b'{"x":' * 100_000
     exchange._decode(Message(KEYS.camera("c1", "detections"), payload, b""))
@@ -293,7 +293,7 @@ BAD_REQUESTS: list[bytes] = [
 
 
 @pytest.mark.parametrize("request_bytes", BAD_REQUESTS)
-async def test_what_is_no_request_leaves_no_traceback_in_the_log(
+async def test_a_malformed_request_leaves_no_traceback_in_the_log(
     request_bytes: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     service = FedService(site())

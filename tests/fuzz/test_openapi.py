@@ -1,4 +1,4 @@
-"""What the API says of itself is true: schemathesis asks by the description, and holds answers against it."""
+"""The API matches its OpenAPI description, checked by schemathesis."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from benchmarks.fuzz.http.served_site import ServedSite
 from fakes.timeouts import PATIENCE
 
 CASES = 4
-"""Of each operation and mode; endless streams are only begun."""
+"""Per operation and mode; of endless streams only the beginning is read."""
 CHECKS = [content_type_conformance, response_schema_conformance, status_code_conformance]
-"""A 500 is described nowhere; a 400 may be, though a schema cannot say what is a moment."""
+"""A 500 is never documented; a 400 may be, since a schema cannot describe times."""
 ENDLESS = ("video/", "multipart/", "text/event-stream")
 DECODED = (".mjpeg", ".jpg")
-"""What starts a process that decodes, for which other tests are."""
+"""Paths that start a render worker, which other tests cover."""
 
 
 @dataclass
 class Site:
-    """A served site, and how it describes itself."""
+    """A served site and its documented operations."""
 
     url: str
     operations: dict[str, Any]
 
 
 @pytest.fixture(scope="module")
-def described() -> Iterator[Site]:
-    """Serve a site in a thread of its own: schemathesis waits for answers."""
+def documented_site() -> Iterator[Site]:
+    """Serve a site in a thread, since schemathesis blocks."""
     served = ServedSite(loop=asyncio.new_event_loop())
     loop = served.loop
     thread = threading.Thread(target=loop.run_forever)
@@ -64,10 +64,10 @@ def endless(operation: Any) -> bool:
 
 
 @pytest.mark.parametrize("mode", list(GenerationMode))
-def test_every_answer_is_one_that_is_described(
-    described: Site, mode: GenerationMode, caplog: pytest.LogCaptureFixture
+def test_every_answer_is_documented(
+    documented_site: Site, mode: GenerationMode, caplog: pytest.LogCaptureFixture
 ) -> None:
-    for label, operation in described.operations.items():
+    for label, operation in documented_site.operations.items():
         if label.endswith(DECODED):
             continue
 
@@ -81,9 +81,9 @@ def test_every_answer_is_one_that_is_described(
         @given(case=operation.as_strategy(generation_mode=mode) if _has(operation, mode) else st.none())
         def ask(case: Any) -> None:
             if case is not None:
-                _ask(described, case)
+                _ask(documented_site, case)
 
-        with contextlib.suppress(Unsatisfiable):  # nothing that could be asked of it is wrong
+        with contextlib.suppress(Unsatisfiable):  # no invalid request exists
             ask()
     assert not [record for record in caplog.records if record.exc_info and record.levelno >= logging.WARNING]
 
@@ -96,7 +96,7 @@ def _ask(site: Site, case: Any) -> None:
     if endless(case.operation):
         kwargs = case.as_transport_kwargs(base_url=site.url)
         with requests.request(**kwargs, stream=True, timeout=PATIENCE) as answer:
-            told = case.operation.definition.raw["responses"]
-            assert str(answer.status_code) in told, f"{case.as_curl_command()}: {answer.status_code}"
+            documented = case.operation.definition.raw["responses"]
+            assert str(answer.status_code) in documented, f"{case.as_curl_command()}: {answer.status_code}"
     else:
         case.call_and_validate(base_url=site.url, timeout=PATIENCE, checks=CHECKS)
