@@ -13,7 +13,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 Series = frozenset[tuple[str, str]]
 """The labels of one series, without its name."""
-GIVEN_BY_PROMETHEUS = {"job", "instance"}
+ADDED_BY_PROMETHEUS = {"job", "instance"}
 _KIND_OF = {"rate": "counter", "increase": "counter", "delta": "gauge"}
 """The kind of metric of each function; a histogram's buckets are counters."""
 
@@ -81,7 +81,7 @@ def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
     wanted = {
         matcher.name: matcher.value
         for matcher in node.matchers.matchers
-        if matcher.name not in GIVEN_BY_PROMETHEUS
+        if matcher.name not in ADDED_BY_PROMETHEUS
     }
     if any(matcher.op != promql.MatchOp.Equal for matcher in node.matchers.matchers):
         raise ValueError(f"not supported: {node.prettify()}")
