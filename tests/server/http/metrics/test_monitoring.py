@@ -90,7 +90,7 @@ def test_what_an_expression_gives_is_known(expression: str, series: list[dict[st
     [
         ("rate(b[5m])", "rate of b, which is a gauge"),
         ("delta(a_total[5m])", "delta of a_total, which is a counter"),
-        ("sum by (object) (b)", "by labels that there are not"),
+        ("sum by (object) (b)", "by missing labels"),
         ("histogram_quantile(0.5, b)", "what has no buckets"),
         ("rate(a_total[5m)", "."),
     ],
