@@ -73,7 +73,7 @@ async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(
 
 
 def test_the_alert_is_about_both() -> None:
-    [alert] = [it for it in ALERTS if it["alert"] == "MyViewMessagesBad"]
+    [alert] = [it for it in ALERTS if it["alert"] == "MyViewInvalidMessages"]
     assert [it.name for it in selectors(alert["expr"])] == [_BAD]
     assert "way" not in alert["expr"]
 
