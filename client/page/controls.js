@@ -1,14 +1,14 @@
-/** What buttons, keys and presses do. */
+/** The actions of buttons, keys and presses on the viewer's page. */
 
-import { element } from './shared/element.js';
+import { element } from './shared/dom.js';
 import { listenToKeys } from './shared/keys.js';
 import { copy, pictureInPicture, saveSnapshot } from './shared/tools.js';
 
-/** @import {Banner} from './operator/assist/flag_banner.js' */
-/** @import {Explaining} from './people/cost_queries.js' */
+/** @import {FlagBanner} from './operator/assist/flag_banner.js' */
+/** @import {SelectionCosts} from './people/selection_costs.js' */
 /** @import {Overlay} from './player/overlay.js' */
 /** @import {Painter} from './player/painter.js' */
-/** @import {Strip} from './timeline/band.js' */
+/** @import {TimelineStrip} from './timeline/strip.js' */
 /** @import {Viewer} from './viewer.js' */
 
 const SKIP_S = 5;
@@ -19,23 +19,23 @@ const SKIP_S = 5;
  * @param {Viewer} parts.viewer
  * @param {Painter} parts.painter
  * @param {Overlay} parts.overlay
- * @param {Strip} parts.strip
- * @param {Explaining} parts.explaining
- * @param {Banner} parts.banner
+ * @param {TimelineStrip} parts.strip
+ * @param {SelectionCosts} parts.costs
+ * @param {FlagBanner} parts.banner
  */
-export function listenToControls({ video, viewer, painter, overlay, strip, explaining, banner }) {
+export function listenToControls({ video, viewer, painter, overlay, strip, costs, banner }) {
   const stage = element('stage');
   const more = /** @type {HTMLDetailsElement} */ (element('more'));
 
-  /** @type {[string, string, () => void][]} element, key, what both do */
+  /** @type {[string, string, () => void][]} id, key, action */
   const controls = [
     ['toggle-boxes', 'b', () => toggle('toggle-boxes', (viewer.boxesOn = !viewer.boxesOn))],
     ['toggle-follow', 'z', () => toggle('toggle-follow', (viewer.currentFrame.follow.on = !viewer.currentFrame.follow.on))],
     ['toggle-why', 'w', toggleWhy],
     ['toggle-sound', 'm', toggleSound],
-    ['prefer', 'p', () => viewer.prefer()],
+    ['prefer', 'p', () => viewer.togglePrefer()],
     ['automatic', '0', () => viewer.hold(null)],
-    ['pause', ' ', () => viewer.timeShift.pause()],
+    ['pause', ' ', () => viewer.timeShift.togglePause()],
     ['live', 'End', () => viewer.timeShift.live()],
     ['full-screen', 'f', fullScreen],
     ['snapshot', 's', snapshot],
@@ -50,7 +50,7 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
     ArrowLeft: () => viewer.step(-1),
     ',': () => viewer.timeShift.skip(-SKIP_S),
     '.': () => viewer.timeShift.skip(SKIP_S),
-    h: () => banner.toggle(),
+    h: () => banner.togglePointing(),
     Escape: () => (more.open = false),
   });
 
@@ -64,11 +64,11 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   }
 
   function toggleWhy() {
-    explaining.toggle();
-    toggle('toggle-why', explaining.on);
+    costs.toggle();
+    toggle('toggle-why', costs.on);
   }
 
-  /** Muted at first, or no browser would play by itself. */
+  /** The video starts muted: browsers block autoplay with sound. */
   function toggleSound() {
     if (!viewer.site?.sound) return;
     video.muted = !video.muted;
@@ -87,8 +87,8 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   }
 
   async function copyLink() {
-    const done = await copy(location.href);
-    viewer.say(done ? 'The link to this person is copied.' : `The link to this person: ${location.href}`);
+    const copied = await copy(location.href);
+    viewer.showNotice(copied ? 'Link copied.' : `Link to this person: ${location.href}`);
   }
 
   /** @param {number} number from 1, of a camera in the site's order */
@@ -126,7 +126,7 @@ export function listenToControls({ video, viewer, painter, overlay, strip, expla
   stage.addEventListener('click', (event) => {
     if (banner.pointing.object !== null || isInBanner(event)) return;
     const object = personAt(event);
-    if (object !== null) viewer.choose(object);
-    else if (video.paused) viewer.timeShift.pause();
+    if (object !== null) viewer.select(object);
+    else if (video.paused) viewer.timeShift.togglePause();
   });
 }

@@ -1,28 +1,28 @@
-/** What the page knows and what follows from it: the one place where the parts meet. */
+/** The state of the viewer's page: what the server sent, what is selected, and what follows from it. */
 
-import { onAddress, watchedInAddress, writeAddress } from './shared/address.js';
-import { Beside } from './people/nearby_people.js';
-import { Decisions } from './timeline/decisions.js';
-import { Kept } from './timeline/available_past.js';
-import { learnNames } from './people/names.js';
-import { Notice } from './shared/notice.js';
+import { onAddressChange, readAddress, writeAddress } from './shared/address.js';
 import { CurrentFrame } from './player/current_frame.js';
-import { Override } from './people/view_preference.js';
+import { Decisions } from './timeline/decisions.js';
+import { RecordedViews } from './timeline/recorded_views.js';
+import { setNames } from './people/names.js';
+import { Notice } from './shared/notice.js';
+import { ViewPreference } from './people/view_preference.js';
 import { Palette } from './people/palette.js';
 import { createPlayer } from './player/create_player.js';
-import { Probe } from './player/probe.js';
 import { PastDecisions } from './timeline/past_decisions.js';
+import { Probe } from './player/probe.js';
 import { describe } from './shared/status.js';
+import { TileSelection } from './people/tiles.js';
 import { TimeShift } from './timeline/time_shift.js';
 
-/** @import {Camera, Gop, Person, Site} from './shared/contract.js' */
-/** @import {View} from './timeline/available_past.js' */
+/** @import {Camera, Gop, Person, Site} from './shared/api_types.js' */
+/** @import {View} from './timeline/recorded_views.js' */
 /** @import {StreamFormat} from './player/create_player.js' */
 /** @import {Status} from './shared/status.js' */
 
-const LANDING_MS = 1500; // for which the old picture may go on after somebody else was chosen
-const RECENT_S = 10; // after this out of view a person belongs to the earlier ones
-const RESTART_S = 1; // pulse 0 moved by more than this: the pulses began anew
+const SWITCH_MS = 1500; // how long the previous person may be displayed after a selection
+const RECENT_S = 10; // people out of view for longer are listed as earlier
+const RESTART_S = 1; // pulse 0 moved by more than this: the pulses have restarted
 
 export class Viewer {
   /** @type {Site | null} */
@@ -31,27 +31,27 @@ export class Viewer {
   people = null;
   /** @type {Camera[]} */
   cameras = [];
-  /** @type {number | null} */
-  object = watchedInAddress().object;
-  override = new Override(watchedInAddress());
-  beside = new Beside(watchedInAddress().beside);
+  /** @type {number | null} the selected person */
+  object = readAddress().object;
+  preference = new ViewPreference(readAddress());
+  tileSelection = new TileSelection(readAddress().beside);
   currentFrame = new CurrentFrame(this);
   notice = new Notice();
   palette = new Palette([]);
   decisions = new Decisions(1);
-  kept = new Kept();
+  recordedViews = new RecordedViews();
   probe = new Probe();
   connected = false;
   supported = true;
   /** @type {StreamFormat} */
   format = { container: 'mp4', codec: '', pulse0: null, gopS: 0 };
   boxesOn = true;
-  #asked = this.object !== null; // by the viewer, not by default
-  #chosenAt = -Infinity;
+  #selectedByUser = this.object !== null; // or by default
+  #selectedAt = -Infinity; // performance.now()
 
   /**
    * @param {HTMLVideoElement} video
-   * @param {() => void} changed something to show has changed
+   * @param {() => void} changed the page needs an update
    */
   constructor(video, changed) {
     this.changed = changed;
@@ -63,10 +63,10 @@ export class Viewer {
       resumed: () => this.timeShift.resumed(),
     });
     this.probe.object = this.object;
-    onAddress((watched) => {
-      if (this.override.take(watched)) this.timeShift.moveOn();
-      this.beside.numbers = watched.beside;
-      if (watched.object !== null) this.#turnTo(watched.object, true);
+    onAddressChange((view) => {
+      if (this.preference.set(view)) this.timeShift.keepMoment();
+      this.tileSelection.numbers = view.beside;
+      if (view.object !== null) this.#setObject(view.object, true);
       this.changed();
     });
   }
@@ -74,39 +74,39 @@ export class Viewer {
   /** @param {Site} site */
   setSite(site) {
     const old = this.site;
-    const anew = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
-    if (anew) {
+    const restarted = !old || old.fps !== site.fps || Math.abs((old.pulse0 ?? 0) - (site.pulse0 ?? 0)) > RESTART_S;
+    if (restarted) {
       this.decisions = new Decisions(site.fps);
       this.pastDecisions = new PastDecisions(site.fps, this.changed);
-      this.kept.forget();
-      this.#rename();
-      this.timeShift.beginAnew();
+      this.recordedViews.clear();
+      this.#renameDecisions();
+      this.timeShift.pulsesRestarted();
     }
-    this.override.configure(site.cameras);
+    this.preference.configure(site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
     const codec = [site.codec, site.sound].filter(Boolean).join(',');
     this.format = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0, gopS: site.gop / site.fps };
-    // Before the first key frame nobody knows yet what there is to be played.
+    // Before the first keyframe the codec is unknown.
     this.supported = site.codec === null || this.player.configure(this.format);
-    this.#play();
+    this.#updatePlayer();
     this.changed();
   }
 
   /** @param {Person[]} people */
   setPeople(people) {
     this.people = people;
-    learnNames(people);
-    this.#rename();
+    setNames(people);
+    this.#renameDecisions();
     this.#followMerge();
-    const lost = this.object !== null && !this.chosen;
-    if (this.object === null || (lost && !this.#asked)) this.#chooseDefault();
-    this.#play();
+    const missing = this.object !== null && !this.selected;
+    if (this.object === null || (missing && !this.#selectedByUser)) this.#selectDefault();
+    this.#updatePlayer();
     this.changed();
   }
 
-  #rename() {
-    for (const said of [this.decisions, this.pastDecisions.decisions]) said.rename(this.people ?? []);
+  #renameDecisions() {
+    for (const decisions of [this.decisions, this.pastDecisions.decisions]) decisions.rename(this.people ?? []);
   }
 
   /** @param {Camera[]} cameras */
@@ -119,7 +119,7 @@ export class Viewer {
   addGop(gop) {
     this.decisions.add(gop);
     for (const { kept, new_object: split, camera } of gop.split ?? []) {
-      if (kept === this.object) this.say(`${camera} took somebody else for person ${kept}: that is person ${split}.`);
+      if (kept === this.object) this.showNotice(`${camera} mistook person ${split} for person ${kept}.`);
     }
   }
 
@@ -130,57 +130,57 @@ export class Viewer {
   }
 
   /** @returns {Person | undefined} */
-  get chosen() {
+  get selected() {
     return this.people?.find((person) => person.object === this.object);
   }
 
-  /** @param {number} object as the viewer wishes */
-  choose(object) {
-    if (object !== this.object) this.override.hold(null);
-    this.beside.swap(object, this.object);
-    this.#turnTo(object, true);
-    this.#write(true);
+  /** @param {number} object selected by the user */
+  select(object) {
+    if (object !== this.object) this.preference.hold(null);
+    this.tileSelection.swap(object, this.object);
+    this.#setObject(object, true);
+    this.#writeAddress(true);
   }
 
-  /** @param {string | null} camera to stay with; once more, or null: the best is shown again */
+  /** @param {string | null} camera to hold; the held one, or null: return to the best view */
   hold(camera) {
-    this.#change(() => this.override.hold(camera));
+    this.#changePreference(() => this.preference.hold(camera));
   }
 
-  /** Prefer the camera that was held, or hold the one that was preferred. */
-  prefer() {
-    if (this.override.camera !== null) this.#change(() => this.override.toggle());
+  /** Prefer the held camera, or hold the preferred one. */
+  togglePrefer() {
+    if (this.preference.camera !== null) this.#changePreference(() => this.preference.togglePrefer());
   }
 
-  /** @param {() => void} change by which camera the chosen person is seen */
-  #change(change) {
+  /** @param {() => void} change */
+  #changePreference(change) {
     if (this.object === null) return;
-    this.timeShift.moveOn();
+    this.timeShift.keepMoment();
     change();
-    this.#write(true);
-    this.#play();
+    this.#writeAddress(true);
+    this.#updatePlayer();
     this.changed();
   }
 
-  /** @param {number} object to be seen beside the chosen person, or no more */
-  toggleBeside(object) {
-    this.beside.toggle(object, this.tiles);
-    this.#write(true);
+  /** @param {number} object to show on a tile, or no longer */
+  toggleTile(object) {
+    this.tileSelection.toggle(object, this.tiles);
+    this.#writeAddress(true);
     this.changed();
   }
 
-  /** @returns {number[]} those of them who have a stream */
+  /** @returns {number[]} the people on tiles */
   get tiles() {
-    return this.beside.shown(this.people, this.object);
+    return this.tileSelection.shown(this.people, this.object);
   }
 
-  /** @param {number} by steps through those in view, around the end */
+  /** @param {number} by steps through the people in view, cyclically */
   step(by) {
     const shown = (this.people ?? []).filter((person) => person.visible || person.object === this.object);
     const numbers = shown.map((person) => person.object).sort((a, b) => a - b);
     if (!numbers.length) return;
     const at = numbers.indexOf(this.object ?? NaN);
-    this.choose(numbers.at((at + by) % numbers.length) ?? numbers[0]);
+    this.select(numbers.at((at + by) % numbers.length) ?? numbers[0]);
   }
 
   /** @param {Person} person */
@@ -191,7 +191,7 @@ export class Viewer {
 
   /**
    * @param {number} pulse
-   * @returns {Decisions} what is known of that moment, lately decided or asked for again
+   * @returns {Decisions} that cover the pulse: recent ones, or those requested again
    */
   decisionsAt(pulse) {
     return pulse < this.decisions.begin ? this.pastDecisions.decisions : this.decisions;
@@ -199,95 +199,95 @@ export class Viewer {
 
   /**
    * @param {number} from pulse
-   * @returns {View[]} what has been shown of the chosen person, and is decided
+   * @returns {View[]} of the selected person, displayed or decided
    */
   views(from) {
     const { object, decisions } = this;
     if (object === null) return [];
-    return [...this.kept.between(from, decisions.begin), ...decisions.runs(object, from)];
+    return [...this.recordedViews.between(from, decisions.begin), ...decisions.views(object, from)];
   }
 
   /** @returns {Status} */
   status() {
     const { advancing, exists } = this.currentFrame;
-    const landing = performance.now() - this.#chosenAt < LANDING_MS;
+    const switching = performance.now() - this.#selectedAt < SWITCH_MS;
     const status = describe({
       supported: this.supported,
       connected: this.connected,
       known: this.site !== null && this.people !== null,
       people: this.people?.length ?? 0,
       object: this.object,
-      listed: this.chosen !== undefined,
-      visible: this.chosen?.visible ?? false,
+      listed: this.selected !== undefined,
+      visible: this.selected?.visible ?? false,
       paused: this.player.video.paused && exists,
-      moving: advancing && (landing || this.player.shown?.object === this.object),
+      moving: advancing && (switching || this.player.shown?.object === this.object),
     });
     this.probe.state = status.state;
     return status;
   }
 
-  /** Whoever was chosen by a number that is no longer theirs stays chosen by the one they have. */
+  /** Keep the selected person selected when their number was merged into another. */
   #followMerge() {
     const { object } = this;
-    this.beside.rename(this.people);
-    const same = this.people?.find((person) => object !== null && person.aliases?.includes(object));
-    if (!same || this.chosen) return;
-    this.say(`Person ${object} turned out to be person ${same.object}.`);
-    this.#turnTo(same.object, this.#asked);
-    this.#write(false);
+    this.tileSelection.renumber(this.people);
+    const merged = this.people?.find((person) => object !== null && person.aliases?.includes(object));
+    if (!merged || this.selected) return;
+    this.showNotice(`Person ${object} is the same as person ${merged.object}.`);
+    this.#setObject(merged.object, this.#selectedByUser);
+    this.#writeAddress(false);
   }
 
-  /** @param {string} text that is worth a moment's notice */
-  say(text) {
-    this.notice.say(text);
+  /** @param {string} text shown for some seconds */
+  showNotice(text) {
+    this.notice.show(text);
     this.changed();
   }
 
-  #chooseDefault() {
+  #selectDefault() {
     const first = this.people?.filter((person) => person.visible).sort((a, b) => a.object - b.object)[0];
     if (first) {
-      this.#turnTo(first.object, false);
-      this.#write(false);
-    } else if (!this.#asked) {
+      this.#setObject(first.object, false);
+      this.#writeAddress(false);
+    } else if (!this.#selectedByUser) {
       this.object = this.probe.object = null;
     }
   }
 
-  /** @param {boolean} chosen by the viewer */
-  #write(chosen) {
-    writeAddress({ object: this.object, ...this.override.written, beside: this.beside.numbers }, chosen);
+  /** @param {boolean} byUser */
+  #writeAddress(byUser) {
+    writeAddress({ object: this.object, ...this.preference.addressPart, beside: this.tileSelection.numbers }, byUser);
   }
 
   /**
    * @param {number} object
-   * @param {boolean} asked
+   * @param {boolean} byUser
    */
-  #turnTo(object, asked) {
-    this.#asked = asked;
+  #setObject(object, byUser) {
+    this.#selectedByUser = byUser;
     if (object === this.object) {
-      this.#play();
+      this.#updatePlayer();
       return;
     }
-    this.timeShift.moveOn();
+    this.timeShift.keepMoment();
     this.object = object;
-    this.#chosenAt = performance.now();
+    this.#selectedAt = performance.now();
     this.probe.select(object);
-    this.#play();
+    this.#updatePlayer();
     this.changed();
   }
 
-  /** With the picture, from where it is wished for. */
-  goOn() {
+  /** Resume playback, from the moment that the time shift has set. */
+  play() {
     this.player.play();
-    this.#play();
+    this.#updatePlayer();
     this.changed();
   }
 
-  #play() {
+  #updatePlayer() {
     if (!this.site?.codec || !this.supported || !this.people) return;
-    if (this.object === null || !this.chosen) return this.player.stop();
+    if (this.object === null || !this.selected) return this.player.stop();
     const past = this.timeShift.moment;
-    const { held, preferred } = this.override;
+    const { held, preferred } = this.preference;
     this.player.select({ object: this.object, camera: held, prefer: past ? null : preferred, past });
   }
 }

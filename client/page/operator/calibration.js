@@ -1,15 +1,16 @@
-/** The calibration walk: what it has covered while somebody walks, and what has come of it. */
+/** The calibration walk: its coverage while a person walks, and the result of the calibration. */
 
-import { ask } from './requests.js';
-import { element, make, put, Repeated } from './section.js';
+import { requestOperator } from '../shared/requests.js';
+import { element, make, setText } from '../shared/dom.js';
+import { Repeater } from './section.js';
 import { copy } from '../shared/tools.js';
 
-/** @import {Walk, WalkCamera} from './contract.js' */
-/** @import {Section, Tell} from './section.js' */
+/** @import {Walk, WalkCamera} from './api_types.js' */
+/** @import {Section, ShowError} from './section.js' */
 
-const EVERY_MS = 1000;
+const INTERVAL_MS = 1000;
 /** @type {Record<Walk['state'], string>} */
-const WORDS = {
+const STATES = {
   none: 'No walk yet.',
   walking: 'Walk now.',
   working: 'Calculating.',
@@ -18,15 +19,15 @@ const WORDS = {
 
 /** @implements {Section} */
 export class CalibrationWalk {
-  #repeated;
+  #repeater;
   /** @type {HTMLButtonElement} */
   #start = element('walk-start');
   /** @type {HTMLButtonElement} */
   #finish = element('walk-finish');
   /** @type {HTMLButtonElement} */
-  #on = element('walk-on');
+  #resume = element('walk-resume');
   /** @type {HTMLButtonElement} */
-  #forget = element('walk-forget');
+  #discard = element('walk-discard');
   /** @type {HTMLInputElement} */
   #person = element('walk-person');
   /** @type {HTMLImageElement} */
@@ -34,43 +35,43 @@ export class CalibrationWalk {
   /** @type {HTMLTextAreaElement} */
   #lines = element('walk-configuration');
   #state = element('walk-state');
-  #shown = ''; // of what has come of it
+  #shownResult = '';
 
-  /** @param {Tell} tell */
-  constructor(tell) {
-    this.tell = tell;
-    this.#repeated = new Repeated(async () => this.#show(await ask('walk')), EVERY_MS, tell);
-    this.#start.addEventListener('click', () => void this.#do('POST', { action: 'start' }));
+  /** @param {ShowError} showError */
+  constructor(showError) {
+    this.showError = showError;
+    this.#repeater = new Repeater(async () => this.#show(await requestOperator('walk')), INTERVAL_MS, showError);
+    this.#start.addEventListener('click', () => void this.#request('POST', { action: 'start' }));
     this.#finish.addEventListener('click', () => {
-      if (this.#person.reportValidity()) void this.#do('POST', { action: 'finish', person: this.#person.valueAsNumber });
+      if (this.#person.reportValidity()) void this.#request('POST', { action: 'finish', person: this.#person.valueAsNumber });
     });
-    this.#on.addEventListener('click', () => void this.#do('POST', { action: 'resume' }));
-    this.#forget.addEventListener('click', () => void this.#do('DELETE'));
+    this.#resume.addEventListener('click', () => void this.#request('POST', { action: 'resume' }));
+    this.#discard.addEventListener('click', () => void this.#request('DELETE'));
     element('walk-copy').addEventListener('click', async () => {
-      const done = await copy(this.#lines.value);
-      put(this.#state, done ? 'The lines are copied.' : 'Select the lines and copy them.');
-      if (!done) this.#lines.select();
+      const copied = await copy(this.#lines.value);
+      setText(this.#state, copied ? 'Copied.' : 'Select the lines and copy them.');
+      if (!copied) this.#lines.select();
     });
   }
 
   open() {
-    this.#repeated.start();
+    this.#repeater.start();
   }
 
   close() {
-    this.#repeated.stop();
+    this.#repeater.stop();
   }
 
   /**
    * @param {'POST' | 'DELETE'} method
    * @param {object} [content]
    */
-  async #do(method, content) {
+  async #request(method, content) {
     try {
-      this.#show(await ask('walk', method, content));
-      this.tell(null);
+      this.#show(await requestOperator('walk', method, content));
+      this.showError(null);
     } catch (error) {
-      this.tell(error);
+      this.showError(error);
     }
   }
 
@@ -79,58 +80,58 @@ export class CalibrationWalk {
     const { state } = walk;
     this.#start.disabled = state === 'walking' || state === 'working';
     this.#finish.disabled = state !== 'walking';
-    this.#on.disabled = state !== 'done' && state !== 'working';
-    this.#forget.disabled = state === 'none';
-    if (state !== 'done') put(this.#state, said(walk));
+    this.#resume.disabled = state !== 'done' && state !== 'working';
+    this.#discard.disabled = state === 'none';
+    if (state !== 'done') setText(this.#state, describeState(walk));
     element('walk-covered').hidden = state === 'none';
-    element('walk-cameras').replaceChildren(...walk.cameras.map(row));
+    element('walk-cameras').replaceChildren(...walk.cameras.map(coverageRow));
     const pairs = walk.pairs.map(({ one, other, seconds }) => make('li', { textContent: `${one} and ${other}: ${seconds.toFixed(0)} s` }));
     element('walk-pairs').replaceChildren(...pairs);
-    list('walk-uncovered', state === 'walking' ? walk.uncovered : []);
+    showList('walk-uncovered', state === 'walking' ? walk.uncovered : []);
     this.#showResult(walk);
   }
 
   /** @param {Walk} walk */
   #showResult(walk) {
-    const come = walk.state === 'done' ? walk.error + walk.lines.join() : '';
-    if (come === this.#shown) return;
-    this.#shown = come;
-    if (come) put(this.#state, walk.error ? `Calibration failed: ${walk.error}` : found(walk));
-    const there = walk.configuration !== '';
-    element('walk-result').hidden = !there;
-    list('walk-lines', walk.lines);
+    const result = walk.state === 'done' ? walk.error + walk.lines.join() : '';
+    if (result === this.#shownResult) return;
+    this.#shownResult = result;
+    if (result) setText(this.#state, walk.error ? `Calibration failed: ${walk.error}` : describeResult(walk));
+    const hasGround = walk.configuration !== '';
+    element('walk-result').hidden = !hasGround;
+    showList('walk-lines', walk.lines);
     this.#lines.value = walk.configuration;
-    if (there) this.#plan.src = `api/operator/walk/plan.png?${Date.now()}`; // another plan is at the same address
+    if (hasGround) this.#plan.src = `api/operator/walk/plan.png?${Date.now()}`; // each plan has the same address
     else this.#plan.removeAttribute('src');
   }
 }
 
 /** @param {Walk} walk */
-function said({ state, seconds, max_seconds: most }) {
-  if (state === 'walking' && seconds >= most) return `That is enough: a walk has at most ${most / 60} minutes.`;
+function describeState({ state, seconds, max_seconds: max }) {
+  if (state === 'walking' && seconds >= max) return `The walk has reached its maximum of ${max / 60} minutes.`;
   const minutes = `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')}`;
-  return state === 'none' ? WORDS.none : `${WORDS[state]} ${minutes} minutes so far.`;
+  return state === 'none' ? STATES.none : `${STATES[state]} ${minutes} minutes so far.`;
 }
 
 /** @param {Walk} walk */
-function found({ insufficient }) {
-  return insufficient ? `The result is a guess, the walk covered too little: ${insufficient}.` : 'Calibrated. The configuration in force is unchanged.';
+function describeResult({ insufficient }) {
+  return insufficient ? `The result is uncertain. The walk did not cover enough: ${insufficient}.` : 'Calibrated. The configuration in force is unchanged.';
 }
 
 /** @param {WalkCamera} camera */
-function row({ camera, foot_points: feet, thirds, depth_ratio: depth }) {
-  const shares = thirds.map((share) => make('td', { textContent: feet ? `${Math.round(100 * share)} %` : '–' }));
-  return make('tr', {}, make('th', { scope: 'row', textContent: camera }), ...shares, make('td', { textContent: depth === null ? '–' : `${depth.toFixed(1)} times` }));
+function coverageRow({ camera, foot_points: footPoints, thirds, depth_ratio: depthRatio }) {
+  const shares = thirds.map((share) => make('td', { textContent: footPoints ? `${Math.round(100 * share)} %` : '–' }));
+  return make('tr', {}, make('th', { scope: 'row', textContent: camera }), ...shares, make('td', { textContent: depthRatio === null ? '–' : `${depthRatio.toFixed(1)} times` }));
 }
 
 /**
- * Only where it differs: else what is selected would be lost.
+ * Update a list if it differs, so that selected text stays selected.
  *
  * @param {string} id
  * @param {string[]} lines
  */
-function list(id, lines) {
-  const shown = element(id);
-  if ([...shown.children].map((it) => it.textContent).join('\n') === lines.join('\n')) return;
-  shown.replaceChildren(...lines.map((textContent) => make('li', { textContent })));
+function showList(id, lines) {
+  const list = element(id);
+  if ([...list.children].map((item) => item.textContent).join('\n') === lines.join('\n')) return;
+  list.replaceChildren(...lines.map((textContent) => make('li', { textContent })));
 }

@@ -1,50 +1,51 @@
-/** The configuration in force, to read: what differs from the default is marked. */
+/** The configuration in force, read-only; settings that differ from the default are marked. */
 
-import { ask } from './requests.js';
-import { element, make, put } from './section.js';
+import { requestOperator } from '../shared/requests.js';
+import { element, make, setText } from '../shared/dom.js';
 
-/** @import {Setting, Settings} from './contract.js' */
-/** @import {Section, Tell} from './section.js' */
+/** @import {Setting, Settings} from './api_types.js' */
+/** @import {Section, ShowError} from './section.js' */
 
 /** @implements {Section} */
-export class Configuration {
+export class ConfigurationTable {
   /** @type {Setting[]} */
   #settings = [];
   /** @type {HTMLInputElement} */
-  #find = element('find-setting');
-  #only = element('only-differing');
+  #search = element('find-setting');
+  #differingButton = element('only-differing');
 
-  /** @param {Tell} tell */
-  constructor(tell) {
-    this.tell = tell;
-    this.#find.addEventListener('input', () => this.#show());
-    this.#only.addEventListener('click', () => {
-      this.#only.setAttribute('aria-pressed', String(!this.#onlyDiffering));
+  /** @param {ShowError} showError */
+  constructor(showError) {
+    this.showError = showError;
+    this.#search.addEventListener('input', () => this.#show());
+    this.#differingButton.addEventListener('click', () => {
+      this.#differingButton.setAttribute('aria-pressed', String(!this.#onlyDiffering));
       this.#show();
     });
   }
 
   open() {
-    void ask('config').then((/** @type {Settings} */ { settings, error, pending_restart: pending }) => {
+    void requestOperator('config').then((/** @type {Settings} */ { settings, error, pending_restart: pending }) => {
       this.#settings = settings;
-      put(element('config-on-disk'), onDisk(error, pending));
+      setText(element('config-on-disk'), describeFile(error, pending));
       this.#show();
-    }, this.tell);
+    }, this.showError);
   }
 
   close() {}
 
   get #onlyDiffering() {
-    return this.#only.getAttribute('aria-pressed') === 'true';
+    return this.#differingButton.getAttribute('aria-pressed') === 'true';
   }
 
   #show() {
-    const wanted = this.#find.value.trim().toLowerCase();
+    const search = this.#search.value.trim().toLowerCase();
     const shown = this.#settings.filter(
-      (it) => (it.differs || it.default === null || !this.#onlyDiffering) && `${it.key}: ${it.value}`.toLowerCase().includes(wanted),
+      ({ key, value, default: usual, differs }) =>
+        (differs || usual === null || !this.#onlyDiffering) && `${key}: ${value}`.toLowerCase().includes(search),
     );
-    element('settings').replaceChildren(...shown.map(row));
-    put(element('settings-none'), shown.length || !this.#settings.length ? '' : 'No matching setting.');
+    element('settings').replaceChildren(...shown.map(settingRow));
+    setText(element('settings-none'), shown.length || !this.#settings.length ? '' : 'No matching setting.');
   }
 }
 
@@ -52,13 +53,13 @@ export class Configuration {
  * @param {string} error
  * @param {string[]} pending
  */
-function onDisk(error, pending) {
+function describeFile(error, pending) {
   if (error) return `The file is not in force: ${error}`;
   return pending.length ? `Changed in the file, not in force: ${pending.join(', ')}` : '';
 }
 
 /** @param {Setting} setting */
-function row({ key, value, default: usual, differs }) {
+function settingRow({ key, value, default: usual, differs }) {
   return make(
     'tr',
     { className: differs ? 'differs' : '' },

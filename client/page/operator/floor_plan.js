@@ -1,115 +1,118 @@
-/** The floor plan: what the cameras cover, who is on the floor, and the ways of the last seconds. */
+/** The floor plan: the area that each camera covers, and people's positions and tracks of the last seconds. */
 
-import { label } from '../people/names.js';
-import { ask } from './requests.js';
-import { element, make, put, Repeated, svg } from './section.js';
-import { Ways } from './positions.js';
+import { shortLabel } from '../people/names.js';
+import { requestOperator } from '../shared/requests.js';
+import { element, make, setText, svg } from '../shared/dom.js';
+import { Repeater } from './section.js';
+import { FloorTracks } from './floor_tracks.js';
 
-/** @import {Gop, Site} from '../shared/contract.js' */
-/** @import {Floor, FloorCamera} from './contract.js' */
-/** @import {Section, Tell} from './section.js' */
-/** @import {Walker} from './positions.js' */
+/** @import {Gop, Site} from '../shared/api_types.js' */
+/** @import {Floor, FloorCamera} from './api_types.js' */
+/** @import {Section, ShowError} from './section.js' */
+/** @import {FloorTrack} from './floor_tracks.js' */
 /** @import {Palette} from '../people/palette.js' */
 
-const EVERY_MS = 5000; // the cameras' parts change when one comes that was not there
-const MARGIN = 0.05; // of the plan
-const DOT = 0.012;
+const INTERVAL_MS = 5000; // the covered areas change when a camera starts
+const MARGIN = 0.05; // share of the plan's size
+const DOT = 0.012; // likewise
 
 /** @implements {Section} */
 export class FloorPlan {
   /** @type {FloorCamera[]} */
   #cameras = [];
-  #ways;
-  #repeated;
+  #tracks;
+  #repeater;
   #open = false;
-  #drawn = '';
+  #drawnFloor = '';
   #size = 1;
   #people = svg('g');
 
   /**
    * @param {Site} site
    * @param {Palette} palette
-   * @param {Tell} tell
+   * @param {ShowError} showError
    */
-  constructor(site, palette, tell) {
+  constructor(site, palette, showError) {
     this.palette = palette;
-    this.#ways = new Ways(site);
-    this.#repeated = new Repeated(() => this.#ask(), EVERY_MS, tell);
-    void ask('floor').then((floor) => (this.#cameras = floor.cameras), () => undefined); // ways begin at once
+    this.#tracks = new FloorTracks(site);
+    this.#repeater = new Repeater(() => this.#refresh(), INTERVAL_MS, showError);
+    // Tracks are collected before the section is opened.
+    void requestOperator('floor').then((floor) => (this.#cameras = floor.cameras), () => undefined);
   }
 
   open() {
     this.#open = true;
-    this.#repeated.start();
+    this.#repeater.start();
   }
 
   close() {
     this.#open = false;
-    this.#repeated.stop();
+    this.#repeater.stop();
   }
 
   /** @param {Gop} gop */
   add(gop) {
-    this.#ways.add(gop, this.#cameras);
-    if (this.#open) this.#show();
+    this.#tracks.add(gop, this.#cameras);
+    if (this.#open) this.#showTracks();
   }
 
-  async #ask() {
+  async #refresh() {
     /** @type {Floor} */
-    const floor = await ask('floor');
+    const floor = await requestOperator('floor');
     this.#cameras = floor.cameras;
-    const said = JSON.stringify(floor);
-    if (said !== this.#drawn) this.#draw(floor);
-    this.#drawn = said;
-    this.#show();
+    const json = JSON.stringify(floor);
+    if (json !== this.#drawnFloor) this.#draw(floor);
+    this.#drawnFloor = json;
+    this.#showTracks();
   }
 
   /** @param {Floor} floor */
   #draw({ cameras, uncalibrated }) {
-    const outlines = cameras.map(({ outline }) => outline).filter((it) => it.length > 0);
+    const outlines = cameras.map(({ outline }) => outline).filter((outline) => outline.length > 0);
     element('plan').toggleAttribute('hidden', !outlines.length);
-    put(element('floor-words'), words(outlines.length, uncalibrated));
+    setText(element('floor-words'), describe(outlines.length, uncalibrated));
     element('floor-cameras').replaceChildren(...cameras.map(({ camera }) => make('li', {}, this.#chip(camera))));
     if (!outlines.length) return;
     const corners = outlines.flat();
     const [left, right] = range(corners.map(([x]) => x));
-    const [low, high] = range(corners.map(([, y]) => -y)); // up is up, on paper
+    const [low, high] = range(corners.map(([, y]) => -y)); // the y axis of SVG points down
     this.#size = Math.max(right - left, high - low);
     const margin = this.#size * MARGIN;
     const box = [left - margin, low - margin, right - left + 2 * margin, high - low + 2 * margin];
     const plan = element('plan');
     plan.setAttribute('viewBox', box.join(' '));
-    const parts = cameras.map(({ camera, outline }) => {
-      const colour = this.palette.colour(camera);
-      return svg('polygon', { points: points(outline), fill: colour, stroke: colour, class: 'part' });
+    const areas = cameras.map(({ camera, outline }) => {
+      const color = this.palette.color(camera);
+      return svg('polygon', { points: svgPoints(outline), fill: color, stroke: color, class: 'part' });
     });
-    plan.replaceChildren(...parts, this.#people);
+    plan.replaceChildren(...areas, this.#people);
   }
 
-  #show() {
-    const walkers = this.#ways.walkers;
+  #showTracks() {
+    const tracks = this.#tracks.tracks;
     const size = this.#size;
-    this.#people.replaceChildren(...walkers.flatMap((it) => this.#walker(it, size)));
-    const lines = walkers.map(({ object, way, cameras }) => {
-      const [x, y] = way[way.length - 1];
-      return `${label(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
+    this.#people.replaceChildren(...tracks.flatMap((track) => this.#drawTrack(track, size)));
+    const lines = tracks.map(({ object, positions, cameras }) => {
+      const [x, y] = positions[positions.length - 1];
+      return `${shortLabel(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
     });
     const list = element('places');
     while (list.children.length > lines.length) list.lastChild?.remove();
-    lines.forEach((line, at) => put(list.children[at] ?? list.appendChild(make('li')), line));
-    put(element('floor').querySelector('h2') ?? list, walkers.length ? 'On the floor now' : 'No one is on the floor now');
+    lines.forEach((line, at) => setText(list.children[at] ?? list.appendChild(make('li')), line));
+    const heading = element('floor').querySelector('h2') ?? list;
+    setText(heading, tracks.length ? 'On the floor now' : 'No one is on the floor now');
   }
 
   /**
-   * @param {Walker} walker
+   * @param {FloorTrack} track
    * @param {number} size of the plan
    */
-  #walker({ object, way }, size) {
-    const [x, y] = way[way.length - 1];
+  #drawTrack({ object, positions }, size) {
+    const [x, y] = positions[positions.length - 1];
     const name = svg('text', { x, y: -y - size * DOT * 1.6, 'font-size': size * 0.035, class: 'name' });
-    name.textContent = label(object);
+    name.textContent = shortLabel(object);
     return [
-      svg('polyline', { points: points(way), class: 'way' }),
+      svg('polyline', { points: svgPoints(positions), class: 'way' }),
       svg('circle', { cx: x, cy: -y, r: size * DOT, class: 'walker' }),
       name,
     ];
@@ -118,17 +121,17 @@ export class FloorPlan {
   /** @param {string} camera */
   #chip(camera) {
     const chip = make('span', { className: 'chip', textContent: camera });
-    chip.style.setProperty('--camera', this.palette.colour(camera));
+    chip.style.setProperty('--camera', this.palette.color(camera));
     return chip;
   }
 }
 
 /**
- * @param {number} parts that there are
+ * @param {number} calibrated number of calibrated cameras
  * @param {string[]} uncalibrated
  */
-function words(parts, uncalibrated) {
-  if (parts) return uncalibrated.length ? `Not calibrated: ${uncalibrated.join(', ')}.` : '';
+function describe(calibrated, uncalibrated) {
+  if (calibrated) return uncalibrated.length ? `Not calibrated: ${uncalibrated.join(', ')}.` : '';
   if (!uncalibrated.length) return 'No camera has reported yet.';
   return 'No camera is calibrated: mark the floor under Zones, or calibrate by a walk.';
 }
@@ -138,7 +141,7 @@ function range(values) {
   return [Math.min(...values), Math.max(...values)];
 }
 
-/** @param {[number, number][]} places */
-function points(places) {
-  return places.map(([x, y]) => `${x},${-y}`).join(' ');
+/** @param {[number, number][]} positions */
+function svgPoints(positions) {
+  return positions.map(([x, y]) => `${x},${-y}`).join(' ');
 }

@@ -1,118 +1,115 @@
-/** Puts the operator's page together: who may see it, and which of its sections is open. */
+/** Entry point of the operator's page: signs in, creates its sections and shows the one in the address. */
 
 import { ServerEvents } from '../shared/events.js';
-import { getJson } from '../shared/requests.js';
-import { CameraTiles } from './cameras.js';
-import { learnNames } from '../people/names.js';
+import { element, setText } from '../shared/dom.js';
+import { getJson, HttpError, requestOperator } from '../shared/requests.js';
+import { CameraTiles } from './camera_tiles.js';
+import { setNames } from '../people/names.js';
 import { ViewSelectionForm } from './view_selection.js';
-import { Configuration } from './configuration.js';
+import { ConfigurationTable } from './configuration.js';
 import { FloorPlan } from './floor_plan.js';
 import { Downloads } from './downloads.js';
-import { FlagList } from './assist/flags.js';
-import { ask, Refused } from './requests.js';
-import { element } from './section.js';
+import { FlagList } from './assist/flag_list.js';
 import { ZoneEditor } from './zones.js';
-import { KnownPeople } from './people.js';
+import { PeopleEditor } from './people_editor.js';
 import { CalibrationWalk } from './calibration.js';
 import { Palette } from '../people/palette.js';
 import { SignIn } from '../shared/sign_in.js';
 
-/** @import {Session, Site} from '../shared/contract.js' */
+/** @import {Session, Site} from '../shared/api_types.js' */
 /** @import {Section} from './section.js' */
 
-/** @type {Map<string, Section>} */
+/** @type {Map<string, Section>} by id of its element */
 const sections = new Map();
 /** @type {string | null} */
-let opened = null;
+let openSection = null;
 
-const signIn = new SignIn(() => void enter(), tell);
+const signIn = new SignIn(() => void enter(), showError);
 
-/** @param {unknown} error what went wrong; null: nothing */
-function tell(error) {
-  const line = error instanceof Error ? error.message : '';
-  const trouble = element('trouble');
-  if (trouble.textContent !== line) trouble.textContent = line; // or it is read out again
-  if (error instanceof Refused && error.status === 401) askForToken();
+/** @param {unknown} error null: no error */
+function showError(error) {
+  setText(element('trouble'), error instanceof Error ? error.message : '');
+  if (error instanceof HttpError && error.status === 401) askForToken();
 }
 
 function askForToken() {
-  show(null);
-  signIn.ask();
+  showSection(null);
+  signIn.showForm();
 }
 
 async function enter() {
   try {
-    const session = await signIn.look();
-    if (!session) return show(null);
-    if (session.role !== 'operate') return await refused(session);
+    const session = await signIn.getSession();
+    if (!session) return showSection(null);
+    if (session.role !== 'operate') return await showRefusal(session);
     const site = await getJson('api/site');
-    tell(null);
-    if (!sections.size) build(site);
-    show(location.hash.slice(1));
+    showError(null);
+    if (!sections.size) createSections(site);
+    showSection(location.hash.slice(1));
   } catch (error) {
-    tell(error);
+    showError(error);
   }
 }
 
-/** @param {Session} session of somebody who may not operate: the server says what it takes */
-async function refused({ by_token: byToken }) {
+/** @param {Session} session without the operator's rights: an operator's request makes the server explain why */
+async function showRefusal({ by_token: byToken }) {
   if (byToken) askForToken();
-  await ask('config').catch(tell);
+  await requestOperator('config').catch(showError);
 }
 
 /** @param {Site} site */
-function build(site) {
+function createSections(site) {
   const palette = new Palette(site.cameras);
   element('site').textContent = site.name;
   document.documentElement.style.setProperty('--picture', String(site.width / site.height));
-  const floor = new FloorPlan(site, palette, tell);
-  sections.set('cameras', new CameraTiles(palette, tell));
-  sections.set('floor', floor);
-  const known = new KnownPeople(site, tell);
-  sections.set('known', known);
-  const flags = new FlagList(site, tell);
-  sections.set('flagged', flags);
+  const floor = new FloorPlan(site, palette, showError);
+  const people = new PeopleEditor(site, showError);
+  const flags = new FlagList(site, showError);
   const downloads = new Downloads(site);
+  sections.set('cameras', new CameraTiles(palette, showError));
+  sections.set('floor', floor);
+  sections.set('known', people);
+  sections.set('flagged', flags);
   sections.set('downloads', downloads);
-  sections.set('zones', new ZoneEditor(site, tell));
-  sections.set('calibration', new CalibrationWalk(tell));
-  sections.set('view-selection', new ViewSelectionForm(tell));
-  sections.set('configuration', new Configuration(tell));
+  sections.set('zones', new ZoneEditor(site, showError));
+  sections.set('calibration', new CalibrationWalk(showError));
+  sections.set('view-selection', new ViewSelectionForm(showError));
+  sections.set('configuration', new ConfigurationTable(showError));
   new ServerEvents({
     opened: () => {
-      tell(null);
-      flags.open(); // another run of the service has raised others
+      showError(null);
+      flags.open(); // a restarted service has other flags
     },
-    lost: () => tell(new Error('Connection lost; retrying.')),
-    heard: (name, data) => {
+    lost: () => showError(new Error('Connection lost; retrying.')),
+    received: (name, data) => {
       if (name === 'gop') floor.add(data);
-      if (name === 'flag') flags.take(data);
+      if (name === 'flag') flags.update(data);
       if (name === 'objects') {
-        learnNames(data.objects);
-        known.show(data.objects);
+        setNames(data.objects);
+        people.show(data.objects);
         downloads.show(data.objects);
       }
     },
   });
 }
 
-/** @param {string | null} wanted section; null: none, since nobody may see them */
-function show(wanted) {
+/** @param {string | null} requested section, or an unknown name for the first one; null: none, before sign-in */
+function showSection(requested) {
   const [first] = sections.keys();
-  const next = wanted === null ? null : sections.has(wanted) ? wanted : first;
+  const next = requested === null ? null : sections.has(requested) ? requested : first;
   element('sections').hidden = next === null;
-  if (opened !== null && opened !== next) sections.get(opened)?.close();
+  if (openSection !== null && openSection !== next) sections.get(openSection)?.close();
   for (const name of sections.keys()) {
     element(name).hidden = name !== next;
     const link = document.querySelector(`#sections a[href="#${name}"]`);
     if (name === next) link?.setAttribute('aria-current', 'page');
     else link?.removeAttribute('aria-current');
   }
-  if (next !== null && next !== opened) sections.get(next)?.open();
-  opened = next;
+  if (next !== null && next !== openSection) sections.get(next)?.open();
+  openSection = next;
 }
 
 addEventListener('hashchange', () => {
-  if (opened !== null) show(location.hash.slice(1));
+  if (openSection !== null) showSection(location.hash.slice(1));
 });
-void signIn.begin().then(enter);
+void signIn.signInByLink().then(enter);

@@ -1,86 +1,49 @@
-/** What every section of the operator's page is made of. */
+/** What the sections of the operator's page have in common. */
 
-export { element } from '../shared/element.js';
-
-const SVG = 'http://www.w3.org/2000/svg';
-
-/** @typedef {(error: unknown) => void} Tell what went wrong; null: nothing does any more */
+/** @typedef {(error: unknown) => void} ShowError null: no error */
 
 /**
  * @typedef {object} Section of the page
- * @property {() => void} open it is shown from now on
- * @property {() => void} close it is not
+ * @property {() => void} open called when it is shown
+ * @property {() => void} close called when it is hidden
  */
 
-/**
- * @template {keyof HTMLElementTagNameMap} Name
- * @param {Name} name
- * @param {Partial<HTMLElementTagNameMap[Name]>} [properties]
- * @param {...(Node | string)} children
- * @returns {HTMLElementTagNameMap[Name]}
- */
-export function make(name, properties = {}, ...children) {
-  const made = Object.assign(document.createElement(name), properties);
-  made.append(...children);
-  return made;
-}
-
-/**
- * @param {string} name
- * @param {Record<string, string | number>} [attributes]
- */
-export function svg(name, attributes = {}) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
-  return made;
-}
-
-/**
- * Only where it differs: else what is read out would be read again.
- *
- * @param {Element} shown
- * @param {string} text
- */
-export function put(shown, text) {
-  if (shown.textContent !== text) shown.textContent = text;
-}
-
-/** Does something again and again, one time after the other, while it is wanted and somebody looks. */
-export class Repeated {
-  #running = 0;
+/** Repeats an asynchronous action at intervals, between start() and stop(), while the page is visible. */
+export class Repeater {
+  #run = 0;
 
   /**
    * @param {() => Promise<void>} action
-   * @param {number} everyMs
-   * @param {Tell} tell
+   * @param {number} intervalMs
+   * @param {ShowError} showError
    */
-  constructor(action, everyMs, tell) {
+  constructor(action, intervalMs, showError) {
     this.action = action;
-    this.everyMs = everyMs;
-    this.tell = tell;
+    this.intervalMs = intervalMs;
+    this.showError = showError;
   }
 
   start() {
-    void this.#run((this.#running += 1));
+    void this.#loop((this.#run += 1));
   }
 
   stop() {
-    this.#running += 1;
+    this.#run += 1;
   }
 
-  /** @param {number} run which goes on until another is begun, or it is stopped */
-  async #run(run) {
+  /** @param {number} run ends when another is started, or it is stopped */
+  async #loop(run) {
     let failed = false;
-    while (run === this.#running) {
+    while (run === this.#run) {
       try {
         if (!document.hidden) await this.action();
-        if (failed && run === this.#running) this.tell(null);
+        if (failed && run === this.#run) this.showError(null);
         failed = false;
       } catch (error) {
         failed = true;
-        if (run === this.#running) this.tell(error);
+        if (run === this.#run) this.showError(error);
       }
-      await new Promise((resolve) => setTimeout(resolve, this.everyMs));
+      await new Promise((resolve) => setTimeout(resolve, this.intervalMs));
     }
   }
 }

@@ -1,16 +1,16 @@
-/** What views are chosen by, to try out: it holds at once, and the lines for the configuration stand below. */
+/** The settings of view selection: changes apply at once, and their YAML for the configuration is shown. */
 
-import { ask } from './requests.js';
-import { element, make, put } from './section.js';
+import { requestOperator } from '../shared/requests.js';
+import { element, make, setText } from '../shared/dom.js';
 import { copy } from '../shared/tools.js';
 
-/** @import {SelectionSettings, Values} from './contract.js' */
-/** @import {Section, Tell} from './section.js' */
+/** @import {SelectionSettings, Values} from './api_types.js' */
+/** @import {Section, ShowError} from './section.js' */
 
-/** @type {[string, string, string][]} key, name, what it does */
+/** @type {[string, string, string][]} key, label, explanation */
 const FIELDS = [
-  ['lookahead', 'Look-ahead, frames', 'How many frames are seen before a view is chosen; all of it is delay.'],
-  ['switch_cost_s', 'Cut cost λ, s', 'How many seconds of not seeing the person are worth a cut.'],
+  ['lookahead', 'Look-ahead, frames', 'Frames known ahead when a view is selected; adds that delay.'],
+  ['switch_cost_s', 'Cut cost λ, s', 'Seconds of not seeing the person that cost as much as a cut.'],
   ['extrapolate_s', 'Extrapolation, s', 'For how long after the look-ahead its last views are assumed to stay.'],
   ['presence_decay_s', 'Presence decay, s', 'How long a view takes to decay to nothing after the last detection.'],
   ['undetected_weight', 'Undetected weight', 'Weight of a view in which only other cameras detect the person, 0 to 1.'],
@@ -32,26 +32,26 @@ export class ViewSelectionForm {
   #state = element('selection-state');
   /** @type {HTMLTextAreaElement} */
   #lines = element('selection-lines');
-  /** @type {Values} in force, as far as known */
+  /** @type {Values} in force */
   #values = {};
 
-  /** @param {Tell} tell */
-  constructor(tell) {
-    this.tell = tell;
+  /** @param {ShowError} showError */
+  constructor(showError) {
+    this.showError = showError;
     element('selection-form').addEventListener('submit', (event) => {
       event.preventDefault();
       void this.#change('PUT', this.#entered());
     });
     element('selection-back').addEventListener('click', () => void this.#change('DELETE'));
     element('selection-copy').addEventListener('click', async () => {
-      const done = await copy(this.#lines.value);
-      put(this.#state, done ? 'The lines are copied.' : 'Select the lines and copy them.');
-      if (!done) this.#lines.select();
+      const copied = await copy(this.#lines.value);
+      setText(this.#state, copied ? 'Copied.' : 'Select the lines and copy them.');
+      if (!copied) this.#lines.select();
     });
   }
 
   open() {
-    void ask('view_selection').then((settings) => this.#show(settings), this.tell);
+    void requestOperator('view_selection').then((settings) => this.#show(settings), this.showError);
   }
 
   close() {}
@@ -62,14 +62,14 @@ export class ViewSelectionForm {
    */
   async #change(method, values) {
     try {
-      this.#show(await ask('view_selection', method, values));
-      this.tell(null);
+      this.#show(await requestOperator('view_selection', method, values));
+      this.showError(null);
     } catch (error) {
-      this.tell(error);
+      this.showError(error);
     }
   }
 
-  /** @returns {Values} those that were changed */
+  /** @returns {Values} the changed ones */
   #entered() {
     /** @type {Values} */
     const values = {};
@@ -81,34 +81,34 @@ export class ViewSelectionForm {
   }
 
   /** @param {SelectionSettings} settings */
-  #show({ values, file, lines, min_lookahead: least, max_lookahead: most }) {
+  #show({ values, file, lines, min_lookahead: min, max_lookahead: max }) {
     this.#values = values;
-    if (!this.#fields.size) element('selection-fields').append(...FIELDS.filter(([key]) => key in values).map((it) => this.#field(it)));
-    const ahead = this.#fields.get('lookahead')?.input;
-    if (ahead) Object.assign(ahead, { min: String(least), max: String(most), step: '1' });
-    let tried = 0;
-    for (const [key, { input, file: said }] of this.#fields) {
+    if (!this.#fields.size) element('selection-fields').append(...FIELDS.filter(([key]) => key in values).map((field) => this.#createField(field)));
+    const lookahead = this.#fields.get('lookahead')?.input;
+    if (lookahead) Object.assign(lookahead, { min: String(min), max: String(max), step: '1' });
+    let changed = 0;
+    for (const [key, { input, file: fileValue }] of this.#fields) {
       const value = values[key];
       if (typeof value === 'boolean') input.checked = value;
       else input.value = String(value);
       const differs = value !== file[key];
-      tried += Number(differs);
-      put(said, differs ? `file: ${file[key]}` : '');
+      changed += Number(differs);
+      setText(fileValue, differs ? `file: ${file[key]}` : '');
     }
-    put(this.#state, tried ? `${tried} changed from the file.` : 'As in the file.');
+    setText(this.#state, changed ? `${changed} changed from the file.` : 'As in the file.');
     this.#lines.value = lines || '# all at their defaults\n';
   }
 
   /** @param {[string, string, string]} field */
-  #field([key, name, does]) {
+  #createField([key, label, explanation]) {
     const weight = key.startsWith('quality.');
     const input = make('input', key === 'quality.relative' ? { type: 'checkbox' } : { type: 'number', min: '0', step: 'any', required: true });
     if (weight) input.max = '1';
     input.id = `selection-${key}`;
-    const help = make('small', { id: `${input.id}-help`, textContent: does });
+    const help = make('small', { id: `${input.id}-help`, textContent: explanation });
     input.setAttribute('aria-describedby', help.id);
     const file = make('span', { className: 'file' });
     this.#fields.set(key, { input, file });
-    return make('p', {}, make('label', { htmlFor: input.id, textContent: name }), input, file, help);
+    return make('p', {}, make('label', { htmlFor: input.id, textContent: label }), input, file, help);
   }
 }

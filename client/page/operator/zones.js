@@ -1,27 +1,27 @@
-/** Zones on a camera's picture: areas where nobody is looked for, and places that are known on the floor. */
+/** The zone editor: areas of a camera's picture to ignore, and points with known positions on the floor. */
 
-import { ignoreLines, missing, pointsFile, toOwn, toSite } from './drawing.js';
-import { ask } from './requests.js';
-import { element, make, put } from './section.js';
-import { MarkedPicture } from './picture.js';
-import { load } from './stills.js';
+import { ignoredAreasYaml, missingPoints, pointsFile, toCameraPixels, toSitePixels } from './zone_export.js';
+import { requestOperator } from '../shared/requests.js';
+import { element, make, setText } from '../shared/dom.js';
+import { MarkingStage } from './marking_stage.js';
+import { loadStill } from './camera_stills.js';
 import { copy } from '../shared/tools.js';
 
-/** @import {Site} from '../shared/contract.js' */
-/** @import {CameraDiagnostics, OwnPicture, Setting} from './contract.js' */
-/** @import {Pair, Place} from './drawing.js' */
-/** @import {Section, Tell} from './section.js' */
+/** @import {Site} from '../shared/api_types.js' */
+/** @import {CameraDiagnostics, CameraPicture, Setting} from './api_types.js' */
+/** @import {Point, PointPair} from './zone_export.js' */
+/** @import {Section, ShowError} from './section.js' */
 
 /** @implements {Section} */
 export class ZoneEditor {
-  /** @type {Map<string, OwnPicture | null>} by camera */
+  /** @type {Map<string, CameraPicture | null>} by camera */
   #pictures = new Map();
-  /** @type {Map<string, Place[][]>} areas to ignore, by camera; the last one is being drawn */
-  #shapes = new Map();
-  /** @type {Map<string, Pair[]>} */
+  /** @type {Map<string, Point[][]>} areas to ignore, by camera; the last one is being drawn */
+  #ignored = new Map();
+  /** @type {Map<string, PointPair[]>} */
   #pairs = new Map();
-  #learned = false; // the areas of the configuration
-  #marked;
+  #configLoaded = false; // the areas of the configuration
+  #stage;
   /** @type {HTMLSelectElement} */
   #select = element('mark-camera');
   /** @type {HTMLImageElement} */
@@ -30,37 +30,37 @@ export class ZoneEditor {
   #lines = element('mark-lines');
   /** @type {HTMLInputElement} */
   #unit = element('mark-unit');
-  #said = element('mark-said');
-  #areas = element('mark-areas');
+  #message = element('mark-said');
+  #areasButton = element('mark-areas');
 
   /**
    * @param {Site} site
-   * @param {Tell} tell
+   * @param {ShowError} showError
    */
-  constructor(site, tell) {
+  constructor(site, showError) {
     this.site = site;
-    this.tell = tell;
+    this.showError = showError;
     const [stage, drawing] = [element('mark-stage'), element('mark-drawing')];
-    this.#marked = new MarkedPicture(stage, drawing, site, (place) => this.#mark(place), () => this.#undo());
-    this.#select.replaceChildren(...site.cameras.map((it) => make('option', { value: it, textContent: it })));
-    this.#select.addEventListener('change', () => this.#chooseCamera());
-    this.#areas.addEventListener('click', () => this.#chooseKind(true));
-    element('mark-points').addEventListener('click', () => this.#chooseKind(false));
+    this.#stage = new MarkingStage(stage, drawing, site, (point) => this.#mark(point), () => this.#undo());
+    this.#select.replaceChildren(...site.cameras.map((camera) => make('option', { value: camera, textContent: camera })));
+    this.#select.addEventListener('change', () => this.#showCamera());
+    this.#areasButton.addEventListener('click', () => this.#setMode(true));
+    element('mark-points').addEventListener('click', () => this.#setMode(false));
     element('mark-next').addEventListener('click', () => this.#nextArea());
     element('mark-undo').addEventListener('click', () => this.#undo());
     element('mark-clear').addEventListener('click', () => this.#clear());
-    element('mark-picture').addEventListener('click', () => void this.#takePicture());
+    element('mark-picture').addEventListener('click', () => void this.#loadPicture());
     element('mark-copy').addEventListener('click', async () => {
-      const done = await copy(this.#lines.value);
-      put(this.#said, done ? 'Copied.' : 'Select the lines and copy them.');
-      if (!done) this.#lines.select();
+      const copied = await copy(this.#lines.value);
+      setText(this.#message, copied ? 'Copied.' : 'Select the lines and copy them.');
+      if (!copied) this.#lines.select();
     });
     element('mark-download').addEventListener('click', () => this.#download());
     this.#unit.addEventListener('input', () => this.#show());
   }
 
   open() {
-    void this.#learn();
+    void this.#loadConfig();
   }
 
   close() {}
@@ -69,74 +69,74 @@ export class ZoneEditor {
     return this.#select.value;
   }
 
-  get #onAreas() {
-    return this.#areas.getAttribute('aria-pressed') === 'true';
+  get #markingAreas() {
+    return this.#areasButton.getAttribute('aria-pressed') === 'true';
   }
 
   get #picture() {
     return this.#pictures.get(this.#camera) ?? null;
   }
 
-  async #learn() {
+  async #loadConfig() {
     try {
-      const [{ cameras }, { settings }] = await Promise.all([ask('cameras'), ask('config')]);
+      const [{ cameras }, { settings }] = await Promise.all([requestOperator('cameras'), requestOperator('config')]);
       for (const { camera, picture } of /** @type {CameraDiagnostics[]} */ (cameras)) this.#pictures.set(camera, picture);
       for (const { key, value } of /** @type {Setting[]} */ (settings)) {
         const [section, camera, name] = key.split('.');
-        const known = section === 'cameras' && name === 'ignore' && !this.#learned;
-        if (known) this.#shapes.set(camera, [...JSON.parse(value), []]); // such lists are JSON, too
+        const isArea = section === 'cameras' && name === 'ignore' && !this.#configLoaded;
+        if (isArea) this.#ignored.set(camera, [...JSON.parse(value), []]); // YAML lists of numbers are JSON
       }
-      this.#learned = true;
-      this.#chooseCamera();
+      this.#configLoaded = true;
+      this.#showCamera();
     } catch (error) {
-      this.tell(error);
+      this.showError(error);
     }
   }
 
-  #chooseCamera() {
+  #showCamera() {
     this.#image.removeAttribute('src');
     this.#image.alt = `A picture of ${this.#camera}`;
-    void this.#takePicture();
+    void this.#loadPicture();
     this.#show();
   }
 
-  async #takePicture() {
+  async #loadPicture() {
     const camera = this.#camera;
-    const there = await load(this.#image, `cameras/${camera}/live.jpg`);
+    const loaded = await loadStill(this.#image, `cameras/${camera}/live.jpg`);
     if (camera !== this.#camera) return;
-    if (!there) put(this.#said, `There is no picture of ${camera} now.`);
-    else if (!this.#picture) put(this.#said, `The size of ${camera}'s own picture is not known yet: open this section again.`);
-    else put(this.#said, '');
+    if (!loaded) setText(this.#message, `There is no picture of ${camera} now.`);
+    else if (!this.#picture) setText(this.#message, `The size of ${camera}'s picture is not known yet. Open this section again.`);
+    else setText(this.#message, '');
   }
 
   /** @param {boolean} areas */
-  #chooseKind(areas) {
-    this.#areas.setAttribute('aria-pressed', String(areas));
+  #setMode(areas) {
+    this.#areasButton.setAttribute('aria-pressed', String(areas));
     element('mark-points').setAttribute('aria-pressed', String(!areas));
     this.#show();
   }
 
-  /** @param {Place} at in the site's picture */
-  #mark(at) {
+  /** @param {Point} sitePoint in the site's picture */
+  #mark(sitePoint) {
     const picture = this.#picture;
     if (!picture) return;
-    const place = toOwn(at, picture);
-    if (this.#onAreas) this.#areasHere()[this.#areasHere().length - 1].push(place);
-    else this.#pairsHere().push({ image: place, floor: ['', ''] });
+    const point = toCameraPixels(sitePoint, picture);
+    if (this.#markingAreas) this.#cameraAreas()[this.#cameraAreas().length - 1].push(point);
+    else this.#cameraPairs().push({ image: point, floor: ['', ''] });
     this.#show();
-    if (!this.#onAreas) this.#said.textContent = `Pair ${this.#pairsHere().length}: where is it on the floor?`;
+    if (!this.#markingAreas) this.#message.textContent = `Pair ${this.#cameraPairs().length}: where is it on the floor?`;
   }
 
   #nextArea() {
-    const areas = this.#areasHere();
+    const areas = this.#cameraAreas();
     if (areas[areas.length - 1].length) areas.push([]);
     this.#show();
   }
 
   #undo() {
-    if (!this.#onAreas) this.#pairsHere().pop();
+    if (!this.#markingAreas) this.#cameraPairs().pop();
     else {
-      const areas = this.#areasHere();
+      const areas = this.#cameraAreas();
       if (!areas[areas.length - 1].length && areas.length > 1) areas.pop();
       areas[areas.length - 1].pop();
     }
@@ -144,51 +144,51 @@ export class ZoneEditor {
   }
 
   #clear() {
-    if (this.#onAreas) this.#shapes.set(this.#camera, [[]]);
+    if (this.#markingAreas) this.#ignored.set(this.#camera, [[]]);
     else this.#pairs.set(this.#camera, []);
     this.#show();
   }
 
-  /** @returns {Place[][]} at least one, of which the last is being drawn */
-  #areasHere() {
-    const known = this.#shapes.get(this.#camera) ?? [[]];
-    this.#shapes.set(this.#camera, known);
-    return known;
+  /** @returns {Point[][]} at least one; the last is being drawn */
+  #cameraAreas() {
+    const areas = this.#ignored.get(this.#camera) ?? [[]];
+    this.#ignored.set(this.#camera, areas);
+    return areas;
   }
 
-  /** @returns {Pair[]} */
-  #pairsHere() {
-    const known = this.#pairs.get(this.#camera) ?? [];
-    this.#pairs.set(this.#camera, known);
-    return known;
+  /** @returns {PointPair[]} */
+  #cameraPairs() {
+    const pairs = this.#pairs.get(this.#camera) ?? [];
+    this.#pairs.set(this.#camera, pairs);
+    return pairs;
   }
 
   #show() {
-    element('mark-next').hidden = !this.#onAreas;
-    element('mark-table').hidden = element('mark-download').hidden = this.#onAreas;
-    element('mark-how').textContent = this.#onAreas
-      ? 'Press the corners of the area to ignore, one after the other. These lines replace those of the configuration.'
-      : 'Press a place on the floor, and enter below where it is. The file is for: myview calibrate points.json --out ground.json';
-    if (!this.#onAreas) this.#table();
-    this.#write();
+    element('mark-next').hidden = !this.#markingAreas;
+    element('mark-table').hidden = element('mark-download').hidden = this.#markingAreas;
+    element('mark-how').textContent = this.#markingAreas
+      ? 'Press the corners of the area to ignore in order. The lines below replace those of the configuration.'
+      : 'Press a point on the floor and enter its position below. The file is for: myview calibrate points.json --out ground.json';
+    if (!this.#markingAreas) this.#showPairs();
+    this.#showExport();
     this.#draw();
   }
 
-  #write() {
-    const areas = this.#onAreas;
-    this.#lines.value = areas ? ignoreLines(this.#camera, this.#areasHere()) : pointsFile(this.#pairs, this.#unit.value);
-    if (!areas) put(this.#said, missing(this.#camera, this.#pairsHere()));
+  #showExport() {
+    const areas = this.#markingAreas;
+    this.#lines.value = areas ? ignoredAreasYaml(this.#camera, this.#cameraAreas()) : pointsFile(this.#pairs, this.#unit.value);
+    if (!areas) setText(this.#message, missingPoints(this.#camera, this.#cameraPairs()));
   }
 
-  #table() {
+  #showPairs() {
     const body = element('mark-pairs');
-    const rows = this.#pairsHere().map((pair, at) => {
+    const rows = this.#cameraPairs().map((pair, at) => {
       const inputs = ['x', 'y'].map((axis, side) => {
         const input = make('input', { type: 'text', inputMode: 'decimal', autocomplete: 'off', value: pair.floor[side] });
         input.ariaLabel = `Pair ${at + 1}, ${axis} on the floor`;
         input.addEventListener('input', () => {
           pair.floor[side] = input.value;
-          this.#write();
+          this.#showExport();
         });
         return make('td', {}, input);
       });
@@ -199,9 +199,9 @@ export class ZoneEditor {
 
   #draw() {
     const picture = this.#picture;
-    if (!picture) this.#marked.drawPoints([]);
-    else if (this.#onAreas) this.#marked.drawAreas(this.#areasHere().map((area) => area.map((it) => toSite(it, picture))));
-    else this.#marked.drawPoints(this.#pairsHere().map(({ image }) => toSite(image, picture)));
+    if (!picture) this.#stage.drawPoints([]);
+    else if (this.#markingAreas) this.#stage.drawAreas(this.#cameraAreas().map((area) => area.map((point) => toSitePixels(point, picture))));
+    else this.#stage.drawPoints(this.#cameraPairs().map(({ image }) => toSitePixels(image, picture)));
   }
 
   #download() {

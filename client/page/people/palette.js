@@ -1,9 +1,7 @@
-/**
- * A stable colour per camera, told apart by the colour-blind too: Okabe and Ito's, lightened for a
- * dark ground, without their green, which is the chosen person's here.
- */
+/** A stable color per camera. */
 
-const COLOURS = ['#56b4e9', '#e69f00', '#cc79a7', '#f0e442', '#4a86d8', '#e0672b', '#b9b9b9'];
+/** Okabe and Ito's for color-blind readers, lightened for a dark background; green is the selected person's. */
+const COLORS = ['#56b4e9', '#e69f00', '#cc79a7', '#f0e442', '#4a86d8', '#e0672b', '#b9b9b9'];
 
 export class Palette {
   /** @param {string[]} cameras in the site's order */
@@ -13,10 +11,10 @@ export class Palette {
 
   /**
    * @param {string} camera
-   * @returns {string} a CSS colour
+   * @returns {string} a CSS color
    */
-  colour(camera) {
-    const at = this.order.get(camera) ?? COLOURS.length - 1;
-    return COLOURS[at % COLOURS.length];
+  color(camera) {
+    const at = this.order.get(camera) ?? COLORS.length - 1;
+    return COLORS[at % COLORS.length];
   }
 }

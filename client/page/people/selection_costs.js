@@ -1,128 +1,167 @@
-/** Why a view was chosen, in numbers: a table of the cameras at one moment of the last minute. */
+/** Why a view was selected, in numbers: a table of the cameras at a displayed moment, or at one under the mouse. */
 
+import { make } from '../shared/dom.js';
 import { getJson } from '../shared/requests.js';
 
-/** @import {Choice} from '../shared/contract.js' */
+/** @import {Choice} from '../shared/api_types.js' */
+/** @import {TimelineStrip} from '../timeline/strip.js' */
+/** @import {Viewer} from '../viewer.js' */
 
-/** @typedef {{key: string, object: number, pulse: number, when: string}} Wish */
+/** @typedef {{key: string, object: number, pulse: number, time: string}} CostQuery */
 
-const KEPT = 200; // answers: a minute of GOPs, and some
+const CACHE_SIZE = 200; // answers: more than the GOPs of a minute
 const NUMBERS = new Intl.NumberFormat('en', { minimumFractionDigits: 2, maximumFractionDigits: 2 });
 const FRAMES = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
 
-export class Why {
-  /** @type {Map<string, Choice>} by person and first pulse of the GOP */
-  #known = new Map();
-  /** @type {Wish | null} null: nothing is to be shown */
-  #wanted = null;
-  #asking = false;
+/** Opens the table: by the Why button for the displayed view, by the mouse on the timeline for another. */
+export class SelectionCosts {
+  on = false;
+  #decisions;
 
-  /** @param {HTMLElement} place */
-  constructor(place) {
-    this.place = place;
+  /**
+   * @param {Viewer} viewer
+   * @param {TimelineStrip} strip
+   * @param {HTMLElement} container
+   */
+  constructor(viewer, strip, container) {
+    this.viewer = viewer;
+    this.strip = strip;
+    this.table = new CostTable(container);
+    this.#decisions = viewer.decisions;
+    const { canvas } = strip.surface;
+    canvas.addEventListener('pointermove', ({ offsetX, pointerType }) => {
+      if (pointerType === 'mouse') this.#show(strip.pulseAt(offsetX));
+    });
+    canvas.addEventListener('pointerleave', () => this.on || this.table.hide());
+  }
+
+  toggle() {
+    this.on = !this.on;
+    this.table.container.classList.toggle('stays', this.on);
+    if (this.on) this.#show(this.viewer.probe.pulse);
+    else this.table.hide();
+  }
+
+  /** Follow the displayed frame, unless the mouse is on the timeline. */
+  update() {
+    if (this.on && !this.strip.surface.canvas.matches(':hover')) this.#show(this.viewer.probe.pulse);
+  }
+
+  /** @param {number | null} pulse */
+  #show(pulse) {
+    const { site, object, probe, decisions } = this.viewer;
+    if (decisions !== this.#decisions) this.table.clear(); // the pulses have restarted
+    this.#decisions = decisions;
+    if (!site || object === null || pulse === null || probe.pulse === null) return this.table.hide();
+    const age = (probe.pulse - pulse) / site.fps;
+    this.table.show(object, pulse, site.gop, age < site.gop / site.fps ? 'Now' : `${age.toFixed(1)} s before`);
+  }
+}
+
+class CostTable {
+  /** @type {Map<string, Choice>} by person and first pulse of the GOP */
+  #cache = new Map();
+  /** @type {CostQuery | null} null: hidden */
+  #query = null;
+  #requesting = false;
+
+  /** @param {HTMLElement} container */
+  constructor(container) {
+    this.container = container;
   }
 
   hide() {
-    this.#wanted = null;
-    this.place.hidden = true;
+    this.#query = null;
+    this.container.hidden = true;
   }
 
-  /** Pulses began anew: their numbers mean other moments. */
-  forget() {
-    this.#known.clear();
+  clear() {
+    this.#cache.clear();
   }
 
   /**
-   * Called often; only the newest wish is answered.
+   * Called often; only the newest query is answered.
    *
    * @param {number} object
    * @param {number} pulse
    * @param {number} gop frames
-   * @param {string} when in words
+   * @param {string} time label
    */
-  show(object, pulse, gop, when) {
+  show(object, pulse, gop, time) {
     const key = `${object} ${pulse - (pulse % gop)}`;
-    this.#wanted = { key, object, pulse, when };
-    const known = this.#known.get(key);
-    if (known) this.#draw(known, when);
-    else if (!this.#asking) void this.#ask(this.#wanted);
+    this.#query = { key, object, pulse, time };
+    const choice = this.#cache.get(key);
+    if (choice) this.#draw(choice, time);
+    else if (!this.#requesting) void this.#request(this.#query);
   }
 
-  /** @param {Wish} wish */
-  async #ask({ key, object, pulse }) {
-    this.#asking = true;
+  /** @param {CostQuery} query */
+  async #request({ key, object, pulse }) {
+    this.#requesting = true;
     try {
       const choice = /** @type {Choice} */ (await getJson(`api/objects/${object}/choice?at=p${pulse}`));
-      this.#known.set(key, choice);
-      if (this.#known.size > KEPT) this.#known.delete(/** @type {string} */ (this.#known.keys().next().value));
-      if (this.#wanted?.key === key) this.#draw(choice, this.#wanted.when);
+      this.#cache.set(key, choice);
+      if (this.#cache.size > CACHE_SIZE) this.#cache.delete(/** @type {string} */ (this.#cache.keys().next().value));
+      if (this.#query?.key === key) this.#draw(choice, this.#query.time);
     } catch {
-      if (this.#wanted?.key === key) {
-        this.#say(`${this.#wanted.when}: not known. Reasons are kept from when a person is first watched.`);
+      if (this.#query?.key === key) {
+        this.#showText(`${this.#query.time}: not known. Reasons are kept from when a person is first watched.`);
       }
     }
-    this.#asking = false;
-    const next = this.#wanted; // somebody may have gone on meanwhile, and rest there
-    if (next && next.key !== key && !this.#known.has(next.key)) void this.#ask(next);
+    this.#requesting = false;
+    const next = this.#query; // the mouse may have moved during the request
+    if (next && next.key !== key && !this.#cache.has(next.key)) void this.#request(next);
   }
 
   /** @param {string} text */
-  #say(text) {
-    this.place.replaceChildren(made('p', text));
-    this.place.hidden = false;
+  #showText(text) {
+    this.container.replaceChildren(make('p', { textContent: text }));
+    this.container.hidden = false;
   }
 
   /**
    * @param {Choice} choice
-   * @param {string} when
+   * @param {string} time
    */
-  #draw(choice, when) {
-    const words = `${when}: ${choice.camera ?? 'no camera'}. ${choice.reason}`;
-    this.place.replaceChildren(made('p', words), table(choice), made('p', prices(choice)));
-    this.place.hidden = false;
+  #draw(choice, time) {
+    const summary = `${time}: ${choice.camera ?? 'no camera'}. ${choice.reason}`;
+    const [head, foot] = [summary, cutCosts(choice)].map((textContent) => make('p', { textContent }));
+    this.container.replaceChildren(head, cameraTable(choice), foot);
+    this.container.hidden = false;
   }
 }
 
 /** @param {Choice} choice */
-function table(choice) {
+function cameraTable(choice) {
   const terms = Object.keys(choice.weights);
   const { undetected = {} } = choice;
-  const some = Object.values(undetected).some((share) => share > 0);
-  const views = document.createElement('table');
-  const head = views.createTHead().insertRow();
-  head.append(...['camera', 'cost', 'sees', ...(some ? ['undetected'] : []), ...terms].map((name) => made('th', name)));
-  const body = views.createTBody();
+  const anyUndetected = Object.values(undetected).some((share) => share > 0);
+  const columns = ['camera', 'cost', 'sees', ...(anyUndetected ? ['undetected'] : []), ...terms];
+  const table = document.createElement('table');
+  const head = table.createTHead().insertRow();
+  head.append(...columns.map((textContent) => make('th', { textContent })));
+  const body = table.createTBody();
   for (const [camera, cost] of Object.entries(choice.costs)) {
     const row = body.insertRow();
     if (camera === choice.camera) row.setAttribute('aria-current', 'true');
-    const shares = some ? [choice.seen[camera], undetected[camera]] : [choice.seen[camera]];
+    const shares = anyUndetected ? [choice.seen[camera], undetected[camera]] : [choice.seen[camera]];
     const values = [cost, ...shares, ...terms.map((term) => choice.terms[camera]?.[term])];
-    row.append(made('th', camera), ...values.map((value) => made('td', number(value))));
+    const cells = values.map((value) => make('td', { textContent: formatNumber(value) }));
+    row.append(make('th', { textContent: camera }), ...cells);
   }
-  return views;
+  return table;
 }
 
 /** @param {Choice} choice */
-function prices({ before, stay, cut_to: to, cut, switch_cost: price, lookahead }) {
-  const words = `A cut costs as much as ${FRAMES.format(price)} frames of not seeing the person.`;
+function cutCosts({ before, stay, cut_to: to, cut, switch_cost: cutCost, lookahead }) {
+  const text = `A cut costs as much as ${FRAMES.format(cutCost)} frames of not seeing the person.`;
   const costs = [];
   if (before !== null && stay !== null) costs.push(`staying with ${before} ${FRAMES.format(stay)}`);
   if (to !== null && cut !== null) costs.push(`${to} ${FRAMES.format(cut)} with its cut`);
-  return costs.length ? `${words} Over ${lookahead} frames: ${costs.join(', ')}.` : words;
+  return costs.length ? `${text} Over ${lookahead} frames: ${costs.join(', ')}.` : text;
 }
 
 /** @param {number | null | undefined} value */
-function number(value) {
+function formatNumber(value) {
   return value === null || value === undefined ? '–' : NUMBERS.format(value);
-}
-
-/**
- * @template {keyof HTMLElementTagNameMap} K
- * @param {K} name
- * @param {string} text
- */
-function made(name, text) {
-  const element = document.createElement(name);
-  element.textContent = text;
-  return element;
 }

@@ -1,55 +1,55 @@
-/** Why this view: the server's one plain sentence about the present choice, or about that of a moment of the past. */
+/** Why this view: one sentence from the server about the selection displayed now. */
 
 import { getJson } from '../shared/requests.js';
 
-/** @import {Choice} from '../shared/contract.js' */
+/** @import {Choice} from '../shared/api_types.js' */
 
-const EVERY_MS = 3000;
+const INTERVAL_MS = 3000;
 
-export class Reason {
-  #asked = -Infinity;
-  #about = '';
+export class SelectionReason {
+  #requestedAt = -Infinity;
+  #key = '';
 
-  /** @param {HTMLElement} place */
-  constructor(place) {
-    this.place = place;
+  /** @param {HTMLElement} target */
+  constructor(target) {
+    this.target = target;
   }
 
   /**
-   * Ask, unless this was asked just now. Called often.
+   * Request and show the reason, unless it was requested within the interval. Called often.
    *
    * @param {number} object
-   * @param {string | null} camera now shown
-   * @param {number | null} pulse now shown, of the past; null: it is live
+   * @param {string | null} camera displayed
+   * @param {number | null} pulse displayed, of the past; null: live
    */
-  async about(object, camera, pulse) {
-    const about = `${object} ${camera} ${pulse === null}`;
+  async refresh(object, camera, pulse) {
+    const key = `${object} ${camera} ${pulse === null}`;
     const now = performance.now();
-    if (about === this.#about && now - this.#asked < EVERY_MS) return;
-    this.#about = about;
-    this.#asked = now;
+    if (key === this.#key && now - this.#requestedAt < INTERVAL_MS) return;
+    this.#key = key;
+    this.#requestedAt = now;
     const query = pulse === null ? '' : `?at=p${pulse}`;
     try {
       const choice = /** @type {Choice} */ (await getJson(`api/objects/${object}/choice${query}`));
-      // The choice runs ahead of the picture by the look-ahead: it may already be about the next view.
-      this.#say(about, choice.camera === camera ? choice.reason : '');
+      // Decisions are ahead of the video by the look-ahead: this one may be about the next view.
+      this.#show(key, choice.camera === camera ? choice.reason : '');
     } catch {
-      this.#say(about, '');
+      this.#show(key, '');
     }
   }
 
-  /** @param {string} text instead */
-  put(text) {
-    this.#about = '';
-    this.#asked = -Infinity;
-    this.place.textContent = this.place.title = text;
+  /** @param {string} text shown instead of a reason */
+  replace(text) {
+    this.#key = '';
+    this.#requestedAt = -Infinity;
+    this.target.textContent = this.target.title = text;
   }
 
   /**
-   * @param {string} about an answer to an older question is not said any more
+   * @param {string} key of the request; an outdated answer is not shown
    * @param {string} text
    */
-  #say(about, text) {
-    if (about === this.#about) this.place.textContent = this.place.title = text;
+  #show(key, text) {
+    if (key === this.#key) this.target.textContent = this.target.title = text;
   }
 }

@@ -1,49 +1,48 @@
-/** By which camera somebody wishes to see: held, whichever is best; or preferred, while it sees the person. */
+/** The viewer's camera: held always, or preferred while it sees the person. */
 
-/** @import {Watched} from '../shared/address.js' */
+/** @import {AddressView} from '../shared/address.js' */
 
-export class Override {
+export class ViewPreference {
   /** @type {string | null} */
   #camera = null;
   /** @type {string[]} */
-  #known = [];
+  #cameras = [];
   prefers = false;
 
-  /** @param {Watched} watched */
-  constructor(watched) {
-    this.take(watched);
+  /** @param {Pick<AddressView, 'camera' | 'prefer'>} view */
+  constructor(view) {
+    this.set(view);
   }
 
   /**
-   * @param {Pick<Watched, 'camera' | 'prefer'>} watched
-   * @returns {boolean} whether that is something else
+   * @param {Pick<AddressView, 'camera' | 'prefer'>} view
+   * @returns {boolean} whether it changed
    */
-  take({ camera, prefer }) {
+  set({ camera, prefer }) {
     const [old, preferred] = [this.#camera, this.prefers];
     this.#camera = camera ?? prefer;
     this.prefers = camera === null && prefer !== null;
     return old !== this.#camera || preferred !== this.prefers;
   }
 
-  /** @param {string[]} cameras of the site: what is not among them is not wished for */
+  /** @param {string[]} cameras of the site: others are ignored */
   configure(cameras) {
-    this.#known = cameras;
+    this.#cameras = cameras;
   }
 
-  /** @param {string | null} camera to hold; once more, or null: the best is shown again */
+  /** @param {string | null} camera to hold; the held one, or null: return to the best view */
   hold(camera) {
-    const mine = camera === this.#camera;
-    this.take({ camera: mine ? null : camera, prefer: null });
+    this.set({ camera: camera === this.#camera ? null : camera, prefer: null });
   }
 
-  /** Hold no longer, but prefer; or the other way. */
-  toggle() {
+  /** Change from holding to preferring, or back. */
+  togglePrefer() {
     if (this.#camera !== null) this.prefers = !this.prefers;
   }
 
-  /** @returns {string | null} the camera that is wished for in either way */
+  /** @returns {string | null} the held or preferred camera */
   get camera() {
-    return this.#camera !== null && this.#known.includes(this.#camera) ? this.#camera : null;
+    return this.#camera !== null && this.#cameras.includes(this.#camera) ? this.#camera : null;
   }
 
   /** @returns {string | null} */
@@ -57,21 +56,21 @@ export class Override {
   }
 
   /**
-   * @param {string | null} best the camera that would be shown
-   * @param {string | null} shown
-   * @param {boolean} live only then a camera is preferred
-   * @returns {string | null} why this camera is shown; null: not by what somebody wishes
+   * @param {string | null} best camera of the best view
+   * @param {string | null} displayed
+   * @param {boolean} live cameras are preferred only live
+   * @returns {string | null} why this camera is displayed; null: not because of the preference
    */
-  words(best, shown, live) {
+  reason(best, displayed, live) {
     const { camera } = this;
     if (camera === null || (this.prefers && !live)) return null;
-    if (this.prefers && shown !== camera) return `${camera} is preferred, and does not see this person just now.`;
-    const better = best === camera ? 'It is the best view now.' : `The best view now is ${best}.`;
-    return [this.prefers ? 'Preferred.' : 'Held by hand.', ...(best === null ? [] : [better])].join(' ');
+    if (this.prefers && displayed !== camera) return `${camera} is preferred, but does not see this person now.`;
+    const comparison = best === camera ? 'It is the best view now.' : `The best view now is ${best}.`;
+    return [this.prefers ? 'Preferred.' : 'Held.', ...(best === null ? [] : [comparison])].join(' ');
   }
 
-  /** @returns {Pick<Watched, 'camera' | 'prefer'>} for the address: also of a camera that is not known */
-  get written() {
+  /** @returns {Pick<AddressView, 'camera' | 'prefer'>} for the address, including a camera that the site lacks */
+  get addressPart() {
     return { camera: this.prefers ? null : this.#camera, prefer: this.prefers ? this.#camera : null };
   }
 }

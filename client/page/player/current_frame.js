@@ -2,7 +2,7 @@
 
 import { PersonViewport } from './viewport.js';
 
-/** @import {Box} from '../shared/contract.js' */
+/** @import {Box} from '../shared/api_types.js' */
 /** @import {Decisions} from '../timeline/decisions.js' */
 /** @import {Viewport} from './viewport.js' */
 /** @import {Frame} from './frames.js' */

@@ -1,9 +1,9 @@
 /** Draws a frame, or its viewport, with its boxes: the selected person in the accent color, others thin and neutral. */
 
-import { label } from '../people/names.js';
+import { shortLabel } from '../people/names.js';
 import { Surface } from './surface.js';
 
-/** @import {Box} from '../shared/contract.js' */
+/** @import {Box} from '../shared/api_types.js' */
 /** @import {Size, Viewport} from './viewport.js' */
 
 const ACCENT = '#3fdc7f';
@@ -130,7 +130,7 @@ function drawBox(context, [object, left, top, right, bottom], scale, selected) {
   context.lineWidth = line;
   context.strokeStyle = selected ? ACCENT : NEUTRAL;
   context.strokeRect(x, y, width, height);
-  drawNumber(context, label(object), x, y, selected);
+  drawNumber(context, shortLabel(object), x, y, selected);
 }
 
 /**

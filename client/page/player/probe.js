@@ -7,7 +7,7 @@
  * @property {number | null} delayMs from when the pulse was due until its frame is displayed
  */
 
-/** @import {Box, Flag, Site} from '../shared/contract.js' */
+/** @import {Box, Flag, Site} from '../shared/api_types.js' */
 /** @import {State} from '../shared/status.js' */
 
 const DELAYS_KEPT = 2048;

@@ -4,7 +4,7 @@
  * It moves exponentially towards the person, and zooms more slowly than it pans.
  */
 
-/** @import {Box} from '../shared/contract.js' */
+/** @import {Box} from '../shared/api_types.js' */
 
 const FILL = 0.6; // share of the viewport's height that the person takes
 const MAX_ZOOM = 3; // beyond it only pixels are to be seen

@@ -1,22 +1,22 @@
-/** Who is watched, and by which camera, in the page's address: the link to share, and the browser's back button. */
+/** The view in the page's address, so that it can be shared as a link and the browser's back button works. */
 
 /**
- * @typedef {object} Watched
- * @property {number | null} object
- * @property {string | null} camera held by hand; null: none is
- * @property {string | null} prefer the camera that is preferred; null: none is
- * @property {number[]} beside who else is seen
+ * @typedef {object} AddressView
+ * @property {number | null} object the selected person
+ * @property {string | null} camera the held camera
+ * @property {string | null} prefer the preferred camera
+ * @property {number[]} beside people on small tiles
  */
 
 const NUMBER = /^\d{1,9}$/;
 
-/** @returns {Watched} */
-export function watchedInAddress() {
+/** @returns {AddressView} */
+export function readAddress() {
   const query = new URLSearchParams(location.search);
-  const text = query.get('object') ?? '';
-  const beside = (query.get('beside') ?? '').split(',').filter((it) => NUMBER.test(it));
+  const object = query.get('object') ?? '';
+  const beside = (query.get('beside') ?? '').split(',').filter((text) => NUMBER.test(text));
   return {
-    object: NUMBER.test(text) ? Number(text) : null,
+    object: NUMBER.test(object) ? Number(object) : null,
     camera: query.get('camera'),
     prefer: query.get('prefer'),
     beside: [...new Set(beside.map(Number))],
@@ -24,23 +24,22 @@ export function watchedInAddress() {
 }
 
 /**
- * @param {Watched} watched
- * @param {boolean} chosen by the viewer (a step to go back from) or by default
+ * @param {AddressView} view
+ * @param {boolean} addStep whether to add a step to the browser's history
  */
-export function writeAddress(watched, chosen) {
-  const { object, camera, prefer, beside } = watched;
-  if (JSON.stringify(watchedInAddress()) === JSON.stringify({ object, camera, prefer, beside })) return;
+export function writeAddress({ object, camera, prefer, beside }, addStep) {
+  if (JSON.stringify(readAddress()) === JSON.stringify({ object, camera, prefer, beside })) return;
   const address = new URL(location.href);
   address.searchParams.set('object', String(object));
   for (const [name, value] of Object.entries({ camera, prefer, beside: beside.join() || null })) {
     if (value === null) address.searchParams.delete(name);
     else address.searchParams.set(name, value);
   }
-  if (chosen) history.pushState(null, '', address);
+  if (addStep) history.pushState(null, '', address);
   else history.replaceState(null, '', address);
 }
 
-/** @param {(watched: Watched) => void} tell */
-export function onAddress(tell) {
-  window.addEventListener('popstate', () => tell(watchedInAddress()));
+/** @param {(view: AddressView) => void} changed called after a step through the browser's history */
+export function onAddressChange(changed) {
+  window.addEventListener('popstate', () => changed(readAddress()));
 }

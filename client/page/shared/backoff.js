@@ -1,12 +1,12 @@
-/** How long to wait before trying again: soon at first, never longer than two seconds. */
+/** Exponential backoff between retries, up to two seconds. */
 
 const FIRST_MS = 250;
-const LONGEST_MS = 2000;
+const MAX_MS = 2000;
 
 export class Backoff {
   #next = FIRST_MS;
 
-  /** It worked: the next failure is tried again soon. */
+  /** Start again at the shortest wait, after a success. */
   reset() {
     this.#next = FIRST_MS;
   }
@@ -14,7 +14,7 @@ export class Backoff {
   /** @returns {number} milliseconds to wait now */
   next() {
     const wait = this.#next;
-    this.#next = Math.min(2 * wait, LONGEST_MS);
+    this.#next = Math.min(2 * wait, MAX_MS);
     return wait;
   }
 }

@@ -1,27 +1,27 @@
 /**
- * The server's events, for as long as the page lives.
+ * The server's events, for as long as the page is open.
  *
- * EventSource reconnects by itself only from some failures, and slowly; so this closes it at every
- * failure and opens a new one. A link that is open but silent is asked about over HTTP.
+ * EventSource reconnects by itself only after some failures, and slowly; so it is closed at every failure and
+ * opened again. A connection that is open but idle is checked by an HTTP request.
  */
 
 import { Backoff } from './backoff.js';
 import { getJson } from './requests.js';
 
 const NAMES = ['site', 'objects', 'cameras', 'gop', 'flag'];
-const SILENCE_MS = 6000;
+const IDLE_MS = 6000;
 const CHECK_MS = 2000;
 
 export class ServerEvents {
   /** @type {EventSource | null} */
   #source = null;
   #backoff = new Backoff();
-  #heard = 0;
+  #activeAt = 0; // performance.now()
   #checking = false;
 
   /**
    * @param {object} listener
-   * @param {(name: string, data: any) => void} listener.heard
+   * @param {(name: string, data: any) => void} listener.received
    * @param {() => void} listener.opened
    * @param {() => void} listener.lost
    */
@@ -34,17 +34,17 @@ export class ServerEvents {
   #open() {
     const source = new EventSource('api/events');
     this.#source = source;
-    this.#heard = performance.now();
+    this.#activeAt = performance.now();
     source.onopen = () => {
       this.#backoff.reset();
-      this.#heard = performance.now();
+      this.#activeAt = performance.now();
       this.listener.opened();
     };
     source.onerror = () => this.#lose(source);
     for (const name of NAMES) {
       source.addEventListener(name, (event) => {
-        this.#heard = performance.now();
-        this.listener.heard(name, JSON.parse(/** @type {MessageEvent} */ (event).data));
+        this.#activeAt = performance.now();
+        this.listener.received(name, JSON.parse(/** @type {MessageEvent} */ (event).data));
       });
     }
   }
@@ -60,11 +60,11 @@ export class ServerEvents {
 
   async #check() {
     const source = this.#source;
-    if (!source || this.#checking || performance.now() - this.#heard < SILENCE_MS) return;
+    if (!source || this.#checking || performance.now() - this.#activeAt < IDLE_MS) return;
     this.#checking = true;
     try {
       await getJson('api/site');
-      this.#heard = performance.now();
+      this.#activeAt = performance.now();
     } catch {
       this.#lose(source);
     } finally {

@@ -1,16 +1,16 @@
-/** The keyboard. What a key does stands beside the button that does the same, as its aria-keyshortcuts. */
+/** Keyboard shortcuts. Each is the aria-keyshortcuts of the button with the same action. */
 
-const PRESSES = new Set([' ', 'Enter']); // what has the focus, if it can be pressed
-const SCROLLS = new Set(['ArrowLeft', 'ArrowRight']); // what has the focus, if it can be scrolled
+const PRESS_KEYS = new Set([' ', 'Enter']); // activate a focused button
+const SCROLL_KEYS = new Set(['ArrowLeft', 'ArrowRight']); // scroll a focused region
 
-/** @param {Record<string, () => void>} keys what each does, by KeyboardEvent.key in lower case */
-export function listenToKeys(keys) {
+/** @param {Record<string, () => void>} actions by KeyboardEvent.key, single letters in lower case */
+export function listenToKeys(actions) {
   document.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || isIn(event.target, 'select, form')) return;
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-    const action = keys[name];
-    if (!action || (PRESSES.has(event.key) && isIn(event.target, 'button, summary, a'))) return;
-    if (SCROLLS.has(event.key) && isIn(event.target, '[role=region]')) return;
+    const action = actions[name];
+    if (!action || (PRESS_KEYS.has(event.key) && isIn(event.target, 'button, summary, a'))) return;
+    if (SCROLL_KEYS.has(event.key) && isIn(event.target, '[role=region]')) return;
     event.preventDefault();
     action();
   });

@@ -1,19 +1,19 @@
-/** What is worth a moment's notice: said for a while, and then no more. */
+/** A notice that disappears after some seconds. */
 
-const NOTICE_MS = 10_000;
+const DURATION_MS = 10_000;
 
 export class Notice {
   #text = '';
-  #at = -Infinity;
+  #shownAt = -Infinity;
 
   /** @param {string} text */
-  say(text) {
+  show(text) {
     this.#text = text;
-    this.#at = performance.now();
+    this.#shownAt = performance.now();
   }
 
-  /** @returns {string} what was said just now; empty: nothing */
+  /** @returns {string} empty: none, or it has expired */
   get text() {
-    return performance.now() - this.#at < NOTICE_MS ? this.#text : '';
+    return performance.now() - this.#shownAt < DURATION_MS ? this.#text : '';
   }
 }

@@ -1,40 +1,88 @@
-/** Small JSON requests that give up in time. Addresses are relative to the page, for reverse proxies. */
+/** JSON requests with timeouts. Addresses are relative to the page, for reverse proxies. */
 
-const PATIENCE_MS = 4000;
+const TIMEOUT_MS = 4000;
+const OPERATOR_TIMEOUT_MS = 8000;
 
-/**
- * @param {string} path relative to the page, such as api/site
- * @param {number} [patience] milliseconds until the request is given up
- * @returns {Promise<any>}
- * @throws {Error} when the server is away, too slow, or answers with an error
- */
-export async function getJson(path, patience = PATIENCE_MS) {
-  const response = await fetch(path, { cache: 'no-store', signal: AbortSignal.timeout(patience) });
-  if (!response.ok) throw new Refused(path, response.status);
-  return response.json();
-}
-
-/** An answer that is an error. */
-export class Refused extends Error {
+/** An HTTP answer with an error status. */
+export class HttpError extends Error {
   /**
-   * @param {string} path
+   * @param {string} message
    * @param {number} status
    */
-  constructor(path, status) {
-    super(`${path}: ${status}`);
+  constructor(message, status) {
+    super(message);
     this.status = status;
   }
 
-  /** @returns {boolean} whether to ask again would not help: what was asked for is not there */
-  get forGood() {
+  /** @returns {boolean} whether a retry would fail as well */
+  get permanent() {
     return this.status >= 400 && this.status < 500;
   }
 }
 
 /**
- * The server's own addresses start at its root; behind a proxy the page may live deeper.
+ * @param {string} path relative to the page, such as api/site
+ * @returns {Promise<any>}
+ * @throws {Error} when the server is unreachable, too slow, or answers with an error
+ */
+export async function getJson(path) {
+  const response = await fetch(path, { cache: 'no-store', signal: AbortSignal.timeout(TIMEOUT_MS) });
+  if (!response.ok) throw new HttpError(`${path}: ${response.status}`, response.status);
+  return response.json();
+}
+
+/**
+ * @param {string} name below api/operator/
+ * @param {'GET' | 'POST' | 'PUT' | 'DELETE'} [method]
+ * @param {object} [content] the request's JSON
+ * @returns {Promise<any>}
+ * @throws {HttpError} with the server's error message
+ * @throws {Error} the server does not answer
+ */
+export function requestOperator(name, method = 'GET', content) {
+  return requestJson(`api/operator/${name}`, method, content);
+}
+
+/**
+ * Request an address whose errors are one line of text for the user.
  *
- * @param {string} address
+ * @param {string} path relative to the page
+ * @param {'GET' | 'POST' | 'PUT' | 'DELETE'} [method]
+ * @param {object} [content] the request's JSON
+ * @returns {Promise<any>}
+ * @throws {HttpError} with the server's error message
+ * @throws {Error} the server does not answer
+ */
+export async function requestJson(path, method = 'GET', content) {
+  const response = await send(path, method, content);
+  const answer = await response.json().catch(() => ({}));
+  if (!response.ok) throw new HttpError(answer.error ?? `The server answers ${response.status}.`, response.status);
+  return answer;
+}
+
+/**
+ * @param {string} path
+ * @param {string} method
+ * @param {object} [content]
+ */
+async function send(path, method, content) {
+  try {
+    return await fetch(path, {
+      method,
+      cache: 'no-store',
+      headers: method === 'GET' ? {} : { 'X-MyView-Changes': '1', 'Content-Type': 'application/json' },
+      body: content && JSON.stringify(content),
+      signal: AbortSignal.timeout(OPERATOR_TIMEOUT_MS),
+    });
+  } catch {
+    throw new Error('The server does not answer.');
+  }
+}
+
+/**
+ * Make an address of the server relative to the page, which may be served below a path by a reverse proxy.
+ *
+ * @param {string} address that starts at the server's root
  */
 export function relative(address) {
   return address.replace(/^\/+/, '');

@@ -1,71 +1,70 @@
-/** Signing in and out, on both pages: a token for a cookie, which no script can read. */
+/** Signing in and out, on both pages: exchanges a token for a cookie that scripts cannot read. */
 
-import { element } from './element.js';
-import { askAt, Refused } from '../operator/requests.js';
+import { element } from './dom.js';
+import { HttpError, requestJson } from './requests.js';
 
-/** @import {Session} from './contract.js' */
+/** @import {Session} from './api_types.js' */
 
 const SESSION = 'api/session';
-const NEEDS_TOKEN = [401, 403, 429]; // none, one that is void, too many wrong ones
-const IN_LINK = /^#token=([\w-]+)$/;
+const NEEDS_TOKEN = [401, 403, 429]; // no token, an invalid one, too many attempts
+const TOKEN_IN_LINK = /^#token=([\w-]+)$/;
 
 export class SignIn {
   /** @type {HTMLFormElement} */
   #form = element('sign-in');
   /** @type {HTMLInputElement} */
   #field = element('token');
-  #out = element('sign-out');
+  #signOut = element('sign-out');
 
   /**
-   * @param {() => void} done what to do when somebody has signed in
-   * @param {(error: unknown) => void} tell says what went wrong; null: nothing
+   * @param {() => void} signedIn
+   * @param {(error: unknown) => void} showError null: no error
    */
-  constructor(done, tell) {
-    this.tell = tell;
+  constructor(signedIn, showError) {
+    this.showError = showError;
     this.#form.addEventListener('submit', async (event) => {
       event.preventDefault();
       if (await this.#signIn(this.#field.value)) {
         this.#field.value = '';
-        done();
+        signedIn();
       } else this.#field.select();
     });
-    this.#out.addEventListener('click', async () => {
-      await askAt(SESSION, 'DELETE').catch(tell);
-      location.reload(); // nothing that was shown stays
+    this.#signOut.addEventListener('click', async () => {
+      await requestJson(SESSION, 'DELETE').catch(showError);
+      location.reload(); // removes everything that was shown
     });
   }
 
   /**
-   * Signs in by the token in the page's address, if it has one, and takes it out of there: behind a # it is sent
-   * to no server, and stands in nobody's log.
+   * Sign in with the token in the page's address, if there is one, and remove it from there. As a fragment it is
+   * sent to no server and appears in no log.
    */
-  async begin() {
-    const [, token] = IN_LINK.exec(location.hash) ?? [];
+  async signInByLink() {
+    const [, token] = TOKEN_IN_LINK.exec(location.hash) ?? [];
     if (!token) return;
     history.replaceState(null, '', location.pathname + location.search);
     await this.#signIn(token);
   }
 
   /**
-   * @returns {Promise<Session | null>} what whoever looks at this page may; null: they have to sign in
-   * @throws {Error} the server does not say
+   * @returns {Promise<Session | null>} the visitor's rights; null: sign-in is needed, and the form is shown
+   * @throws {Error} the server does not answer
    */
-  async look() {
+  async getSession() {
     try {
-      const session = await askAt(SESSION);
+      const session = await requestJson(SESSION);
       this.#form.hidden = true;
-      this.#out.hidden = !session.by_token;
+      this.#signOut.hidden = !session.by_token;
       return session;
     } catch (error) {
-      if (!(error instanceof Refused) || !NEEDS_TOKEN.includes(error.status)) throw error;
-      if (error.status === 403) this.tell(error);
-      this.ask();
+      if (!(error instanceof HttpError) || !NEEDS_TOKEN.includes(error.status)) throw error;
+      if (error.status === 403) this.showError(error);
+      this.showForm();
       return null;
     }
   }
 
-  /** Shows the form. */
-  ask() {
+  showForm() {
     if (!this.#form.hidden) return;
     this.#form.hidden = false;
     this.#field.focus();
@@ -74,12 +73,12 @@ export class SignIn {
   /** @param {string} token */
   async #signIn(token) {
     try {
-      await askAt(SESSION, 'POST', { token });
+      await requestJson(SESSION, 'POST', { token });
       this.#form.hidden = true;
-      this.tell(null);
+      this.showError(null);
       return true;
     } catch (error) {
-      this.tell(error);
+      this.showError(error);
       return false;
     }
   }

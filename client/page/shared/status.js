@@ -1,4 +1,4 @@
-/** From what is known to the state of the page and the few words that say it. */
+/** The state of the viewer's page and the text that describes it. */
 
 /**
  * @typedef {'starting' | 'unsupported' | 'lost' | 'empty' | 'unknown' | 'paused' | 'waiting' | 'away' | 'playing'} State
@@ -6,17 +6,17 @@
  * @typedef {object} Facts
  * @property {boolean} supported whether this browser can play the streams
  * @property {boolean} connected
- * @property {boolean} known whether the list of people has come
- * @property {number} people how many are known
- * @property {number | null} object the chosen person
- * @property {boolean} listed whether the chosen person is among the known
- * @property {boolean} visible whether any camera sees the chosen person now
+ * @property {boolean} known whether the list of people was received
+ * @property {number} people number of people on the list
+ * @property {number | null} object the selected person
+ * @property {boolean} listed whether the selected person is on the list
+ * @property {boolean} visible whether a camera sees the selected person now
  * @property {boolean} paused
- * @property {boolean} moving whether frames of the chosen person are being shown
+ * @property {boolean} moving whether new frames of the selected person are displayed
  *
  * @typedef {object} Status
  * @property {State} state
- * @property {string} title empty when the picture says it all
+ * @property {string} title empty while the person is displayed live
  * @property {string} text
  */
 
@@ -25,46 +25,46 @@
  * @returns {Status}
  */
 export function describe(facts) {
-  return link(facts) ?? whom(facts) ?? picture(facts);
+  return connectionStatus(facts) ?? personStatus(facts) ?? playbackStatus(facts);
 }
 
 /**
  * @param {Facts} facts
  * @returns {Status | null}
  */
-function link({ supported, connected, known }) {
+function connectionStatus({ supported, connected, known }) {
   if (!supported) {
-    return say('unsupported', 'No live video here', 'This browser cannot play it. Any current one can.');
+    return status('unsupported', 'No live video here', 'This browser cannot play it. Any current one can.');
   }
   if (!connected) {
-    if (!known) return say('starting', 'Connecting…', '');
-    return say('lost', 'Connection lost — trying again', 'The picture comes back by itself.');
+    if (!known) return status('starting', 'Connecting…', '');
+    return status('lost', 'Connection lost, reconnecting', 'The video will resume.');
   }
-  return known ? null : say('starting', 'Connecting…', '');
+  return known ? null : status('starting', 'Connecting…', '');
 }
 
 /**
  * @param {Facts} facts
  * @returns {Status | null}
  */
-function whom({ object, people, listed }) {
+function personStatus({ object, people, listed }) {
   if (object !== null && !listed) {
-    return say('unknown', `Person ${object} is not here`, 'Choose somebody else, or wait: the view opens as they appear.');
+    return status('unknown', `Person ${object} is not here`, 'Choose someone else, or wait until they appear.');
   }
   if (object !== null) return null;
-  if (people === 0) return say('empty', 'Nobody yet', 'Whoever walks into a camera’s view appears here.');
-  return say('empty', 'Nobody in view', 'Choose somebody, or wait for the next to appear.');
+  if (people === 0) return status('empty', 'No people yet', 'People appear here when a camera sees them.');
+  return status('empty', 'No one in view', 'Choose a person, or wait for the next to appear.');
 }
 
 /**
  * @param {Facts} facts
  * @returns {Status}
  */
-function picture({ object, visible, paused, moving }) {
-  if (paused && !moving) return say('paused', 'Paused', 'Press the picture to go on.');
-  if (!visible) return say('away', `Person ${object} is out of view`, 'Waiting for a camera to see them again.');
-  if (!moving) return say('waiting', 'Waiting for the picture…', '');
-  return say('playing', '', '');
+function playbackStatus({ object, visible, paused, moving }) {
+  if (paused && !moving) return status('paused', 'Paused', 'Press the picture to resume.');
+  if (!visible) return status('away', `Person ${object} is out of view`, 'Waiting for a camera to see them again.');
+  if (!moving) return status('waiting', 'Waiting for the video…', '');
+  return status('playing', '', '');
 }
 
 /**
@@ -73,6 +73,6 @@ function picture({ object, visible, paused, moving }) {
  * @param {string} text
  * @returns {Status}
  */
-function say(state, title, text) {
+function status(state, title, text) {
   return { state, title, text };
 }

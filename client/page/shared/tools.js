@@ -1,12 +1,12 @@
-/** What a viewer can take along: the picture, the link, the video in a window of its own. */
+/** Saving a snapshot, copying text, and picture-in-picture. */
 
 const QUALITY = 0.92; // of JPEG
 
 /**
- * Save the picture now shown, as the camera sent it.
+ * Save the displayed frame as JPEG, without boxes.
  *
  * @param {HTMLVideoElement} video
- * @param {string} name of the file, without its ending
+ * @param {string} name of the file, without extension
  */
 export async function saveSnapshot(video, name) {
   const canvas = new OffscreenCanvas(video.videoWidth, video.videoHeight);
@@ -19,8 +19,10 @@ export async function saveSnapshot(video, name) {
 }
 
 /**
- * @param {string} text to the clipboard
- * @returns {Promise<boolean>} whether the browser allowed it: some only on a page that came encrypted
+ * Copy text to the clipboard.
+ *
+ * @param {string} text
+ * @returns {Promise<boolean>} whether the browser allowed it; the clipboard API needs HTTPS
  */
 export async function copy(text) {
   try {
@@ -35,15 +37,19 @@ export async function copy(text) {
 function copyBySelection(text) {
   const field = document.createElement('textarea');
   field.value = text;
-  field.className = 'out-of-sight';
+  field.className = 'off-screen';
   document.body.append(field);
   field.select();
-  const done = document.execCommand('copy');
+  const copied = document.execCommand('copy');
   field.remove();
-  return done;
+  return copied;
 }
 
-/** @param {HTMLVideoElement} video out of the page and back */
+/**
+ * Enter picture-in-picture, or leave it.
+ *
+ * @param {HTMLVideoElement} video
+ */
 export async function pictureInPicture(video) {
   if (document.pictureInPictureElement) await document.exitPictureInPicture();
   else await video.requestPictureInPicture();

@@ -1,25 +1,26 @@
-/** What the server decided, by pulse: cameras, cuts and boxes of the last minute and a bit. */
+/** The server's decisions of the last minute, by pulse: cameras, cuts and boxes. */
 
-/** @import {Box, Gop} from '../shared/contract.js' */
+/** @import {Box, Gop} from '../shared/api_types.js' */
+/** @import {View} from './recorded_views.js' */
 
 const KEPT_SECONDS = 75;
 
 export class Decisions {
   /** @type {Gop[]} sorted by first pulse */
   #gops = [];
-  /** @type {Map<number, number>} by a number that somebody once had: the one they have now */
-  #now = new Map();
-  /** @type {Map<number, number[]>} the other way */
-  #once = new Map();
+  /** @type {Map<number, number>} current number by alias */
+  #current = new Map();
+  /** @type {Map<number, number[]>} aliases by current number */
+  #aliases = new Map();
 
   /** @param {number} fps */
   constructor(fps) {
     this.keptFrames = KEPT_SECONDS * fps;
   }
 
-  /** @param {Gop} gop may repeat one that is known: the server sends the last few on connecting */
+  /** @param {Gop} gop may replace a known one: the server sends the last few on connecting */
   add(gop) {
-    if (this.#gops.length && gop.first < this.#gops[0].first) this.#gops = []; // pulses began anew
+    if (this.#gops.length && gop.first < this.#gops[0].first) this.#gops = []; // the pulses have restarted
     let at = this.#gops.length;
     while (at > 0 && this.#gops[at - 1].first >= gop.first) at -= 1;
     const known = this.#gops[at]?.first === gop.first;
@@ -31,10 +32,10 @@ export class Decisions {
     this.#gops = [];
   }
 
-  /** @param {{object: number, aliases?: number[]}[]} people with the numbers that they once had: what was said of those is theirs */
+  /** @param {{object: number, aliases?: number[]}[]} people whose aliases' decisions count as theirs */
   rename(people) {
-    this.#once = new Map(people.map(({ object, aliases }) => [object, aliases ?? []]));
-    this.#now = new Map(people.flatMap(({ object, aliases }) => (aliases ?? []).map((it) => [it, object])));
+    this.#aliases = new Map(people.map(({ object, aliases }) => [object, aliases ?? []]));
+    this.#current = new Map(people.flatMap(({ object, aliases }) => (aliases ?? []).map((alias) => [alias, object])));
   }
 
   /**
@@ -43,17 +44,17 @@ export class Decisions {
    * @returns {string | null}
    */
   #choice(gop, object) {
-    const known = [object, ...(this.#once.get(object) ?? [])].find((it) => gop?.choices[it]);
-    return known === undefined ? null : gop?.choices[known] ?? null;
+    const number = [object, ...(this.#aliases.get(object) ?? [])].find((alias) => gop?.choices[alias]);
+    return number === undefined ? null : gop?.choices[number] ?? null;
   }
 
-  /** The first pulse that nothing is decided for yet; 0 when nothing is known. */
+  /** The first undecided pulse; 0: there are no decisions. */
   get end() {
     const last = this.#gops.at(-1);
     return last ? last.first + last.frames : 0;
   }
 
-  /** The first pulse that something is known of; Infinity when nothing is. */
+  /** The first pulse with a decision; Infinity: there are none. */
   get begin() {
     return this.#gops[0]?.first ?? Infinity;
   }
@@ -63,7 +64,7 @@ export class Decisions {
    * @returns {Gop | undefined}
    */
   at(pulse) {
-    // From the end: what is asked for is nearly always among the newest.
+    // From the end: the newest are requested most often.
     for (let i = this.#gops.length - 1; i >= 0; i -= 1) {
       const gop = this.#gops[i];
       if (gop.first <= pulse) return pulse < gop.first + gop.frames ? gop : undefined;
@@ -81,8 +82,8 @@ export class Decisions {
   }
 
   /**
-   * Which camera a stream shows that prefers one: as the server does it, by what is told of this GOP and of the
-   * one before. It is that camera where it sees the person in more than half of the frames of both.
+   * Return the camera of a stream with a preferred camera, computed as the server does: the preferred one if it
+   * sees the person in more than half of the frames of this GOP and of the one before.
    *
    * @param {number} object
    * @param {string} camera
@@ -92,7 +93,7 @@ export class Decisions {
   preferring(object, camera, pulse) {
     const gop = this.at(pulse);
     const before = gop && this.at(gop.first - 1);
-    if (gop && [gop, before ?? gop].every((it) => this.#sees(it, camera, object))) return camera;
+    if (gop && [gop, before ?? gop].every((candidate) => this.#sees(candidate, camera, object))) return camera;
     return this.#choice(gop, object);
   }
 
@@ -103,7 +104,7 @@ export class Decisions {
    */
   #sees(gop, camera, object) {
     const frames = gop.boxes[camera] ?? [];
-    const seen = frames.filter((boxes) => boxes.some(([number]) => (this.#now.get(number) ?? number) === object));
+    const seen = frames.filter((boxes) => boxes.some(([number]) => (this.#current.get(number) ?? number) === object));
     return 2 * seen.length > frames.length;
   }
 
@@ -115,27 +116,27 @@ export class Decisions {
   boxes(camera, pulse) {
     const gop = this.at(pulse);
     const boxes = gop?.boxes[camera]?.[pulse - gop.first] ?? [];
-    return boxes.map(([number, ...sides]) => [this.#now.get(number) ?? number, ...sides]);
+    return boxes.map(([number, ...sides]) => [this.#current.get(number) ?? number, ...sides]);
   }
 
   /**
-   * The bands of the strip: neighbouring GOPs of the same camera are one run.
+   * Return a person's views from a pulse on; adjacent GOPs of the same camera are merged.
    *
    * @param {number} object
    * @param {number} from pulse
-   * @returns {{camera: string, first: number, end: number}[]}
+   * @returns {View[]}
    */
-  runs(object, from) {
-    /** @type {{camera: string, first: number, end: number}[]} */
-    const runs = [];
+  views(object, from) {
+    /** @type {View[]} */
+    const views = [];
     for (const gop of this.#gops) {
       const end = gop.first + gop.frames;
       const camera = this.#choice(gop, object);
       if (end <= from || !camera) continue;
-      const last = runs.at(-1);
-      if (last && last.camera === camera && last.end === gop.first) last.end = end;
-      else runs.push({ camera, first: Math.max(gop.first, from), end });
+      const last = views.at(-1);
+      if (last?.camera === camera && last.end === gop.first) last.end = end;
+      else views.push({ camera, first: Math.max(gop.first, from), end });
     }
-    return runs;
+    return views;
   }
 }

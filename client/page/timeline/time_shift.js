@@ -1,22 +1,22 @@
-/** Where in time somebody watches: what happens now, or a moment of the past and on from there; or it stands. */
+/** Time shift: live playback, playback of the past, and pausing. */
 
 /** @import {Viewer} from '../viewer.js' */
 
 /**
  * @typedef {object} Moment
  * @property {number} pulse
- * @property {number} time of that pulse: media time, seconds
+ * @property {number} time media time of that pulse, seconds
  */
 
-const LIVE_S = 2; // who is less behind the newest decision than this is live
+const LIVE_S = 2; // closer than this to the newest decision, playback is live
 
 export class TimeShift {
-  /** @type {Moment | null} where the past that is watched began; null: it is live */
+  /** @type {Moment | null} where playback of the past started; null: live */
   moment = null;
-  /** Whether the picture is of pulses that have begun anew since. */
+  /** Whether the displayed pulse is from before the pulses restarted. */
   stale = false;
-  #resumed = false; // it is watched because the picture was paused, not because somebody wished to look back
-  #asleep = false; // paused by a browser that nobody looks at, not by hand
+  #resumedPause = false; // the past is played because the video was paused, not because a moment was chosen
+  #pausedByBrowser = false; // on a hidden page
 
   /**
    * @param {HTMLVideoElement} video
@@ -25,67 +25,69 @@ export class TimeShift {
   constructor(video, viewer) {
     this.video = video;
     this.viewer = viewer;
-    video.addEventListener('pause', () => (this.#asleep = document.hidden));
+    video.addEventListener('pause', () => (this.#pausedByBrowser = document.hidden));
     document.addEventListener('visibilitychange', () => {
-      if (!document.hidden && this.#asleep && video.paused) this.live();
+      if (!document.hidden && this.#pausedByBrowser && video.paused) this.live();
     });
   }
 
   /**
-   * @param {number} wanted pulse to see again, from there on
-   * @param {boolean} resumed it is where the picture was paused
+   * Play from a pulse on.
+   *
+   * @param {number} from pulse
+   * @param {boolean} resumedPause whether that is where the video was paused
    */
-  watchFrom(wanted, resumed = false) {
+  watchFrom(from, resumedPause = false) {
     const { site, object, probe, decisions, format } = this.viewer;
     if (!site || object === null || probe.pulse === null) return;
-    const pulse = Math.max(0, wanted);
+    const pulse = Math.max(0, from);
     if (this.stale || pulse >= decisions.end - LIVE_S * site.fps) return this.live();
-    if (format.container === 'webm') return this.#lose(); // of such a site nothing is kept
+    if (format.container === 'webm') return this.#notRecorded(); // VP8 is not recorded
     this.moment = { pulse, time: pulse / site.fps };
-    this.#resumed = resumed;
-    this.viewer.goOn();
+    this.#resumedPause = resumedPause;
+    this.viewer.play();
   }
 
-  /** From now on what happens now. */
+  /** Return to live playback. */
   live() {
     this.moment = null;
-    this.viewer.goOn();
+    this.viewer.play();
   }
 
-  /** @param {number} seconds to go on, or back, from the frame now shown */
+  /** @param {number} seconds from the displayed frame; negative: back */
   skip(seconds) {
     const { site, probe } = this.viewer;
     if (site && probe.pulse !== null) this.watchFrom(probe.pulse + Math.round(seconds * site.fps));
   }
 
-  /** Stop the picture, or go on with it where it stopped. */
-  pause() {
+  /** Pause, or resume where the video was paused. */
+  togglePause() {
     if (this.video.paused) this.#resume();
     else this.video.pause();
   }
 
-  /** The picture goes on, and not because the page said so. */
+  /** The video plays again, and the page did not start it. */
   resumed() {
-    if (this.#asleep) this.live();
+    if (this.#pausedByBrowser) this.live();
     else this.#resume();
   }
 
-  /** @param {boolean} refused nothing is kept of this past; else it is over */
+  /** @param {boolean} refused there is no such recording; false: it has ended */
   ended(refused) {
-    if (refused) this.#lose();
+    if (refused) this.#notRecorded();
     else this.live();
   }
 
-  /** Whoever is watched next, or by which camera, is watched from the moment of the past that is now shown. */
-  moveOn() {
+  /** Keep the displayed moment of the past for the next person or camera. */
+  keepMoment() {
     const { site, player } = this.viewer;
     if (!site || !this.moment || player.shown?.past !== this.moment) return;
     const pulse = Math.floor(player.mediaTime(this.video.currentTime) * site.fps);
     this.moment = { pulse, time: pulse / site.fps };
   }
 
-  /** Pulses have begun anew: their numbers mean other moments. */
-  beginAnew() {
+  /** The site's pulses have restarted: pulses now mean other moments. */
+  pulsesRestarted() {
     this.moment = null;
     this.stale = this.viewer.probe.pulse !== null;
   }
@@ -96,10 +98,10 @@ export class TimeShift {
     else this.watchFrom(probe.pulse, true);
   }
 
-  #lose() {
-    // Who was paused after somebody had left has lost nothing: there is no picture of them since.
-    const left = this.#resumed && !this.viewer.chosen?.visible;
-    if (!left) this.viewer.notice.say('Nothing is recorded of that time: this is live.');
+  #notRecorded() {
+    // After a pause of a person who has left, nothing is missed: there is no later video of them.
+    const nothingMissed = this.#resumedPause && !this.viewer.selected?.visible;
+    if (!nothingMissed) this.viewer.notice.show('There is no recording of that time. This is live.');
     this.live();
   }
 }

@@ -1,4 +1,4 @@
-"""The page with a keyboard and a screen reader: axe-core finds no serious fault in any of its states."""
+"""Accessibility: axe-core finds no serious fault in any state of the page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = [
 
 
 @pytest.mark.parametrize("width", [360, 1600])
-async def test_while_somebody_is_watched(browser: Browser, width: int) -> None:
+async def test_a_page_with_a_selected_person_has_no_faults(browser: Browser, width: int) -> None:
     async with visiting(browser, FakeSite(people={1: True, 2: False}), width=width) as visit:
         await visit.playing(1)
         await visit.page.get_by_text("More", exact=True).click()
@@ -28,10 +28,12 @@ async def test_while_somebody_is_watched(browser: Browser, width: int) -> None:
         assert await faults(visit) == []
 
 
-async def test_the_numbers_behind_a_view_are_reached_and_scrolled_by_keyboard(browser: Browser) -> None:
+async def test_the_cost_table_is_focused_and_scrolled_by_keyboard(browser: Browser) -> None:
     async with visiting(browser, width=360) as visit:
         await visit.playing(1)
-        await visit.page.add_style_tag(content=".why table { width: 900px }")  # of many cameras and terms
+        await visit.page.add_style_tag(
+            content=".why table { width: 900px }"
+        )  # as with many cameras and terms
         await visit.page.keyboard.press("w")
         await visit.until("document.querySelector('#why table')")
         await visit.page.get_by_role("region", name="Why this view").focus()
@@ -40,7 +42,9 @@ async def test_the_numbers_behind_a_view_are_reached_and_scrolled_by_keyboard(br
 
 
 @pytest.mark.parametrize(("people", "query"), [({}, ""), ({1: False}, "?object=1"), ({1: True}, "?object=9")])
-async def test_while_there_is_nobody_to_watch(browser: Browser, people: dict[int, bool], query: str) -> None:
+async def test_a_page_without_a_visible_person_has_no_faults(
+    browser: Browser, people: dict[int, bool], query: str
+) -> None:
     async with visiting(browser, FakeSite(people=people), query) as visit:
         await visit.until("['empty', 'away', 'unknown'].includes(myview.state)")
         assert await faults(visit) == []

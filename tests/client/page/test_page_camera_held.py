@@ -1,4 +1,4 @@
-"""A camera held by hand: it stays, the page says so, and automatic is one press away."""
+"""Held and preferred cameras."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fakes.programs import needs_chromium
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
-async def stays(visit: Visit, camera: str) -> None:
-    """Check that a camera is shown for as long as the best view would have gone through all of them."""
+async def check_held(visit: Visit, camera: str) -> None:
+    """Check that a camera stays for as long as the best view would have cut through all cameras."""
     await visit.until(f"myview.camera === '{camera}'")
-    seen = await visit.get("myview.pulse")
+    pulse = await visit.get("myview.pulse")
     cuts = await visit.get("myview.cuts.length")
     for later in range(HOLD, len(CAMERAS) * HOLD + 1, HOLD):
-        await visit.until(f"myview.pulse > {seen + later}")
+        await visit.until(f"myview.pulse > {pulse + later}")
         assert await camera_on_the_stage(visit) == camera
     assert await visit.get("myview.cuts.length") == cuts
 
@@ -29,8 +29,8 @@ async def test_a_held_camera_stays_until_automatic_is_pressed(browser: Browser) 
         await visit.playing(1)
         await visit.get("window.before = [video, video.currentSrc]")
         await visit.page.get_by_role("button", name="c1", exact=True).click()
-        await stays(visit, "c1")
-        await expect(visit.page.locator("#reason")).to_contain_text("Held by hand.")
+        await check_held(visit, "c1")
+        await expect(visit.page.locator("#reason")).to_contain_text("Held.")
         assert visit.page.url.endswith("?object=1&camera=c1")
         await visit.page.get_by_role("button", name="Automatic").click()
         await visit.until("new Set(myview.cuts.slice(-2).map((cut) => cut.to)).size > 1")
@@ -40,10 +40,10 @@ async def test_a_held_camera_stays_until_automatic_is_pressed(browser: Browser) 
 
 
 @pytest.mark.slow
-async def test_a_link_and_keys_hold_too_and_another_person_is_automatic(browser: Browser) -> None:
+async def test_links_and_keys_hold_a_camera_and_another_person_is_automatic(browser: Browser) -> None:
     async with visiting(browser, query="?object=1&camera=c0") as visit:
         await visit.playing(1)
-        await stays(visit, "c0")
+        await check_held(visit, "c0")
         await visit.page.keyboard.press("3")
         await visit.until("myview.camera === 'c2'")
         await visit.page.keyboard.press("ArrowRight")
@@ -53,7 +53,7 @@ async def test_a_link_and_keys_hold_too_and_another_person_is_automatic(browser:
         await visit.until("myview.object === 1 && myview.camera === 'c2'")
 
 
-async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(browser: Browser) -> None:
+async def test_a_preferred_camera_is_replaced_while_it_does_not_see_the_person(browser: Browser) -> None:
     async with visiting(browser, query="?object=2&camera=c0") as visit:
         await visit.playing(2)
         await visit.page.get_by_role("button", name="Prefer").click()
@@ -63,7 +63,7 @@ async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(bro
         await expect(visit.page.locator("#reason")).to_have_text("Preferred. The best view now is c2.")
         site = visit.server.site
         first = site.edge - site.edge % GOP + 3 * GOP
-        site.blind = range(first, first + 10_000 * GOP)  # until it has been looked at
+        site.blind = range(first, first + 10_000 * GOP)  # longer than the test
         await visit.until(f"myview.pulse > {first + GOP}")
         assert await visit.get("myview.camera") == "c2"
         assert await camera_on_the_stage(visit) == "c2"
@@ -71,16 +71,16 @@ async def test_a_preferred_camera_gives_way_where_it_does_not_see_the_person(bro
         site.blind = range(first, site.edge - site.edge % GOP + 3 * GOP)
         await visit.until(f"myview.pulse > {site.blind.stop + GOP}")
         cuts = await visit.get("myview.cuts.slice(-2)")
-        assert [it["to"] for it in cuts] == ["c2", "c0"]
+        assert [cut["to"] for cut in cuts] == ["c2", "c0"]
         for cut, since in zip(cuts, (first, site.blind.stop + GOP), strict=True):
-            assert 0 <= cut["pulse"] - since < GOP, "a slow core may leave the very first frame out"
+            assert 0 <= cut["pulse"] - since < GOP, "a slow machine may skip the first frame"
         await visit.page.get_by_role("button", name="Prefer").click()
         await visit.until("new URL(location).searchParams.get('camera') === 'c0'")
         await visit.page.keyboard.press("0")
         await visit.until("myview.camera === 'c2'")
 
 
-async def test_a_camera_that_is_not_there_is_held_by_nobody(browser: Browser) -> None:
+async def test_an_unknown_camera_in_a_link_is_ignored(browser: Browser) -> None:
     async with visiting(browser, query="?object=1&camera=c9") as visit:
         await visit.playing(1)
         await visit.until("myview.cuts.length > 1")

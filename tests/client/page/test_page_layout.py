@@ -1,4 +1,4 @@
-"""The page at the widths of a phone, a tablet and a desk: nothing overflows, nothing jumps."""
+"""Layout of the page on a phone, a tablet and a desktop: no overflow, no layout shifts."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from fakes.programs import needs_chromium
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 MANY = {person: person % 4 != 0 for person in range(1, 24)}
-# Over the picture a slow machine's page has the time to say first this, then that: no jump.
+# On a slow machine the status over the picture may change several times: no layout shift.
 WATCH_SHIFTS = """
     window.shifts = [];
-    const said = ({ node }) => document.querySelector('#status').contains(node);
+    const inStatus = ({ node }) => document.querySelector('#status').contains(node);
     new PerformanceObserver((list) => {
-      for (const entry of list.getEntries()) if (!entry.sources.every(said)) shifts.push(entry.value);
+      for (const entry of list.getEntries()) if (!entry.sources.every(inStatus)) shifts.push(entry.value);
     }).observe({ type: 'layout-shift', buffered: true });
 """
 
 
-@pytest.mark.parametrize("people", [{}, MANY], ids=["nobody", "many"])
+@pytest.mark.parametrize("people", [{}, MANY], ids=["empty", "many"])
 @pytest.mark.parametrize(("width", "height"), [(360, 740), (740, 360), (800, 900), (1600, 900)])
-async def test_nothing_needs_scrolling_sideways(
+async def test_nothing_needs_horizontal_scrolling(
     browser: Browser, width: int, height: int, people: dict[int, bool]
 ) -> None:
     site = FakeSite(people=dict(people))
@@ -42,7 +42,7 @@ async def test_nothing_needs_scrolling_sideways(
 
 
 @pytest.mark.parametrize("shown", ["#tiles", "#why table"])
-async def test_at_a_desk_all_is_seen_without_scrolling(browser: Browser, shown: str) -> None:
+async def test_on_a_desktop_everything_fits_without_scrolling(browser: Browser, shown: str) -> None:
     async with visiting(browser, width=1600, height=900) as visit:
         await visit.playing(1)
         if shown == "#tiles":
@@ -55,7 +55,7 @@ async def test_at_a_desk_all_is_seen_without_scrolling(browser: Browser, shown: 
 
 
 @pytest.mark.parametrize("width", [360, 1600])
-async def test_nothing_jumps_from_opening_to_switching(browser: Browser, width: int) -> None:
+async def test_opening_and_switching_cause_no_layout_shifts(browser: Browser, width: int) -> None:
     async with visiting(browser, width=width) as visit:
         await visit.get(f"{{ {WATCH_SHIFTS} }}")
         await visit.playing(1)
@@ -75,7 +75,7 @@ async def test_controls_are_large_enough_for_a_thumb(browser: Browser) -> None:
             assert min(box["width"], box["height"]) >= 44
 
 
-async def test_everything_that_can_be_pressed_has_a_name(browser: Browser) -> None:
+async def test_every_control_has_an_accessible_name(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         snapshot = await visit.page.locator("body").aria_snapshot()
@@ -86,16 +86,16 @@ async def test_everything_that_can_be_pressed_has_a_name(browser: Browser) -> No
         assert 'navigation "People"' in snapshot
 
 
-async def test_everything_comes_from_the_server_and_keeps_to_its_policy(browser: Browser) -> None:
+async def test_all_requests_go_to_the_server_within_its_content_policy(browser: Browser) -> None:
     async with serving(FakeSite()) as server:
         page = await browser.new_page()
-        complaints: list[str] = []
-        asked: list[str] = []
-        page.on("console", lambda message: complaints.append(message.text))
-        page.on("request", lambda request: asked.append(request.url))
+        messages: list[str] = []
+        requests: list[str] = []
+        page.on("console", lambda message: messages.append(message.text))
+        page.on("request", lambda request: requests.append(request.url))
         await page.goto(server.url)
         await expect(page.locator("#stage")).to_have_attribute("data-state", "playing")
         await expect(page.locator("#camera")).not_to_be_empty()
         await page.close()
-    assert complaints == []
-    assert all(url.startswith((server.url, f"blob:{server.url}", "data:")) for url in asked)
+    assert messages == []
+    assert all(url.startswith((server.url, f"blob:{server.url}", "data:")) for url in requests)

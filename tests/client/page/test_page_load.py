@@ -1,4 +1,4 @@
-"""A camera that leaves something out on a machine with too much to do: whoever watches can read it."""
+"""The viewer's page shows which cameras shed load."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from server.camera.load.load_shedder import shed_levels
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
-async def test_what_a_camera_leaves_out_stands_beside_its_name(browser: Browser) -> None:
-    ladder = shed_levels(5, live=True)
-    site = FakeSite(busy={CAMERAS[1]: ladder[1].description, CAMERAS[2]: ladder[-1].description})
+async def test_the_shed_level_of_a_camera_is_shown_beside_its_name(browser: Browser) -> None:
+    levels = shed_levels(5, live=True)
+    site = FakeSite(busy={CAMERAS[1]: levels[1].description, CAMERAS[2]: levels[-1].description})
     async with visiting(browser, site) as visit:
         await visit.playing(1)
         items = visit.page.locator("#cameras li")
@@ -25,6 +25,6 @@ async def test_what_a_camera_leaves_out_stands_beside_its_name(browser: Browser)
         await expect(items.nth(2)).to_contain_text("showing every 2nd and detecting in every 5th frame")
         for busy in (1, 2):
             await expect(items.nth(busy)).to_have_attribute(
-                "title", ladder[-1 if busy == 2 else 1].description
+                "title", levels[-1 if busy == 2 else 1].description
             )
             await expect(items.nth(busy)).not_to_have_class("away")

@@ -1,4 +1,4 @@
-"""What goes wrong by itself comes right by itself."""
+"""Recovery of the page from lost connections, restarts, gaps and broken streams."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fakes.programs import needs_chromium
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
-async def test_a_lost_server_is_said_under_the_last_picture_and_found_again(browser: Browser) -> None:
+async def test_a_lost_connection_is_reported_under_the_last_frame_and_restored(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.get("window.visit = 'the same'")
         site = visit.server.site
         await visit.server.stop()
         await visit.until("myview.state === 'lost'")
-        await expect(visit.page.get_by_role("status")).to_contain_text("Connection lost — trying again")
+        await expect(visit.page.get_by_role("status")).to_contain_text("Connection lost, reconnecting")
         await expect(visit.page.locator("#stage")).to_have_class("stage pictured")
         await visit.server.restart_as(site)
         last = await visit.get("myview.pulse")
@@ -30,7 +30,7 @@ async def test_a_lost_server_is_said_under_the_last_picture_and_found_again(brow
 
 
 @pytest.mark.parametrize("first", [500, STARTS_AT + 900_000], ids=["earlier", "later"])
-async def test_a_site_whose_pulses_begin_anew_plays_on(browser: Browser, first: int) -> None:
+async def test_a_site_whose_pulses_restart_plays_on(browser: Browser, first: int) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.server.restart_as(FakeSite(first_pulse=first))
@@ -41,7 +41,7 @@ async def test_a_site_whose_pulses_begin_anew_plays_on(browser: Browser, first: 
         assert 0 < delay < 30_000
 
 
-async def test_before_the_first_picture_nobody_is_told_that_the_browser_cannot_play_it(
+async def test_before_the_first_keyframe_the_page_waits(
     browser: Browser,
 ) -> None:
     site = FakeSite(codec=None)
@@ -52,7 +52,7 @@ async def test_before_the_first_picture_nobody_is_told_that_the_browser_cannot_p
         await visit.playing(1)
 
 
-async def test_a_page_that_is_there_before_the_first_picture_plays_when_it_comes(browser: Browser) -> None:
+async def test_a_page_opened_before_the_first_keyframe_plays_when_it_arrives(browser: Browser) -> None:
     site = FakeSite(codec=None)
     async with visiting(browser, site) as visit:
         await visit.until("myview.state === 'waiting' && performance.now() > 2500")
@@ -60,16 +60,16 @@ async def test_a_page_that_is_there_before_the_first_picture_plays_when_it_comes
         await visit.playing(1)
 
 
-async def test_a_hole_in_the_stream_is_jumped_over(browser: Browser) -> None:
+async def test_a_gap_in_the_stream_is_skipped(browser: Browser) -> None:
     site = FakeSite()
     site.skipped = range(site.edge + 2 * FPS, site.edge + 2 * FPS + 8)
     async with visiting(browser, site) as visit:
         await visit.until(f"myview.pulse > {site.skipped.stop + FPS}")
-        seen = await visit.get("myview.delays.map((d) => d.pulse)")
+        seen = await visit.get("myview.delays.map((delay) => delay.pulse)")
         assert not set(seen) & set(site.skipped)
 
 
-async def test_a_broken_stream_is_opened_again(browser: Browser) -> None:
+async def test_a_broken_stream_is_requested_again(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.server.break_streams()
@@ -79,8 +79,7 @@ async def test_a_broken_stream_is_opened_again(browser: Browser) -> None:
         await visit.until("myview.state === 'playing'")
 
 
-async def test_what_cannot_be_decoded_is_asked_for_again_now_and_then(browser: Browser) -> None:
-    """An element that fails at once whenever it is opened."""
+async def test_an_undecodable_stream_is_requested_again_with_backoff(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         fails = "video.dispatchEvent(new Event('error'))"

@@ -1,4 +1,4 @@
-"""Choosing whom to watch: by default, by click, by key, by link, in the picture."""
+"""Selecting a person: by default, click, key, link, and in the picture."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fakes.programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
-# The last frame before a pause may still be on its way to the screen.
+# The last frame before a pause may not be displayed yet.
 SOME_REFRESHES = "(async () => { for (let n = 0; n < 9; n++) await new Promise(requestAnimationFrame); })()"
 
 
@@ -23,14 +23,16 @@ async def test_opens_on_the_first_person_in_view(browser: Browser) -> None:
         assert await visit.page.title() == "Person 2 · MyView"
 
 
-async def test_lists_everybody_with_number_picture_and_cameras(browser: Browser) -> None:
+async def test_every_person_has_a_card_with_number_picture_and_cameras(browser: Browser) -> None:
     async with visiting(browser, FakeSite(people={1: True, 2: False})) as visit:
         cards = visit.page.locator("nav .person")
         await expect(cards).to_have_count(2)
         await expect(cards.nth(0)).to_have_accessible_name("Person 1, seen by c0, c1")
         await expect(cards.nth(1)).to_have_accessible_name("Person 2, not in view")
         await expect(cards.nth(0)).to_have_attribute("aria-current", "true")
-        await visit.until("[...document.querySelectorAll('.person img')].every((i) => i.naturalWidth > 0)")
+        await visit.until(
+            "[...document.querySelectorAll('.person img')].every((image) => image.naturalWidth > 0)"
+        )
 
 
 async def test_a_link_opens_on_its_person(browser: Browser) -> None:
@@ -39,11 +41,11 @@ async def test_a_link_opens_on_its_person(browser: Browser) -> None:
         assert visit.server.site.opened == [2]
 
 
-async def test_who_was_left_before_they_were_shown_is_shown_when_chosen_again(browser: Browser) -> None:
+async def test_a_person_selected_again_during_a_switch_is_shown(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
-        press = "document.querySelector(`#people li[data-object='${it}'] .person`).click()"
-        await visit.get(f"[2, 1, 2].forEach((it) => {press})")
+        press = "document.querySelector(`#people li[data-object='${number}'] .person`).click()"
+        await visit.get(f"[2, 1, 2].forEach((number) => {press})")
         await visit.playing(2)
         first, _, last = await visit.get("myview.switches.slice(-3)")
         assert (first["object"], first["shownAt"]) == (2, None)
@@ -58,10 +60,10 @@ async def test_a_click_switches_and_keeps_the_player(browser: Browser) -> None:
         for person in (2, 1, 2):
             await visit.page.get_by_role("button", name=f"Person {person},").click()
             await visit.playing(person)
-        kept = "[video, video.currentSrc, performance.timeOrigin].every((v, i) => v === window.before[i])"
+        kept = "[video, video.currentSrc, performance.timeOrigin].every((now, i) => now === window.before[i])"
         assert await visit.get(kept)
-        took = await visit.get("myview.switches.slice(-3).map((s) => s.shownAt - s.chosenAt)")
-        assert 0 < min(took) <= max(took) < 10_000  # tenfold what is promised on a machine that keeps up
+        took = await visit.get("myview.switches.slice(-3).map((it) => it.shownAt - it.chosenAt)")
+        assert 0 < min(took) <= max(took) < 10_000  # ten times the target of an idle machine
         assert visit.page.url.endswith("?object=2")
         await visit.page.go_back()
         await visit.playing(1)
@@ -78,7 +80,7 @@ async def test_after_a_switch_only_the_new_person_is_shown(browser: Browser) -> 
         assert await visit.get("myview.camera") == CAMERAS[2]
 
 
-async def test_the_keyboard_is_enough(browser: Browser) -> None:
+async def test_people_are_selected_by_keyboard(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("ArrowRight")
@@ -92,7 +94,7 @@ async def test_the_keyboard_is_enough(browser: Browser) -> None:
         assert (await visit.get(focused)).startswith("Person 2,")
 
 
-async def test_a_click_on_somebody_in_the_picture_chooses_them(browser: Browser) -> None:
+async def test_a_click_on_a_person_in_the_picture_selects_them(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.until("myview.delays.length > 5")
@@ -113,17 +115,17 @@ async def test_a_click_on_somebody_in_the_picture_chooses_them(browser: Browser)
         await visit.playing(2)
 
 
-async def test_says_so_while_nobody_is_there_and_begins_by_itself(browser: Browser) -> None:
+async def test_an_empty_site_says_so_and_plays_when_a_person_appears(browser: Browser) -> None:
     async with visiting(browser, FakeSite(people={})) as visit:
         status = visit.page.get_by_role("status")
-        await expect(status).to_contain_text("Nobody yet")
+        await expect(status).to_contain_text("No people yet")
         assert await visit.get("myview.state") == "empty"
         visit.server.site.people[1] = True
         await visit.playing(1)
         await expect(status).to_have_text("")
 
 
-async def test_a_link_to_somebody_who_is_not_here_waits_for_them(browser: Browser) -> None:
+async def test_a_link_to_an_unknown_person_waits_for_them(browser: Browser) -> None:
     async with visiting(browser, query="?object=7") as visit:
         await expect(visit.page.get_by_role("status")).to_contain_text("Person 7 is not here")
         assert visit.server.site.opened == []
@@ -131,7 +133,7 @@ async def test_a_link_to_somebody_who_is_not_here_waits_for_them(browser: Browse
         await visit.playing(7)
 
 
-async def test_says_when_the_person_has_left_and_goes_on_showing_the_picture(browser: Browser) -> None:
+async def test_when_the_person_leaves_the_page_says_so_and_keeps_the_picture(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         visit.server.site.people[1] = False

@@ -1,4 +1,4 @@
-"""Pause, look back over the last minute, and back to live."""
+"""Time shift: pausing, playing the past, and returning to live."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ HIDDEN = "Object.defineProperty(document, 'hidden', {{ value: {}, configurable: 
 LIVE = "myview.delays.at(-1).delayMs < 2000"
 
 
-async def first_after(visit: Visit, stopped: int) -> int:
-    """Return the first pulse that is shown after one at which the picture stood."""
-    await visit.until(f"!video.paused && myview.pulse > {stopped}")
-    return int(await visit.get(f"myview.delays.find((it) => it.pulse > {stopped}).pulse"))
+async def first_after(visit: Visit, paused_at: int) -> int:
+    """Return the first pulse displayed after the one at which the video was paused."""
+    await visit.until(f"!video.paused && myview.pulse > {paused_at}")
+    return int(await visit.get(f"myview.delays.find((delay) => delay.pulse > {paused_at}).pulse"))
 
 
-async def test_a_press_on_the_strip_shows_that_moment_again(browser: Browser) -> None:
+async def test_a_press_on_the_timeline_plays_from_that_moment(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await seconds_of_playing(visit, 6)
@@ -39,31 +39,31 @@ async def test_a_press_on_the_strip_shows_that_moment_again(browser: Browser) ->
         back = await visit.get("myview.pulse")
         await visit.until(f"myview.pulse > {back + FPS}")
         assert await visit.get("myview.delays.at(-1).delayMs") > 3000
-        frames = await visit.get("myview.delays.map((it) => it.pulse)")
-        assert sum(after < before for before, after in pairwise(frames)) == 1, "back once, then on"
+        frames = await visit.get("myview.delays.map((delay) => delay.pulse)")
+        assert sum(after < before for before, after in pairwise(frames)) == 1, "one jump back, then forward"
         await visit.page.get_by_role("button", name="Live", exact=True).click()
         await visit.until(LIVE)
         await expect(visit.page.get_by_role("button", name="Live", exact=True)).to_be_hidden()
 
 
-async def test_who_pauses_goes_on_where_they_stopped(browser: Browser) -> None:
+async def test_playback_resumes_where_it_was_paused(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
         await visit.until("video.paused && myview.state === 'paused'")
-        stopped = await visit.get("myview.pulse")
+        paused_at = await visit.get("myview.pulse")
         visit.server.site.pulse0 -= 20
         await visit.until("video.buffered.end(video.buffered.length - 1) > video.currentTime + 20")
         await visit.page.get_by_role("button", name="Play").click()
-        assert await first_after(visit, stopped) < stopped + 2 * FPS
+        assert await first_after(visit, paused_at) < paused_at + 2 * FPS
         await visit.page.keyboard.press("End")
-        await visit.until(f"myview.pulse > {stopped + 20 * FPS}")
-        steps = np.diff(await visit.get("myview.delays.map((it) => it.pulse)"))
-        assert steps.max() > 10 * FPS, "at once"
+        await visit.until(f"myview.pulse > {paused_at + 20 * FPS}")
+        steps = np.diff(await visit.get("myview.delays.map((delay) => delay.pulse)"))
+        assert steps.max() > 10 * FPS, "a jump to live"
 
 
-async def some_seconds_back(visit: Visit) -> int:
-    """Look at what was shown five seconds ago; give the pulse that is shown then."""
+async def play_five_seconds_back(visit: Visit) -> int:
+    """Go back five seconds; return the displayed pulse."""
     await visit.playing(1)
     await seconds_of_playing(visit, 6)
     await visit.page.keyboard.press(",")
@@ -71,70 +71,72 @@ async def some_seconds_back(visit: Visit) -> int:
     return int(await visit.get("myview.pulse"))
 
 
-async def left_for_long(visit: Visit) -> int:
-    """Let the stream of a paused picture run on until the page leaves it; give the pulse that is shown."""
+async def pause_until_suspended(visit: Visit) -> int:
+    """Buffer so much behind a paused video that the page cancels its stream; return the displayed pulse."""
     await visit.until("video.paused")
-    stopped = int(await visit.get("myview.pulse"))
+    paused_at = int(await visit.get("myview.pulse"))
     visit.server.site.ahead = 40
     await visit.until("video.buffered.end(video.buffered.length - 1) > video.currentTime + 30")
     await visit.page.wait_for_timeout(300)
-    visit.server.site.people[3] = False  # of whom the page is told
+    visit.server.site.people[3] = False  # makes the page update
     await expect(visit.page.locator(".cards li")).to_have_count(3)
     await visit.page.wait_for_timeout(300)
-    # A few frames may be told of that were on their way to the screen when the picture was stopped.
-    assert await visit.get("video.paused && myview.pulse") - stopped in range(6)
-    assert visit.server.site.opened == [1], "nobody looks at what comes"
-    return stopped
+    # A few frames may still be reported after the pause.
+    assert await visit.get("video.paused && myview.pulse") - paused_at in range(6)
+    assert visit.server.site.opened == [1], "the stream is not requested again"
+    return paused_at
 
 
-async def test_however_long_a_picture_is_paused_it_stays_so(browser: Browser) -> None:
+async def test_a_long_pause_lasts_until_it_is_ended(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
-        stopped = await left_for_long(visit)
+        paused_at = await pause_until_suspended(visit)
         await visit.page.keyboard.press("Space")
-        assert await first_after(visit, stopped) < stopped + 2 * FPS
+        assert await first_after(visit, paused_at) < paused_at + 2 * FPS
 
 
 @pytest.mark.parametrize(
-    "awake",
+    "wake_up",
     ["video.play()", f"{HIDDEN.format('false')} && document.dispatchEvent(new Event('visibilitychange'))"],
 )
-async def test_what_a_browser_paused_unseen_is_live_when_somebody_looks(browser: Browser, awake: str) -> None:
+async def test_a_video_paused_by_the_browser_on_a_hidden_page_resumes_live(
+    browser: Browser, wake_up: str
+) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
-        asked: list[str] = []
-        visit.page.on("request", lambda request: asked.append(request.url))
+        requests: list[str] = []
+        visit.page.on("request", lambda request: requests.append(request.url))
         await visit.get(f"{HIDDEN.format('true')} && video.pause()")
-        stopped = await left_for_long(visit)
-        await visit.get(awake)
-        await visit.until(f"myview.pulse > {stopped + 30 * FPS}")
-        assert not any("from=" in address for address in asked)
+        paused_at = await pause_until_suspended(visit)
+        await visit.get(wake_up)
+        await visit.until(f"myview.pulse > {paused_at + 30 * FPS}")
+        assert not any("from=" in address for address in requests)
 
 
-async def test_a_past_that_comes_slowly_is_shown(browser: Browser) -> None:
-    comes = asyncio.Event()
-    async with visiting(browser, FakeSite(recorded=1800, past_comes=comes)) as visit:
+async def test_a_slowly_arriving_past_is_displayed(browser: Browser) -> None:
+    rest_arrives = asyncio.Event()
+    async with visiting(browser, FakeSite(recorded=1800, past_comes=rest_arrives)) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
         await visit.until("video.paused && myview.state === 'paused'")
-        await visit.page.get_by_label("How much of the past the band shows").select_option("Last 10 minutes")
-        stopped = await visit.get("myview.pulse")
+        await visit.page.get_by_label("Range of the timeline").select_option("Last 10 minutes")
+        paused_at = await visit.get("myview.pulse")
         strip = visit.page.locator("#strip")
         box = await strip.bounding_box()
         assert box is not None
-        # In the middle of a GOP: its first frame is not the one that is wished for.
-        x = next(x for x in count(100) if 4 <= (stopped + (x / box["width"] * 620 - 600) * FPS) % GOP <= 6)
+        # In the middle of a GOP, so that its first frame is not the requested one.
+        x = next(x for x in count(100) if 4 <= (paused_at + (x / box["width"] * 620 - 600) * FPS) % GOP <= 6)
         await strip.click(position={"x": x, "y": 5})
         await visit.until("video.buffered.length && video.buffered.start(0) < video.currentTime - 100")
-        comes.set()
-        await visit.until(f"myview.pulse < {stopped - 100 * FPS}")
+        rest_arrives.set()
+        await visit.until(f"myview.pulse < {paused_at - 100 * FPS}")
 
 
-async def test_the_band_reaches_back_over_all_that_is_recorded(browser: Browser) -> None:
+async def test_the_timeline_covers_the_whole_recording(browser: Browser) -> None:
     async with visiting(browser, FakeSite(recorded=1800)) as visit:
         await visit.playing(1)
-        span = visit.page.get_by_label("How much of the past the band shows")
+        span = visit.page.get_by_label("Range of the timeline")
         await expect(span.locator("option")).to_have_text(["Last minute", "Last 10 minutes", "Last hour"])
         await span.select_option("Last 10 minutes")
         strip = visit.page.locator("#strip")
@@ -156,76 +158,76 @@ async def test_the_band_reaches_back_over_all_that_is_recorded(browser: Browser)
         await visit.until(LIVE)
 
 
-async def test_who_was_paused_while_the_site_began_anew_is_live(browser: Browser) -> None:
+async def test_a_pause_during_a_restart_of_the_pulses_resumes_live(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
         await visit.until("video.paused")
-        stopped = await visit.get("myview.pulse")
+        paused_at = await visit.get("myview.pulse")
         await visit.server.restart_as(FakeSite(first_pulse=500))
-        began_anew = "Math.abs(myview.site.pulse0 - Date.now() / 1000) < 40"
-        await visit.until(f"myview.state === 'paused' && {began_anew}")
+        restarted = "Math.abs(myview.site.pulse0 - Date.now() / 1000) < 40"
+        await visit.until(f"myview.state === 'paused' && {restarted}")
         await visit.page.wait_for_timeout(1000)
-        assert await visit.get("video.paused && myview.pulse") - stopped in range(6), "the picture stays"
+        assert await visit.get("video.paused && myview.pulse") - paused_at in range(6), "the frame stays"
         await visit.page.keyboard.press("Space")
         await visit.until(f"!video.paused && myview.pulse < 2000 && {LIVE}")
         await expect(visit.page.locator("#notice")).to_be_empty()
 
 
-async def test_who_plays_on_in_a_window_of_its_own_is_where_they_stopped(browser: Browser) -> None:
+async def test_playback_resumed_outside_the_page_continues_where_it_was_paused(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.get("video.pause()")
-        stopped = await visit.get("myview.pulse")
+        paused_at = await visit.get("myview.pulse")
         visit.server.site.ahead = 20
         await visit.until("video.buffered.end(video.buffered.length - 1) > video.currentTime + 15")
         await visit.get("video.play()")
-        await visit.until(f"!video.paused && myview.pulse > {stopped + FPS}")
-        assert await visit.get("myview.pulse") < stopped + 5 * FPS
+        await visit.until(f"!video.paused && myview.pulse > {paused_at + FPS}")
+        assert await visit.get("myview.pulse") < paused_at + 5 * FPS
         await expect(visit.page.get_by_role("button", name="Live", exact=True)).to_be_visible()
 
 
 @pytest.mark.slow
-async def test_the_past_goes_on_where_its_stream_broke(browser: Browser) -> None:
+async def test_the_past_continues_where_its_stream_broke(browser: Browser) -> None:
     async with visiting(browser) as visit:
-        back = await some_seconds_back(visit)
+        back = await play_five_seconds_back(visit)
         await visit.server.break_streams()
         await visit.until(f"myview.pulse > {back + 6 * FPS}")
         assert await visit.get("myview.delays.at(-1).delayMs") > 4000
         await expect(visit.page.locator("#notice")).to_be_empty()
 
 
-async def test_who_was_paused_after_somebody_had_left_has_lost_nothing(browser: Browser) -> None:
+async def test_a_pause_of_a_person_who_has_left_resumes_live_without_a_notice(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
         visit.server.site.people = {1: False, 2: True}
         visit.server.site.kept_from = STARTS_AT + 100_000
-        await left_for_long(visit)
+        await pause_until_suspended(visit)
         await visit.page.keyboard.press("Space")
         await visit.until(f"!video.paused && {LIVE}")
         await expect(visit.page.locator("#notice")).to_be_empty()
 
 
-async def test_what_is_not_kept_is_said_and_live_goes_on(browser: Browser) -> None:
+async def test_an_unrecorded_moment_is_reported_and_playback_is_live(browser: Browser) -> None:
     async with visiting(browser, FakeSite(kept_from=STARTS_AT + 10_000)) as visit:
         await visit.playing(1)
         await seconds_of_playing(visit, 3)
         await visit.page.keyboard.press(",")
-        await expect(visit.page.locator("#notice")).to_contain_text("Nothing is recorded of that time")
+        await expect(visit.page.locator("#notice")).to_contain_text("There is no recording of that time")
         seen = await visit.get("myview.pulse")
         await visit.until(f"myview.pulse > {seen + GOP} && {LIVE}")
 
 
 @pytest.mark.slow
-async def test_another_person_is_watched_at_the_same_moment_of_the_past(browser: Browser) -> None:
+async def test_another_person_is_played_from_the_same_moment_of_the_past(browser: Browser) -> None:
     async with visiting(browser) as visit:
-        back = await some_seconds_back(visit)
+        back = await play_five_seconds_back(visit)
         async with visit.page.expect_request(lambda request: "choice?at=p" in request.url):
             await visit.until(f"myview.pulse > {back + 2 * FPS}")
         await visit.page.keyboard.press("ArrowRight")
         await visit.playing(2)
-        assert await visit.get("myview.pulse") > back + FPS, "goes on from the moment shown"
+        assert await visit.get("myview.pulse") > back + FPS, "continues from the displayed moment"
         await visit.until("myview.delays.at(-1).delayMs > 4000 && myview.camera === 'c2'")
         await visit.page.keyboard.press("1")
         await visit.until("myview.delays.at(-1).delayMs > 4000 && myview.camera === 'c0'")

@@ -1,4 +1,4 @@
-"""The unit tests of the page's modules that need no browser: units/, by Node's own test runner."""
+"""Unit tests of the page's modules that need no browser (units/), run by Node's test runner."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NODE = Path(sys.executable).parent / "node"
 
 
 @pytest.mark.parametrize("file", sorted(_UNITS.glob("*.test.js")), ids=lambda file: file.name.split(".")[0])
-def test_the_modules_of_the_page_do_as_they_say(file: Path) -> None:
+def test_page_module(file: Path) -> None:
     done = subprocess.run(
         [_NODE, "--test", "--test-reporter=tap", file],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""The numbers behind a view: of the present one by a button, of another moment under the mouse."""
+"""The cost table: of the displayed view by the Why button, of another moment by the mouse on the timeline."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fakes.programs import needs_chromium
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 
-async def test_the_present_view_is_explained_camera_by_camera(browser: Browser) -> None:
+async def test_the_why_button_shows_the_costs_of_every_camera(browser: Browser) -> None:
     async with visiting(browser, query="?object=2") as visit:
         await visit.playing(2)
         await visit.page.keyboard.press("w")
@@ -30,12 +30,12 @@ async def test_the_present_view_is_explained_camera_by_camera(browser: Browser) 
         legend = await visit.page.locator(".legend").bounding_box()
         assert table is not None
         assert legend is not None
-        assert table["y"] + table["height"] <= legend["y"], "it lies over nothing that can be pressed"
+        assert table["y"] + table["height"] <= legend["y"], "it covers no controls"
         await visit.page.get_by_role("button", name="Why").click()
         await expect(why).to_be_hidden()
 
 
-async def test_where_somebody_is_not_found_that_is_a_column_of_its_own(browser: Browser) -> None:
+async def test_undetected_shares_have_their_own_column(browser: Browser) -> None:
     async with visiting(browser, FakeSite(undetected=0.25), query="?object=2") as visit:
         await visit.playing(2)
         await visit.page.keyboard.press("w")
@@ -44,42 +44,42 @@ async def test_where_somebody_is_not_found_that_is_a_column_of_its_own(browser: 
         await expect(why.locator("tr[aria-current]")).to_have_text("c20.001.000.251.001.00")
 
 
-async def test_a_moment_under_the_mouse_is_explained(browser: Browser) -> None:
+async def test_the_mouse_on_the_timeline_shows_the_costs_of_that_moment(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
-        seen = await visit.get("myview.pulse")
-        await visit.until(f"myview.pulse > {seen + 5 * FPS}")
+        pulse = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {pulse + 5 * FPS}")
         strip = visit.page.locator("#strip")
         box = await strip.bounding_box()
         assert box is not None
         await strip.hover(position={"x": box["width"] * (60 - 3) / 62, "y": 5})
         why = visit.page.locator("#why")
         await expect(why).to_contain_text("s before: c")
-        words = await why.locator("p").first.text_content() or ""
-        assert 2 < float(words.split(maxsplit=1)[0]) < 15
+        text = await why.locator("p").first.text_content() or ""
+        assert 2 < float(text.split(maxsplit=1)[0]) < 15
         await visit.page.mouse.move(5, 5)
         await expect(why).to_be_hidden()
 
 
-async def test_where_the_mouse_comes_to_rest_is_explained_though_answers_are_slow(browser: Browser) -> None:
+async def test_with_slow_answers_the_costs_are_of_the_last_mouse_position(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
 
-        async def late(route: Route) -> None:
+        async def delay(route: Route) -> None:
             await asyncio.sleep(0.4)
             await route.continue_()
 
-        await visit.page.route("**/choice?at=*", late)
+        await visit.page.route("**/choice?at=*", delay)
         box = await visit.page.locator("#strip").bounding_box()
         assert box is not None
         for seconds in (10, 30):
             await visit.page.mouse.move(box["x"] + box["width"] * (60 - seconds) / 62, box["y"] + 5)
-        words = visit.page.locator("#why p").first
-        await expect(words).to_contain_text("s before: c")
-        assert 28 < float((await words.text_content() or "").split(maxsplit=1)[0]) < 45
+        text = visit.page.locator("#why p").first
+        await expect(text).to_contain_text("s before: c")
+        assert 28 < float((await text.text_content() or "").split(maxsplit=1)[0]) < 45
 
 
-async def test_a_moment_whose_reasons_are_not_kept_is_said(browser: Browser) -> None:
+async def test_a_moment_without_recorded_reasons_says_so(browser: Browser) -> None:
     async with visiting(browser, FakeSite(kept_from=STARTS_AT + 100_000)) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("w")

@@ -1,4 +1,4 @@
-"""Following somebody by a zoom in the page, and what a viewer can take along."""
+"""The Follow button, snapshots and copied links."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from fakes.programs import needs_chromium
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
 BRIGHT = 150
-"""Of 255: person 1's square is brighter in all three colours, nothing else is."""
+"""Of 255: only person 1's square is brighter in all three colors."""
 BROWN = 50
-"""Of 255: person 2's square is more red than blue by more than that, nothing else is."""
+"""Of 255: only person 2's square has a larger difference of red and blue."""
 
 
 async def bright_share(visit: Visit) -> float:
-    """Return the share of the stage that the chosen person's square takes: the most of some moments.
+    """Return the largest of several shares of the stage that the selected person's square takes.
 
-    It moves faster than anybody walks, and so leaves the part that is shown now and then.
+    It moves faster than a person walks, so that it sometimes leaves the viewport.
     """
     return max([await bright_share_now(visit) for _ in range(8)])
 
@@ -35,7 +35,7 @@ async def bright_share_now(visit: Visit) -> float:
 
 
 @pytest.mark.parametrize("boxes", [True, pytest.param(False, marks=pytest.mark.slow)])
-async def test_who_is_followed_is_large_and_inside_the_picture(browser: Browser, boxes: bool) -> None:
+async def test_a_followed_person_is_large_and_inside_the_picture(browser: Browser, boxes: bool) -> None:
     async with visiting(browser, FakeSite(people={1: True})) as visit:
         await visit.playing(1)
         if not boxes:
@@ -46,7 +46,9 @@ async def test_who_is_followed_is_large_and_inside_the_picture(browser: Browser,
         await visit.until("document.querySelector('#toggle-follow').ariaPressed === 'true'")
         seen = await visit.get("myview.pulse")
         await visit.until(f"myview.pulse > {seen + 75}")
-        while await bright_share_now(visit) < 4 * whole:  # three times as large both ways, less its edges
+        while (
+            await bright_share_now(visit) < 4 * whole
+        ):  # three times as large in both directions, except for the edges
             pass
         await visit.page.keyboard.press("z")
         seen = await visit.get("myview.pulse")
@@ -54,7 +56,7 @@ async def test_who_is_followed_is_large_and_inside_the_picture(browser: Browser,
         assert await bright_share(visit) < 2 * whole
 
 
-async def test_a_click_on_somebody_hits_them_in_the_part_that_is_shown(browser: Browser) -> None:
+async def test_a_person_is_found_under_the_pointer_while_followed(browser: Browser) -> None:
     async with visiting(browser, query="?object=2") as visit:
         await visit.playing(2)
         await visit.page.keyboard.press("z")
@@ -71,7 +73,7 @@ async def test_a_click_on_somebody_hits_them_in_the_part_that_is_shown(browser: 
         await visit.until("document.querySelector('#stage').classList.contains('over-person')")
 
 
-async def test_a_snapshot_is_the_cameras_picture_without_boxes(browser: Browser, tmp_path: Path) -> None:
+async def test_a_snapshot_is_the_frame_without_boxes(browser: Browser, tmp_path: Path) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
         await visit.page.get_by_text("More").click()

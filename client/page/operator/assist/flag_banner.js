@@ -1,26 +1,26 @@
-/** The quiet line at the top of every view: what may go wrong soon, and whom to point at. */
+/** The line at the top of the picture: the most urgent flag, and the button to answer it by pointing. */
 
-import { element } from '../../shared/element.js';
-import { Flags, NOW_S, when, words } from './flag_priority.js';
-import { label } from '../../people/names.js';
+import { element, setText } from '../../shared/dom.js';
+import { describeFlag, describeTime, NOW_S, OpenFlags } from './flag_priority.js';
+import { shortLabel } from '../../people/names.js';
 
-/** @import {Flag} from '../../shared/contract.js' */
+/** @import {Flag} from '../../shared/api_types.js' */
 /** @import {Pointing} from './pointing.js' */
 /** @import {Viewer} from '../../viewer.js' */
 
-const BEFORE_S = 1; // what is over in the picture is seen again from so long before it
+const LEAD_IN_S = 1; // a past event is played again from this long before it
 
-export class Banner {
-  flags = new Flags();
+export class FlagBanner {
+  flags = new OpenFlags();
   #banner = element('flags');
-  #words = element('flag-words');
-  #when = element('flag-when');
-  #point = element('flag-point');
-  #toggle = element('point');
-  /** @type {string | null} the camera that is held to point in its picture */
-  #held = null;
-  #answers = false; // who is pointed at is so for a flag, not because the operator wished it of who is watched
-  #back = false; // what is shown is past, to point at somebody there
+  #text = element('flag-words');
+  #time = element('flag-when');
+  #answerButton = element('flag-point');
+  #pointButton = element('point');
+  /** @type {string | null} the camera held for pointing */
+  #heldCamera = null;
+  #answering = false; // pointing answers a flag; false: the operator points at the selected person
+  #wentBack = false; // the past is played for pointing
 
   /**
    * @param {Viewer} viewer
@@ -29,97 +29,87 @@ export class Banner {
   constructor(viewer, pointing) {
     this.viewer = viewer;
     this.pointing = pointing;
-    this.#point.addEventListener('click', () => this.answer());
-    this.#toggle.addEventListener('click', () => this.toggle());
+    this.#answerButton.addEventListener('click', () => this.toggleAnswer());
+    this.#pointButton.addEventListener('click', () => this.togglePointing());
   }
 
   /** @param {Flag} flag */
-  take(flag) {
-    this.flags.take(flag);
+  update(flag) {
+    this.flags.update(flag);
     const { object } = this.pointing;
-    const mine = this.#answers && object !== null && flag.objects.includes(object);
-    if (flag.state === 'answered' && mine && !this.flags.about(object, this.#now)) this.#leave();
+    const answered = flag.state === 'answered' && this.#answering && object !== null && flag.objects.includes(object);
+    if (answered && !this.flags.mostUrgentOf(object, this.#now)) this.#stop();
     this.show();
   }
 
-  /** Point at whom the most urgent flag is about; once more: no more. */
-  answer() {
-    if (this.pointing.object !== null) return this.#leave();
-    const [flag] = this.flags.urgent(this.#now);
+  /** Start pointing at the person of the most urgent flag, or stop pointing. */
+  toggleAnswer() {
+    if (this.pointing.object !== null) return this.#stop();
+    const [flag] = this.flags.byUrgency(this.#now);
     if (flag) this.#answer(flag);
     this.show();
   }
 
-  /** Point at who is watched, whatever flags there are; where nobody is, answer. Once more: no more. */
-  toggle() {
+  /** Start pointing at the selected person (without one, answer the most urgent flag), or stop pointing. */
+  togglePointing() {
     const { viewer, pointing } = this;
-    if (pointing.object !== null || viewer.object === null) return this.answer();
+    if (pointing.object !== null || viewer.object === null) return this.toggleAnswer();
     pointing.begin(viewer.object);
-    this.#answers = false;
+    this.#answering = false;
     this.show();
   }
 
   show() {
     const { flags, pointing, viewer } = this;
-    const on = pointing.object !== null;
-    // Who follows somebody is told what they are followed through, however urgent others are.
     const { site, probe } = viewer;
-    const urgent = flags.urgent(this.#now);
-    const flag = on ? flags.about(pointing.object, this.#now) : urgent[0];
+    const on = pointing.object !== null;
+    const byUrgency = flags.byUrgency(this.#now);
+    // While pointing, the banner shows the person's own flag, even if others are more urgent.
+    const flag = on ? flags.mostUrgentOf(pointing.object, this.#now) : byUrgency[0];
     this.#banner.hidden = !flag && !on;
     const target = pointing.object ?? flag?.objects[0] ?? null;
-    const follow = on && target !== null ? `Follow ${label(target)}` : '';
-    write(this.#words, [follow, flag ? words(flag, label) : ''].filter(Boolean).join(': '));
-    write(this.#when, flag && site && probe.pulse !== null ? ` ${when(flag, probe.pulse, site.fps)}` : '');
-    this.#point.hidden = this.#toggle.hidden = !pointing.possible;
-    write(this.#point, on ? 'Done' : `Point at ${target === null ? '' : label(target)}`);
-    this.#toggle.setAttribute('aria-pressed', String(on));
-    probe.flags = urgent;
+    const follow = on && target !== null ? `Follow ${shortLabel(target)}` : '';
+    setText(this.#text, [follow, flag ? describeFlag(flag, shortLabel) : ''].filter(Boolean).join(': '));
+    setText(this.#time, flag && site && probe.pulse !== null ? ` ${describeTime(flag, probe.pulse, site.fps)}` : '');
+    this.#answerButton.hidden = this.#pointButton.hidden = !pointing.available;
+    setText(this.#answerButton, on ? 'Done' : `Point at ${target === null ? '' : shortLabel(target)}`);
+    this.#pointButton.setAttribute('aria-pressed', String(on));
+    probe.flags = byUrgency;
     probe.pointing = { object: pointing.object, accepted: pointing.accepted };
-    if (!on && (this.#held !== null || this.#back)) this.#leave();
+    if (!on && (this.#heldCamera !== null || this.#wentBack)) this.#stop();
   }
 
-  /** The first frame of which what is expected there is not past for who looks at the picture. */
+  /** The pulse before which events count as past at the displayed frame. */
   get #now() {
     const { site, probe } = this.viewer;
     return site && probe.pulse !== null ? probe.pulse - NOW_S * site.fps : 0;
   }
 
-  /** @param {Flag} flag to be answered in the picture of the camera that has raised it, as it happens or again */
+  /** @param {Flag} flag to answer in the picture of its camera, live or in the past */
   #answer({ objects: [object], cameras: [camera], pulse }) {
     const { viewer, pointing } = this;
-    const over = pulse < this.#now;
+    const past = pulse < this.#now;
     pointing.begin(object);
-    this.#answers = pointing.object !== null;
-    if (!this.#answers) return;
-    viewer.choose(object);
-    if (viewer.override.camera !== camera) {
+    this.#answering = pointing.object !== null;
+    if (!this.#answering) return;
+    viewer.select(object);
+    if (viewer.preference.camera !== camera) {
       viewer.hold(camera);
-      this.#held = camera;
-    } // else as the operator wished
-    if (!over || !viewer.site || viewer.timeShift.moment) return;
-    viewer.timeShift.watchFrom(pulse - Math.round(BEFORE_S * viewer.site.fps));
-    this.#back = viewer.timeShift.moment !== null; // it stays live where that is as good
+      this.#heldCamera = camera;
+    }
+    if (!past || !viewer.site || viewer.timeShift.moment) return;
+    viewer.timeShift.watchFrom(pulse - Math.round(LEAD_IN_S * viewer.site.fps));
+    this.#wentBack = viewer.timeShift.moment !== null; // null: recent enough to stay live
   }
 
-  /** What was held to point is let go, unless somebody has held another meanwhile; and what was past is live. */
-  #leave() {
-    const [held, back] = [this.#held, this.#back];
-    this.#held = null;
-    this.#back = false;
+  /** Stop pointing; release the camera held for it, unless another was held since, and return to live. */
+  #stop() {
+    const [heldCamera, wentBack] = [this.#heldCamera, this.#wentBack];
+    this.#heldCamera = null;
+    this.#wentBack = false;
     if (this.pointing.object !== null) this.pointing.end();
-    if (held !== null && this.viewer.override.camera === held) this.viewer.hold(null);
-    if (back && this.viewer.timeShift.moment) this.viewer.timeShift.live();
+    if (heldCamera !== null && this.viewer.preference.camera === heldCamera) this.viewer.hold(null);
+    if (wentBack && this.viewer.timeShift.moment) this.viewer.timeShift.live();
     this.show();
   }
-}
-
-/**
- * Only where it is another: what is written is read out.
- *
- * @param {HTMLElement} place
- * @param {string} text
- */
-function write(place, text) {
-  if (place.textContent !== text) place.textContent = text;
 }

@@ -1,70 +1,70 @@
-/** What the operator is asked to look at: which flag is the most urgent, and in what words. No element. */
+/** The order of flags by urgency, and their descriptions. No DOM. */
 
-/** @import {Flag} from '../../shared/contract.js' */
+/** @import {Flag} from '../../shared/api_types.js' */
 
-export const NOW_S = 0.5; // within so much of it, it happens now
+export const NOW_S = 0.5; // an event within this time happens now
 
 /** The flags that can be answered. */
-export class Flags {
+export class OpenFlags {
   /** @type {Map<number, Flag>} */
-  #open = new Map();
+  #flags = new Map();
 
-  /** @param {Flag} flag as it is now */
-  take(flag) {
-    if (flag.state === 'raised' || flag.state === 'followed') this.#open.set(flag.id, flag);
-    else this.#open.delete(flag.id);
+  /** @param {Flag} flag */
+  update(flag) {
+    if (flag.state === 'raised' || flag.state === 'followed') this.#flags.set(flag.id, flag);
+    else this.#flags.delete(flag.id);
   }
 
-  /** Another run of the server raises others. */
+  /** Delete all: after a reconnection the server sends the open ones again. */
   clear() {
-    this.#open.clear();
+    this.#flags.clear();
   }
 
   /**
-   * What is ahead before what is past, which can be answered for a while; the nearest first.
+   * Sort the flags: future events before past ones, which can be answered for a while; then the nearest first.
    *
-   * @param {number} now the frame that is looked at; what was expected before it is past
+   * @param {number} now pulse; events expected before it are past
    * @returns {Flag[]} the most urgent first
    */
-  urgent(now) {
+  byUrgency(now) {
     const past = (/** @type {Flag} */ { pulse }) => Number(pulse < now);
-    const away = (/** @type {Flag} */ { pulse }) => Math.abs(pulse - now);
-    return [...this.#open.values()].sort(
-      (a, b) => past(a) - past(b) || away(a) - away(b) || a.margin - b.margin || a.id - b.id,
+    const distance = (/** @type {Flag} */ { pulse }) => Math.abs(pulse - now);
+    return [...this.#flags.values()].sort(
+      (a, b) => past(a) - past(b) || distance(a) - distance(b) || a.margin - b.margin || a.id - b.id,
     );
   }
 
   /**
    * @param {number | null} object
-   * @param {number} now as of {@link urgent}
-   * @returns {Flag | undefined} the most urgent that somebody is in
+   * @param {number} now as of {@link byUrgency}
+   * @returns {Flag | undefined} the most urgent flag that involves a person
    */
-  about(object, now) {
-    return this.urgent(now).find(({ objects }) => object !== null && objects.includes(object));
+  mostUrgentOf(object, now) {
+    return this.byUrgency(now).find(({ objects }) => object !== null && objects.includes(object));
   }
 }
 
 /**
  * @param {Flag} flag
- * @param {(object: number) => string} called what somebody is called
- * @returns {string} what may go wrong
+ * @param {(object: number) => string} labelOf
+ * @returns {string} the predicted failure
  */
-export function words({ objects, reason }, called) {
-  const who = objects.map(called).join(' and ');
-  if (reason === 'track_loss') return `${who} fades, or is lost from sight`;
-  if (reason === 'optimality_gap') return `It is not sure who is ${objects.map(called).join(', and who is ')}`;
-  if (objects.length < 2) return `${who} may be taken for somebody else`;
-  return reason === 'crossing' ? `${who}, alike, cross` : `${who} may be taken for each other`;
+export function describeFlag({ objects, reason }, labelOf) {
+  const people = objects.map(labelOf).join(' and ');
+  if (reason === 'track_loss') return `${people} may be lost`;
+  if (reason === 'optimality_gap') return `${people}: identities uncertain`;
+  if (objects.length < 2) return `${people} may be mistaken for someone else`;
+  return reason === 'crossing' ? `${people} look alike and cross` : `${people} may be swapped`;
 }
 
 /**
  * @param {Flag} flag
- * @param {number} pulse the frame that is shown
+ * @param {number} pulse displayed
  * @param {number} fps
- * @returns {string} when, as seen by who looks at that frame
+ * @returns {string} when the event is expected, relative to the displayed frame
  */
-export function when({ pulse: expected }, pulse, fps) {
-  const left = (expected - pulse) / fps;
-  if (Math.abs(left) < NOW_S) return 'now';
-  return left > 0 ? `in ${left.toFixed(1)} s` : `${(-left).toFixed(0)} s ago`;
+export function describeTime({ pulse: expected }, pulse, fps) {
+  const seconds = (expected - pulse) / fps;
+  if (Math.abs(seconds) < NOW_S) return 'now';
+  return seconds > 0 ? `in ${seconds.toFixed(1)} s` : `${(-seconds).toFixed(0)} s ago`;
 }

@@ -1,34 +1,47 @@
 /**
- * The operator points at somebody: whatever moves the pointer, a mouse, a finger, a pen, an eye.
+ * Pointing: the operator's pointer (mouse, finger, pen, eye tracker) marks a person's position frame by frame.
  *
- * While it is on, every frame that is shown becomes a place, as long as the pointer is over the picture; of a
- * finger, as long as it is down. A press is one more. Arrows move the cross, and Enter is a press.
+ * While it is on, every displayed frame yields a position correction as long as the pointer is over the picture, or
+ * the finger is down. A press adds one more. Arrow keys move the cross, and Enter counts as a press.
  */
 
-import { Refused, ask } from '../requests.js';
-import { Samples } from './pointing_samples.js';
+import { HttpError, requestOperator } from '../../shared/requests.js';
 
 /** @import {Overlay} from '../../player/overlay.js' */
 /** @import {Viewer} from '../../viewer.js' */
 
 const SEND_MS = 100;
-const REACH = { touch: 24, other: 12 }; // CSS pixels that a finger, and anything else, may be off
-const STEP = 8; // CSS pixels that an arrow moves the cross by; with shift four times as far
+const TOLERANCE = { touch: 24, other: 12 }; // CSS pixels
+const STEP = 8; // CSS pixels that an arrow key moves the cross; four times as far with shift
+const MAX_QUEUED = 250; // corrections; after a failure of the server only the newest are sent
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** @typedef {{x: number, y: number, tolerance: number}} Place CSS pixels from the corner of the stage */
+/** @typedef {{x: number, y: number, tolerance: number}} StagePoint CSS pixels from the corner of the stage */
+
+/**
+ * @typedef {object} Correction
+ * @property {number} pulse
+ * @property {number} x pixels of the site's picture
+ * @property {number} y
+ * @property {number} tolerance maximum error, pixels
+ *
+ * @typedef {object} CorrectionBatch
+ * @property {number} object
+ * @property {string} camera
+ * @property {Correction[]} corrections
+ */
 
 export class Pointing {
-  /** @type {number | null} at whom; null: it is off */
+  /** @type {number | null} the person pointed at; null: off */
   object = null;
-  /** The server lets whoever looks at this page point, and its cameras take it. */
-  possible = false;
-  /** Places that the server has taken. */
+  /** Whether the visitor may point, and the site's cameras use corrections. */
+  available = false;
+  /** Corrections accepted by the server. */
   accepted = 0;
-  /** @type {Place | null} where the pointer is; null: not over the picture */
-  #at = null;
-  #samples = new Samples();
+  /** @type {StagePoint | null} null: the pointer is not over the picture */
+  #pointer = null;
+  #queue = new CorrectionQueue();
   #sending = false;
 
   /**
@@ -36,35 +49,36 @@ export class Pointing {
    * @param {HTMLElement} cross
    * @param {Viewer} viewer
    * @param {Overlay} overlay
-   * @param {(error: unknown) => void} tell what went wrong; null: nothing
+   * @param {(error: unknown) => void} showError null: no error
    */
-  constructor(stage, cross, viewer, overlay, tell) {
+  constructor(stage, cross, viewer, overlay, showError) {
     this.stage = stage;
     this.cross = cross;
     this.viewer = viewer;
     this.overlay = overlay;
-    this.tell = tell;
+    this.showError = showError;
     stage.addEventListener('pointermove', (event) => this.#move(event, event.pointerType === 'touch' && !event.buttons));
     stage.addEventListener('pointerdown', (event) => this.#press(event));
-    stage.addEventListener('pointerleave', () => this.#put(null));
+    stage.addEventListener('pointerleave', () => this.#setPointer(null));
     for (const name of ['pointerup', 'pointercancel']) {
       stage.addEventListener(name, (event) => {
-        if (/** @type {PointerEvent} */ (event).pointerType === 'touch') this.#put(null);
+        if (/** @type {PointerEvent} */ (event).pointerType === 'touch') this.#setPointer(null);
       });
     }
-    document.addEventListener('keydown', (event) => this.#key(event), { capture: true });
+    document.addEventListener('keydown', (event) => this.#handleKey(event), { capture: true });
     setInterval(() => void this.#send(), SEND_MS);
   }
 
-  /** Ask whether the server would take it. */
-  async look() {
-    this.possible = await ask('position_corrections').then(({ unavailable }) => unavailable === '', () => false);
-    if (!this.possible) this.end();
+  /** Ask the server whether corrections are available. */
+  async updateAvailability() {
+    const request = requestOperator('position_corrections');
+    this.available = await request.then(({ unavailable }) => unavailable === '', () => false);
+    if (!this.available) this.end();
   }
 
-  /** @param {number} object whom to point at from now on */
+  /** @param {number} object the person to point at */
   begin(object) {
-    if (!this.possible) return;
+    if (!this.available) return;
     this.object = object;
     this.stage.classList.add('pointing');
   }
@@ -72,98 +86,129 @@ export class Pointing {
   end() {
     this.object = null;
     this.stage.classList.remove('pointing');
-    this.#put(null);
+    this.#setPointer(null);
   }
 
-  /** A frame is shown: whom the pointer is on is there in it. */
-  frame() {
-    if (this.#at) this.#sample(this.#at);
+  /** A frame is displayed: the person is at the pointer in it. */
+  addFrame() {
+    if (this.#pointer) this.#addCorrection(this.#pointer);
   }
 
   /**
    * @param {PointerEvent} event
-   * @param {boolean} [gone] it is over the picture no more
+   * @param {boolean} [left] whether the pointer is no longer over the picture
    */
-  #move({ clientX, clientY, pointerType }, gone = false) {
+  #move({ clientX, clientY, pointerType }, left = false) {
     if (this.object === null) return;
-    const { left, top } = this.stage.getBoundingClientRect();
-    const tolerance = pointerType === 'touch' ? REACH.touch : REACH.other;
-    this.#put(gone ? null : { x: clientX - left, y: clientY - top, tolerance });
+    const stage = this.stage.getBoundingClientRect();
+    const tolerance = pointerType === 'touch' ? TOLERANCE.touch : TOLERANCE.other;
+    this.#setPointer(left ? null : { x: clientX - stage.left, y: clientY - stage.top, tolerance });
   }
 
   /** @param {PointerEvent} event */
   #press(event) {
     if (this.object === null || (event.target instanceof Element && event.target.closest('button'))) return;
     this.#move(event);
-    if (this.#at) this.#sample(this.#at);
+    if (this.#pointer) this.#addCorrection(this.#pointer);
   }
 
   /** @param {KeyboardEvent} event */
-  #key(event) {
+  #handleKey(event) {
     const { key, shiftKey, target } = event;
     if (this.object === null || event.ctrlKey || event.metaKey || event.altKey) return;
-    const pressed = target instanceof Element && target.closest('button, a, summary, select, input');
+    const onControl = target instanceof Element && target.closest('button, a, summary, select, input');
     if (key in ARROWS) {
-      const [x, y] = ARROWS[key].map((way) => way * STEP * (shiftKey ? 4 : 1));
-      const at = this.#at ?? this.#start();
+      const [x, y] = ARROWS[key].map((direction) => direction * STEP * (shiftKey ? 4 : 1));
+      const from = this.#pointer ?? this.#initialPointer();
       const { width, height } = this.stage.getBoundingClientRect();
-      this.#put({ x: within(at.x + x, width), y: within(at.y + y, height), tolerance: REACH.other });
-    } else if (key === 'Enter' && !pressed && this.#at) this.#sample(this.#at);
+      this.#setPointer({ x: clamp(from.x + x, width), y: clamp(from.y + y, height), tolerance: TOLERANCE.other });
+    } else if (key === 'Enter' && !onControl && this.#pointer) this.#addCorrection(this.#pointer);
     else if (key === 'Escape') this.end();
     else return;
     event.preventDefault();
     event.stopPropagation();
   }
 
-  /** @returns {Place} where the cross begins: on the one who is pointed at, if they are in the picture */
-  #start() {
+  /** @returns {StagePoint} the center of the person's box, or of the stage */
+  #initialPointer() {
     const { site, currentFrame } = this.viewer;
     const { width, height } = this.stage.getBoundingClientRect();
     const box = currentFrame.boxes.find(([object]) => object === this.object);
-    if (!site || !box) return { x: width / 2, y: height / 2, tolerance: REACH.other };
+    if (!site || !box) return { x: width / 2, y: height / 2, tolerance: TOLERANCE.other };
     const [, left, top, right, bottom] = box;
-    return { ...this.overlay.toCanvas((left + right) / 2, (top + bottom) / 2, site), tolerance: REACH.other };
+    return { ...this.overlay.toCanvas((left + right) / 2, (top + bottom) / 2, site), tolerance: TOLERANCE.other };
   }
 
-  /** @param {Place | null} at */
-  #put(at) {
-    this.#at = at;
-    this.cross.hidden = at === null;
-    if (at) this.cross.style.transform = `translate(${at.x}px, ${at.y}px)`;
+  /** @param {StagePoint | null} point */
+  #setPointer(point) {
+    this.#pointer = point;
+    this.cross.hidden = point === null;
+    if (point) this.cross.style.transform = `translate(${point.x}px, ${point.y}px)`;
   }
 
-  /** @param {Place} at in the frame that is shown */
-  #sample({ x, y, tolerance }) {
+  /** @param {StagePoint} point in the displayed frame */
+  #addCorrection({ x, y, tolerance }) {
     const { site, probe, currentFrame, player } = this.viewer;
     if (this.object === null || !site || !currentFrame.mapped || player.switching) return;
     if (probe.pulse === null || probe.camera === null) return;
-    const { scale, ...place } = this.overlay.toPicture(x, y, site);
-    if (!(place.x >= 0 && place.x <= site.width && place.y >= 0 && place.y <= site.height)) return;
-    this.#samples.add(this.object, probe.camera, { pulse: probe.pulse, ...place, tolerance: tolerance / scale });
+    const { scale, ...point } = this.overlay.toPicture(x, y, site);
+    if (!(point.x >= 0 && point.x <= site.width && point.y >= 0 && point.y <= site.height)) return;
+    this.#queue.add(this.object, probe.camera, { pulse: probe.pulse, ...point, tolerance: tolerance / scale });
   }
 
   async #send() {
     if (this.#sending) return;
     this.#sending = true;
     try {
-      for (let said = this.#samples.take(); said; said = this.#samples.take()) {
-        const { accepted } = await ask('position_corrections', 'POST', said);
+      for (let batch = this.#queue.take(); batch; batch = this.#queue.take()) {
+        const { accepted } = await requestOperator('position_corrections', 'POST', batch);
         this.accepted += accepted;
-        this.tell(null);
+        this.showError(null);
       }
     } catch (error) {
-      this.tell(error);
-      if (error instanceof Refused && [401, 403].includes(error.status)) this.possible = false;
+      this.showError(error);
+      if (error instanceof HttpError && [401, 403].includes(error.status)) this.available = false;
     } finally {
       this.#sending = false;
     }
   }
 }
 
+/** Corrections to be sent, in batches of one person and camera. */
+export class CorrectionQueue {
+  /** @type {{object: number, camera: string, correction: Correction}[]} in order */
+  #queue = [];
+
+  /**
+   * Add a correction; it replaces an earlier one of the same frame.
+   *
+   * @param {number} object
+   * @param {string} camera
+   * @param {Correction} correction
+   */
+  add(object, camera, correction) {
+    const last = this.#queue.at(-1);
+    const sameFrame = last?.correction.pulse === correction.pulse && last.camera === camera && last.object === object;
+    if (sameFrame) this.#queue.pop();
+    this.#queue.push({ object, camera, correction });
+    if (this.#queue.length > MAX_QUEUED) this.#queue.shift();
+  }
+
+  /** @returns {CorrectionBatch | null} the oldest batch; null: the queue is empty */
+  take() {
+    const [first] = this.#queue;
+    if (!first) return null;
+    const { object, camera } = first;
+    const end = this.#queue.findIndex((entry) => entry.object !== object || entry.camera !== camera);
+    const entries = this.#queue.splice(0, end < 0 ? this.#queue.length : end);
+    return { object, camera, corrections: entries.map(({ correction }) => correction) };
+  }
+}
+
 /**
  * @param {number} value
- * @param {number} most
+ * @param {number} max
  */
-function within(value, most) {
-  return Math.min(Math.max(value, 0), most);
+function clamp(value, max) {
+  return Math.min(Math.max(value, 0), max);
 }

@@ -4,7 +4,7 @@ import { Backoff } from '../../shared/backoff.js';
 import { atLeastTwoGops } from '../latency_control.js';
 import { SegmentSplitter } from './mp4.js';
 import { ClusterSplitter } from './webm.js';
-import { pause, Refused } from '../../shared/requests.js';
+import { HttpError, pause } from '../../shared/requests.js';
 import { streamUrl } from '../stream_selection.js';
 
 /** @import {Segment} from './mp4.js' */
@@ -72,7 +72,7 @@ export class StreamDownload {
       } catch (error) {
         // Server unreachable, person unknown and the like: retry.
         if (!this.cancelled) console.info(`stream of person ${this.selection.object}: ${error}`);
-        refused = error instanceof Refused && error.forGood;
+        refused = error instanceof HttpError && error.permanent;
         broken = !refused;
       }
       if (this.cancelled) return;
@@ -112,7 +112,7 @@ async function* downloadSegments(address, signal, gopS) {
   if (signal.aborted) abort();
   try {
     const response = await fetch(address, { cache: 'no-store', signal: request.signal });
-    if (!response.ok || !response.body) throw new Refused(address, response.status);
+    if (!response.ok || !response.body) throw new HttpError(`${address}: ${response.status}`, response.status);
     const reader = response.body.getReader();
     const splitter = address.split('?')[0].endsWith('.webm') ? new ClusterSplitter() : new SegmentSplitter();
     for (;;) {

@@ -1,11 +1,11 @@
-/** How long to wait before trying again. */
+/** Exponential backoff. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { Backoff } from '../../../../client/page/shared/backoff.js';
 
-test('soon at first, never longer than two seconds, and soon again once it worked', () => {
+test('the wait doubles up to two seconds, and is reset by a success', () => {
   const backoff = new Backoff();
   assert.deepEqual(Array.from({ length: 6 }, () => backoff.next()), [250, 500, 1000, 2000, 2000, 2000]);
   backoff.reset();

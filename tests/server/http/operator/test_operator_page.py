@@ -160,15 +160,15 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await page.keyboard.press("Enter")
         await expect(page.locator("#known-words")).to_have_text(f"{first} is called Ann.")
         await expect(page.locator("#merge-kept option").first).to_have_text(f"{first} Ann")
-        await page.get_by_label("who is also").select_option(str(second))
+        await page.get_by_label("and merge into it").select_option(str(second))
         await page.get_by_role("button", name="Merge").click()
         await expect(page.locator("#known-words")).to_have_text(f"{second} is merged into {first}.")
         assert people.registry.merged == {second: first}
         hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
         await expect(page.locator(f'#known-people [data-object="{second}"]')).to_have_count(0)
         shown = people.number(A, 1, 15)
-        await page.get_by_label("As whom").select_option(str(shown))
-        await page.get_by_label("Which camera").select_option(A)
+        await page.get_by_label("Split", exact=True).select_option(str(shown))
+        await page.get_by_label("as seen by").select_option(A)
         await page.get_by_role("button", name="Split off as new person").click()
         await expect(page.locator("#known-words")).to_have_text(re.compile(r"Split off as person \d+\."))
         assert people.number(A, 1, 19) != shown
@@ -188,12 +188,12 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         hall.service.pulse = 19
         hall.service.decide()
         line = page.locator("#flag-list li")
-        await expect(line).to_have_text(re.compile(r"2 and 1.*, cross .* \(c0\): waits to be answered"))
+        await expect(line).to_have_text(re.compile(r"2 and 1.* cross .* \(c0\): open"))
         await expect(page.locator("#flag-none")).to_have_text("")
         hall.service.assist.flags.step(29 + 8 * FPS + 1, [], int)
-        await expect(line).to_have_text(re.compile(r": was not answered"))
+        await expect(line).to_have_text(re.compile(r": expired without an answer"))
         await page.reload()
-        await expect(line).to_have_text(re.compile(r": was not answered"))
+        await expect(line).to_have_text(re.compile(r": expired without an answer"))
         # Another run of the service knows nothing of it; the page sees that its connection ends.
         hall.service.assist.flags._ended.clear()
         [events] = [tell.__self__ for tell in hall.service.assist.flags.on_flag]  # type: ignore[attr-defined]
@@ -223,7 +223,7 @@ async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
         assert b"moof" in (await (await download.value).path()).read_bytes()
         await page.get_by_label("From").fill("2020-01-02T00:00:00")
         await page.get_by_label("to", exact=True).fill("2020-01-01T00:00:00")
-        await expect(page.locator("#download-tables")).to_have_text("The end is not after the beginning.")
+        await expect(page.locator("#download-tables")).to_have_text("The end is not after the start.")
 
 
 async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes_late(
@@ -310,7 +310,7 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
         see(hall)
         await page.reload()
         await page.get_by_label("Camera", exact=True).select_option(B)
-        await page.get_by_role("button", name="Places on the floor").click()
+        await page.get_by_role("button", name="Points on the floor").click()
         stage = page.locator("#mark-stage")
         box = await stage.bounding_box()
         assert box is not None
@@ -318,7 +318,7 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
             await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
             await page.get_by_label(f"Pair {pair}, x on the floor").fill(str(10 * x))
             if pair == 4:
-                await expect(page.locator("#mark-said")).to_contain_text("1 of 4 pairs have no place")
+                await expect(page.locator("#mark-said")).to_contain_text("1 of 4 pairs have no position")
             await page.get_by_label(f"Pair {pair}, y on the floor").fill(str(-10 * y))
         await expect(page.locator("#mark-said")).to_be_empty()
         async with page.expect_download() as download:
@@ -387,9 +387,9 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
         for name in ("Truncation", "Occlusion", "Centering"):
             await page.get_by_label(name).fill("0")
-        await page.get_by_role("button", name="Try it").click()
+        await page.get_by_role("button", name="Apply").click()
         await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
-        await page.get_by_role("button", name="Back to the file").click()
+        await page.get_by_role("button", name="Revert to file").click()
         await expect(page.locator("#selection-state")).to_have_text("As in the file.")
         await expect(page.locator("#trouble")).to_be_empty()
         assert decider.view == hall.service.config.view
@@ -400,7 +400,7 @@ async def test_the_configuration_shows_what_differs_and_finds_the_rest(browser: 
         rows = page.locator("#settings tr")
         await expect(rows.filter(has_text="encode.gop")).to_have_text("encode.gop510")
         await expect(rows.filter(has_text="http.jpeg_quality")).to_have_count(0)
-        await page.get_by_role("button", name="Only what differs").click()
+        await page.get_by_role("button", name="Only non-defaults").click()
         await page.get_by_label("Find").fill("jpeg")
         await expect(rows).to_have_text(["http.jpeg_quality80"])
         await page.get_by_label("Find").fill("no such")

@@ -3,7 +3,7 @@ import test from 'node:test';
 
 import { Decisions } from '../../../../client/page/timeline/decisions.js';
 
-// As in tests/server/service/streaming/test_preferred_camera.py: in so many of five frames the preferred camera sees the person.
+// As in tests/server/service/streaming/test_preferred_camera.py: per GOP, in how many of five frames the preferred camera sees the person.
 const CASES = [
   [[5, 5, 5, 5], '0000'],
   [[5, 5, 0, 5, 5], '00110'],
@@ -13,7 +13,7 @@ const CASES = [
 ];
 
 for (const [seen, shown] of CASES) {
-  test(`seen ${seen}`, () => {
+  test(`frames seen per GOP: ${seen}`, () => {
     const decisions = new Decisions(25);
     for (const [at, frames] of seen.entries()) {
       const boxes = { c0: Array.from({ length: 5 }, (_, frame) => (frame < frames ? [[1, 1, 1, 9, 9]] : [])), c1: [] };
@@ -23,7 +23,7 @@ for (const [seen, shown] of CASES) {
   });
 }
 
-test('who once had another number is seen under it', () => {
+test('a person is found under an alias', () => {
   const decisions = new Decisions(25);
   decisions.rename([{ object: 1, aliases: [7] }]);
   decisions.add({ first: 0, frames: 1, choices: { 7: 'c1' }, boxes: { c0: [[[7, 1, 1, 9, 9]]] }, cuts: [] });

@@ -1,10 +1,10 @@
 /**
- * What the operator's addresses answer, as types. No code.
+ * JSON of the operator's HTTP interface as types, for the type checker. No code.
  *
  * @typedef {{median: number, worst: number}} Spread seconds
  *
- * @typedef {object} OwnPicture site = own · scale + (left, top), in pixels
- * @property {number} width pixels of the camera's own picture
+ * @typedef {object} CameraPicture site pixel = camera pixel · scale + (left, top)
+ * @property {number} width pixels of the camera's picture
  * @property {number} height
  * @property {number} scale
  * @property {number} left
@@ -28,7 +28,7 @@
  * @property {number | null} certified share of the windows
  * @property {number} windows
  * @property {{text: string, at: number} | null} last_error
- * @property {OwnPicture | null} picture
+ * @property {CameraPicture | null} picture
  *
  * @typedef {object} Pulses /api/operator/pulses
  * @property {string} server
@@ -47,46 +47,46 @@
  *
  * @typedef {object} WalkCamera
  * @property {string} camera
- * @property {number} foot_points feet seen while another camera saw somebody
+ * @property {number} foot_points detected while another camera detected the person too
  * @property {number[]} thirds shares of them in the left, middle and right third of the picture
- * @property {number | null} depth_ratio how many times as tall the nearest appear as the farthest
+ * @property {number | null} depth_ratio height of the nearest over that of the farthest person, in pixels
  *
  * @typedef {object} Walk /api/operator/walk
  * @property {'none' | 'walking' | 'working' | 'done'} state
  * @property {number} seconds
- * @property {number} max_seconds seconds after which nothing more is taken in
+ * @property {number} max_seconds maximum length of a walk
  * @property {WalkCamera[]} cameras
- * @property {{one: string, other: string, seconds: number}[]} pairs for how long both saw somebody
- * @property {string[]} uncovered where to walk, too
- * @property {string} error why nothing has come of it
- * @property {string[]} lines what has come of it
- * @property {string} insufficient what was not walked, where the result is a guess
- * @property {string} configuration lines; empty: there is no ground file
+ * @property {{one: string, other: string, seconds: number}[]} pairs for how long both detected the person
+ * @property {string[]} uncovered where to walk as well
+ * @property {string} error why the calibration failed
+ * @property {string[]} lines the result as text
+ * @property {string} insufficient what the walk did not cover, if the result is uncertain
+ * @property {string} configuration YAML; empty: there is no ground file
  *
  * @typedef {object} Setting an entry of /api/operator/config
  * @property {string} key
- * @property {string} value as the configuration writes it
+ * @property {string} value in YAML
  * @property {string | null} default
  * @property {boolean} differs
  *
  * @typedef {object} Settings /api/operator/config
  * @property {Setting[]} settings
- * @property {string} error why the file on the disk cannot be in force; empty: it can
- * @property {string[]} pending_restart keys in which it differs from what is in force
+ * @property {string} error why the file on disk is invalid; empty: it is valid
+ * @property {string[]} pending_restart keys whose values in the file are not in force
  *
  * @typedef {Record<string, number | boolean>} Values
  *
  * @typedef {object} SelectionSettings /api/operator/view_selection
  * @property {Values} values in force
- * @property {Values} file what the configuration says
- * @property {string} lines for the configuration
+ * @property {Values} file values of the configuration
+ * @property {string} lines YAML for the configuration
  * @property {number} min_lookahead frames
  * @property {number} max_lookahead frames
  *
- * @typedef {object} ByHand /api/operator/people
+ * @typedef {object} ManualOverrides /api/operator/people
  * @property {Record<string, string>} names by number
- * @property {Record<string, number>} merged by number: whose it is
- * @property {number | null} new_object the number of the person who was just split off
+ * @property {Record<string, number>} merged kept number by merged number
+ * @property {number | null} new_object number of the person just split off
  * @property {string} unavailable why people cannot be edited; empty: they can
  */
 

@@ -1,30 +1,30 @@
 /**
- * A picture that can be pressed, or have the focus and be marked by keys: arrows move a cross, Enter sets a mark.
- * Places are in pixels of the site's picture.
+ * A picture on which points are marked by a press or by keys: arrow keys move a cross, Enter marks a point.
+ * Points are in pixels of the site's picture.
  */
 
-import { svg } from './section.js';
+import { svg } from '../shared/dom.js';
 
-/** @import {Site} from '../shared/contract.js' */
-/** @import {Place} from './drawing.js' */
+/** @import {Site} from '../shared/api_types.js' */
+/** @import {Point} from './zone_export.js' */
 
 const STEP = 1; // pixels that an arrow key moves the cross
-const LEAP = 10; // with shift
+const LARGE_STEP = 10; // with shift
 const CROSS = 1 / 40; // of the picture's width
-/** @type {Record<string, Place>} */
+/** @type {Record<string, Point>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-export class MarkedPicture {
-  /** @type {Place} */
+export class MarkingStage {
+  /** @type {Point} */
   #cross;
   /** @type {Element[]} */
   #marks = [];
 
   /**
    * @param {HTMLElement} stage
-   * @param {HTMLElement} drawing an svg element that lies over the picture
+   * @param {HTMLElement} drawing an svg element over the picture
    * @param {Site} site
-   * @param {(place: Place) => void} mark
+   * @param {(point: Point) => void} mark
    * @param {() => void} undo
    */
   constructor(stage, drawing, site, mark, undo) {
@@ -36,16 +36,16 @@ export class MarkedPicture {
     this.#cross = [site.width / 2, site.height / 2];
     drawing.setAttribute('viewBox', `0 0 ${site.width} ${site.height}`);
     stage.addEventListener('click', (event) => this.#press(event));
-    stage.addEventListener('keydown', (event) => this.#key(event));
+    stage.addEventListener('keydown', (event) => this.#handleKey(event));
   }
 
-  /** @param {Place[][]} areas */
+  /** @param {Point[][]} areas */
   drawAreas(areas) {
     this.#marks = areas.map((corners) => svg('polygon', { points: corners.join(' '), class: 'area' }));
     this.#draw();
   }
 
-  /** @param {Place[]} points are numbered from 1 */
+  /** @param {Point[]} points numbered from 1 */
   drawPoints(points) {
     const size = this.site.width * CROSS;
     this.#marks = points.flatMap(([x, y], at) => {
@@ -64,12 +64,12 @@ export class MarkedPicture {
   }
 
   /** @param {KeyboardEvent} event */
-  #key(event) {
+  #handleKey(event) {
     const arrow = ARROWS[event.key];
     if (arrow) {
-      const by = event.shiftKey ? LEAP : STEP;
+      const step = event.shiftKey ? LARGE_STEP : STEP;
       const [x, y] = this.#cross;
-      this.#cross = [clamp(x + by * arrow[0], this.site.width), clamp(y + by * arrow[1], this.site.height)];
+      this.#cross = [clamp(x + step * arrow[0], this.site.width), clamp(y + step * arrow[1], this.site.height)];
       this.#draw();
     } else if (event.key === 'Enter' || event.key === ' ') this.mark(this.#cross);
     else if (event.key === 'Backspace') this.undo();
@@ -87,8 +87,8 @@ export class MarkedPicture {
 
 /**
  * @param {number} value
- * @param {number} most
+ * @param {number} max
  */
-function clamp(value, most) {
-  return Math.min(most, Math.max(0, value));
+function clamp(value, max) {
+  return Math.min(max, Math.max(0, value));
 }

@@ -1,0 +1,92 @@
+/**
+ * JSON of the HTTP interface as types, for the type checker. No code.
+ *
+ * A pulse is a frame number, the common time axis of a site; the media time of a frame is pulse / fps.
+ *
+ * @typedef {object} Site
+ * @property {string} name
+ * @property {number} fps frames per second
+ * @property {number} width of the site's picture, the pixels of boxes
+ * @property {number} height
+ * @property {number} gop frames of a GOP; the camera changes only between GOPs
+ * @property {number} lookahead_frames
+ * @property {string | null} codec RFC 6381, such as avc1.42C01F, or vp8; null: no keyframe has arrived yet
+ * @property {'mp4' | 'webm'} [container] of the streams; mp4 if missing
+ * @property {string | null} [sound] codec of the audio, such as mp4a.40.2; null: the site has none
+ * @property {number | null} pulse0 Unix seconds at which pulse 0 was due; null before the first pulse
+ * @property {number} now Unix seconds of the server's clock
+ * @property {string[]} cameras
+ *
+ * @typedef {object} Session rights of the visitor
+ * @property {boolean} by_token signed in by a token; false: the site needs none
+ * @property {string | null} name of the token
+ * @property {'watch' | 'operate'} role
+ * @property {number | null} object only this person's views
+ * @property {string | null} camera only this camera
+ *
+ * @typedef {object} Person an entry of /api/objects
+ * @property {number} object
+ * @property {string | null} [name] given by an operator
+ * @property {number[]} [aliases] earlier numbers, merged into this one
+ * @property {number} first_seen pulse
+ * @property {number} last_seen pulse
+ * @property {boolean} visible
+ * @property {string | null} camera selected now
+ * @property {string[]} cameras that see the person now
+ * @property {string | null} thumbnail
+ *
+ * @typedef {object} Camera an entry of /api/cameras
+ * @property {string} camera
+ * @property {'live' | 'gone' | 'ended' | 'starting' | 'refused'} state
+ * @property {number} pulse
+ * @property {number} late
+ * @property {number} fps
+ * @property {string} message
+ *
+ * @typedef {object} Cut
+ * @property {number} object
+ * @property {string | null} from
+ * @property {string} to
+ * @property {number} pulse
+ *
+ * @typedef {[number, number, number, number, number]} Box object, left, top, right, bottom (pixels)
+ *
+ * @typedef {object} Gop decisions for the frames [first, first + frames)
+ * @property {number} first pulse
+ * @property {number} frames
+ * @property {Record<string, string>} choices camera by object
+ * @property {Record<string, Box[][]>} boxes by camera, one list per frame
+ * @property {Cut[]} cuts
+ * @property {{kept: number, lost: number}[]} [merged] numbers found to be the same person
+ * @property {{kept: number, new_object: number, camera: string}[]} [split] numbers that a camera had mixed up
+ *
+ * @typedef {object} Flag a predicted tracking failure
+ * @property {number} id
+ * @property {number[]} objects the people involved; the first is the one to point at
+ * @property {string[]} cameras whose trackers predict it
+ * @property {'crossing' | 'id_switch' | 'track_loss' | 'optimality_gap'} reason
+ * @property {number} pulse at which it is expected
+ * @property {number} raised the newest pulse when it was raised
+ * @property {number} margin cost difference to the tracker's second-best solution
+ * @property {number} risk of a failure without an answer
+ * @property {'raised' | 'followed' | 'answered' | 'expired'} state
+ *
+ * @typedef {object} Choice /api/objects/{k}/choice
+ * @property {number} object
+ * @property {string | null} camera
+ * @property {number} since pulse
+ * @property {string} reason one sentence
+ * @property {Record<string, number | null>} costs by camera, mean per frame; null: it cannot be shown
+ * @property {Record<string, number>} seen by camera, share of the look-ahead
+ * @property {Record<string, number>} [undetected] by camera, share of the look-ahead in which only other cameras detect the person
+ * @property {Record<string, Record<string, number>>} terms by camera and view-quality term
+ * @property {Record<string, number>} weights by term
+ * @property {string | null} before camera of the previous GOP
+ * @property {number | null} stay cost of the look-ahead without a cut
+ * @property {string | null} cut_to the best other camera
+ * @property {number | null} cut cost of the look-ahead with that camera, including the cut
+ * @property {number} switch_cost frames of not seeing the person
+ * @property {number} lookahead frames
+ */
+
+export {};
