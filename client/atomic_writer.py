@@ -1,4 +1,4 @@
-"""Writes that a full disk leaves undone as a whole."""
+"""Atomic writes: each is complete, or leaves the file unchanged, for example on a full disk."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class AtomicWriter:
         """Append all of ``data``.
 
         Raises:
-            OSError: it cannot be written whole; the file is unchanged.
+            OSError: it cannot be written completely; the file is unchanged.
         """
         begin, remaining = self._file.tell(), memoryview(data)
         try:
-            while remaining:  # a full disk takes a part, and fails at the next write
+            while remaining:  # a full disk accepts a part, and fails at the next write
                 remaining = remaining[self._file.write(remaining) :]
         except OSError:
             self._file.truncate(begin)

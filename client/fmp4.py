@@ -1,4 +1,4 @@
-"""Fragmented MP4 as it arrives: boxes, the init segment, fragments and their time (ISO/IEC 14496-12)."""
+"""Incremental parser of fragmented MP4: boxes, init segment, fragments and their time (ISO/IEC 14496-12)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class BoxReader:
 
 
 class Mp4Reader:
-    """Splits the bytes of one connection into its init segment and whole fragments."""
+    """Splits the bytes of one connection into the init segment and complete fragments."""
 
     def __init__(self) -> None:
         self._boxes = BoxReader()
@@ -181,7 +181,7 @@ class _Head(NamedTuple):
 
 
 def _head(data: bytes | bytearray, at: int) -> _Head | None:
-    """Parse the header of the box at an offset; None if it has not come whole."""
+    """Parse the header of the box at an offset; None if it is incomplete."""
     if len(data) < at + _HEADER:
         return None
     size, kind = _SIZE_AND_KIND.unpack_from(data, at)
@@ -197,7 +197,7 @@ def _head(data: bytes | bytearray, at: int) -> _Head | None:
 
 
 def _first_box(data: bytes | bytearray) -> Mp4Box | None:
-    """Return the box at the beginning of the bytes; None if it has not come whole."""
+    """Return the box at the beginning of the bytes; None if it is incomplete."""
     head = _head(data, 0)
     if head is None or len(data) < head.size:
         return None

@@ -17,9 +17,9 @@ from yarl import URL
 from expbackoff import Backoff
 
 MAX_BODY = 64_000_000
-"""Bytes of an answer that is read as a whole; all objects of a large site take some millions."""
-_MAX_WORDS = 64_000
-"""Bytes of an error response."""
+"""Largest response that is read as a whole, in bytes; all objects of a large site take some millions."""
+_MAX_ERROR_BODY = 64_000
+"""Largest error response in bytes."""
 _MAX_SHOWN = 300
 """Characters of a library's message."""
 _NOT_FOUND = 404
@@ -58,16 +58,16 @@ class HttpSettings:
     answer_timeout: float = 60.0
     """Seconds until a response must have begun, and until one that is read whole must be complete."""
     retries: int = 26
-    """Failed attempts in a row before a stream is given up, after the first; 0: no second attempt."""
+    """Retries in a row before a stream is abandoned; 0: none."""
     backoff_first: float = 0.25
-    """Seconds before the second attempt; doubled each time."""
+    """Seconds before the first retry; doubled each time."""
     backoff_most: float = 1.0
     """Maximum of the seconds between attempts."""
     token: str | None = field(default=None, repr=False)
     """Bearer token, for a server that requires one."""
 
     def backoff(self) -> Backoff:
-        """Return the delays between attempts at one thing."""
+        """Return the delays between attempts of a request."""
         return Backoff(self.backoff_first, self.backoff_most)
 
 
@@ -206,15 +206,15 @@ async def _check(answer: aiohttp.ClientResponse, settings: HttpSettings) -> None
     if answer.ok:
         return
     try:
-        words = _error_text(await read_body(answer, settings, _MAX_WORDS))
+        message = _error_text(await read_body(answer, settings, _MAX_ERROR_BODY))
     except ContractError:
-        words = None
-    words = words or f"{answer.status} {answer.reason}"
+        message = None
+    message = message or f"{answer.status} {answer.reason}"
     if answer.status == _NOT_FOUND:
-        raise NotFoundError(words)
+        raise NotFoundError(message)
     if answer.status in _CLIENT_ERRORS:
-        raise RefusedError(words)
-    raise AwayError(f"{answer.url.origin()}: {words}")
+        raise RefusedError(message)
+    raise AwayError(f"{answer.url.origin()}: {message}")
 
 
 class _ErrorBody(msgspec.Struct):
@@ -224,19 +224,19 @@ class _ErrorBody(msgspec.Struct):
 def _error_text(body: bytes) -> str | None:
     """Return the first line of the server's error text; None without one."""
     try:
-        words = decoded(body, _ErrorBody).error
+        message = decoded(body, _ErrorBody).error
     except ValueError:
         return None
-    return words.splitlines()[0] if words.strip() else None
+    return message.splitlines()[0] if message.strip() else None
 
 
 def _why_away(error: aiohttp.ClientError) -> str:
-    """Return in one line why there is no response; aiohttp's text may be long and quote what was received."""
-    words = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
+    """Return in one line why there is no response; aiohttp's text may be long and quote received data."""
+    message = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
     if isinstance(error, aiohttp.ClientConnectorError) and not isinstance(error, aiohttp.ClientSSLError):
         number, text = error.os_error.errno, error.os_error.strerror
         # The resolver's errors have numbers below 0, and texts of their own.
-        words = (os.strerror(number) if number and number > 0 else text) or words
+        message = (os.strerror(number) if number and number > 0 else text) or message
     if isinstance(error, aiohttp.InvalidURL):  # its text repeats the address, secrets included
-        words = "redirects to an address that is not HTTP"
-    return " ".join(words.split())[:_MAX_SHOWN] or type(error).__name__
+        message = "redirects to an address that is not HTTP"
+    return " ".join(message.split())[:_MAX_SHOWN] or type(error).__name__

@@ -1,4 +1,4 @@
-"""What a best view's stream consists of, in any container: an init segment, then fragments."""
+"""Parts of a best view's stream in any container: an init segment, then fragments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class FormatChangedError(MediaStreamError):
 
 @dataclass(frozen=True, slots=True)
 class InitSegment:
-    """What a player needs before the first fragment (MP4: ``ftyp`` and ``moov``)."""
+    """Data that a player needs before the first fragment (MP4: ``ftyp`` and ``moov``)."""
 
     data: bytes
     timescale: int
@@ -24,7 +24,7 @@ class InitSegment:
 
 @dataclass(frozen=True, slots=True)
 class Fragment:
-    """Media that a player can append whole: a picture, or some sound."""
+    """A unit of media that a player can append: a picture, or some sound."""
 
     data: bytes
     time: int

@@ -30,7 +30,7 @@ class WatchResult:
     cuts: int
     reconnections: int
     complete: bool
-    """Whether all of the requested seconds came; False if the server went away for good before."""
+    """Whether all of the requested seconds were received; False if the server stayed away before."""
 
 
 async def watch(

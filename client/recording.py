@@ -18,9 +18,9 @@ _READERS: dict[str, type[Mp4Reader | WebmReader]] = {"mp4": Mp4Reader, "webm": W
 
 
 class Recording:
-    """Takes the init segment and the fragments of one or more connections; ``out`` None: only counts them.
+    """Writes the init segment and the fragments of one or more connections; ``out`` None: only counts them.
 
-    The init segment of the first connection serves all; a later one must be equal to it.
+    The init segment of the first connection is written; later ones must be equal to it.
     """
 
     def __init__(self, out: Sink | None, seconds: float | None, container: str = "mp4") -> None:
@@ -67,7 +67,7 @@ class Recording:
         if isinstance(part, InitSegment):
             self._take_init_segment(part)
         elif part.is_sound:
-            if part.time > self._last_sound:  # else it is sent again after a reconnection
+            if part.time > self._last_sound:  # otherwise it is repeated after a reconnection
                 self._last_sound = part.time
                 self._write(part.data)
         elif self._first is None or part.time > self._last:
@@ -99,10 +99,10 @@ class Recording:
 
 @contextmanager
 def recording(out: Path | None, seconds: float | None, container: str = "mp4") -> Iterator[Recording]:
-    """Record into ``out.part``, which is remuxed into ``out`` at the end, however it ends, if it has media.
+    """Record into ``out.part``, which is remuxed into ``out`` at the end, also after errors, if it has media.
 
-    An interrupted recording, or one on a full disk, is whole up to its last fragment and is kept; an empty
-    one leaves no file. ``out`` is a progressive MP4 or an indexed WebM; if the disk has no room to write it
+    An interrupted recording, or one on a full disk, is kept up to its last complete fragment; an empty one
+    leaves no file. ``out`` is a progressive MP4 or an indexed WebM; if the disk has no room to write it
     beside ``out.part``, it is the fragments as received.
 
     Raises:
@@ -125,7 +125,7 @@ def recording(out: Path | None, seconds: float | None, container: str = "mp4") -
 
 
 def _finish(part: Path, out: Path, container: str) -> None:
-    from client.remux import remux  # noqa: PLC0415 — it loads FFmpeg, which the best-view process does without
+    from client.remux import remux  # noqa: PLC0415 — it loads FFmpeg, which the best-view process does not need
 
     remuxed = out.with_name(out.name + ".remuxed")
     try:

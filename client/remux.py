@@ -1,4 +1,4 @@
-"""From a recorded stream to a file that plays everywhere: from time 0, with an index. Nothing is decoded."""
+"""Remuxing of a recorded stream into a file with time 0 and an index, without decoding."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def remux(stream: Path, out: Path, container: str) -> None:
     """Copy the pictures and the sound of a recorded stream into a file of the same container.
 
     The first picture is at time 0, and a gap prolongs the picture before it. Sound before the first picture
-    is not heard (an edit list skips it), sound after the last is left out.
+    is skipped by an edit list; sound after the last is dropped.
 
     Raises:
-        MediaStreamError: the stream cannot be read, or has times that no file can have.
+        MediaStreamError: the stream cannot be read, or has invalid times.
         OSError: ``out`` cannot be written.
     """
     try:
@@ -36,7 +36,7 @@ def remux(stream: Path, out: Path, container: str) -> None:
         ):
             if not source.streams.video:
                 raise MediaStreamError("there are no pictures")
-            tracks = {it.index: target.add_stream_from_template(it) for it in source.streams}
+            tracks = {track.index: target.add_stream_from_template(track) for track in source.streams}
             begin: Fraction | None = None
             for pts, packet in _until_last_picture(source.demux(), source.streams.video[0]):
                 begin = pts * packet.time_base if begin is None else begin

@@ -1,4 +1,4 @@
-"""One recording over as many connections as it takes."""
+"""A recording session: streams over one connection after another until the recording is complete."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Report = Callable[[Progress], None]
 
 
 class Session:
-    """One recording over as many connections as it takes."""
+    """A recording session: streams over one connection after another until the recording is complete."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class Session:
         self.reconnections = 0
 
     async def run(self, address: URL, settings: HttpSettings) -> bool:
-        """Stream until full (True) or the server is gone for good (False)."""
+        """Stream until the recording is complete (return True) or the server stays away (return False)."""
         backoff = settings.backoff()
         while True:
             before = self._record.fragments
@@ -79,7 +79,7 @@ class Session:
             self.reconnections += 1
 
     def _resume_address(self, address: URL) -> URL:
-        """Return the address of the rest of the stream: from the frame after the last one on."""
+        """Return the address of the remaining stream, which begins after the last received frame."""
         query = {} if self._end is None else {"to": self._end}
         at, site = self._record.media_time, self._history.site
         if at is not None and site is not None and self._start is not None:
@@ -89,7 +89,7 @@ class Session:
         return address.with_query(query)
 
     async def _connection(self, address: URL, settings: HttpSettings) -> bool:
-        """Stream over one connection; True when full, False when it has ended."""
+        """Stream over one connection; return True when complete, False when the connection has ended."""
         take = self._record.connection()
         async with get(address, settings, f"video/{self._record.container}") as answer:
             async for data in answer.content.iter_any():

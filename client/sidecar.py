@@ -79,7 +79,7 @@ def _vtt_head(number: int, site: Site) -> str:
 def _cue(frame: Frame, first: int, site: Site) -> str:
     """Return a frame's cue: its pulse as the identifier, JSON as the text (W3C WebVTT)."""
     times = " --> ".join(_clock((at - first) / site.fps, 3) for at in (frame.pulse, frame.pulse + 1))
-    text = {"camera": frame.camera, "boxes": [_rounded(it) for it in frame.boxes]}
+    text = {"camera": frame.camera, "boxes": [_rounded(box) for box in frame.boxes]}
     return f"p{frame.pulse}\n{times}\n{msgspec.json.encode(text).decode()}"
 
 

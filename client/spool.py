@@ -18,7 +18,7 @@ class Place:
 
 
 class Spool:
-    """Bytes in an unnamed file in ``folder``, made at the first ``put``; it vanishes with the process."""
+    """Bytes in an unnamed file in ``folder``, created at the first ``put`` and deleted with the process."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

@@ -1,4 +1,4 @@
-"""Which camera a stream shows, and the boxes in its pictures, from the server's events."""
+"""View history of a stream from the server's events: the camera shown, and the boxes in its pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from client.model import Box, Event, Gop, Site
 from client.spool import Place, Spool
 
 _log = logging.getLogger(__name__)
-_MAX_GOPS = 64  # remembered if nothing is recorded: far more than the stream lags behind the events
+_MAX_GOPS = 64  # kept if nothing is recorded; far more than the stream lags behind the events
 _TIMEOUT_S = 1.0
 
 
@@ -40,7 +40,7 @@ class _Shown:
 
 
 class ViewHistory:
-    """The views of one object: the last ones, or with a ``spool`` all of them and their boxes."""
+    """The views of one object: the newest ones, or with a ``spool`` all of them and their boxes."""
 
     def __init__(self, number: int, *, spool: Spool | None = None) -> None:
         self.number = number
@@ -78,7 +78,7 @@ class ViewHistory:
     async def reach(self, media_time: float) -> None:
         """Wait up to a second for the event about ``media_time``, which comes over another connection."""
         if self.site is None:
-            return  # no event has come
+            return  # no event was received
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_TIMEOUT_S):
                 while self.camera_at(media_time) is None:

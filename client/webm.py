@@ -1,4 +1,4 @@
-"""WebM as it arrives: elements, the init segment, clusters and their time (RFC 9559, in EBML, RFC 8794)."""
+"""Incremental parser of WebM: elements, init segment, clusters and their time (RFC 9559; EBML: RFC 8794)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Element:
 
 
 class ElementReader:
-    """Splits a stream into its elements; of the segment, whose size is unknown, only the header is one."""
+    """Splits a stream into elements; the segment, whose size is unknown, is only its header."""
 
     def __init__(self) -> None:
         self._rest = bytearray()
@@ -90,7 +90,7 @@ def cluster_time(cluster: Element) -> int:
 
 
 def _element(data: bytes | bytearray, begin: int) -> Element | None:
-    """Return the element at an offset; None if it has not come whole."""
+    """Return the element at an offset; None if it is incomplete."""
     element_id, at = _number(data, begin, marked=True)
     size, end = _number(data, at, marked=False) if at else (0, 0)
     if not end:
@@ -107,7 +107,7 @@ def _element(data: bytes | bytearray, begin: int) -> Element | None:
 def _number(data: bytes | bytearray, at: int, *, marked: bool) -> tuple[int, int]:
     """Return a number of variable length, with or without its length marker, and where it ends.
 
-    Both are 0 if it has not come whole.
+    Both are 0 if it is incomplete.
     """
     if at >= len(data):
         return 0, 0

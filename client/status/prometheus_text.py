@@ -21,10 +21,10 @@ class Metrics:
         self._values: dict[tuple[str, frozenset[tuple[str, str]]], float] = {}
         try:
             for family in text_string_to_metric_families(text):
-                for it in family.samples:
-                    if not math.isfinite(it.value):
+                for sample in family.samples:
+                    if not math.isfinite(sample.value):
                         continue  # MyView exports none
-                    self._values[it.name, frozenset(it.labels.items())] = it.value
+                    self._values[sample.name, frozenset(sample.labels.items())] = sample.value
         except ValueError as error:
             raise ContractError(f"/metrics is not understood: {error}") from error
 

@@ -49,7 +49,7 @@ async def status(url: str, settings: HttpSettings = _DEFAULT) -> SiteNow:
         ready=ready,
         why=why,
         pulse=None if newest is None or newest < 0 else int(newest),
-        cameras=tuple(_measured(it, metrics) for it in listed),
+        cameras=tuple(_measured(camera, metrics) for camera in listed),
         people=await _people(url, people, site.fps, settings),
         service=service,
     )
@@ -102,16 +102,16 @@ def _measured(camera: CameraNow, metrics: Metrics | None) -> CameraNow:
 async def _people(
     url: str, people: tuple[SeenObject, ...], fps: float, settings: HttpSettings
 ) -> tuple[PersonNow, ...]:
-    known = await asyncio.gather(*(_since(url, it, fps, settings) for it in people[:_MAX_CHOICES]))
+    known = await asyncio.gather(*(_since(url, person, fps, settings) for person in people[:_MAX_CHOICES]))
     since = [*known, *[None] * len(people)]
     return tuple(
-        PersonNow(it.object, it.name, it.visible, it.camera, seconds, it.cameras)
-        for it, seconds in zip(people, since, strict=False)
+        PersonNow(person.object, person.name, person.visible, person.camera, seconds, person.cameras)
+        for person, seconds in zip(people, since, strict=False)
     )
 
 
 async def _since(url: str, person: SeenObject, fps: float, settings: HttpSettings) -> float | None:
-    """Return the seconds for which a person's camera shows them already."""
+    """Return for how many seconds the current camera has shown a person."""
     try:
         decision = await choice(url, person.object, settings)
     except NotFoundError:

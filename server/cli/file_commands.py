@@ -1,6 +1,6 @@
-"""The commands that turn files into files.
+"""Commands that read and write files: render, track, evaluate and scene.
 
-Each imports what it runs only when it runs, so that a process loads no more than it needs.
+Each imports its modules when it runs, so that a process loads no more than it needs.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def render(
     ] = None,
     ground: Annotated[Path | None, typer.Option("--ground", help="Homographies (JSON) per view.")] = None,
 ) -> None:
-    """Render the best view of everybody in recorded views: videos, tracks, choices and plots."""
+    """Render the best view of each person in recorded views: videos, tracks, choices and plots."""
     from server.cli.generated_config import config_for_videos
     from server.cli.progress import bar, total_frames
     from server.cli.render.renderer import render as render_views
@@ -50,8 +50,8 @@ def render(
     with atomic_folder(out) as folder, bar("frames") as progress:
         task = progress.add_task("rendering", total=total_frames(videos, loaded.site.fps))
         numbers = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
-    who = ", ".join(map(str, numbers)) if numbers else "nobody"
-    typer.echo(f"{out}: best views of {len(numbers)} people ({who}), tracks, choices.csv and plots")
+    people = ", ".join(map(str, numbers)) or "none"
+    typer.echo(f"{out}: best views of {len(numbers)} people ({people}), tracks, choices.csv and plots")
 
 
 def track(
@@ -66,10 +66,10 @@ def track(
         typer.Option(metavar="LEFT,TOP,WIDTH,HEIGHT", help="Follow this box of the first picture."),
     ] = None,
 ) -> None:
-    """Track everybody in one video, or in its detections alone, or what is shown with --template."""
+    """Track people in a video or in detections, or the objects shown by --template."""
     if template:
         if tracker is not None:
-            raise UserError("--template: has a tracker of its own; leave --tracker out")
+            raise UserError("--template: has its own tracker; leave --tracker out")
         _track_templates(out, video, det, solver, config, template)
         return
     from server.cli.progress import bar, total_frames
@@ -144,7 +144,7 @@ def evaluate(
     """Score tracks (HOTA, MOTA, IDF1, identity switches) and choices of views against ground truth."""
     from server.cli.evaluate.command import EvaluateOptions
     from server.cli.evaluate.command import evaluate as score
-    from server.cli.evaluate.site_facts import SiteOptions
+    from server.cli.evaluate.site_info import SiteOptions
 
     site = SiteOptions(size, fps, switch_cost)
     score(EvaluateOptions(truth, tracks or [], views, videos or [], site, iou, visible, json_file, plots))

@@ -1,4 +1,4 @@
-"""Configurations that are not in a file: for recordings named on the command line, and for the demo."""
+"""Generated configurations: for recordings given on the command line, and for the demo."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DEMO: dict[str, Any] = {
         for number in range(3)
     ],
 }
-"""The embedded synthetic scene; `configs/demo.yaml` says the same with every setting explained."""
+"""The embedded synthetic scene, as in `configs/demo.yaml`."""
 
 
 def config_for_videos(
@@ -38,15 +38,15 @@ def config_for_videos(
     ground: Path | None = None,
     detections: Sequence[Path] = (),
 ) -> Config:
-    """Return a configuration for recorded views, named after their files; each is played once.
+    """Return a configuration for recorded views, each named after its file and played once.
 
-    ``base`` is the content of a configuration file (in ``folder``): its settings hold, and those of its
-    cameras with the same names. Without a site in it, the size is the first view's, and the rate that of the
-    first that has one: a folder of images has none.
+    ``base`` is the content of a configuration file in ``folder``: its settings apply, including those of
+    cameras with the same names. Without a section `site`, the size is that of the first view, and the rate
+    that of the first view that has one; a folder of images has none.
 
     Raises:
-        UserError: a view cannot be opened or never ends, two have one name, or something in the configuration
-            is wrong.
+        UserError: a view cannot be opened or never ends, two have the same name, or the configuration is
+            invalid.
     """
     if detections and len(detections) != len(videos):
         raise UserError(
@@ -73,7 +73,7 @@ def config_for_videos(
 
 
 def camera_name(video: Path) -> str:
-    """Return the name of a view: its file's, with a dash for whatever a camera's name cannot have."""
+    """Return the name of a view: that of its file, with dashes for invalid characters."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", video.stem).lstrip("-_")[:_NAME_CHARACTERS] or "view"
 
 
@@ -92,11 +92,13 @@ def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
 
 
 def _site_like(videos: Sequence[Path]) -> dict[str, Any]:
-    """Take rate and size from views; a size that H.264 cannot store is rounded down by a pixel."""
+    """Return the section `site` with rate and size of the views; odd sizes are rounded down for H.264."""
     first = read_video_info(videos[0])
     width, height = first.size
     rates = (
-        (first.fps, *(read_video_info(it).fps for it in videos[1:])) if first.fps is None else (first.fps,)
+        (first.fps, *(read_video_info(video).fps for video in videos[1:]))
+        if first.fps is None
+        else (first.fps,)
     )
     rate = next((fps for fps in rates if fps is not None), None)
     site = {} if rate is None else {"fps": rate}
@@ -104,7 +106,7 @@ def _site_like(videos: Sequence[Path]) -> dict[str, Any]:
 
 
 def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:
-    """Write the demo's configuration into a folder, on free ports; the environment goes before it."""
+    """Write the demo's configuration into a folder, with free ports; the environment takes precedence."""
     sync, bus = free_port(), free_port()
     content = {
         **DEMO,
@@ -119,7 +121,7 @@ def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:
 
 
 def free_port(preferred: int = 0) -> int:
-    """Return the preferred port if it is free, else any that is."""
+    """Return the preferred port if it is free, otherwise any free port."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

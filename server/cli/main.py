@@ -1,4 +1,4 @@
-"""The command line: one entry point, exit code 0, or one line that says what is wrong and another code."""
+"""Entry point of the command line: runs a command; errors are one line and an exit code."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import Annotated
 
 import typer
 
-from server.cli import file_commands, operation_commands, site_commands, token_commands, viewer_commands
+from server.cli import client_commands, file_commands, site_commands
 from server.cli.calibrate.command import calibrate
 from server.supervisor.shutdown import SUPERVISED_VARIABLE
 from server.system.address_redaction import redact_address
 from server.system.child_process import terminate_with_parent
 from server.system.descriptors import raise_descriptor_limit
 from server.system.errors import UserError
-from server.system.log_setup import say_failure
+from server.system.log_setup import report_error
 
 app = typer.Typer(
     help="MyView: pick a person; see them, live, from whichever camera sees them best.",
@@ -57,10 +57,10 @@ for run in (
     file_commands.evaluate,
     file_commands.scene,
     calibrate,
-    viewer_commands.watch,
-    operation_commands.doctor,
-    operation_commands.status,
-    token_commands.token,
+    client_commands.watch,
+    client_commands.doctor,
+    client_commands.status,
+    client_commands.token,
 ):
     app.command()(run)
 
@@ -69,7 +69,7 @@ _INTERRUPTED = 130
 _PATH_ERRORS = {errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP}
 _TERMINATED = 143
 _sigterms: list[int] = []
-"""SIGTERM, once it was received."""
+"""SIGTERM, if it was received."""
 
 
 def _on_sigterm(number: int, _: object) -> None:
@@ -77,7 +77,7 @@ def _on_sigterm(number: int, _: object) -> None:
     sys.exit(_TERMINATED)
 
 
-def _was_cut_short(error: BaseException | None) -> bool:
+def _was_interrupted(error: BaseException | None) -> bool:
     """Return whether an error was caused by a call that a signal interrupted."""
     while error is not None:
         if isinstance(error, OSError) and error.errno == errno.EINTR:
@@ -87,14 +87,14 @@ def _was_cut_short(error: BaseException | None) -> bool:
 
 
 def main() -> None:
-    """Run the command line; no traceback for bad input."""
-    # Collecting cycles of a thousand modules at exit takes half a second, for nothing.
+    """Run the command line; bad input causes no traceback."""
+    # Garbage collection of a thousand modules at exit would take half a second.
     atexit.register(gc.freeze)
     raise_descriptor_limit()
     if os.environ.get(SUPERVISED_VARIABLE):
         terminate_with_parent()
-    # Signals raise, so that half-written files are removed. Services write nothing before they have their own
-    # handlers, and until then end at once.
+    # Signals raise exceptions, so that half-written files are removed. Services exit at once until they have
+    # their own handlers, since they have written nothing before.
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
@@ -104,22 +104,22 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
     except Exception as error:  # noqa: BLE001 — printed, or raised again
-        if _was_cut_short(error):
+        if _was_interrupted(error):
             sys.exit(_TERMINATED if _sigterms else _INTERRUPTED)
         _fail(error)
 
 
 def _fail(error: Exception) -> None:
-    """Print a one-line error and exit; raise again what is a bug."""
+    """Print a one-line error and exit; re-raise bugs."""
     if isinstance(error, UserError):
-        say_failure(str(error))
+        report_error(str(error))
         sys.exit(error.code)
-    if isinstance(error, BrokenPipeError):  # the reader of our output has gone, as in `… | head`
+    if isinstance(error, BrokenPipeError):  # the reader of the output has exited, as in `… | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     if isinstance(error, OSError) and error.filename is not None and error.errno in _PATH_ERRORS:
-        # A path that cannot be followed, wherever it is used first.
-        say_failure(f"{redact_address(str(error.filename))}: {error.strerror}")
+        # An inaccessible path.
+        report_error(f"{redact_address(str(error.filename))}: {error.strerror}")
         sys.exit(_BAD_INPUT)
     raise error
 

@@ -1,4 +1,4 @@
-"""Progress bars for what takes a while."""
+"""Progress bars of long commands."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from server.system.errors import UserError
 
 
 def total_frames(videos: list[Path], fps: float | None = None) -> int | None:
-    """Count the frames of all views as their files say it; None where one does not.
+    """Return the number of frames of all views, as stated by their files.
 
-    ``fps``: how many are taken a second; None: as many as there are.
+    ``fps`` is the rate at which frames are taken; None: that of each file.
+
+    Returns:
+        None: a file does not state its length.
     """
     total = 0
     for video in videos:
@@ -32,7 +35,7 @@ def total_frames(videos: list[Path], fps: float | None = None) -> int | None:
 
 
 def bar(unit: str) -> Progress:
-    """Return a progress bar on standard error, where that is a terminal."""
+    """Return a progress bar on standard error, disabled if that is not a terminal."""
     console = Console(stderr=True)
     return Progress(
         TextColumn("{task.description}"),
@@ -41,5 +44,5 @@ def bar(unit: str) -> Progress:
         TextColumn(unit),
         TimeRemainingColumn(),
         console=console,
-        disable=not console.is_terminal,  # in a log it would only stand around the one line that matters
+        disable=not console.is_terminal,  # a log needs only the result
     )

@@ -1,6 +1,6 @@
-"""The commands that run a site or a part of it.
+"""Commands that run a site or one of its processes: demo, up, sync, camera and bestview.
 
-Each imports what it runs only when it runs, so that a process loads no more than it needs.
+Each imports its modules when it runs, so that a process loads no more than it needs.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
 _UP_RELEASE_S = 1.9
-"""Longer than its child processes take to end."""
+"""Longer than the release time of child processes."""
 LogFolder = Annotated[
     Path | None, typer.Option("--out", help="Write tracks and camera choices into this new folder.")
 ]
 
 
 def _read(config: Path) -> ActiveConfig:
-    """Read a process's configuration; from then on SIGHUP asks to reload it.
+    """Read a process's configuration; from then on SIGHUP reloads it.
 
     Raises:
-        UserError: it cannot be read, or something in it is wrong.
+        UserError: it cannot be read or is invalid.
     """
     from server.config.running_config import ActiveConfig
     from server.supervisor.sighup import record_early_sighups
@@ -65,7 +65,7 @@ def camera(
         )
 
     def run() -> Coroutine[Any, Any, None]:
-        lower_own_priority(running.now.site.niceness)  # no-op under a supervisor, which has done so
+        lower_own_priority(running.now.site.niceness)  # no effect under a supervisor, which has done so
         return camera_process(running, camera_id)
 
     run_process(run)

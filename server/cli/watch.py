@@ -27,7 +27,7 @@ async def run_watch(
     end: str | None = None,
     token: str | None = None,
 ) -> None:
-    """List people, or watch one.
+    """List people, or watch one person.
 
     Raises:
         UnavailableError: the server cannot be reached.
@@ -65,9 +65,10 @@ def _file_at(out: Path | None) -> int | None:
 
 async def _list(url: str, settings: HttpSettings) -> None:
     table = Table("object", "visible", "shown by", "seen by", box=None)
-    for it in await objects(url, settings):
-        who = escape(f"{it.object} {it.name}") if it.name else str(it.object)
-        table.add_row(who, "yes" if it.visible else "no", it.camera or "-", " ".join(it.cameras))
+    for person in await objects(url, settings):
+        label = escape(f"{person.object} {person.name}") if person.name else str(person.object)
+        visible = "yes" if person.visible else "no"
+        table.add_row(label, visible, person.camera or "-", " ".join(person.cameras))
     Console().print(table)
 
 

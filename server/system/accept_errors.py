@@ -1,4 +1,4 @@
-"""Throttled log of accept(2) errors, such as too many open files."""
+"""Throttled log of accept(2) errors, for example too many open files."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from logthrottle import LogThrottle
 log = logging.getLogger(__name__)
 
 _OUT_OF_RESOURCES = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
-"""errno of accept(2) where file descriptors or memory are exhausted."""
+"""errno of accept(2) if file descriptors or memory are exhausted."""
 
 
 def is_out_of_resources(error: object) -> bool:
-    """Return whether an error says that there are no descriptors, or no memory, for another connection."""
+    """Return whether an error means that file descriptors or memory are exhausted."""
     return isinstance(error, OSError) and error.errno in _OUT_OF_RESOURCES
 
 
 class AcceptErrors:
-    """Logs that connections cannot be accepted: at once, then seldom, with a count."""
+    """Logs failures to accept connections: the first at once, then rarely, with a count."""
 
     def __init__(self) -> None:
-        self._failing = LogThrottle()
+        self._throttle = LogThrottle()
 
     def failed(self, error: OSError) -> None:
-        """Note that one was not."""
+        """Log that a connection could not be accepted."""
         reason = error.strerror or str(error)
-        if (more := self._failing.record(reason)) is not None:
+        if (more := self._throttle.record(reason)) is not None:
             log.error("a connection cannot be accepted: %s%s", reason, more)
 
     def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle what goes wrong in a loop: asyncio says it of each attempt, with a traceback."""
+        """Handle errors of an event loop: asyncio would log each failure to accept, with a traceback."""
         error = context.get("exception")
         if "socket" in context and isinstance(error, OSError) and is_out_of_resources(error):
             self.failed(error)

@@ -1,7 +1,7 @@
-"""Addresses as they may be shown: the protocol and the host. All else may be a password, or hold one.
+"""Redaction of addresses: only protocol and host are shown, since everything else may contain a password.
 
-Nothing tells a password from a path: some cameras have it there, others behind ``?p=`` or ``?sig=``, and
-one with a slash or a space in it ends a login too early. So what is shown is what surely is none.
+Some cameras have the password in the path, others in ``?p=`` or ``?sig=``, and one with a slash or a space
+ends the user information too early. So only parts that cannot be a password are shown.
 """
 
 from __future__ import annotations
@@ -10,58 +10,58 @@ import re
 
 HIDDEN = "(not shown)"
 _MORE = "..."
-"""What stands for the rest of an address."""
+"""Replaces the hidden part of an address."""
 _PROTOCOLS = (
     r"amqp|async|bluray|cache|concatf?|crypto|data|dtls|dvd|fd|ffrtmpcrypt|ffrtmphttp|file|ftps?|gophers?|hls|"
     r"https?|httpproxy|icecast|ip[fn]s|md5|mms[htu]?|nfs|onvif|pipe|prompeg|rist|rtmp(?:e|s|t|te|ts)?|rtp|"
     r"rtsp[stu]?|sap|satip|sctp|sdp|sftp|smb|srtp?|subfile|tcp|tee|tls|udp|udplite|unix|webrtc|whip|wss?|zmq"
 )
-"""What FFmpeg opens, and what people take for it."""
+"""Protocols of FFmpeg, and similar ones that users may enter."""
 _PROTOCOL = rf"(?:{_PROTOCOLS})(?:[+](?:{_PROTOCOLS}))*"
 _OPENED = re.compile(rf"{_PROTOCOL}:|subfile,", re.IGNORECASE)
-"""How an address begins where no // follows: ``rtsp:host``, ``concat:a|b``."""
+"""The start of an address without //: ``rtsp:host``, ``concat:a|b``."""
 _LOGIN = re.compile(r"(?![./])[^@]*:[^@]*@")
-"""An address whose protocol was left out or mistyped: ``name:password@host``, ``rtsp//name:…@host``."""
+"""An address whose protocol is missing or mistyped: ``name:password@host``, ``rtsp//name:…@host``."""
 _IN_PATH = re.compile(rf"(?<=/)(?:{_PROTOCOL}:|[a-z][a-z0-9+.-]+:/(?=.*@))", re.IGNORECASE | re.DOTALL)
-"""An address that was taken for a path in a folder, where ``//`` becomes ``/``."""
+"""An address that was resolved like a path, in which ``//`` became ``/``."""
 _ANYWHERE = re.compile(rf"[a-z][a-z0-9+.-]*:/|\b{_PROTOCOL}:(?!\s)", re.IGNORECASE)
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]*(?=://)", re.IGNORECASE)
 _PLACE = re.compile(r"(?:\[[0-9a-z:.%_-]+\]|[\w.-]+)(?::[0-9]{1,5})?", re.IGNORECASE)
-"""A host, and perhaps a port."""
+"""A host, with an optional port."""
 _ENDPOINT = re.compile(r"[a-z]+/(?:\[[0-9a-z:.%_-]+\]|[\w.*-]+):[0-9]{1,5}(?![^?#])", re.IGNORECASE)
 
 
 def has_protocol(source: str) -> bool:
-    """Return whether FFmpeg would look for a protocol in this, rather than for a file."""
+    """Return whether FFmpeg takes a source for an address rather than a file."""
     return "://" in source or _OPENED.match(source) is not None
 
 
 def is_login(source: str) -> bool:
-    """Return whether this looks like a name and a password for a host, though it has no protocol."""
+    """Return whether a source without a protocol looks like ``name:password@host``."""
     return _LOGIN.match(source) is not None
 
 
 def redact_address(source: str) -> str:
-    """Return a source, or another address or path, as it may be shown: of an address its protocol and host.
+    """Return a source, address or path without secrets: only protocol and host of an address.
 
-    ``rtsp://name:password@10.0.0.1/live`` is shown as ``rtsp://10.0.0.1/...``. Where an @ stands behind what
-    looks like the host, that may be the login's beginning, and is not shown. A path is shown as it is.
+    ``rtsp://name:password@10.0.0.1/live`` becomes ``rtsp://10.0.0.1/...``. If an @ follows the apparent host,
+    that may be part of a name or password, and is hidden. A path is unchanged.
     """
     if source.startswith("scene:"):
         return source
     if source.startswith("/") and (match := _IN_PATH.search(source)) is not None:
         return f"{source[: match.start()]}{_MORE}"
     if (match := _SCHEME.match(source)) is not None:
-        return f"{match[0]}://{_shown_place(source[match.end() + 3 :])}"
+        return f"{match[0]}://{_host_and_port(source[match.end() + 3 :])}"
     if (match := _OPENED.match(source)) is not None:
         return f"{match[0][:-1]}:{_MORE}"
     return HIDDEN if "://" in source or is_login(source) else source
 
 
-def _shown_place(rest: str) -> str:
-    """Return host and port of what stands behind ``://``, if they are surely that."""
-    authority = re.split(r"[/?#]", rest, maxsplit=1)[0]
-    beyond = rest[len(authority) :]
+def _host_and_port(after_scheme: str) -> str:
+    """Return host and port of an address, given the part after ``://``, if they cannot be a password."""
+    authority = re.split(r"[/?#]", after_scheme, maxsplit=1)[0]
+    beyond = after_scheme[len(authority) :]
     login, _, place = authority.rpartition("@")
     if "@" in beyond or not _PLACE.fullmatch(place):
         return _MORE
@@ -69,7 +69,7 @@ def _shown_place(rest: str) -> str:
 
 
 def redact_endpoint(endpoint: str) -> str:
-    """Return zenoh's ``protocol/host:port`` without the settings that may stand behind it: keys, for one."""
+    """Return a zenoh endpoint ``protocol/host:port`` without its options, which may contain keys."""
     match = _ENDPOINT.match(endpoint)
     if match is None:
         return HIDDEN
@@ -77,7 +77,7 @@ def redact_endpoint(endpoint: str) -> str:
 
 
 def redact_addresses(text: str) -> str:
-    """Return others' words, such as a traceback, with each line only up to where an address begins."""
+    """Return a text, such as a traceback, with each line cut where an address begins."""
     return "".join(_cut(line) for line in text.splitlines(keepends=True))
 
 
@@ -90,5 +90,5 @@ def _cut(line: str) -> str:
 
 
 def ffmpeg_reason(error: Exception) -> str:
-    """Return FFmpeg's reason by its errno: the error's own text repeats the whole address."""
-    return getattr(error, "strerror", None) or "it is no address or path that FFmpeg understands"
+    """Return the reason of an FFmpeg error by its errno, since its text repeats the whole address."""
+    return getattr(error, "strerror", None) or "it is not an address or path that FFmpeg understands"

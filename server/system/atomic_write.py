@@ -17,7 +17,7 @@ _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 
 
 def check_new_folder(out: Path) -> None:
-    """Make sure that a folder is not there yet, or empty.
+    """Check that a folder does not exist or is empty.
 
     Raises:
         UserError: it is not.
@@ -27,10 +27,10 @@ def check_new_folder(out: Path) -> None:
 
 
 def check_new_file(out: Path, *read: Path | None) -> None:
-    """Make sure that a file can take this place.
+    """Check that a file can be written; ``read`` are input files, which it must not replace.
 
     Raises:
-        UserError: a folder, a device or one of the files that are read has it.
+        UserError: it is a folder, a device, or one of the inputs.
     """
     if out.is_dir():
         raise UserError(f"{out}: is a folder; name a file")
@@ -38,16 +38,16 @@ def check_new_file(out: Path, *read: Path | None) -> None:
         return
     if not out.is_file():
         raise UserError(f"{out}: is not a regular file, and would be replaced by one; name another")
-    if any(it is not None and it.exists() and out.samefile(it) for it in read):
+    if any(path is not None and path.exists() and out.samefile(path) for path in read):
         raise UserError(f"{out}: is an input, and would be replaced; name another")
 
 
 @contextmanager
 def atomic_folder(out: Path) -> Iterator[Path]:
-    """Return a folder to write into; it becomes ``out`` only when all went well.
+    """Yield a folder to write into; it becomes ``out`` only if the block succeeds.
 
     Raises:
-        UserError: ``out`` is there already and not an empty folder, or cannot be made.
+        UserError: ``out`` exists and is not an empty folder, or cannot be created.
     """
     check_new_folder(out)
     target = out.resolve()
@@ -58,7 +58,7 @@ def atomic_folder(out: Path) -> Iterator[Path]:
         with _cannot_write(out, _FULL):
             yield draft
         with _cannot_write(out):
-            draft.chmod(0o777 & ~_umask())  # mkdtemp makes it for this user alone
+            draft.chmod(0o777 & ~_umask())  # mkdtemp creates it with mode 700
             draft.replace(target)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -66,12 +66,12 @@ def atomic_folder(out: Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
-    """Return a file to write; it becomes ``out``, in place of an older one, only when all went well.
+    """Yield a file to write; it replaces ``out`` only if the block succeeds.
 
-    ``read`` are the files that are read meanwhile: none of them is replaced.
+    ``read`` are input files, which it must not replace.
 
     Raises:
-        UserError: there cannot be a file ``out``; checked before anything else.
+        UserError: ``out`` cannot be written; checked before the block runs.
     """
     check_new_file(out, *read)
     target = out.resolve()
@@ -92,7 +92,7 @@ def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
 
 @contextmanager
 def _cannot_write(out: Path, only: Collection[int] | None = None) -> Iterator[None]:
-    """Turn an OSError into a UserError; with ``only``, just these errno."""
+    """Turn an OSError into a UserError; ``only``: only these errno."""
     try:
         yield
     except OSError as error:

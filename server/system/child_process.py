@@ -1,7 +1,7 @@
-"""Start child processes: the only place of the server that does, and what a child does when it begins.
+"""Child processes: all processes that the server starts, and their setup.
 
-Three kinds: commands of this program (a supervisor's), modules that answer over their standard input and
-output (the best-view service's workers), and functions in a new interpreter (`myview render`'s workers).
+There are three kinds: commands of this program (started by the supervisor), modules that answer over standard
+input and output (the best-view service's workers), and functions in a new interpreter (`myview render`).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from server.system.niceness import lower_priority
 
 TERMINATION_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SPAWN = multiprocessing.get_context("spawn")
-"""Queues that are handed to :func:`start_function` come from this context."""
+"""The context for queues that are passed to :func:`start_function`."""
 _PR_SET_PDEATHSIG = 1
 _WORKER_NICENESS = 5
-"""Workers yield to the service, which has viewers to serve; cameras yield to both (`site.niceness`)."""
+"""Workers have a lower priority than the service, and cameras than both (`site.niceness`)."""
 
 
 async def start_command(
@@ -35,12 +35,12 @@ async def start_command(
     inherited: Sequence[int] = (),
     niceness: int = 0,
 ) -> asyncio.subprocess.Process:
-    """Start a command of this program, such as ``["camera", "site.yaml", "c0"]``, as a process of its own.
+    """Start a command of this program, such as ``["camera", "site.yaml", "c0"]``, as a process.
 
-    ``inherited``: file descriptors that stay open in it. ``niceness`` is added to that of this process.
+    ``inherited`` are file descriptors that stay open in it. ``niceness`` is added to that of this process.
 
     Raises:
-        OSError: the system does not let it start.
+        OSError: it cannot be started.
     """
     process = await asyncio.create_subprocess_exec(
         sys.executable,
@@ -49,17 +49,17 @@ async def start_command(
         *arguments,
         env=environment,
         pass_fds=inherited,
-        process_group=0,  # Ctrl-C in a terminal is for the supervisor alone
+        process_group=0,  # only the supervisor receives Ctrl-C
     )
     lower_priority(process.pid, niceness)
     return process
 
 
 async def start_worker(module: str) -> asyncio.subprocess.Process:
-    """Start a module that reads requests from its standard input and writes answers to its standard output.
+    """Start a module that reads requests from standard input and writes answers to standard output.
 
     Raises:
-        OSError: the system does not let it start.
+        OSError: it cannot be started.
     """
     process = await asyncio.create_subprocess_exec(
         sys.executable,
@@ -68,16 +68,16 @@ async def start_worker(module: str) -> asyncio.subprocess.Process:
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        process_group=0,  # Ctrl-C in a terminal is for the service alone
+        process_group=0,  # only the service receives Ctrl-C
     )
     lower_priority(process.pid, _WORKER_NICENESS)
     return process
 
 
 def start_function(name: str, function: Callable[..., None], *arguments: Any) -> BaseProcess:
-    """Start a function in a new interpreter, which ends with this process and leaves Ctrl-C to it.
+    """Start a function in a new interpreter, which ends with this process and ignores Ctrl-C.
 
-    Function and arguments are pickled. Several are started within :func:`defer_termination`.
+    Function and arguments are pickled. Start several within :func:`defer_termination`.
     """
     process = SPAWN.Process(target=_run_function, args=(function, *arguments), name=name, daemon=True)
     process.start()
@@ -86,24 +86,24 @@ def start_function(name: str, function: Callable[..., None], *arguments: Any) ->
 
 def _run_function(function: Callable[..., None], *arguments: Any) -> None:
     terminate_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and ends its workers
     restore_termination()
     function(*arguments)
 
 
 def terminate_with_parent() -> None:
-    """Ask the kernel to send this process SIGTERM when its parent dies (Linux; elsewhere nothing happens)."""
+    """Let the kernel send this process SIGTERM when its parent dies (Linux only)."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 @contextmanager
 def defer_termination() -> Iterator[None]:
-    """Put off SIGINT and SIGTERM until the block is over; only in the main thread.
+    """Defer SIGINT and SIGTERM until the block ends; only in the main thread.
 
-    The mask alone is not enough: a library's thread may take the signal, and Python then runs the handler in
-    this one. It is set too because children inherit it: one that is terminated while it starts would print
-    a traceback. They call :func:`restore_termination`.
+    A signal mask alone is not enough: a thread of a library may receive the signal, and Python runs the
+    handler in the main thread. The mask is set for children, which would print a traceback if terminated
+    while they start; they call :func:`restore_termination`.
     """
     received: list[int] = []
     before = {

@@ -5,23 +5,23 @@ from __future__ import annotations
 import contextlib
 import resource
 
-_MOST = 1 << 20
-"""More is of no use to anybody, and some systems say that there is no limit at all."""
+_MAX_LIMIT = 1 << 20
+"""The limit that is used where the system has a higher one or none."""
 
 
 def raise_descriptor_limit() -> None:
-    """Let this process, and those that it starts, have as many descriptors open as the system lets it."""
+    """Raise the soft limit of this process, and of those that it starts, to the hard limit."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = _within(hard)
-    if _within(soft) < most:
-        with contextlib.suppress(OSError, ValueError):  # macOS names a limit that cannot be had
+    most = _capped(hard)
+    if _capped(soft) < most:
+        with contextlib.suppress(OSError, ValueError):  # macOS reports a hard limit that cannot be set
             resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def descriptor_limit() -> int:
-    """Return how many descriptors this process may have open."""
-    return _within(resource.getrlimit(resource.RLIMIT_NOFILE)[0])
+    """Return the number of descriptors that this process may have open."""
+    return _capped(resource.getrlimit(resource.RLIMIT_NOFILE)[0])
 
 
-def _within(value: int) -> int:
-    return _MOST if value == resource.RLIM_INFINITY else min(value, _MOST)
+def _capped(value: int) -> int:
+    return _MAX_LIMIT if value == resource.RLIM_INFINITY else min(value, _MAX_LIMIT)

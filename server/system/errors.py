@@ -1,4 +1,4 @@
-"""Errors that are shown to the user as a single line: what, where, and what to do."""
+"""Errors that are shown to the user as one line: what, where, and what to do."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import ClassVar
 
 
 class UserError(Exception):
-    """Bad input from outside; the command line prints its text as one line and exits with ``code``."""
+    """Invalid input; the command line prints its text as one line and exits with ``code``."""
 
     code: ClassVar[int] = 2
 
 
 class UnavailableError(UserError):
-    """Something that this process needs is not there now: trying again later may help, and is done."""
+    """Something that this process needs is unavailable now; it is retried."""
 
     code: ClassVar[int] = 3

@@ -8,7 +8,7 @@ FileState = tuple[int, int, int]
 
 
 def file_state(path: Path) -> FileState | None:
-    """Return what changes when a file does, or is replaced by another; None: there is none."""
+    """Return modification time, size and inode of a file; None: it does not exist."""
     try:
         now = path.stat()
     except OSError:

@@ -4,7 +4,7 @@
     {"time":"2026-11-22T04:31:03.120Z","level":"INFO","process":"bestview","event":"camera c1 is gone",
      "camera":"c1"}
 
-Which camera or object a line is about is taken from its template: ``log.info("camera %s is gone", camera)``.
+The camera or object of a line is found by its template: ``log.info("camera %s is gone", camera)``.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ _PLACE = re.compile(r"(?:\b(camera|object) )?%[-#0 +]*[0-9]*(?:\.[0-9]+)?([a-zA-
 
 
 class TextLines(logging.Formatter):
-    """Writes lines for people, and tracebacks below them, in which errors' own words repeat no address."""
+    """Formats log lines as text, with tracebacks below them in which addresses are redacted."""
 
     def formatException(self, ei: _ExcInfo) -> str:  # noqa: N802 — as logging calls it
-        """Return a traceback, each line up to where an address begins."""
+        """Return a traceback with addresses redacted."""
         return redact_addresses(super().formatException(ei))
 
 
 class JsonLines(TextLines):
-    """Writes each record as one line of JSON, with its traceback inside, if there is one."""
+    """Formats each record as one line of JSON, including its traceback."""
 
     def __init__(self, process: str) -> None:
         super().__init__()
         self._process = process
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line, without its end."""
+        """Return the line, without a newline."""
         time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
         line: dict[str, object] = {
             "time": time.replace("+00:00", "Z"),
@@ -55,20 +55,22 @@ class JsonLines(TextLines):
         }
         if record.exc_info:
             line["traceback"] = self.formatException(record.exc_info)
-        sayable = {key: _sayable(value) if isinstance(value, str) else value for key, value in line.items()}
-        return msgspec.json.encode(sayable, enc_hook=lambda value: _sayable(str(value))).decode()
+        encodable = {
+            key: _encodable(value) if isinstance(value, str) else value for key, value in line.items()
+        }
+        return msgspec.json.encode(encodable, enc_hook=lambda value: _encodable(str(value))).decode()
 
 
-def _sayable(text: str) -> str:
-    r"""Write what is no Unicode, as in the name of a file that is no UTF-8, as \udc80."""
+def _encodable(text: str) -> str:
+    r"""Escape surrogates, as in a file name that is not UTF-8, as \udc80."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
 def formatter(process: str) -> logging.Formatter:
-    """Return what writes the lines of a process, as MYVIEW_LOG_FORMAT says.
+    """Return the log formatter of a process, chosen by MYVIEW_LOG_FORMAT.
 
     Raises:
-        UserError: it is no format.
+        UserError: MYVIEW_LOG_FORMAT is not a format.
     """
     if is_json():
         return JsonLines(process)
@@ -77,10 +79,10 @@ def formatter(process: str) -> logging.Formatter:
 
 
 def is_json() -> bool:
-    """Return whether lines are for programs.
+    """Return whether log lines are JSON.
 
     Raises:
-        UserError: MYVIEW_LOG_FORMAT is no format.
+        UserError: MYVIEW_LOG_FORMAT is not a format.
     """
     wanted = os.environ.get(VARIABLE) or "text"
     if wanted not in _FORMATS:
@@ -89,7 +91,7 @@ def is_json() -> bool:
 
 
 def _subjects(record: logging.LogRecord) -> dict[str, object]:
-    """Return the camera and object of a record: the names in its template with their values."""
+    """Return the camera and object of a record, found by their names in its template."""
     if not isinstance(record.args, tuple) or not isinstance(record.msg, str):
         return {}
     values = iter(record.args)

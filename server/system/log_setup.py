@@ -1,4 +1,4 @@
-"""Log lines: one per event that matters, to standard error, never one per frame."""
+"""Logging setup: to standard error, as text or JSON."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ log = logging.getLogger("myview")
 
 
 def log_to_stderr(name: str) -> None:
-    """Log as this process; MYVIEW_LOG=DEBUG shows more, MYVIEW_LOG_FORMAT=json is for programs.
+    """Set up logging under a process name; the level is MYVIEW_LOG, the format MYVIEW_LOG_FORMAT.
 
     Raises:
-        UserError: MYVIEW_LOG is no level, or MYVIEW_LOG_FORMAT no format.
+        UserError: MYVIEW_LOG is not a level, or MYVIEW_LOG_FORMAT is not a format.
     """
     level = os.environ.get("MYVIEW_LOG", "INFO").upper()
     if level not in logging.getLevelNamesMapping():
@@ -29,14 +29,14 @@ def log_to_stderr(name: str) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(formatter(name))
     logging.basicConfig(level=level, handlers=[handler])
-    if _logs_json():  # then nothing else may stand between the lines
+    if _logs_json():  # then no other text may stand between the lines
         logging.captureWarnings(capture=True)
         sys.excepthook = _uncaught
         threading.excepthook = _uncaught_in_thread
 
 
-def say_failure(text: str) -> None:
-    """Print a one-line error, or log it where the log is JSON."""
+def report_error(text: str) -> None:
+    """Print a one-line error, or log it if the log is JSON."""
     if _logs_json():
         log.error("%s", text)
     else:
@@ -44,8 +44,8 @@ def say_failure(text: str) -> None:
 
 
 def _logs_json() -> bool:
-    """Return whether this process logs, and for programs."""
-    return any(isinstance(it.formatter, JsonLines) for it in logging.getLogger().handlers)
+    """Return whether this process logs as JSON."""
+    return any(isinstance(handler.formatter, JsonLines) for handler in logging.getLogger().handlers)
 
 
 def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

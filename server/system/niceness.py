@@ -1,36 +1,36 @@
-"""Process priorities (nice(1)): who yields where processors are scarce. A lower priority takes no privilege.
+"""Process priorities (nice(1)); lowering a priority needs no privilege.
 
-The disk is yielded likewise: without a priority of its own a process has one by its niceness (ioprio_set(2)).
+The I/O priority follows: without an explicit one it is derived from the niceness (ioprio_set(2)).
 """
 
 from __future__ import annotations
 
 import os
 
-_NICEST = 19
+_MAX_NICENESS = 19
 
 
 def lower_own_priority(by: int) -> None:
-    """Lower the priority of this process below that of its parent by this niceness.
+    """Set the niceness of this process to that of its parent plus ``by``, if it is lower.
 
-    Called before it has threads: each has a niceness of its own, and begins with that of who begins it.
+    Called before threads start: each thread inherits the niceness of the thread that starts it.
     """
-    _nicer(0, _niceness(os.getppid()) + by)
+    _raise_niceness(0, _niceness(os.getppid()) + by)
 
 
 def lower_priority(pid: int, by: int) -> None:
-    """Lower the priority of a child process below that of this one by this niceness.
+    """Set the niceness of a child process to that of this process plus ``by``, if it is lower.
 
-    What it starts with, libraries that load above all, is then as nice; it may be gone already.
+    This also covers its loading of libraries. A child that has exited already is ignored.
     """
-    _nicer(pid, _niceness(0) + by)
+    _raise_niceness(pid, _niceness(0) + by)
 
 
-def _nicer(pid: int, to: int) -> None:
-    """Make a process as nice as that, if it is not nicer: less nice again it cannot become."""
+def _raise_niceness(pid: int, to: int) -> None:
+    """Raise the niceness of a process; it cannot be lowered again."""
     try:
         if to > _niceness(pid):
-            os.setpriority(os.PRIO_PROCESS, pid, min(to, _NICEST))
+            os.setpriority(os.PRIO_PROCESS, pid, min(to, _MAX_NICENESS))
     except ProcessLookupError:
         return
 

@@ -1,8 +1,8 @@
-"""Text from elsewhere on its way to a terminal, which would obey some of it."""
+"""Sanitizing of external text for a terminal, which would execute control characters."""
 
 from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """Return a text as one line in which nothing moves the cursor or changes colours."""
-    return "".join(it if it.isprintable() else "·" for it in " ".join(text.split()))
+    """Return a text as one line without control characters."""
+    return "".join(char if char.isprintable() else "·" for char in " ".join(text.split()))

@@ -1,4 +1,4 @@
-"""Files and folders that only their owner can read, whatever the umask."""
+"""Private files and folders: only their owner can read them, regardless of the umask."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _OTHERS = 0o077
 
 
 def make_private_folder(path: Path) -> None:
-    """Make a folder, and those above it that are missing, for this user alone; others stay as they are.
+    """Create a folder and its missing parents with mode 700; existing ones are not changed.
 
     Raises:
-        OSError: it cannot be made, or no folder has this name.
+        OSError: it cannot be created, or is not a folder.
     """
     try:
         path.mkdir(mode=FOLDER)
@@ -30,7 +30,7 @@ def make_private_folder(path: Path) -> None:
 
 
 def open_private(path: Path | str, flags: int) -> int:
-    """Open a file; one that is made is for this user alone. Fits ``opener`` of :func:`open`.
+    """Open a file; a new one has mode 600. Usable as ``opener`` of :func:`open`.
 
     Raises:
         OSError: it cannot be opened.
@@ -39,31 +39,31 @@ def open_private(path: Path | str, flags: int) -> int:
 
 
 def write_private(path: Path, data: bytes) -> None:
-    """Write a file for this user alone.
+    """Write a file with mode 600.
 
     Raises:
-        OSError: it cannot be written; part of it may be there.
+        OSError: it cannot be written; part of it may exist.
     """
     with open(path, "wb", opener=open_private) as file:
         file.write(data)
 
 
 def rights_of_others(path: Path) -> str:
-    """Return the mode of a file or folder, such as ``755``, where others have rights to it; else nothing.
+    """Return the mode of a file or folder, such as ``755``, if others can access it; otherwise an empty text.
 
     Raises:
-        OSError: it is not there.
+        OSError: it does not exist.
     """
     mode = stat.S_IMODE(path.stat().st_mode)
     return f"{mode:o}" if mode & _OTHERS else ""
 
 
 def close_to_others(path: Path) -> None:
-    """Take the rights of others away from what is this user's own; anybody else's stays as it is.
+    """Remove the rights of others from a file or folder that this user owns; otherwise do nothing.
 
     Raises:
-        OSError: it is not there, or its rights cannot be changed.
+        OSError: it does not exist, or its mode cannot be changed.
     """
-    there = path.stat()
-    if there.st_uid == os.geteuid() and there.st_mode & _OTHERS:
-        path.chmod(stat.S_IMODE(there.st_mode) & ~_OTHERS)
+    status = path.stat()
+    if status.st_uid == os.geteuid() and status.st_mode & _OTHERS:
+        path.chmod(stat.S_IMODE(status.st_mode) & ~_OTHERS)

@@ -1,4 +1,4 @@
-"""``myview calibrate``: a homography per camera, from marked points or from walks, and how far off."""
+"""``myview calibrate``: homographies of cameras from marked points or walks, with their errors."""
 
 from __future__ import annotations
 
@@ -19,36 +19,43 @@ _UNNAMED = "unit"
 
 
 def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> list[str]:
-    """Read the points, fit, and write the file and the plan; return the lines to say.
+    """Fit homographies to marked points, and write the ground file and the floor plan.
+
+    Returns:
+        Lines to print.
 
     Raises:
-        UserError: the file is no such file, or its points contradict each other.
+        UserError: the file is invalid, or its points contradict each other.
     """
     chosen_unit = None if unit is None else _checked("--unit", unit)
-    given = read_points(points)
-    unit = chosen_unit or _checked(f"{points}: unit", given.unit or _UNNAMED)
+    marked = read_points(points)
+    unit = chosen_unit or _checked(f"{points}: unit", marked.unit or _UNNAMED)
     with refusing(points):
-        fits = fit_cameras(given.cameras)
+        fits = fit_cameras(marked.cameras)
     views = [
-        FloorPlanCamera(it.camera, fits[it.camera].homography, it.image, it.floor) for it in given.cameras
+        FloorPlanCamera(points.camera, fits[points.camera].homography, points.image, points.floor)
+        for points in marked.cameras
     ]
     plot_floor_plan(views, unit, plan)
     homographies = {camera: fit.homography for camera, fit in fits.items()}
     residuals = {name: _rounded(fit) for name, fit in fits.items()}
     out.write_text(ground_file_text(unit, homographies, {"residuals": residuals}), encoding="utf-8")
-    return [_line(it, fits[it.camera], unit) for it in given.cameras]
+    return [_line(camera, fits[camera.camera], unit) for camera in marked.cameras]
 
 
 def calibrate_from_walks(
-    walked: RecordedWalk, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
+    walk: RecordedWalk, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
 ) -> list[str]:
-    """Calibrate from walks, and write the file and the plan; return the lines to print.
+    """Calibrate from walks, and write the ground file and the floor plan.
+
+    Returns:
+        Lines to print.
 
     Raises:
-        UserError: the walk says too little.
+        UserError: the walk covered too little.
     """
     with refusing("calibrate"):
-        outcome = calibrate_walk(walked, settings, person)
+        outcome = calibrate_walk(walk, settings, person)
     if outcome.insufficient and not force:
         raise UserError(
             f"calibrate: the walk covered too little: {outcome.insufficient} (--force writes it anyway)"
@@ -81,7 +88,7 @@ def _rounded(fit: PointFit) -> list[float]:
 
 def _line(points: MarkedPoints, fit: PointFit, unit: str) -> str:
     count = len(points.image)
-    if count == 4:  # noqa: PLR2004 — as many as a homography takes
+    if count == 4:  # noqa: PLR2004 — the minimum for a homography
         return f"{points.camera}: 4 pairs always fit exactly; a fifth would show errors"
     worst = int(np.argmax(fit.image_error))
     return (

@@ -13,7 +13,7 @@ from server.system.errors import UserError
 
 
 def calibrate(
-    given: Annotated[
+    inputs: Annotated[
         list[Path],
         typer.Argument(
             metavar="INPUT…", help="Marked points (JSON or CSV), or tracks of each camera, or videos."
@@ -40,27 +40,29 @@ def calibrate(
         bool, typer.Option("--force", help="Write even if the walk covered too little.")
     ] = False,
 ) -> None:
-    """Find each camera's homography to the floor: from marked points, or from people who walk about."""
+    """Calibrate cameras to the floor: from marked points, or from people who walk about."""
     from server.cli.calibrate.calibration import calibrate_from_walks, calibrate_points
     from server.cli.calibrate.points_file import ENDINGS
     from server.cli.calibrate.walk_input import VideoFormat, read_walks
     from server.cli.render.video_info import parse_size
     from server.service.calibration.calibration_report import walk_settings
 
-    for path in given:
+    for path in inputs:
         if not path.exists():
-            raise UserError(f"{redact_address(str(path))}: is not there")
+            raise UserError(f"{redact_address(str(path))}: does not exist")
     plan = plan or out.with_suffix(".png")
     if plan.resolve() == out.resolve():
         raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")
     picture = VideoFormat(parse_size(size) if size else None, fps)
-    with atomic_file(out, *given) as ground, atomic_file(plan, *given) as drawn:  # both of them, or none
-        if any(path.suffix.lower() in ENDINGS for path in given):
-            if len(given) > 1:
+    with atomic_file(out, *inputs) as ground, atomic_file(plan, *inputs) as drawn:  # both files or none
+        if any(path.suffix.lower() in ENDINGS for path in inputs):
+            if len(inputs) > 1:
                 raise UserError("calibrate: marked points are one file, with all cameras in it")
-            lines = calibrate_points(given[0], ground, drawn, unit)
+            lines = calibrate_points(inputs[0], ground, drawn, unit)
         else:
-            walked = read_walks(given, config, picture, lambda name: typer.echo(f"tracking {name}", err=True))
+            walked = read_walks(
+                inputs, config, picture, lambda name: typer.echo(f"tracking {name}", err=True)
+            )
             settings = walk_settings(walked.fps, shift)
             lines = calibrate_from_walks(walked, ground, drawn, settings, person, force=force)
     for line in lines:

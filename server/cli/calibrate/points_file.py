@@ -1,4 +1,4 @@
-"""Marked points from a file: JSON or CSV, as docs/reference/files.md has them."""
+"""Reader of marked points from JSON or CSV (docs/reference/files.md)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from server.system.errors import UserError
 
 COLUMNS = ("camera", "image_x", "image_y", "floor_x", "floor_y")
 ENDINGS = (".json", ".csv")
-_FARTHEST = 1e9
-"""Pixels, or the floor's units; beyond, squares of them say nothing any more."""
+_MAX_COORDINATE = 1e9
+"""Largest coordinate, in pixels or units of the floor; squares of larger ones lose all precision."""
 _SHOWN = 40
-"""Characters of what is wrong that an error repeats."""
+"""Characters of an invalid value that an error repeats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ def read_points(path: Path) -> PointFile:
     """Read a file of marked points.
 
     Raises:
-        UserError: it cannot be read, or is no such file; the line or pair is named.
+        UserError: it cannot be read or is invalid; the error names the line or pair.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets begin a CSV with a byte order mark
@@ -84,7 +84,7 @@ def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
         )
     twice = next((column for column in COLUMNS if (rows.fieldnames or []).count(column) > 1), None)
     if twice is not None:
-        raise UserError(f"{name}:1: has two columns {twice!r}, and only the last would count: keep one")
+        raise UserError(f"{name}:1: has two columns {twice!r}, and only the last would be read: keep one")
     for row in rows:
         where = f"{name}:{rows.line_num}"
         camera = (row["camera"] or "").strip()
@@ -101,7 +101,7 @@ def _json(text: str, name: str) -> dict[str, Any]:
         raise UserError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from error
     except DuplicateKeyError as error:
         raise UserError(f"{name}: {error}") from error
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets in brackets
+    except (ValueError, RecursionError) as error:  # a number with thousands of digits, or deep nesting
         raise UserError(f"{name}: is not readable JSON: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("cameras"), dict):
         raise UserError(
@@ -125,20 +125,22 @@ def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
         for number, pair in enumerate(pairs, start=1):
             where = f"{name}: camera {camera}: pair {number}"
             try:
-                (x, y), (right, far) = pair["image"], pair["floor"]
+                (x, y), (floor_x, floor_y) = pair["image"], pair["floor"]
             except (KeyError, TypeError, ValueError):
                 raise UserError(f'{where}: is not {{"image": [x, y], "floor": [x, y]}}') from None
-            yield _Pair(camera, _four([x, y, right, far], where))
+            yield _Pair(camera, _four([x, y, floor_x, floor_y], where))
 
 
 def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float]:
     try:
-        x, y, right, far = (float(value) for value in values)
+        x, y, floor_x, floor_y = numbers = tuple(float(value) for value in values)
     except (TypeError, ValueError, OverflowError):
         raise UserError(f"{where}: {_shown(values)}: are not four numbers") from None
-    if max(map(abs, (x, y, right, far))) > _FARTHEST or not all(map(math.isfinite, (x, y, right, far))):
-        raise UserError(f"{where}: {_shown(values)}: are not four finite numbers, none beyond {_FARTHEST:g}")
-    return x, y, right, far
+    if max(map(abs, numbers)) > _MAX_COORDINATE or not all(map(math.isfinite, numbers)):
+        raise UserError(
+            f"{where}: {_shown(values)}: are not four finite numbers, none beyond {_MAX_COORDINATE:g}"
+        )
+    return x, y, floor_x, floor_y
 
 
 def _shown(values: Sequence[Any]) -> str:

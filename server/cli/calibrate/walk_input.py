@@ -1,4 +1,4 @@
-"""The walks that cameras saw, from files of tracks, or from videos that are tracked first."""
+"""Walks for the calibration, from files of tracks, or from videos, which are tracked first."""
 
 from __future__ import annotations
 
@@ -21,46 +21,49 @@ from tracking.motchallenge import MotRow, read_rows
 ENDINGS = (".txt", ".txt.gz")
 _FPS = 25.0
 _SAME_RATE = 0.01
-"""Share by which the rates that files tell of may differ; they are rounded, and a walk is short."""
+"""Relative difference allowed between the frame rates of files: they are rounded, and a walk is short."""
 
 
 @dataclass(frozen=True, slots=True)
 class VideoFormat:
-    """Size and frame rate of the videos, as far as the options give them."""
+    """Size and frame rate inputs by the options; None: not inputs."""
 
     size: Size | None
     fps: float | None
 
 
 def read_walks(
-    given: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
+    inputs: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
 ) -> RecordedWalk:
-    """Read tracks, or track people in videos; ``progress`` is called with the current video.
+    """Read tracks, or track people in videos; ``progress`` is called with the current camera.
 
     Raises:
-        UserError: some are tracks and some videos, or as the two functions below.
+        UserError: some inputs are tracks and some videos, or as :func:`walks_from_tracks` and
+            :func:`walks_from_videos`.
     """
-    tracks = [path for path in given if _is_tracks(path)]
-    if tracks and len(tracks) < len(given):
-        other = next(path for path in given if path not in tracks)
-        raise UserError(f"calibrate: {tracks[0]} is tracks and {other} is not; give one or the other for all")
+    tracks = [path for path in inputs if _is_tracks(path)]
+    if tracks and len(tracks) < len(inputs):
+        other = next(path for path in inputs if path not in tracks)
+        raise UserError(
+            f"calibrate: {tracks[0]} is tracks and {other} is not; give only tracks, or only videos"
+        )
     return (
-        walks_from_tracks(given, picture) if tracks else walks_from_videos(given, config, picture, progress)
+        walks_from_tracks(inputs, picture) if tracks else walks_from_videos(inputs, config, picture, progress)
     )
 
 
 def _is_tracks(path: Path) -> bool:
-    """Return whether this is a file of tracks, or a folder of such files (or with a folder `tracks/`)."""
+    """Return whether a path is a file of tracks, or a folder with such files or a folder `tracks/`."""
     return path.name.endswith(ENDINGS) or (path.is_dir() and bool(_files(path)))
 
 
-def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> RecordedWalk:
-    """Read files of tracks, MOTChallenge text; each camera is called like its file.
+def walks_from_tracks(inputs: Sequence[Path], picture: VideoFormat) -> RecordedWalk:
+    """Read files of tracks (MOTChallenge); each camera is named after its file.
 
     Raises:
-        UserError: a file cannot be read or has no people in it, or two have one name.
+        UserError: a file cannot be read or has no people, or two have the same name.
     """
-    files = [file for path in given for file in (_files(path) if path.is_dir() else [path])]
+    files = [file for path in inputs for file in (_files(path) if path.is_dir() else [path])]
     names = [camera_name(Path(file.name.removesuffix(".gz"))) for file in files]
     _check_names(names)
     rows = {file: _rows(file) for file in files}
@@ -76,33 +79,35 @@ def walks_from_tracks(given: Sequence[Path], picture: VideoFormat) -> RecordedWa
 def walks_from_videos(
     videos: Sequence[Path], config: Path | None, picture: VideoFormat, progress: Callable[[str], None]
 ) -> RecordedWalk:
-    """Track people in each video first, as `myview track` does; the configuration's offsets are left out.
+    """Track people in each video, as `myview track` does, without the configured offsets.
 
     Raises:
-        UserError: a video cannot be opened or shows no people, two have one name, or their rates differ.
+        UserError: a video cannot be opened or shows no people, two have the same name, or rates differ.
     """
     names = [camera_name(video) for video in videos]
     _check_names(names)
-    # Everything is checked before the first is tracked, which takes a while.
-    seen = [read_video_info(video) for video in videos]
+    # All videos are checked before the first is tracked, which takes a while.
+    infos = [read_video_info(video) for video in videos]
     loaded = [config_for_video(video, None, config) for video in videos]
-    # Tracks are counted by the site's rate, which is a video's own where the configuration has none.
-    rates = {name: one.site.fps for name, one, it in zip(names, loaded, seen, strict=True) if it.fps}
+    # Frames are counted at the site's rate, by default that of the video.
+    rates = {
+        name: config.site.fps for name, config, info in zip(names, loaded, infos, strict=True) if info.fps
+    }
     fps = picture.fps or _rate(rates)
-    offsets = [it.cameras[0].offset for it in loaded]
+    offsets = [config.cameras[0].offset for config in loaded]
     walks = []
     with TemporaryDirectory() as folder:
-        for name, video, it, offset in zip(names, videos, seen, offsets, strict=True):
+        for name, video, info, offset in zip(names, videos, infos, offsets, strict=True):
             progress(name)
             out = Path(folder) / f"{name}.txt"
             track_one(video, None, out, config, None, lambda _: None)
-            # With an offset tracks count pulses, and not the video's own frames.
-            walks.append(_walk(name, it.size, _rows(out, str(video)), fps, offset))
+            # With an offset, tracks count pulses instead of the video's frames.
+            walks.append(_walk(name, info.size, _rows(out, str(video)), fps, offset))
     return RecordedWalk(tuple(walks), fps)
 
 
 def _rate(rates: Mapping[str, float]) -> float:
-    """Return the rate that all cameras have: frame n of all is one moment."""
+    """Return the common frame rate: frame n of all cameras is the same moment."""
     first = next(iter(rates), None)
     if first is None:
         return _FPS
@@ -130,7 +135,7 @@ def _rows(path: Path, name: str | None = None) -> list[MotRow]:
     except ValueError as error:
         raise UserError(str(error)) from error
     if not rows:
-        raise UserError(f"{name or path}: nobody is in it")
+        raise UserError(f"{name or path}: has no people")
     if any(row.id < 0 for row in rows):
         raise UserError(
             f"{path}: has detections, not tracks (id -1); `myview track --det` makes tracks of them"

@@ -14,7 +14,7 @@ from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UserError
 
 _FRAMES_S = 3.0
-"""Seconds of frames that are run at most."""
+"""Longest run, in seconds of frames."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +24,13 @@ class CameraProbe:
     Attributes:
         problem: why the camera cannot run; empty if it can.
         sent: statistics of a network camera's stream; None for other sources.
-        size: width and height of its own pictures.
+        size: width and height of its pictures.
         recorded_fps: stated frame rate of a video file; None for other sources.
-        passes: its own H.264 passes through.
-        why_encoded: why it does not, if configured to.
-        frames: how many frames were run.
-        kbps: bit rate as the site streams them.
-        cores: processor cores that this camera takes at the site's rate.
+        passes: whether its H.264 is passed through.
+        why_encoded: why it is not, if pass-through is configured.
+        frames: the number of frames run.
+        kbps: bit rate of the site's stream.
+        cores: processor cores that the camera needs at the site's rate.
     """
 
     problem: str = ""
@@ -45,7 +45,7 @@ class CameraProbe:
 
 
 def probe_camera(config: Config, camera_id: str, seconds: float) -> CameraProbe:
-    """Probe a camera for so many seconds, after it has answered."""
+    """Probe a camera for ``seconds`` once it has answered."""
     sent = None
     try:
         config = fill_in_password(config, camera_id)
@@ -82,9 +82,9 @@ def _run_frames(
             break
         if live:
             time.sleep(1 / fps)
-    spent = time.thread_time() - began
+    cpu_s = time.thread_time() - began
     decoding = sent.cpu_s if sent is not None else 0.0
-    each = 1 / max(1, frames)
+    per_frame = 1 / max(1, frames)
     return CameraProbe(
         problem="" if frames else "no picture arrived in time",
         sent=sent,
@@ -92,6 +92,6 @@ def _run_frames(
         passes=pipeline.is_passthrough,
         why_encoded=pipeline.why_encoded,
         frames=frames,
-        kbps=8 * units * each * fps / 1000,
-        cores=(spent * each + decoding) * fps,
+        kbps=8 * units * per_frame * fps / 1000,
+        cores=(cpu_s * per_frame + decoding) * fps,
     )

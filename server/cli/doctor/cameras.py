@@ -36,7 +36,7 @@ def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
             probes[camera] = CameraProbe(describe_bug(error))
 
     # Daemons: a thread that hangs in a driver must not keep the doctor from ending.
-    threads = [threading.Thread(target=run, args=(it,), daemon=True) for it in config.camera_ids]
+    threads = [threading.Thread(target=run, args=(camera,), daemon=True) for camera in config.camera_ids]
     for thread in threads:
         thread.start()
     until = time.monotonic() + 2 * seconds + _GRACE_S
@@ -47,7 +47,7 @@ def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
 
 
 def _while_busy() -> str:
-    """Return a remark if the machine is overloaded, since that may be the cause; else an empty text."""
+    """Return a remark if the machine is overloaded, which may be the cause; otherwise an empty text."""
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     return f", while the machine is overloaded (load {load:.0f})" if load > 2 * cores else ""
 
@@ -71,9 +71,11 @@ def sound_findings(config: Config) -> list[Finding]:
 
 
 def camera_findings(config: Config, probes: Mapping[str, CameraProbe], *, runs: bool) -> list[Finding]:
-    """Report on each camera; ``runs``: the site is running, and may hold a device exclusively."""
+    """Report on each camera; ``runs``: the site is running and may hold a device exclusively."""
     findings = [
-        it for camera, probed in probes.items() for it in _findings_of(config, camera, probed, runs=runs)
+        finding
+        for camera, probe in probes.items()
+        for finding in _findings_of(config, camera, probe, runs=runs)
     ]
     return findings + _shared_devices(config)
 
@@ -81,12 +83,13 @@ def camera_findings(config: Config, probes: Mapping[str, CameraProbe], *, runs: 
 def _shared_devices(config: Config) -> list[Finding]:
     """Report devices that two cameras share."""
     findings, owners = [], dict[str, str]()
-    for it in config.cameras:
-        if is_device(it.source):
-            first = owners.setdefault(os.path.realpath(it.source), it.id)  # it has other names in /dev/v4l
-            if first != it.id:
-                text = f"{it.source} is also used by camera {first}, and only one can open it"
-                findings.append(bad(f"camera {it.id}", text, "give each camera its own device"))
+    for camera in config.cameras:
+        if is_device(camera.source):
+            # A device has several names, in /dev/v4l for example.
+            first = owners.setdefault(os.path.realpath(camera.source), camera.id)
+            if first != camera.id:
+                text = f"{camera.source} is also used by camera {first}, and only one can open it"
+                findings.append(bad(f"camera {camera.id}", text, "give each camera its own device"))
     return findings
 
 
@@ -94,15 +97,15 @@ def _findings_of(config: Config, camera: str, probe: CameraProbe, *, runs: bool)
     check = f"camera {camera}"
     if probe.problem or probe.size is None:
         if runs:
-            do = "the site is running and may hold the device: see /api/cameras"
-            return [warning(check, probe.problem, do)]
+            remedy = "the site is running and may hold the device: see /api/cameras"
+            return [warning(check, probe.problem, remedy)]
         return [bad(check, probe.problem, _remedy(config.camera(camera).source))]
     parts = [f"{_size(probe.size)} pixels"]
     rate = probe.recorded_fps if probe.sent is None else probe.sent.fps
     if rate is not None:
         parts.append(f"{rate:.1f} pictures a second")
-    how = "its own H.264 passes" if probe.passes else f"{probe.kbps:.0f} kbit/s"
-    parts += [how, f"{probe.cores:.2f} of a core"]
+    encoding = "its own H.264 passes" if probe.passes else f"{probe.kbps:.0f} kbit/s"
+    parts += [encoding, f"{probe.cores:.2f} of a core"]
     return [ok(check, ", ".join(parts)), *_quality_findings(config, check, probe)]
 
 
@@ -116,12 +119,12 @@ def _remedy(source: str) -> str:
 
 def _quality_findings(config: Config, check: str, probe: CameraProbe) -> list[Finding]:
     site, findings = config.site, []
-    wide, high = probe.size or (site.width, site.height)
-    if wide < site.width and high < site.height:
+    width, height = probe.size or (site.width, site.height)
+    if width < site.width and height < site.height:
         findings.append(
             warning(
                 check,
-                f"its pictures ({_size((wide, high))}) are smaller than the site's "
+                f"its pictures ({_size((width, height))}) are smaller than the site's "
                 f"({_size((site.width, site.height))}), and are upscaled",
                 "lower site.width and site.height, or set the camera to a larger size",
             )
@@ -137,12 +140,12 @@ def _quality_findings(config: Config, check: str, probe: CameraProbe) -> list[Fi
         )
     recorded = probe.recorded_fps
     if recorded is not None and abs(recorded / site.fps - 1) > _SAME_SPEED:
-        some = "left out" if recorded > site.fps else "shown twice"
+        effect = "left out" if recorded > site.fps else "shown twice"
         findings.append(
             warning(
                 check,
                 f"was recorded at {recorded:g} pictures a second, the site takes {site.fps:g}: "
-                f"some are {some}",
+                f"some are {effect}",
                 "set site.fps to that of most of the recordings",
             )
         )

@@ -11,7 +11,7 @@ from server.cli.doctor.findings import Finding, bad, ok, warning
 
 _SOON_DAYS = 14
 _DAY_S = 86_400
-_NEW_ONE = "renew it; the running site loads it without a restart"
+_RENEW = "renew it; the running site loads it without a restart"
 _READABLE = "name another file, or let this user read it"
 
 
@@ -21,9 +21,9 @@ def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
         if unreadable := _unreadable(path):
             return bad(check, f"{path}: cannot be read: {unreadable}", _READABLE)
     try:
-        seen = handshake(certificate, key, certificate)
+        accepted = handshake(certificate, key, certificate)
     except ssl.SSLCertVerificationError as error:
-        return bad(check, f"{certificate}: {error.verify_message}", _NEW_ONE)
+        return bad(check, f"{certificate}: {error.verify_message}", _RENEW)
     except (ssl.SSLError, OSError, ValueError) as error:
         reason = getattr(error, "reason", None) or str(error)
         return bad(
@@ -31,14 +31,14 @@ def certificate_finding(check: str, certificate: Path, key: Path) -> Finding:
             f"{certificate} and {key} are not a certificate and its key: {reason}",
             "both must be PEM files",
         )
-    days = (ssl.cert_time_to_seconds(str(seen.get("notAfter"))) - time.time()) / _DAY_S
-    names = ", ".join(name for _, name in seen.get("subjectAltName", ()))
+    days = (ssl.cert_time_to_seconds(str(accepted.get("notAfter"))) - time.time()) / _DAY_S
+    names = ", ".join(name for _, name in accepted.get("subjectAltName", ()))
     text = f"{certificate} is valid for {days:.0f} days, for {names or 'no host: it has no subjectAltName'}"
-    return ok(check, text) if days >= _SOON_DAYS and names else warning(check, text, _NEW_ONE)
+    return ok(check, text) if days >= _SOON_DAYS and names else warning(check, text, _RENEW)
 
 
 def router_finding(check: str, certificate: Path, key: Path, authority: Path, host: str) -> Finding | None:
-    """Report why a client would refuse a host's certificate; None if it would not."""
+    """Report why clients would refuse a host's certificate; None: they would accept it."""
     try:
         handshake(certificate, key, authority, host)
     except ssl.SSLCertVerificationError as error:
@@ -58,12 +58,15 @@ def authority_finding(check: str, authority: Path) -> Finding:
         ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(authority)
     except (ssl.SSLError, OSError) as error:
         reason = getattr(error, "reason", None) or error
-        return bad(check, f"{authority}: is no certificate: {reason}", "it must be a PEM file")
+        return bad(check, f"{authority}: is not a certificate: {reason}", "it must be a PEM file")
     return ok(check, f"{authority} can be read")
 
 
 def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = None) -> dict[str, Any]:
-    """Return the server certificate that a client accepts that trusts `trusted` and expects `host`.
+    """Perform a TLS handshake with a client that trusts ``trusted`` and expects ``host``.
+
+    Returns:
+        The server's certificate, as of :meth:`ssl.SSLSocket.getpeercert`.
 
     Raises:
         ssl.SSLCertVerificationError: the client refuses the certificate.
@@ -71,19 +74,19 @@ def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = No
     """
     server = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     server.load_cert_chain(certificate, key, password=_no_password)
-    trusting = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    trusting.check_hostname = host is not None
-    trusting.load_verify_locations(trusted)
-    trusting.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
-    there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
-    one = trusting.wrap_bio(back, there, server_side=False, server_hostname=host)
-    other = server.wrap_bio(there, back, server_side=True)
-    for side in (one, other, one, other):
+    client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname = host is not None
+    client.load_verify_locations(trusted)
+    client.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+    to_server, to_client = ssl.MemoryBIO(), ssl.MemoryBIO()
+    client_side = client.wrap_bio(to_client, to_server, server_side=False, server_hostname=host)
+    server_side = server.wrap_bio(to_server, to_client, server_side=True)
+    for side in (client_side, server_side, client_side, server_side):
         try:
             side.do_handshake()
         except ssl.SSLWantReadError:
             continue
-    return dict(one.getpeercert() or {})
+    return dict(client_side.getpeercert() or {})
 
 
 def _unreadable(path: Path) -> str:

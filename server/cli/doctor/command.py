@@ -1,4 +1,4 @@
-"""``myview doctor``: checks a configuration against reality before the site starts."""
+"""``myview doctor``: checks a configuration against cameras, network and machine before the site starts."""
 
 from __future__ import annotations
 
@@ -40,31 +40,31 @@ from server.system.errors import UserError
 T = TypeVar("T")
 
 _LONGEST = "record.max_mb"
-"""The longest name of a check, but for those that have a camera's in it."""
-_MEND = "fix the configuration; configs/demo.yaml explains every setting"
+"""The longest name of a check without a camera's name."""
+_REMEDY = "fix the configuration; configs/demo.yaml explains every setting"
 
 
 def run_doctor(path: Path, seconds: float, *, as_json: bool) -> bool:
-    """Check a configuration and print each finding at once; return whether nothing is bad."""
-    return asyncio.run(_check_and_report(path, seconds, as_json=as_json)).well
+    """Check a configuration and print findings as they come; return whether none is bad."""
+    return asyncio.run(_check_and_report(path, seconds, as_json=as_json)).ok
 
 
 async def _check_and_report(path: Path, seconds: float, *, as_json: bool) -> Findings:
     findings: list[Finding] = []
     config = _read(path, findings)
-    names = [] if config is None else [f"camera {it}" for it in config.camera_ids]
+    names = [] if config is None else [f"camera {camera}" for camera in config.camera_ids]
     width, console = max(map(len, [_LONGEST, *names])), Console()
 
-    def report(it: Finding) -> None:
+    def report(finding: Finding) -> None:
         if not as_json:
-            show(it, width, console)
+            show(finding, width, console)
 
-    for it in findings:
-        report(it)
+    for finding in findings:
+        report(finding)
     if config is not None:
-        async for it in run_checks(config, seconds):
-            findings.append(it)
-            report(it)
+        async for finding in run_checks(config, seconds):
+            findings.append(finding)
+            report(finding)
     summary = collect_findings(findings)
     if as_json:
         typer.echo(msgspec.json.format(msgspec.json.encode(summary)).decode())
@@ -78,40 +78,40 @@ def _read(path: Path, findings: list[Finding]) -> Config | None:
         try:
             config = load_config(path)
         except UserError as error:
-            findings.append(bad("configuration", str(error), _MEND))
+            findings.append(bad("configuration", str(error), _REMEDY))
             return None
         site = config.site
-        what = f"{len(config.cameras)} cameras, {site.width}x{site.height} at {site.fps:g} a second"
-        findings.append(ok("configuration", f"{path}: {what}"))
+        summary = f"{len(config.cameras)} cameras, {site.width}x{site.height} at {site.fps:g} a second"
+        findings.append(ok("configuration", f"{path}: {summary}"))
         return config
     return None
 
 
 async def run_checks(config: Config, seconds: float) -> AsyncIterator[Finding]:
-    """Yield all findings about a configuration, as soon as they are known."""
+    """Yield all findings about a configuration as soon as they are known."""
     findings: list[Finding] = []
-    runs, probes = False, {it: CameraProbe("not tried") for it in config.camera_ids}
+    runs, probes = False, {camera: CameraProbe("not tried") for camera in config.camera_ids}
     with report_failure("ports", findings):
         ports, runs = await port_findings(config)
         findings += ports
     with report_failure("zenoh.connect", findings):
         findings += await reachability_findings(config)
-    for it in [*findings, *file_findings(_with_scene_ground(config))]:
-        yield it
+    for finding in [*findings, *file_findings(_with_scene_ground(config))]:
+        yield finding
     findings = []
     with report_failure("clock", findings):
         findings += await clock_findings(config)
-    for it in findings:
-        yield it
+    for finding in findings:
+        yield finding
     findings = []
     with report_failure("cameras", findings):
         probes = await _run_detached(lambda: probe_cameras(config, seconds))
-    for it in findings + _camera_dependent_findings(config, probes, runs=runs):
-        yield it
+    for finding in findings + _camera_dependent_findings(config, probes, runs=runs):
+        yield finding
 
 
 async def _run_detached(work: Callable[[], T]) -> T:
-    """Run in a daemon thread, which cancellation abandons: it may hang in a driver."""
+    """Run work in a daemon thread, abandoned on cancellation, since it may hang in a driver."""
     loop = asyncio.get_running_loop()
     result: asyncio.Future[T] = loop.create_future()
 
@@ -122,7 +122,7 @@ async def _run_detached(work: Callable[[], T]) -> T:
             done = partial(result.set_exception, error)
         else:
             done = partial(result.set_result, value)
-        with contextlib.suppress(RuntimeError):  # the loop may be over
+        with contextlib.suppress(RuntimeError):  # the loop may be closed
             loop.call_soon_threadsafe(lambda: None if result.cancelled() else done())
 
     threading.Thread(target=run, daemon=True).start()
@@ -148,7 +148,7 @@ def _camera_dependent_findings(
 
 
 def _with_scene_ground(config: Config) -> Config:
-    """Return the configuration with its scenes' floors; an unknown scene is reported by its camera."""
+    """Return the configuration with its scenes' homographies; the cameras report unknown scenes."""
     try:
         return add_scene_ground(config)
     except (UserError, OSError):

@@ -37,8 +37,8 @@ def _checks(config: Config) -> Iterator[tuple[str, Callable[[], list[Finding]]]]
     yield "ground", lambda: [_ground(config)]
     yield "http.tls", lambda: _pair("http.tls", config.http.tls.certificate, config.http.tls.key)
     yield "sync.tls", lambda: _process_tls("sync.tls", config.sync.tls, config.sync.host)
-    there = host_and_port(config.zenoh.connect)
-    yield "zenoh.tls", lambda: _process_tls("zenoh.tls", config.zenoh.tls, there and there[0])
+    router = host_and_port(config.zenoh.connect)
+    yield "zenoh.tls", lambda: _process_tls("zenoh.tls", config.zenoh.tls, router and router[0])
     if config.sync.users is not None:
         yield SETTING, partial(_users, SETTING, config.sync.users, pulse_clients(config))
     if config.zenoh.users is not None:
@@ -68,7 +68,7 @@ def _process_tls(check: str, tls: ProcessTlsSettings, host: str | None) -> list[
 def _exposed(config: Config) -> list[Finding]:
     findings: list[Finding] = []
     checks = [check_pulses, check_bus]
-    if config.access.tokens is None:  # else it is a matter of their file, of which its own line tells
+    if config.access.tokens is None:  # otherwise the check of the token file reports it
         checks.insert(0, check_viewers)
     for check in checks:
         try:
@@ -86,7 +86,7 @@ def _tokens(config: Config) -> list[Finding]:
         tokens = read_tokens(path)
     except UserError as error:
         return [bad("access.tokens", str(error), "`myview token NAME` prints a line for it")]
-    operators = sum(it.role == "operate" for it in tokens)
+    operators = sum(token.role == "operate" for token in tokens)
     findings = [ok("access.tokens", f"{path}: {len(tokens)} tokens, {operators} of them for operators")]
     if not tokens:
         findings = [warning("access.tokens", f"{path} lets no one in", "`myview token NAME` makes one")]
@@ -104,11 +104,11 @@ def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
         users = read_users(path, check)
     except UserError as error:
         return [bad(check, str(error).removeprefix(f"{check}: "), _LINES)]
-    missing = [it for it in names if it not in users]
+    missing = [name for name in names if name not in users]
     findings = [ok(check, f"{path}: {len(users)} users")]
     if missing:
-        do = "add a line for each on the server's machine; a camera's machine needs only its own"
-        findings = [warning(check, f"{path} has no line for {', '.join(missing)}", do)]
+        remedy = "add a line for each on the server's machine; a camera's machine needs only its own"
+        findings = [warning(check, f"{path} has no line for {', '.join(missing)}", remedy)]
     wrong = [name for name, password in users.items() if check == SETTING and not is_password(password)]
     if wrong:
         text = f"{path}: the passwords of {', '.join(wrong)} have spaces, or more than 128 characters"
@@ -127,12 +127,12 @@ def _private(check: str, path: Path) -> list[Finding]:
 
 
 def _ground(config: Config) -> Finding:
-    without = [it.id for it in config.cameras if it.ground is None]
+    without = [camera.id for camera in config.cameras if camera.ground is None]
     if not without:
         return ok("ground", "all cameras have a homography")
     if len(without) == len(config.cameras):
         return ok("ground", "no camera has a homography: people are matched by appearance alone")
-    do = "`myview calibrate`, or the operator's page"
+    remedy = "`myview calibrate`, or the operator's page"
     return warning(
-        "ground", f"{', '.join(without)}: no homography: people are matched by appearance alone there", do
+        "ground", f"{', '.join(without)}: no homography: people are matched by appearance alone there", remedy
     )

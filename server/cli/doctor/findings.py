@@ -1,4 +1,4 @@
-"""Findings of the doctor: a line per check, with its level and remedy."""
+"""Findings of the doctor: one line per check, with level and remedy."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ class Finding(msgspec.Struct, frozen=True):
     check: str
     level: Level
     text: str
-    do: str = ""
-    """The remedy; empty where none is needed."""
+    remedy: str = ""
+    """What to do; empty: nothing."""
 
 
 class Findings(msgspec.Struct, frozen=True):
     """All findings, as ``--json`` prints them."""
 
-    well: bool
-    """Nothing is bad."""
+    ok: bool
+    """Whether no finding is bad."""
     findings: list[Finding]
 
 
@@ -48,19 +48,19 @@ def ok(check: str, text: str) -> Finding:
     return Finding(check, Level.OK, text)
 
 
-def warning(check: str, text: str, do: str) -> Finding:
+def warning(check: str, text: str, remedy: str) -> Finding:
     """Build a finding for something that should be looked at."""
-    return Finding(check, Level.WARNING, text, do)
+    return Finding(check, Level.WARNING, text, remedy)
 
 
-def bad(check: str, text: str, do: str = "") -> Finding:
+def bad(check: str, text: str, remedy: str = "") -> Finding:
     """Build a finding for something that does not work."""
-    return Finding(check, Level.BAD, text, do)
+    return Finding(check, Level.BAD, text, remedy)
 
 
 def collect_findings(findings: Sequence[Finding]) -> Findings:
-    """Put findings together."""
-    return Findings(all(it.level is not Level.BAD for it in findings), list(findings))
+    """Return findings with their overall result."""
+    return Findings(all(finding.level is not Level.BAD for finding in findings), list(findings))
 
 
 @contextmanager
@@ -75,7 +75,7 @@ def report_failure(check: str, findings: list[Finding]) -> Iterator[None]:
 
 
 def reason_of(error: Exception) -> str:
-    """Return an error as a part of a line."""
+    """Return the reason of an error in one line."""
     if isinstance(error, OSError) and error.strerror:
         return (
             f"{redact_address(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
@@ -91,15 +91,16 @@ def describe_bug(error: Exception) -> str:
 _COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}
 
 
-def show(it: Finding, width: int, console: Console) -> None:
-    """Print a line for a finding, with what to do behind an arrow; ``width`` is that of all checks' names."""
-    colour = _COLOURS[it.level]
-    do = f" → {it.do}" if it.do else ""
-    head = f"[{colour}]{it.level.value:7}[/{colour}] {escape(f'{it.check:{width}}')}"
-    console.print(f"{head}  {escape(printable(f'{it.text}{do}'))}", soft_wrap=True, highlight=False)
+def show(finding: Finding, width: int, console: Console) -> None:
+    """Print a finding in one line, with the remedy behind an arrow; ``width`` is that of the first column."""
+    colour = _COLOURS[finding.level]
+    remedy = f" → {finding.remedy}" if finding.remedy else ""
+    head = f"[{colour}]{finding.level.value:7}[/{colour}] {escape(f'{finding.check:{width}}')}"
+    text = escape(printable(f"{finding.text}{remedy}"))
+    console.print(f"{head}  {text}", soft_wrap=True, highlight=False)
 
 
 def show_counts(findings: Findings, console: Console) -> None:
-    """Print how many there are of each level."""
-    counts = {level: sum(it.level is level for it in findings.findings) for level in Level}
+    """Print the number of findings of each level."""
+    counts = {level: sum(finding.level is level for finding in findings.findings) for level in Level}
     console.print(", ".join(f"{count} {level.value}" for level, count in counts.items()), highlight=False)

@@ -18,14 +18,14 @@ from server.http.connections.connection_limit import connection_limit
 from server.system.clock_sync import is_clock_synchronized
 from server.system.processors import available_processors
 
-_FAR_S = 1.0
+_MAX_OFFSET_S = 1.0
 _ANSWER_S = 2.0
 _SERVICE_CORES = 0.3
-"""The best view with a few cameras and viewers, and the pulse server; see docs/how-to/scale.md."""
-_FULL = 0.8
-"""Share of the cores above which a machine has nothing left for a busy scene."""
+"""Cores of the best view with a few cameras and viewers, and of the pulse server: docs/how-to/scale.md."""
+_MAX_LOAD = 0.8
+"""Share of the cores above which nothing is left for a busy scene."""
 _PROCESS_MB = 250
-"""Memory of a process without its pictures: libraries and tracker."""
+"""Memory of a process without pictures: libraries and tracker."""
 
 
 async def clock_findings(config: Config) -> list[Finding]:
@@ -34,7 +34,7 @@ async def clock_findings(config: Config) -> list[Finding]:
     offset = await _clock_offset(config.sync.host, config.sync.port, pulse_client_tls(config))
     if offset is None:
         findings.append(ok("pulse server", "is not running: its clock cannot be compared"))
-    elif abs(offset) > _FAR_S:
+    elif abs(offset) > _MAX_OFFSET_S:
         text = f"its clock is {offset:+.1f} s off this machine's"
         findings.append(
             warning(
@@ -47,15 +47,15 @@ async def clock_findings(config: Config) -> list[Finding]:
 
 
 def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Finding]:
-    """Compare the load of all cameras with this machine, as if all ran here."""
+    """Compare the load of all cameras with this machine, assuming that all run here."""
     cores = available_processors()
-    untried = [camera for camera, it in probes.items() if it.problem]
-    takes = sum(it.cores for it in probes.values()) + _SERVICE_CORES
-    who = "all cameras" if not untried else f"without {', '.join(untried)}, the cameras"
-    text = f"{who} and the best view take about {takes:.1f} of {cores:.3g} cores"
+    failed = [camera for camera, probe in probes.items() if probe.problem]
+    needed = sum(probe.cores for probe in probes.values()) + _SERVICE_CORES
+    subject = "all cameras" if not failed else f"without {', '.join(failed)}, the cameras"
+    text = f"{subject} and the best view take about {needed:.1f} of {cores:.3g} cores"
     findings = [
         ok("processor", text)
-        if takes <= _FULL * cores
+        if needed <= _MAX_LOAD * cores
         else warning(
             "processor", text, "lower site.fps or detect.work_width, or put cameras on other machines"
         )
@@ -64,11 +64,11 @@ def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[
     if free is not None:
         site = config.site
         pictures = 3 * site.width * site.height * config.track.backlog_s * site.fps / 1e6
-        needs = len(config.cameras) * (_PROCESS_MB + pictures) + 2 * _PROCESS_MB
-        text = f"takes up to {needs:.0f} MB while it is busy; {free:.0f} MB are free"
+        needed_mb = len(config.cameras) * (_PROCESS_MB + pictures) + 2 * _PROCESS_MB
+        text = f"takes up to {needed_mb:.0f} MB while it is busy; {free:.0f} MB are free"
         findings.append(
             ok("memory", text)
-            if needs <= free
+            if needed_mb <= free
             else warning("memory", text, "lower track.backlog_s, use fewer cameras, or add memory")
         )
     return findings
@@ -76,26 +76,28 @@ def machine_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[
 
 def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
     """Check that the limit of open files allows the configured connections and viewers."""
-    wanted, most = config.http.connections, connection_limit(config, descriptors)
+    configured, most = config.http.connections, connection_limit(config, descriptors)
     viewers = min(config.http.viewers_max, most)
-    has = f"{descriptors} files may be open: {most} connections"
+    limit = f"{descriptors} files may be open: {most} connections"
     if viewers < config.http.viewers_max:
-        text = f"{has}, and so {viewers} viewers; http.viewers_max says {config.http.viewers_max}"
-    elif most < wanted:
-        text = f"{has}, {viewers} viewers among them; http.connections_max says {wanted}"
+        text = f"{limit}, and so {viewers} viewers; http.viewers_max says {config.http.viewers_max}"
+    elif most < configured:
+        text = f"{limit}, {viewers} viewers among them; http.connections_max says {configured}"
     else:
-        return [ok("open files", f"{has} and {viewers} viewers fit")]
-    do = "raise the hard limit: ulimit -Hn, LimitNOFILE= of systemd, ulimits of compose; or lower settings"
-    return [warning("open files", text, do)]
+        return [ok("open files", f"{limit} and {viewers} viewers fit")]
+    remedy = (
+        "raise the hard limit: ulimit -Hn, LimitNOFILE= of systemd, ulimits of compose; or lower settings"
+    )
+    return [warning("open files", text, remedy)]
 
 
 def available_mb() -> float | None:
-    """Return the memory that programs may still have, in megabytes; None where the system does not say."""
+    """Return the available memory in megabytes; None: the system does not report it."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
     except OSError:
         return None
-    kilobytes = next((it.split()[1] for it in lines if it.startswith("MemAvailable:")), None)
+    kilobytes = next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), None)
     return None if kilobytes is None else int(kilobytes) * 1024 / 1e6
 
 
@@ -105,15 +107,18 @@ def _ntp_finding(config: Config) -> Finding:
         return ok("clock", "the system does not report whether NTP synchronizes it")
     if synchronized:
         return ok("clock", "is synchronized by NTP")
-    text, do = "is not synchronized by NTP", "timedatectl set-ntp true, or chrony; frames do not depend on it"
+    text, remedy = (
+        "is not synchronized by NTP",
+        "timedatectl set-ntp true, or chrony; frames do not depend on it",
+    )
     if config.record.folder is not None and not config.record.trust_clock:
         text += ": recordings do not age while this machine is off"
-        do += ". Where the clock goes on by itself: record.trust_clock: true"
-    return warning("clock", text, do)
+        remedy += ". If the clock keeps running: record.trust_clock: true"
+    return warning("clock", text, remedy)
 
 
 async def _clock_offset(host: str, port: int, tls: ssl.SSLContext | None) -> float | None:
-    """Return the pulse server's clock minus ours, in seconds, by its first line; None: no answer."""
+    """Return the pulse server's clock minus this one in seconds, from its first line; None: no answer."""
     try:
         async with asyncio.timeout(_ANSWER_S):
             sent = time.time()

@@ -1,4 +1,4 @@
-"""Checks of the site's ports: free, taken by this site, or taken by something else."""
+"""Checks of the site's ports: free, used by this site, or used by another program."""
 
 from __future__ import annotations
 
@@ -13,14 +13,18 @@ from server.config.site_config import Config
 from server.supervisor.startup_checks import check_port_free
 from server.system.errors import UserError
 
-_END_IT = "stop it, or use another port; if it is this site, set MYVIEW_TOKEN to one of its tokens"
+_STOP_IT = "stop it, or use another port; if it is this site, set MYVIEW_TOKEN to one of its tokens"
 
 
-_ALL = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is not listened on
+_ALL = frozenset({"0.0.0.0", "::"})  # noqa: S104 — compared, not listened on
 
 
 async def port_findings(config: Config) -> tuple[list[Finding], bool]:
-    """Report whether each port is free; also return whether this very site is already running."""
+    """Check each port.
+
+    Returns:
+        The findings, and whether this site is running already.
+    """
     http, sync, zenoh = config.http, config.sync, config.zenoh
     protocol, _, address = zenoh.listen.partition("/")
     bus, _, bus_port = address.rpartition(":")
@@ -36,7 +40,7 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
         if check == "zenoh.listen" and protocol not in {"tcp", "tls"}:
             findings.append(ok(check, f"{zenoh.listen} is not checked before the site starts"))
             continue
-        clashing = [it for it, place in places.items() if _overlap(place, (host, port))]
+        clashing = [other for other, place in places.items() if _overlap(place, (host, port))]
         places[check] = (host, port)
         if clashing:
             findings.append(
@@ -48,16 +52,16 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
             if taken is None:
                 findings.append(ok(check, f"{where} is free"))
             elif isinstance(taken, str):
-                do = "use an address of this machine, and a port that this user may bind"
-                findings.append(bad(check, taken, do))
+                remedy = "use an address of this machine, and a port that this user may bind"
+                findings.append(bad(check, taken, remedy))
             else:
                 is_own = runs if check == "zenoh.listen" else await _is_this_site(config, check)
                 runs = runs or is_own
-                here = f"{where} is used"
+                used = f"{where} is used"
                 findings.append(
-                    ok(check, f"{here} by this site, which is running")
+                    ok(check, f"{used} by this site, which is running")
                     if is_own
-                    else bad(check, f"{here} by another program", _END_IT)
+                    else bad(check, f"{used} by another program", _STOP_IT)
                 )
     return findings, runs
 
@@ -68,7 +72,7 @@ def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
 
 
 def _taken(host: str, port: int, check: str) -> bool | str | None:
-    """Return None if a port is free, True if it is in use, else why it cannot be bound."""
+    """Return None if a port is free, True if it is in use, or why it cannot be bound."""
     try:
         check_port_free(host, port, check)
     except UserError as error:
@@ -95,16 +99,16 @@ async def _is_this_site(config: Config, check: str) -> bool:
     host = _connect_host(config.http.host)
     url = f"{scheme}://[{host}]" if ":" in host else f"{scheme}://{host}"
     token = os.environ.get("MYVIEW_TOKEN") or None
-    patience = client.HttpSettings(connect_timeout=2.0, read_timeout=3.0, retries=0, token=token)
+    settings = client.HttpSettings(connect_timeout=2.0, read_timeout=3.0, retries=0, token=token)
     try:
-        site = await client.site(f"{url}:{config.http.port}", patience)
+        site = await client.site(f"{url}:{config.http.port}", settings)
     except (client.ClientError, ValueError):
         return False
     return site.name == config.site.name and set(site.cameras) == set(config.camera_ids)
 
 
 def _credentials(config: Config) -> Credentials | None:
-    """Return credentials of any client of this site: on a camera's machine, those of the camera."""
+    """Return credentials of a client of this site; a camera's machine has only those of the camera."""
     for name in reversed(pulse_clients(config)):
         try:
             return pulse_credentials(config, name)
@@ -114,5 +118,5 @@ def _credentials(config: Config) -> Credentials | None:
 
 
 def _connect_host(host: str) -> str:
-    """Return the address at which a listener on this host is reached from here."""
+    """Return the address at which this machine reaches a listener on ``host``."""
     return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 — it is not listened on

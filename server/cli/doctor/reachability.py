@@ -1,4 +1,4 @@
-"""Checks of reachability: do pulse server and bus answer at the addresses that cameras use."""
+"""Reachability checks: whether pulse server and bus answer at the addresses that cameras use."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from server.cli.doctor.findings import Finding, bad, ok, report_failure, warning
 from server.config.site_config import Config
 
 _ANSWER_S = 3.0
-_ANYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 — it is compared, not listened on
+_ANYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 — compared, not listened on
 
 Place = tuple[str, int]
 """Host and port."""
@@ -23,23 +23,23 @@ async def reachability_findings(config: Config) -> list[Finding]:
     connect, listen = host_and_port(config.zenoh.connect), host_and_port(config.zenoh.listen)
     if connect is not None and listen is not None:
         routes.append(("zenoh.connect", connect, "zenoh.listen", listen))
-    for check, there, setting, listens in routes:
+    for check, target, setting, listener in routes:
         with report_failure(check, findings):
-            findings.append(await _check_route(check, there, setting, listens))
+            findings.append(await _check_route(check, target, setting, listener))
     return findings
 
 
 def host_and_port(endpoint: str) -> Place | None:
-    """Return host and port of a zenoh endpoint; None: it is of another kind."""
+    """Return host and port of a zenoh endpoint; None: its protocol has none."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     return (host.strip("[]"), int(port)) if protocol in {"tcp", "tls"} and port.isdecimal() else None
 
 
-async def _check_route(check: str, there: Place, setting: str, listens: Place) -> Finding:
-    where = f"{there[0]}:{there[1]}"
+async def _check_route(check: str, target: Place, setting: str, listener: Place) -> Finding:
+    where = f"{target[0]}:{target[1]}"
     try:
-        addresses = await _addresses(there[0])
+        addresses = await _addresses(target[0])
     except (socket.gaierror, TimeoutError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or "no answer from DNS"
         return bad(
@@ -48,21 +48,21 @@ async def _check_route(check: str, there: Place, setting: str, listens: Place) -
             "use the server's name or address, as seen from this machine",
         )
     here = any(map(_is_of_this_machine, addresses))
-    if here and there[1] == listens[1] and await _covers(listens[0], addresses):
+    if here and target[1] == listener[1] and await _covers(listener[0], addresses):
         return ok(check, f"{where} leads to {setting}")
-    away = await _refusal(there)
-    if not away:
+    refusal = await _refusal(target)
+    if not refusal:
         return ok(check, f"{where} answers")
     if here:
-        text = f"nothing listens at {where}, where cameras connect; {setting} is {listens[0]}:{listens[1]}"
+        text = f"nothing listens at {where}, where cameras connect; {setting} is {listener[0]}:{listener[1]}"
         return bad(check, text, f"make {check} and {setting} agree")
-    return warning(check, f"{where} does not answer: {away}", "start the site there, or open the firewall")
+    return warning(check, f"{where} does not answer: {refusal}", "start the site there, or open the firewall")
 
 
 async def _addresses(host: str) -> set[str]:
     async with asyncio.timeout(_ANSWER_S):
         resolved = await asyncio.get_running_loop().getaddrinfo(host, None, type=socket.SOCK_STREAM)
-    return {str(it[4][0]) for it in resolved}
+    return {str(info[4][0]) for info in resolved}
 
 
 def _is_of_this_machine(address: str) -> bool:
@@ -75,20 +75,20 @@ def _is_of_this_machine(address: str) -> bool:
 
 
 async def _covers(host: str, addresses: set[str]) -> bool:
-    """Return whether a listener at a host is reached by one of the addresses."""
+    """Return whether one of the addresses reaches a listener on ``host``."""
     try:
         return host in _ANYWHERE or not addresses.isdisjoint(await _addresses(host))
     except (socket.gaierror, TimeoutError, UnicodeError):
         return False  # reported by the check of the port
 
 
-async def _refusal(there: Place) -> str:
+async def _refusal(target: Place) -> str:
     """Return why a connection fails; empty if it succeeds."""
     try:
         async with asyncio.timeout(_ANSWER_S):
-            _, writer = await asyncio.open_connection(*there)
+            _, writer = await asyncio.open_connection(*target)
     except TimeoutError:
-        return f"nothing came within {_ANSWER_S:.0f} s"
+        return f"no answer within {_ANSWER_S:.0f} s"
     except OSError as error:
         return os.strerror(error.errno) if error.errno else str(error)
     writer.close()

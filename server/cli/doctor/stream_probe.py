@@ -11,7 +11,7 @@ from av.video.frame import VideoFrame
 
 from server.camera.sources.opening import OpenedVideo, open_video
 
-_LEAST = 5
+_MIN_PICTURES = 5
 """Fewest pictures from which a rate is computed."""
 
 
@@ -21,10 +21,10 @@ class StreamStats:
 
     Attributes:
         size: width and height in pixels.
-        fps: frames per second, by their time stamps if any; None: too few frames.
-        pictures: how many could be decoded.
-        damaged: how many packets could not.
-        cpu_s: processor seconds for decoding one picture.
+        fps: frames per second, by timestamps if there are any; None: too few frames.
+        pictures: the number of decoded pictures.
+        damaged: the number of packets that could not be decoded.
+        cpu_s: processor seconds for decoding a picture.
     """
 
     size: tuple[int, int]
@@ -35,14 +35,14 @@ class StreamStats:
 
 
 def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> StreamStats:
-    """Decode a stream for so many seconds.
+    """Decode a stream for ``seconds``; ``open_s`` is the timeout for opening it.
 
     Raises:
         UserError: it cannot be opened.
     """
     opened = open_video(url, options, (open_s, open_s))
     try:
-        return _watched(opened, time.monotonic() + seconds)
+        return _measure(opened, time.monotonic() + seconds)
     finally:
         opened.container.close()
 
@@ -58,21 +58,21 @@ def file_fps(file: str) -> float:
     return opened.fps
 
 
-def _watched(opened: OpenedVideo, until: float) -> StreamStats:
+def _measure(opened: OpenedVideo, until: float) -> StreamStats:
     times: list[float] = []
     damaged, began = 0, time.thread_time()
     try:
         for packet in opened.container.demux(opened.stream):
             try:
-                pictures = [it for it in packet.decode() if isinstance(it, VideoFrame)]
+                pictures = [frame for frame in packet.decode() if isinstance(frame, VideoFrame)]
             except av.error.FFmpegError:
                 damaged, pictures = damaged + 1, []
-            times += [time.monotonic() if it.time is None else it.time for it in pictures]
+            times += [time.monotonic() if frame.time is None else frame.time for frame in pictures]
             if time.monotonic() >= until:
                 break
     except (av.error.FFmpegError, OSError):
         damaged += 1  # it stopped sending
-    spent = time.thread_time() - began
+    cpu_s = time.thread_time() - began
     span = times[-1] - times[0] if times else 0.0
-    fps = (len(times) - 1) / span if len(times) >= _LEAST and span > 0 else None
-    return StreamStats(opened.size, fps, len(times), damaged, spent / max(1, len(times)))
+    fps = (len(times) - 1) / span if len(times) >= _MIN_PICTURES and span > 0 else None
+    return StreamStats(opened.size, fps, len(times), damaged, cpu_s / max(1, len(times)))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bestview import NO_CAMERA
 from server.system.errors import UserError
 
-_HEAD = ["frame", "object", "camera"]
+_COLUMNS = ["frame", "object", "camera"]
 _LAST_FRAME = 10_000_000
 
 
@@ -30,13 +30,13 @@ def read_choices(path: Path) -> list[Choice]:
     """Read a file of choices.
 
     Raises:
-        UserError: it cannot be read, or is none; the message names the line.
+        UserError: it cannot be read or is invalid; the error names the line.
     """
     try:
         with path.open(encoding="ascii", newline="") as file:
             lines = csv.reader(file)
-            if next(lines, []) != _HEAD:
-                raise UserError(f"{path}: is not a choices file: its first line is not {','.join(_HEAD)}")
+            if next(lines, []) != _COLUMNS:
+                raise UserError(f"{path}: is not a choices file: its first line is not {','.join(_COLUMNS)}")
             choices: dict[tuple[int, int], Choice] = {}
             for number, fields in enumerate(lines, start=2):
                 choice = _choice(fields, f"{path}:{number}")
@@ -57,12 +57,12 @@ def views_of(
     cameras: Sequence[str],
     frames: int,
 ) -> NDArray[np.int64]:
-    """Lay the choices out by person: (K, N) camera indices, -1 where there is none.
+    """Arrange choices by person: (K, N) camera indices, -1 without a choice.
 
-    ``person_of`` says which of the ``people`` an object stands for.
+    ``person_of`` maps objects to ``people``.
 
     Raises:
-        UserError: a camera is not among them, or all choices are of later frames.
+        UserError: a camera is not one of ``cameras``, or all choices are of later frames.
     """
     camera_at = {camera: index for index, camera in enumerate(cameras)}
     person_at = {person: index for index, person in enumerate(people)}
@@ -74,7 +74,7 @@ def views_of(
         if choice.camera not in camera_at:
             raise UserError(
                 f"--views: camera {choice.camera!r} is not among those that are scored "
-                f"({', '.join(cameras)}): it takes ground truth, and tracks where there are any"
+                f"({', '.join(cameras)}): it needs ground truth, and tracks if there are any"
             )
         person = person_of.get(choice.object)
         if person is not None and choice.frame <= frames:
@@ -83,8 +83,8 @@ def views_of(
 
 
 def _choice(fields: Sequence[str], where: str) -> Choice:
-    if len(fields) != len(_HEAD):
-        raise UserError(f"{where}: expected {len(_HEAD)} fields, found {len(fields)}")
+    if len(fields) != len(_COLUMNS):
+        raise UserError(f"{where}: expected {len(_COLUMNS)} fields, found {len(fields)}")
     frame, number, camera = fields
     if not (frame.isdecimal() and number.isdecimal() and 1 <= int(frame) <= _LAST_FRAME and int(number)):
         raise UserError(f"{where}: frame and object are whole numbers from 1, not {frame!r} and {number!r}")

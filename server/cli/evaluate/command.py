@@ -1,4 +1,4 @@
-"""``myview evaluate``: from options to tables and files."""
+"""``myview evaluate``: computes scores of tracks and view choices, prints and writes them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from server.cli.evaluate.choices_file import read_choices
 from server.cli.evaluate.file_pairing import files_by_camera
 from server.cli.evaluate.ground_truth import build_truth, people_of_objects
 from server.cli.evaluate.plots import plot_views
-from server.cli.evaluate.site_facts import SiteOptions, collect_site_info, videos_by_camera
+from server.cli.evaluate.site_info import SiteOptions, collect_site_info, videos_by_camera
 from server.cli.evaluate.track_scores import (
     content_of,
     evaluate_recordings,
@@ -28,7 +28,7 @@ from tracking.evaluation import TruthAndTracks
 
 @dataclass(frozen=True, slots=True)
 class EvaluateOptions:
-    """The options."""
+    """The options of the command."""
 
     truth: list[Path]
     tracks: list[Path]
@@ -42,15 +42,15 @@ class EvaluateOptions:
 
 
 def evaluate(options: EvaluateOptions) -> None:
-    """Score tracks, choices of views, or both; print the scores and write the files of the options.
+    """Score tracks, view choices, or both; print the scores and write the requested files.
 
     Raises:
-        UserError: something is missing or malformed; nothing is written then.
+        UserError: an input is missing or malformed; nothing is written then.
     """
     _check(options)
     read = (*options.tracks, *options.truth, options.views, *options.videos)
     content: dict[str, Any] = {"iou": options.least_iou}
-    with ExitStack() as outputs:  # all of them, or none
+    with ExitStack() as outputs:  # all files or none
         numbers = outputs.enter_context(atomic_file(options.json_file, *read)) if options.json_file else None
         plots = outputs.enter_context(atomic_folder(options.plots)) if options.plots else None
         if options.tracks:
@@ -73,9 +73,9 @@ def evaluate(options: EvaluateOptions) -> None:
 
 def _check(options: EvaluateOptions) -> None:
     if not options.tracks and options.views is None:
-        raise UserError("evaluate: name what is to be scored: --tracks, or --views, or both")
+        raise UserError("evaluate: give --tracks, --views, or both")
     if options.views is None and (options.plots is not None or options.videos):
-        raise UserError("evaluate: --plots and --videos are about choices: name them with --views")
+        raise UserError("evaluate: --plots and --videos need --views")
 
 
 def _evaluate_views(
@@ -84,9 +84,9 @@ def _evaluate_views(
     cameras = tuple(recordings)
     choices = read_choices(choices_file)
     videos = videos_by_camera(options.videos, cameras) if options.videos else {}
-    facts = collect_site_info(choices_file, cameras, videos, options.site)
-    rows = {camera: it.truth for camera, it in recordings.items()}
-    truth = build_truth(rows, facts.sizes, options.least_shown)
+    site_info = collect_site_info(choices_file, cameras, videos, options.site)
+    rows = {camera: recording.truth for camera, recording in recordings.items()}
+    truth = build_truth(rows, site_info.sizes, options.least_shown)
     if not truth.views.evaluated.any():
         raise UserError("--gt: no person is ever visible in it")
     if options.tracks:
@@ -98,7 +98,7 @@ def _evaluate_views(
                 f"--views: {choices_file}: none of its objects has the number of a person in the "
                 "ground truth; match them with --tracks"
             )
-    evaluation = evaluate_views(truth, choices, person_of, facts)
+    evaluation = evaluate_views(truth, choices, person_of, site_info)
     if plots is not None:
-        plot_views(plots, truth, evaluation, facts, videos)
-    return evaluation, content_of_views(evaluation, facts)
+        plot_views(plots, truth, evaluation, site_info, videos)
+    return evaluation, content_of_views(evaluation, site_info)

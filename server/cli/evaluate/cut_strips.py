@@ -20,11 +20,11 @@ from server.cli.track.command import read_frames
 from server.config.sections import CameraSettings, SiteSettings
 
 MOST_CUTS = 12
-"""Cuts shown of one person: the first."""
+"""Most cuts shown of a person; later ones are left out."""
 _AROUND_S = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Seconds from the cut; the frame just before it is shown as well."""
 _WIDTH = 240
-"""Pixels across a picture in the strip."""
+"""Width of a picture in the strip, in pixels."""
 _GREEN = (0, 200, 0)
 
 Image = NDArray[np.uint8]
@@ -32,7 +32,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, order=True)
 class _BestViewFrame:
-    """A frame of the best view: what a camera showed."""
+    """A frame of the best view."""
 
     camera: int
     frame: int
@@ -48,23 +48,27 @@ class _Strip:
 
 
 def plot_strips(
-    folder: Path, truth: SceneTruth, judged: ViewEvaluation, facts: SiteInfo, videos: Mapping[str, Path]
+    folder: Path,
+    truth: SceneTruth,
+    evaluation: ViewEvaluation,
+    site_info: SiteInfo,
+    videos: Mapping[str, Path],
 ) -> None:
     """Write `person-K.png` for each person whose best view is cut; boxes are the ground truth's.
 
     Raises:
         UserError: a video cannot be read.
     """
-    strips = {row: _strips(views, facts.fps) for row, views in enumerate(judged.views)}
+    strips = {row: _strips(views, site_info.fps) for row, views in enumerate(evaluation.views)}
     wanted = {shown for cuts in strips.values() for strip in cuts for shown in strip.frames}
     images: dict[_BestViewFrame, Image] = {}
     for index, camera in enumerate(truth.cameras):
         numbers = sorted(shown.frame for shown in wanted if shown.camera == index)
-        read = _read(videos[camera], facts, camera, numbers)
+        read = _read(videos[camera], site_info, camera, numbers)
         images |= {_BestViewFrame(index, number): image for number, image in read.items()}
     for row, cuts in strips.items():
         if cuts:
-            _plot(folder, row, cuts, truth, judged, images)
+            _plot(folder, row, cuts, truth, evaluation, images)
 
 
 def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
@@ -77,16 +81,18 @@ def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
     return strips
 
 
-def _read(video: Path, facts: SiteInfo, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
-    """Return frames of a camera's recording by number, in its own size."""
+def _read(video: Path, site_info: SiteInfo, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
+    """Return frames of a camera's recording by number, in the camera's picture size."""
     images: dict[int, Image] = {}
     if not numbers:
         return images
-    source = open_source(CameraSettings(id=camera, source=str(video.absolute())), SiteSettings(fps=facts.fps))
+    source = open_source(
+        CameraSettings(id=camera, source=str(video.absolute())), SiteSettings(fps=site_info.fps)
+    )
     wanted = set(numbers)
     for number, image in read_frames(source):
         if number in wanted and image is not None:
-            images[number] = np.asarray(cv2.resize(image, facts.sizes[camera]), dtype=np.uint8)
+            images[number] = np.asarray(cv2.resize(image, site_info.sizes[camera]), dtype=np.uint8)
         if number >= numbers[-1]:
             break
     source.close()
@@ -98,7 +104,7 @@ def _plot(
     row: int,
     strips: Sequence[_Strip],
     truth: SceneTruth,
-    judged: ViewEvaluation,
+    evaluation: ViewEvaluation,
     images: Mapping[_BestViewFrame, Image],
 ) -> None:
     columns = max(len(strip.frames) for strip in strips)
@@ -114,12 +120,12 @@ def _plot(
             mark = ", cut" if shown.frame == strip.cut else ""
             axis.set_title(f"{truth.cameras[shown.camera]}, frame {shown.frame + 1}{mark}", fontsize="small")
     person = truth.people[row]
-    figure.suptitle(f"Person {person}, object {judged.objects.get(person, '-')}: frames around each cut")
+    figure.suptitle(f"Person {person}, object {evaluation.objects.get(person, '-')}: frames around each cut")
     save_figure(figure, folder / f"person-{person}.png")
 
 
 def _with_box(image: Image, box: NDArray[np.float64]) -> Image:
-    """Return a small picture, red green blue, with the (4,) box, which is NaN where there is none."""
+    """Return a small RGB picture with the (4,) box; NaN: without a box."""
     scale = _WIDTH / image.shape[1]
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     if not np.isnan(box).any():

@@ -1,4 +1,4 @@
-"""Which file of tracks belongs to which file of ground truth."""
+"""Pairing of track files with ground truth files, by name or order."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
 _ENDINGS = (".txt", ".txt.gz")
-_FEW = 3
-"""Names in a message: enough to recognise what they are the names of."""
+_MAX_NAMES = 3
+"""File names in an error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +25,12 @@ class FilePair:
 
 @dataclass(frozen=True, slots=True)
 class _OptionFiles:
-    """The files that an option names."""
+    """The files of an option."""
 
     option: str
     files: tuple[Path, ...]
     folder: bool
-    """Some of the files are from a named folder."""
+    """Whether some of the files are from a folder."""
 
     @property
     def names(self) -> list[str]:
@@ -39,46 +39,47 @@ class _OptionFiles:
     @property
     def some_names(self) -> str:
         """The first names, for a message."""
-        some = [path.name for path in self.files[:_FEW]]
-        return ", ".join(some) + (", …" if len(self.files) > _FEW else "")
+        some = [path.name for path in self.files[:_MAX_NAMES]]
+        return ", ".join(some) + (", …" if len(self.files) > _MAX_NAMES else "")
 
 
 def pair_files(tracks: Sequence[Path], truth: Sequence[Path]) -> list[FilePair]:
-    """Return the pairs, by the files' names where any agree, else in the order in which they are named.
+    """Pair files of tracks and ground truth, by name if any names agree, otherwise in the given order.
 
-    Each of the two is some files, or a folder of one file per camera: the folder may be one that `myview
-    render` has written, whose tracks are in `tracks/`, or one with a folder `gt/`. Of folders, cameras that
-    only one of the two has are skipped; a named file must have a partner. A pair is named after its tracks,
-    or after its truth where tracks of several cameras have one name.
+    Each option gives files, or a folder with one file per camera: it may have been written by `myview
+    render`, with tracks in `tracks/`, or have a folder `gt/`. In folders, cameras without a partner are
+    skipped; a file must have a partner. A pair is named after its tracks, or after its truth if tracks of
+    several cameras have the same name.
 
     Raises:
         UserError: a file is missing, there are no pairs, or a file has no partner.
     """
-    tracked, labeled = _given("--tracks", tracks, "tracks"), _given("--gt", truth, "gt")
+    tracked, labeled = _option_files("--tracks", tracks, "tracks"), _option_files("--gt", truth, "gt")
     if set(tracked.names) & set(labeled.names) or tracked.folder or labeled.folder:
         return _by_name(tracked, labeled)
     if len(tracked.files) != len(labeled.files):
         raise UserError(
             f"--tracks and --gt: {len(tracked.files)} files of tracks ({tracked.some_names}) for "
-            f"{len(labeled.files)} of ground truth ({labeled.some_names}), and no two with one name; "
+            f"{len(labeled.files)} of ground truth ({labeled.some_names}), and none with equal names; "
             "give one for each, in the same order"
         )
-    names = next((it for it in (tracked.names, labeled.names) if len(set(it)) == len(it)), None)
+    candidates = (tracked.names, labeled.names)
+    names = next((names for names in candidates if len(set(names)) == len(names)), None)
     if names is None:
         raise UserError(
-            f"--tracks and --gt: cannot tell the cameras apart: several files of each are called "
+            f"--tracks and --gt: the cameras cannot be distinguished: several files of each are called "
             f"{tracked.some_names} and {labeled.some_names}"
         )
     return [FilePair(*pair) for pair in zip(names, tracked.files, labeled.files, strict=True)]
 
 
 def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str, Path]:
-    """Return the files that an option names, or those of the folder that it names, by camera.
+    """Return the files of an option, or of its folder, by camera.
 
     Raises:
-        UserError: a file is missing, or two files have one name.
+        UserError: a file is missing, or two files have the same name.
     """
-    given = _given(option, paths, inner)
+    given = _option_files(option, paths, inner)
     _check_names(given)
     return dict(zip(given.names, given.files, strict=True))
 
@@ -86,12 +87,11 @@ def files_by_camera(option: str, paths: Sequence[Path], inner: str) -> dict[str,
 def _by_name(tracked: _OptionFiles, labeled: _OptionFiles) -> list[FilePair]:
     for given in (tracked, labeled):
         _check_names(given)
-    tracks, truth = (dict(zip(it.names, it.files, strict=True)) for it in (tracked, labeled))
+    tracks, truth = (dict(zip(side.names, side.files, strict=True)) for side in (tracked, labeled))
     common = [camera for camera in tracks if camera in truth]
     if not common:
         raise UserError(
-            f"--tracks and --gt: no file of the one is called like one of the other "
-            f"({tracked.some_names} here, {labeled.some_names} there)"
+            f"--tracks and --gt: no file names agree ({tracked.some_names} here, {labeled.some_names} there)"
         )
     for given, other in ((tracked, truth), (labeled, tracks)):
         alone = [path for path in given.files if _camera(path) not in other]
@@ -101,11 +101,11 @@ def _by_name(tracked: _OptionFiles, labeled: _OptionFiles) -> list[FilePair]:
     return [FilePair(camera, tracks[camera], truth[camera]) for camera in common]
 
 
-def _given(option: str, paths: Sequence[Path], inner: str) -> _OptionFiles:
+def _option_files(option: str, paths: Sequence[Path], inner: str) -> _OptionFiles:
     files: list[Path] = []
     for path in paths:
         if not path.exists():
-            raise UserError(f"{redact_address(str(path))}: is not there")
+            raise UserError(f"{redact_address(str(path))}: does not exist")
         files += _files(path, inner) if path.is_dir() else [path]
     return _OptionFiles(option, tuple(files), any(path.is_dir() for path in paths))
 

@@ -1,4 +1,4 @@
-"""Ground truth of several cameras: people's boxes and visibility, and which object is which person."""
+"""Ground truth of several cameras: boxes and visibility of people, and matching of objects to people."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.evaluation.frame_matching import align_frames
 from tracking.motchallenge import MotRow
 
 LEAST_SHOWN = 0.25
-"""The share of a person that has to show for a view to show them."""
+"""Visible share of a person from which a view shows them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,8 +24,8 @@ class SceneTruth:
     """The ground truth of all cameras.
 
     Attributes:
-        people: their K numbers in the ground truth, in order.
-        cameras: the names of C cameras.
+        people: the K numbers of people in the ground truth, sorted.
+        cameras: the names of the C cameras.
         boxes: (K, N, C, 4) left, top, right, bottom in pixels; NaN where the person is not in the
             picture. Row n is frame n + 1 of the files.
         views: (K, N, C) costs and visibility of each view.
@@ -40,9 +40,9 @@ class SceneTruth:
 def build_truth(
     rows: Mapping[str, Sequence[MotRow]], sizes: Mapping[str, Size], least_shown: float = LEAST_SHOWN
 ) -> SceneTruth:
-    """Lay out the ground truth of several cameras that share their people's numbers.
+    """Build the ground truth of several cameras with common person numbers.
 
-    Rows of confidence 0 do not count, as in `tracking.evaluation`.
+    Rows with confidence 0 are ignored, as in `tracking.evaluation`.
 
     Raises:
         UserError: a person is twice in one frame of a camera.
@@ -69,27 +69,25 @@ def build_truth(
 def people_of_objects(
     people: Sequence[int], recordings: Mapping[str, TruthAndTracks], least_iou: float
 ) -> dict[int, int]:
-    """Return the person of each object, for objects that match one.
+    """Return the person of each object that matches one.
 
     Raises:
-        ValueError: an id is twice in one frame of a camera, which the message names.
+        ValueError: an id is twice in one frame of a camera.
     """
-    objects = sorted({row.id for it in recordings.values() for row in it.tracks})
+    objects = sorted({row.id for recording in recordings.values() for row in recording.tracks})
     person_at = {number: index for index, number in enumerate(people)}
     object_at = {number: index for index, number in enumerate(objects)}
     matches = np.zeros((len(people), len(objects)), dtype=np.int64)
-    for camera, it in recordings.items():
+    for camera, recording in recordings.items():
         try:
-            frames = align_frames(it.truth, it.tracks, least_iou)
+            frames = align_frames(recording.truth, recording.tracks, least_iou)
         except ValueError as error:
             raise ValueError(f"{camera}: {error}") from None
         for frame in frames:
             for row, column in zip(*np.nonzero(frame.similarity >= least_iou), strict=True):
-                person, thing = int(frame.truth[row]), int(frame.tracks[column])
-                matches[person_at[person], object_at[thing]] += 1
-    standing = match_objects_to_people(matches).tolist()
+                person, number = int(frame.truth[row]), int(frame.tracks[column])
+                matches[person_at[person], object_at[number]] += 1
+    matched = match_objects_to_people(matches).tolist()
     return {
-        number: people[person]
-        for number, person in zip(objects, standing, strict=True)
-        if person != NO_PERSON
+        number: people[person] for number, person in zip(objects, matched, strict=True) if person != NO_PERSON
     }

@@ -1,4 +1,4 @@
-"""Plots of judged choices: the camera over time beside the optimum's (the paper's Fig. 26)."""
+"""Plots of scored view choices: the chosen camera over time and the optimum (the paper's Fig. 26)."""
 
 from __future__ import annotations
 
@@ -18,35 +18,41 @@ from server.cli.render.site_file import SiteInfo
 
 _ROW_INCHES, _WIDTH_INCHES = 1.1, 11.0
 _SEEN, _BEST, _CHOSEN = "#d9d9d9", "#d9822b", "#2a7f3f"
-_ABOVE = 0.16
-"""How far the choice lies above its camera's line and the optimum below."""
+_BAR_OFFSET = 0.16
+"""Vertical offset of the choice above its camera's line, and of the optimum below it."""
 
 
 def plot_views(
-    folder: Path, truth: SceneTruth, judged: ViewEvaluation, facts: SiteInfo, videos: Mapping[str, Path]
+    folder: Path,
+    truth: SceneTruth,
+    evaluation: ViewEvaluation,
+    site_info: SiteInfo,
+    videos: Mapping[str, Path],
 ) -> None:
     """Write `choices.png`, and with videos `person-K.png` with the frames around each cut.
 
     Raises:
         UserError: a video cannot be read.
     """
-    rows = [row for row, person in enumerate(truth.people) if person in judged.people]
+    rows = [row for row, person in enumerate(truth.people) if person in evaluation.people]
     figure = new_figure((_WIDTH_INCHES, 1.2 + _ROW_INCHES * len(rows)))
     axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     for axis, row in zip(axes, rows, strict=True):
         person = truth.people[row]
-        _plot_person(axis, truth.views.visible[row], judged.views[row], judged.best[row], facts.fps)
+        _plot_person(
+            axis, truth.views.visible[row], evaluation.views[row], evaluation.best[row], site_info.fps
+        )
         axis.set_yticks(range(len(truth.cameras)), truth.cameras)
         axis.set_ylim(-0.5, len(truth.cameras) - 0.5)
-        axis.set_ylabel(f"person {person}\nobject {judged.objects.get(person, '-')}")
+        axis.set_ylabel(f"person {person}\nobject {evaluation.objects.get(person, '-')}")
     axes[-1].set_xlabel("seconds")
-    axes[-1].set_xlim(0.0, judged.views.shape[1] / facts.fps)
+    axes[-1].set_xlim(0.0, evaluation.views.shape[1] / site_info.fps)
     lines = [Line2D([], [], color=colour, linewidth=4) for colour in (_CHOSEN, _BEST, _SEEN)]
     figure.legend(lines, ["chosen", "optimum", "visible"], loc="upper right", ncols=3)
     figure.suptitle("Camera chosen for each person", x=0.3)
     save_figure(figure, folder / "choices.png")
     if videos:
-        plot_strips(folder, truth, judged, facts, videos)
+        plot_strips(folder, truth, evaluation, site_info, videos)
 
 
 def _plot_person(
@@ -56,15 +62,15 @@ def _plot_person(
     best: NDArray[np.int64],
     fps: float,
 ) -> None:
-    """Draw where (N, C) cameras see the person, and the (N,) cameras chosen and best."""
+    """Draw the (N, C) visibility of a person, and the (N,) chosen and optimal cameras."""
     for camera in range(visible.shape[1]):
         _bars(axis, visible[:, camera], camera - 0.35, 0.7, _SEEN, fps)
-        _bars(axis, best == camera, camera - _ABOVE - 0.1, 0.2, _BEST, fps)
-        _bars(axis, views == camera, camera + _ABOVE - 0.1, 0.2, _CHOSEN, fps)
+        _bars(axis, best == camera, camera - _BAR_OFFSET - 0.1, 0.2, _BEST, fps)
+        _bars(axis, views == camera, camera + _BAR_OFFSET - 0.1, 0.2, _CHOSEN, fps)
 
 
 def _bars(axis: Axes, on: NDArray[np.bool_], bottom: float, height: float, colour: str, fps: float) -> None:
-    """Draw a bar over each run of frames that are on."""
+    """Draw a bar over each run of frames for which ``on`` is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
     spans = [(float(begin) / fps, float(end - begin) / fps) for begin, end in edges.reshape(-1, 2)]
     axis.broken_barh(spans, (bottom, height), color=colour, linewidth=0)

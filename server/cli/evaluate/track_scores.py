@@ -1,4 +1,4 @@
-"""``myview evaluate``: tracks against ground truth, each camera for itself and all as one."""
+"""``myview evaluate``: scores of tracks against ground truth, per camera and jointly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tracking.motchallenge import MotRow, read_rows
 
 
 def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, TruthAndTracks]:
-    """Read files, or those of folders, in the pairs that :func:`pair_files` makes of them; by camera.
+    """Read tracks and ground truth by camera, paired by :func:`pair_files`.
 
     Raises:
         UserError: there is nothing to compare, or a file is missing or malformed.
@@ -31,7 +31,7 @@ def read_recordings(tracks: Sequence[Path], truth: Sequence[Path]) -> dict[str, 
 
 
 def evaluate_recordings(recordings: Mapping[str, TruthAndTracks], least_iou: float) -> MultiCameraScores:
-    """Score them.
+    """Score recordings.
 
     Raises:
         UserError: an id is twice in one frame of a camera.
@@ -43,8 +43,8 @@ def evaluate_recordings(recordings: Mapping[str, TruthAndTracks], least_iou: flo
 
 
 def print_table(scores: MultiCameraScores) -> None:
-    """Print a row for each camera and, where there are several, one for their mean and one for all as one."""
-    # Without frame and colour, so that eighty columns are enough and a script can split it.
+    """Print a row for each camera and, for several cameras, their mean and the joint scores."""
+    # Without frame and colour, to fit into 80 columns and for scripts.
     table = Table("camera", box=None, padding=(0, 1, 0, 0))
     for heading in HEADINGS.values():
         table.add_column(heading, justify="right", no_wrap=True)
@@ -58,7 +58,7 @@ def print_table(scores: MultiCameraScores) -> None:
 
 
 def content_of(scores: MultiCameraScores) -> dict[str, Any]:
-    """Return all scores for a file; shares are in [0, 1]."""
+    """Return all scores for a JSON file; shares are in [0, 1]."""
     return {
         "cameras": {camera: asdict(camera_scores) for camera, camera_scores in scores.cameras.items()},
         "mean": asdict(scores.mean),
@@ -81,7 +81,7 @@ def rows_of(path: Path) -> list[MotRow]:
 
 
 def _check(recording: TruthAndTracks, tracks: Path, truth: Path) -> None:
-    """Refuse empty ground truth, and files without a common frame."""
+    """Check that the ground truth is not empty and that both files have a common frame."""
     truth_frames = {row.frame for row in recording.truth if row.confidence != 0.0}
     track_frames = {row.frame for row in recording.tracks}
     if not truth_frames:

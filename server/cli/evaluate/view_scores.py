@@ -1,4 +1,4 @@
-"""``myview evaluate --views``: the cameras that were chosen beside the best that could have been."""
+"""``myview evaluate --views``: scores of view choices against the optimum."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class ViewEvaluation:
     """Scores of view choices against the optimum.
 
     Attributes:
-        objects: by person, the object that stands for them.
-        views: (K, N) the camera chosen for each person at each frame, an index; -1: none.
-        best: (K, N) the optimum's; -1 where no camera sees the person.
-        people: scores of each person who is ever visible, by number.
-        total: the scores of all.
+        objects: by person, the matched object.
+        views: (K, N) indices of the cameras chosen for each person and frame; -1: none.
+        best: (K, N) indices of the optimum; -1: no camera sees the person.
+        people: scores of each person who is visible in some frame, by number.
+        total: the scores of all people.
         unmatched: objects that match no person.
     """
 
@@ -39,7 +39,7 @@ class ViewEvaluation:
 
 
 def evaluate_views(
-    truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int], facts: SiteInfo
+    truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int], site_info: SiteInfo
 ) -> ViewEvaluation:
     """Score choices; ``person_of`` maps objects to people.
 
@@ -51,12 +51,12 @@ def evaluate_views(
     cost, visible = truth.views.cost, truth.views.visible
 
     def score(rows: slice) -> ViewScore:
-        return score_views(cost[rows], visible[rows], views[rows], facts.switch_cost, facts.fps)
+        return score_views(cost[rows], visible[rows], views[rows], site_info.switch_cost, site_info.fps)
 
     return ViewEvaluation(
         objects={person: number for number, person in person_of.items()},
         views=views,
-        best=optimal_views(truth.views, facts.switch_cost),
+        best=optimal_views(truth.views, site_info.switch_cost),
         people={
             person: score(slice(row, row + 1))
             for row, person in enumerate(truth.people)
@@ -81,42 +81,46 @@ HEADINGS = (
 )
 
 
-def print_views(judged: ViewEvaluation) -> None:
-    """Print a row for each person and one for all."""
+def print_views(evaluation: ViewEvaluation) -> None:
+    """Print a row for each person and one for all people."""
     table = Table(box=None, padding=(0, 1, 0, 0))
-    for place, heading in enumerate(HEADINGS):
-        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
-    for person, score in judged.people.items():
-        table.add_row(str(person), str(judged.objects.get(person, "-")), *score_cells(score))
-    table.add_row("all", "", *score_cells(judged.total))
+    for column, heading in enumerate(HEADINGS):
+        table.add_column(heading, justify="right" if column else "left", no_wrap=True)
+    for person, score in evaluation.people.items():
+        table.add_row(str(person), str(evaluation.objects.get(person, "-")), *score_cells(score))
+    table.add_row("all", "", *score_cells(evaluation.total))
     console = Console(highlight=False)
     console.print(table, width=max(console.width, console.measure(table).maximum))
 
 
 def score_cells(score: ViewScore) -> list[str]:
-    """Return a row's numbers: shares in percent, cuts per minute, the shortest shot in frames."""
-    shares = [100.0 * it for it in _shares(score)]
+    """Return a row's cells: shares in percent, cuts per minute, the shortest shot in frames."""
+    shares = [100.0 * share for share in _shares(score)]
     cuts = [score.cuts_per_minute, score.optimum_cuts_per_minute]
-    return [str(score.frames), *(f"{it:.1f}" for it in (*shares, *cuts)), str(score.shortest_shot or "-")]
+    return [
+        str(score.frames),
+        *(f"{value:.1f}" for value in (*shares, *cuts)),
+        str(score.shortest_shot or "-"),
+    ]
 
 
 def _shares(score: ViewScore) -> tuple[float, ...]:
     return score.agreement, score.regret, score.visible, score.chosen
 
 
-def content_of_views(judged: ViewEvaluation, facts: SiteInfo) -> dict[str, Any]:
-    """Return it all for a file; shares are parts of 1, and null where they are infinite."""
+def content_of_views(evaluation: ViewEvaluation, site_info: SiteInfo) -> dict[str, Any]:
+    """Return the evaluation for a JSON file; shares are in [0, 1], null if infinite."""
 
     def content(score: ViewScore) -> dict[str, Any]:
         return {name: value if np.isfinite(value) else None for name, value in asdict(score).items()}
 
     return {
-        "fps": facts.fps,
-        "switch_cost_s": facts.switch_cost_s,
+        "fps": site_info.fps,
+        "switch_cost_s": site_info.switch_cost_s,
         "people": {
-            str(person): {"object": judged.objects.get(person), **content(score)}
-            for person, score in judged.people.items()
+            str(person): {"object": evaluation.objects.get(person), **content(score)}
+            for person, score in evaluation.people.items()
         },
-        "all": content(judged.total),
-        "unmatched_objects": judged.unmatched,
+        "all": content(evaluation.total),
+        "unmatched_objects": evaluation.unmatched,
     }

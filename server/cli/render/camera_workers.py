@@ -22,8 +22,8 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_AHEAD = 8
-"""Batches a camera may be ahead of the others: bounds memory however long the recording is."""
+_QUEUE_BATCHES = 8
+"""Batches by which a camera may be ahead of the others; limits memory for long recordings."""
 _POLL_S = 1.0
 
 
@@ -49,7 +49,7 @@ Outbox: TypeAlias = "Queue[EpochBatch | WorkerFailure]"
 
 
 class CameraWorkers:
-    """One process per camera; yields their batches in turn, so that all stay at the same pulse.
+    """One process per camera; yields the batches of all cameras in turn, so that they stay at the same pulse.
 
     Raises:
         UserError: while iterating, when a camera's recording cannot be read.
@@ -61,14 +61,14 @@ class CameraWorkers:
         self._processes: dict[str, BaseProcess] = {}
 
     def start(self) -> None:
-        """Start all workers; a signal waits until each is known, so that :meth:`close` ends every one."""
-        piping = PeerPipeFactory(
+        """Start all workers; signals are deferred, so that :meth:`close` can end each worker."""
+        pipe_factory = PeerPipeFactory(
             {camera: self._config.peers_of(camera) for camera in self._config.camera_ids}
         )
         with defer_termination():
             for camera in self._config.camera_ids:
-                outbox: Outbox = SPAWN.Queue(_AHEAD)
-                with piping.of(camera) as pipes:
+                outbox: Outbox = SPAWN.Queue(_QUEUE_BATCHES)
+                with pipe_factory.of(camera) as pipes:
                     process = start_function(camera, _work, self._config, camera, outbox, pipes)
                 self._outboxes[camera], self._processes[camera] = outbox, process
 
@@ -89,9 +89,8 @@ class CameraWorkers:
 
     def _next(self, camera: str) -> EpochBatch:
         while True:
-            alive = self._processes[
-                camera
-            ].is_alive()  # checked first: its last batch may still be in the queue
+            # Checked before the queue: a worker may exit after it has put its last batch.
+            alive = self._processes[camera].is_alive()
             try:
                 item = self._outboxes[camera].get(timeout=_POLL_S)
             except queue.Empty:
@@ -101,31 +100,29 @@ class CameraWorkers:
             if isinstance(item, WorkerFailure):
                 if item.bad_input:
                     raise UserError(item.text)
-                raise RuntimeError(item.text)  # noqa: TRY004 — what failed was not an argument
+                raise RuntimeError(item.text)  # noqa: TRY004 — not a type error
             return item
 
 
-def _work(config: Config, camera: str, outbox: Outbox, others: PeerPipes) -> None:
+def _work(config: Config, camera: str, outbox: Outbox, peers: PeerPipes) -> None:
     try:
         pipeline = CameraPipeline(config, camera)
         if pipeline.why_encoded:
             log.warning("camera %s is re-encoded: its own H.264: %s", camera, pipeline.why_encoded)
-        for batch in run_camera(pipeline, camera, others):
+        for batch in run_camera(pipeline, camera, peers):
             outbox.put(batch)
     except UserError as error:
         outbox.put(WorkerFailure(str(error), bad_input=True))
-    except Exception as error:  # noqa: BLE001 — goes to the parent, which raises it
+    except Exception as error:  # noqa: BLE001 — the parent raises it
         outbox.put(WorkerFailure(f"camera {camera}: {type(error).__name__}: {error}", bad_input=False))
 
 
-def run_camera(pipeline: CameraPipeline, camera: str, others: PeerLink | None = None) -> Iterator[EpochBatch]:
+def run_camera(pipeline: CameraPipeline, camera: str, peers: PeerLink | None = None) -> Iterator[EpochBatch]:
     """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
     run = CameraRun(pipeline, camera)
     while not run.ended:
         detections = run.detect()
-        batch = run.track(
-            others.exchange(detections) if others is not None and detections is not None else ()
-        )
+        batch = run.track(peers.exchange(detections) if peers is not None and detections is not None else ())
         if batch is not None:
             yield batch
 
@@ -136,7 +133,9 @@ def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[EpochBatch]
     while runs:
         detections = {camera: run.detect() for camera, run in runs.items()}
         for camera, run in list(runs.items()):
-            peer_detections = [it for other, it in detections.items() if other != camera and it is not None]
+            peer_detections = [
+                found for peer, found in detections.items() if peer != camera and found is not None
+            ]
             batch = run.track(peer_detections)
             if batch is not None:
                 yield batch

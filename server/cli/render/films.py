@@ -1,4 +1,4 @@
-"""A file per person: the best view, spliced, from the first sighting to the last."""
+"""Films of a rendering: one file per person with the spliced best view, from first to last sighting."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class _Film:
     file: BinaryIO
     showing: GopSequencer
     origin: int
-    """The pulse that is at time 0."""
+    """The pulse at time 0."""
     trimmed_size: int
     """Bytes up to the end of the last GOP in which the person was present."""
     until: int
@@ -32,7 +32,7 @@ class _Film:
 
 
 class FilmWriter:
-    """Writes ``object-1.mp4`` (or ``.webm``) and so on: the fragments of the streams, rebased to time 0.
+    """Writes a file ``object-K.mp4`` (or ``.webm``) per person: the stream's fragments, rebased to time 0.
 
     ``sound``: None if the site has none.
     """
@@ -77,7 +77,7 @@ class FilmWriter:
                 film.trimmed_size, film.until = film.file.tell(), decision.first + decision.frames
 
     def close(self) -> None:
-        """Truncate each film after its person has left for good, and close the files."""
+        """Truncate each film after the last GOP with its person, and close the files."""
         for film in self._films.values():
             if not film.file.closed:
                 film.file.truncate(film.trimmed_size)

@@ -28,8 +28,8 @@ class PeerLink(Protocol):
 class PeerPipes:
     """One camera's ends of the pipes, in the order of the configuration.
 
-    No camera gets ahead of another by more than one frame, and two messages fit into a pipe: sending never
-    blocks on a peer that is sending, too.
+    No camera is ahead of another by more than one frame, and a pipe holds two messages, so two peers that
+    send to each other never block.
     """
 
     outgoing: dict[str, Connection] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class PeerPipes:
         for camera, connection in list(self.outgoing.items()):
             try:
                 connection.send_bytes(data)
-            except OSError:  # it has ended, and closed its pipes
+            except OSError:  # the peer has ended and closed its pipes
                 del self.outgoing[camera]
         if detections.ended:
             return ()
@@ -50,7 +50,7 @@ class PeerPipes:
     def _receive(self, camera: str) -> FrameDetections | None:
         try:
             detections = _DECODER.decode(self.incoming[camera].recv_bytes())
-        except EOFError:  # it failed, which its starter reports
+        except EOFError:  # the peer has failed; the parent reports it
             detections = None
         if detections is None or detections.ended:
             del self.incoming[camera]
@@ -61,23 +61,23 @@ class PeerPipes:
 class PeerPipeFactory:
     """Creates the pipes between cameras that are started one after the other.
 
-    Only pipes that are not handed over yet are open here: all pipes of very many cameras would be too many.
+    Only pipes that have not been passed to a process are open here, to stay below the limit of descriptors.
     """
 
-    def __init__(self, others: Mapping[str, Sequence[str]]) -> None:
-        self._others = others
-        self._pipes: dict[str, PeerPipes] = {camera: PeerPipes() for camera in others}
+    def __init__(self, peers: Mapping[str, Sequence[str]]) -> None:
+        self._peers = peers
+        self._pipes: dict[str, PeerPipes] = {camera: PeerPipes() for camera in peers}
         self._handed_over: set[str] = set()
 
     @contextmanager
     def of(self, camera: str) -> Iterator[PeerPipes]:
-        """Yield the ends of a camera's pipes while its process starts; they are closed here afterwards."""
+        """Yield a camera's ends of the pipes while its process starts; they are closed here afterwards."""
         own = self._pipes[camera]
-        for other in self._others[camera]:
-            if other not in self._handed_over:
-                peer = self._pipes[other]
-                own.incoming[other], peer.outgoing[camera] = multiprocessing.Pipe(duplex=False)
-                peer.incoming[camera], own.outgoing[other] = multiprocessing.Pipe(duplex=False)
+        for peer_name in self._peers[camera]:
+            if peer_name not in self._handed_over:
+                peer = self._pipes[peer_name]
+                own.incoming[peer_name], peer.outgoing[camera] = multiprocessing.Pipe(duplex=False)
+                peer.incoming[camera], own.outgoing[peer_name] = multiprocessing.Pipe(duplex=False)
         try:
             yield own
         finally:

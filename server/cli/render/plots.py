@@ -1,4 +1,4 @@
-"""Plots of a rendering: who was shown by which camera (the paper's Fig. 26), and who was where (Fig. 18)."""
+"""Plots of a rendering: cameras chosen for each person (the paper's Fig. 26), and tracks (Fig. 18)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def plot_choices(choices: Path, cameras: Sequence[str], out: Path) -> None:
 
 
 def plot_tracks(tracks: Path, out: Path) -> None:
-    """Plot the middle of everybody's box over the frames, x above y."""
+    """Plot the center of each person's box over the frames, x above y."""
     figure = new_figure((_WIDTH_INCHES, 6))
     axes = figure.subplots(2, 1, sharex=True)
     places: dict[int, list[tuple[float, float, float]]] = defaultdict(list)
@@ -58,12 +58,12 @@ def plot_tracks(tracks: Path, out: Path) -> None:
 
 
 def new_figure(size: tuple[float, float]) -> Figure:
-    """Return an empty figure that needs no screen and that nothing global holds on to."""
+    """Return an empty figure that needs no screen and has no reference in pyplot."""
     figure = Figure(figsize=size, layout="tight")
     FigureCanvasAgg(figure)
     return figure
 
 
 def save_figure(figure: Figure, out: Path) -> None:
-    """Write a figure as PNG: the same bytes for the same figure."""
+    """Write a figure as PNG, reproducibly."""
     figure.savefig(out, dpi=100, metadata={"Software": None})

@@ -1,4 +1,4 @@
-"""``myview render``: the best view of everybody in recorded views, as files."""
+"""``myview render``: writes the best view of each person in recorded views."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _BOOT = 0
 
 
 class Renderer:
-    """Runs recordings through the classes of the live system and writes what they decide."""
+    """Decides and splices recordings with the classes of the live system, and writes the results."""
 
     def __init__(self, config: Config, folder: Path) -> None:
         cameras = config.camera_ids
         self._config, self._folder = config, folder
-        # What is to be decided, and what the camera that was run first has done since.
+        # Undecided frames, and frames by which a camera is ahead.
         frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
         stream_format = stream_format_for(
             config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
@@ -46,9 +46,9 @@ class Renderer:
         )
         self._recorder = DecisionWriter(folder, cameras, self._decider.people.letterboxes)
         self._soundtrack = Soundtrack(config)
-        frame_buffer = self._soundtrack.frame_buffer
+        audio_buffer = self._soundtrack.audio_buffer
         self._films = FilmWriter(
-            folder / "best", self._frame_buffers, stream_format, config.site, frame_buffer
+            folder / "best", self._frame_buffers, stream_format, config.site, audio_buffer
         )
         self._sizes: dict[str, Size] = {}
         self.ended: dict[str, int] = {}
@@ -56,7 +56,7 @@ class Renderer:
         self.frames = 0
 
     def take(self, batch: EpochBatch) -> None:
-        """Add a camera's batch, and decide what can be decided."""
+        """Add a camera's batch, and decide the GOPs that are complete."""
         for unit in batch.units:
             self._frame_buffers[batch.camera].put(unit.pulse, _BOOT, unit.data, key=unit.key)
             self._aligner.frame_received(batch.camera, _BOOT, unit.pulse)
@@ -71,7 +71,7 @@ class Renderer:
                 self._write(decision)
 
     def finish(self) -> list[int]:
-        """Decide and write the rest; return all people's numbers."""
+        """Decide and write the remaining GOPs; return the numbers of all people."""
         for decision in self._decider.finish(max(self.ended.values())):
             self._write(decision)
         self.close()
@@ -82,7 +82,7 @@ class Renderer:
         return self._films.numbers
 
     def close(self) -> None:
-        """Close all files; done by :meth:`finish`, too."""
+        """Close all files; :meth:`finish` does it, too."""
         self._recorder.close()
         self._films.close()
 
@@ -105,14 +105,14 @@ def render(config: Config, folder: Path, progress: Callable[[int], None]) -> lis
         for batch in workers:
             renderer.take(batch)
             progress(renderer.frames)
-        _say_if_unequal({camera: renderer.ended[camera] for camera in config.camera_ids})
+        _warn_if_unequal({camera: renderer.ended[camera] for camera in config.camera_ids})
         return renderer.finish()
     finally:
         workers.close()
         renderer.close()
 
 
-def _say_if_unequal(ended: dict[str, int]) -> None:
+def _warn_if_unequal(ended: dict[str, int]) -> None:
     """Log a warning if the recordings differ in length."""
     if len(set(ended.values())) > 1:
         lengths = ", ".join(f"{camera} with frame {last + 1}" for camera, last in ended.items())

@@ -1,4 +1,4 @@
-"""`site.json`, beside `choices.csv`: what a rendering was made with, as far as judging it takes it."""
+"""`site.json`, beside `choices.csv`: properties of a rendering that its evaluation needs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SiteInfo:
 
 
 def write_site(folder: Path, config: Config, sizes: Mapping[str, Size]) -> None:
-    """Write it."""
+    """Write `site.json`."""
     content = {
         "fps": config.site.fps,
         "gop": config.encode.gop,
@@ -49,20 +49,20 @@ def write_site(folder: Path, config: Config, sizes: Mapping[str, Size]) -> None:
 
 
 def read_site(path: Path) -> SiteInfo:
-    """Read it.
+    """Read `site.json`.
 
     Raises:
-        UserError: it cannot be read, or is none.
+        UserError: it cannot be read or is invalid.
     """
     try:
         content = parse_json(path.read_text(encoding="ascii"))
         sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
-        facts = SiteInfo(float(content["fps"]), float(content["switch_cost_s"]), sizes)
+        info = SiteInfo(float(content["fps"]), float(content["switch_cost_s"]), sizes)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        raise UserError(f"{path}: is not what `myview render` writes: {error}") from error
-    sensible = 0 < facts.fps < math.inf and 0 <= facts.switch_cost_s < math.inf
-    if not sensible or any(side <= 0 for size in sizes.values() for side in size):
+        raise UserError(f"{path}: was not written by `myview render`: {error}") from error
+    is_valid = 0 < info.fps < math.inf and 0 <= info.switch_cost_s < math.inf
+    if not is_valid or any(side <= 0 for size in sizes.values() for side in size):
         raise UserError(f"{path}: it has an invalid rate, size or cost")
-    return facts
+    return info

@@ -1,4 +1,4 @@
-"""The site's sound for films: of a recording, read as far as films are written."""
+"""Soundtrack of films: the site's recorded sound, read as films are written."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from server.service.streaming.audio_buffer import AudioBuffer
 
 _KEPT_S = 20.0
 _AHEAD_S = 1.0
-"""Seconds read ahead; an encoder holds back less."""
+"""Seconds read ahead, more than the delay of an encoder."""
 
 
 class Soundtrack:
-    """Fills a shelf. ``shelf`` is None where there is no sound, or none that is recorded.
+    """Reads the sound into ``audio_buffer``, which is None without recorded sound.
 
     Raises:
         UserError: it cannot be opened.
@@ -25,17 +25,17 @@ class Soundtrack:
         self._sound = opened if isinstance(opened, RecordedAudioSource) else None
         self._fps = config.site.fps
         self._begun = False
-        self.frame_buffer = None
+        self.audio_buffer = None
         if form is not None and self._sound is not None:
-            self.frame_buffer = AudioBuffer(form, self._fps, _KEPT_S)
+            self.audio_buffer = AudioBuffer(form, self._fps, _KEPT_S)
 
     def read(self, first: int, until: int) -> None:
-        """Put what sounds at the pulses ``first … until - 1`` on the shelf; pulses must grow."""
-        if self._sound is None or self.frame_buffer is None:
+        """Read the sound of pulses ``first`` to ``until - 1`` into the buffer; pulses must increase."""
+        if self._sound is None or self.audio_buffer is None:
             return
         frames = [] if self._begun else self._sound.until(first)
         self._begun = True
         frames += self._sound.until(until + round(_AHEAD_S * self._fps))
         for run in consecutive_runs(frames):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
-            self.frame_buffer.put(head, b"".join(frame.data for frame in run))
+            self.audio_buffer.put(head, b"".join(frame.data for frame in run))

@@ -14,11 +14,11 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class VideoInfo:
-    """A recorded view's pictures.
+    """Properties of a recorded view.
 
     Attributes:
-        size: of each as it is shown: upright, with square pixels.
-        fps: frames a second; None of a folder of images, which does not say.
+        size: width and height as shown: upright, with square pixels.
+        fps: frames per second; None: unknown, since it is a folder of images.
     """
 
     size: Size
@@ -29,7 +29,7 @@ def read_video_info(view: Path) -> VideoInfo:
     """Read the picture size and frame rate of a video or a folder of images.
 
     Raises:
-        UserError: it cannot be opened, or there is not one picture in it.
+        UserError: it cannot be opened, or has no picture.
     """
     if view.is_dir():
         return VideoInfo(ImageFolder(str(view), 0, "stop").size, None)
@@ -39,10 +39,10 @@ def read_video_info(view: Path) -> VideoInfo:
 
 
 def parse_size(text: str) -> Size:
-    """Read `WIDTHxHEIGHT`.
+    """Parse `WIDTHxHEIGHT`.
 
     Raises:
-        UserError: it is not that.
+        UserError: the text is not a size.
     """
     width, _, height = text.partition("x")
     if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):

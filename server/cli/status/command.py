@@ -23,17 +23,18 @@ _EVERY_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class SiteReport:
-    """The status of a site at one time, or why it is not known."""
+    """The status of a site at one time, or why it is unknown."""
 
     now: SiteNow | None
     away: str = ""
+    """Why the server cannot be reached."""
 
 
 async def status_once(url: str, token: str | None, *, as_json: bool) -> bool:
     """Print a site's status; return whether it is ready.
 
     Raises:
-        UserError: the server refuses, or is not MyView's.
+        UserError: the server refuses the request, or is not a MyView server.
         UnavailableError: it cannot be reached.
     """
     report = await _report(url, HttpSettings(token=token))
@@ -47,10 +48,10 @@ async def status_once(url: str, token: str | None, *, as_json: bool) -> bool:
 
 
 async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
-    """Show a site's status until cancelled; wait for a server that goes away.
+    """Show a site's status until cancelled; an unreachable server is retried.
 
     Raises:
-        UserError: the server refuses, or is not MyView's.
+        UserError: the server refuses the request, or is not a MyView server.
     """
     reports = _reports(url, HttpSettings(token=token, connect_timeout=2.0, read_timeout=5.0))
     if as_json:
@@ -59,7 +60,7 @@ async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
         return
     before: SiteNow | None = None
     restarted = ""
-    with Live(Text("asking the server"), auto_refresh=False, console=Console()) as live:
+    with Live(Text("connecting to the server"), auto_refresh=False, console=Console()) as live:
         async for report in reports:
             if report.now is None:
                 notice = f"{report.away}; trying again"

@@ -1,4 +1,4 @@
-"""A site's status as a picture for the terminal."""
+"""Terminal display of a site's status."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Rates:
 
 
 def render_status(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
-    """Show a site: a head, its cameras, its people; ``notice`` says what has happened to the connection."""
+    """Render a site's status: headline, service, cameras, people; ``notice`` is about the connection."""
     parts: list[RenderableType] = [_head(now)]
     if now.service is not None:
         parts.append(_service(now.service, rates))
@@ -74,29 +74,31 @@ def _service(service: ServiceNow, rates: Rates) -> Text:
 
 
 def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
-    heads = ("camera", "state", "fps", "pulse", "tracks", "missed", "shed", "late", "waiting", "certified")
-    table = Table(*heads, box=None, header_style="dim", pad_edge=False)
+    headings = ("camera", "state", "fps", "pulse", "tracks", "missed", "shed", "late", "waiting", "certified")
+    table = Table(*headings, box=None, header_style="dim", pad_edge=False)
     for column in table.columns:
         column.no_wrap = True
-    words = []
-    for it in cameras:
+    notices = []
+    for camera in cameras:
         table.add_row(
-            escape(printable(it.camera)),
-            Text(printable(it.state), style=_STATES.get(it.state, "red")),
-            f"{it.fps:.1f}",
-            _ms(it.sync_error_s),
-            _ms(it.tracking_delay_s),
-            str(it.missed),
-            str(it.shed),
-            str(it.late),
-            "-" if it.waiting is None else str(it.waiting),
-            "-" if it.certified is None else f"{100 * it.certified:.0f} %",
+            escape(printable(camera.camera)),
+            Text(printable(camera.state), style=_STATES.get(camera.state, "red")),
+            f"{camera.fps:.1f}",
+            _ms(camera.sync_error_s),
+            _ms(camera.tracking_delay_s),
+            str(camera.missed),
+            str(camera.shed),
+            str(camera.late),
+            "-" if camera.waiting is None else str(camera.waiting),
+            "-" if camera.certified is None else f"{100 * camera.certified:.0f} %",
         )
-        step = "" if it.synchronized or it.state != "live" else "not synchronized"
-        words += [
-            Text(printable(f"{it.camera}: {text}"), style="yellow") for text in (it.message, step) if text
+        unsynchronized = "" if camera.synchronized or camera.state != "live" else "not synchronized"
+        notices += [
+            Text(printable(f"{camera.camera}: {text}"), style="yellow")
+            for text in (camera.message, unsynchronized)
+            if text
         ]
-    return Group(table, *words)
+    return Group(table, *notices)
 
 
 def _people(people: tuple[PersonNow, ...]) -> RenderableType:
@@ -104,11 +106,11 @@ def _people(people: tuple[PersonNow, ...]) -> RenderableType:
         return Text("no people yet", style="dim")
     table = Table("person", "shown by", "for", "seen by", box=None, header_style="dim", pad_edge=False)
     for person in people:
-        who = f"{person.object} {person.name}" if person.name else str(person.object)
+        label = f"{person.object} {person.name}" if person.name else str(person.object)
         since = "-" if person.since_s is None else f"{person.since_s:.0f} s"
-        seen = " ".join(person.cameras) or "nobody"
-        shown = [escape(printable(it)) for it in (who, person.camera or "-", since, seen)]
-        table.add_row(*shown, style="" if person.visible else "dim")
+        seen_by = " ".join(person.cameras) or "none"
+        cells = [escape(printable(text)) for text in (label, person.camera or "-", since, seen_by)]
+        table.add_row(*cells, style="" if person.visible else "dim")
     return table
 
 

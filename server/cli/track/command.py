@@ -1,4 +1,4 @@
-"""``myview track``: one video, or just its detections, to MOTChallenge text."""
+"""``myview track``: tracks people in a video or in detections, and writes MOTChallenge text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedFrame:
-    """A frame of a recording, counted from 0; there is no picture where only detections are known."""
+    """A frame of a recording, counted from 0; without an image if only detections are given."""
 
     number: int
     detections: Detections
@@ -45,23 +45,23 @@ def track_one(
     progress: Callable[[int], None],
     tracker: str | None = None,
 ) -> int:
-    """Track and write; give the number of people.
+    """Track people and write their tracks; return the number of people.
 
     Raises:
-        UserError: there is nothing to track in, something cannot be read or written, or no solver or
-            tracker has that name.
+        UserError: neither video nor detections are given, a file cannot be read or written, or the solver or
+            tracker is unknown.
     """
     if video is None and det is None:
         raise UserError("track: name a video, or its detections with --det, or both")
     loaded = config_for_video(video, det, config)
     frames = _from_detections(det) if video is None and det is not None else detect_frames(loaded)
-    follower = _follower(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
+    person_tracker = _set_up(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
     rows: list[MotRow] = []
     with atomic_file(out, video, det) as draft:
         for frame in frames:
-            rows += final_rows(follower.push(frame.number, frame.detections, frame.image))
+            rows += final_rows(person_tracker.push(frame.number, frame.detections, frame.image))
             progress(frame.number + 1)
-        rows += final_rows(follower.flush())
+        rows += final_rows(person_tracker.flush())
         write_rows(draft, rows)
     return len({row.id for row in rows})
 
@@ -70,18 +70,18 @@ def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
     """Return the tracker of this name, by default the configured one.
 
     Raises:
-        UserError: there is none, or it looks at pictures and there are none.
+        UserError: it is unknown, or needs pictures without a video.
     """
     if name is not None and name not in tracker_names():
-        raise UserError(f"--tracker: no tracker is called {name!r}; there are {', '.join(tracker_names())}")
+        raise UserError(f"--tracker: there is no tracker {name!r}; there are {', '.join(tracker_names())}")
     chosen = name or config.track.tracker
     if video is None and needs_images(chosen):
-        raise UserError(f"--tracker: {chosen} follows what pictures show: name a video, too")
+        raise UserError(f"--tracker: {chosen} needs pictures: give a video, too")
     return chosen
 
 
-def _follower(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
-    """Return the tracker, warmed up on the video where it needs pictures."""
+def _set_up(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
+    """Return the tracker, warmed up on the video if it needs pictures."""
     camera = config.cameras[0]
     if not needs_images(name):
         return set_up_tracker(config, name, camera, None, solver)
@@ -93,28 +93,28 @@ def solver_for(config: Config, name: str | None) -> Solver:
     """Return the solver of this name, by default the configured one.
 
     Raises:
-        UserError: there is none.
+        UserError: it is unknown.
     """
     if name is not None and name not in solver_names():
-        raise UserError(f"--solver: no solver is called {name!r}; there are {', '.join(solver_names())}")
+        raise UserError(f"--solver: there is no solver {name!r}; there are {', '.join(solver_names())}")
     return create_solver(name or config.track.solver)
 
 
 def config_for_video(video: Path | None, det: Path | None, config: Path | None) -> Config:
     """Return the configuration with the video as its only camera."""
     base = read_content(config) if config else {}
-    base.pop("ground", None)  # one camera needs no floor; the file may be what `myview calibrate` is to make
+    base.pop("ground", None)  # not needed for one camera, and may not exist yet
     where, folder = str(config or "myview track"), config.parent if config else Path()
     if video is not None:
         return config_for_videos(
             [video], base=base, where=where, folder=folder, detections=[] if det is None else [det]
         )
-    nothing = {"id": "detections", "source": "scene:none"}  # a configuration has a camera; nobody opens it
-    return build_config({**base, "cameras": [nothing]}, where=where, folder=folder)
+    placeholder = {"id": "detections", "source": "scene:none"}  # required, but never opened
+    return build_config({**base, "cameras": [placeholder]}, where=where, folder=folder)
 
 
 def detect_frames(config: Config) -> Iterator[DetectedFrame]:
-    """Yield every frame of the video with its detections, in the video's own pixels."""
+    """Yield every frame of the video with its detections, in pixels of the video."""
     camera = config.cameras[0]
     source = open_source(camera, config.site)
     letterbox = Letterbox(source.size, (config.site.width, config.site.height))
@@ -129,7 +129,7 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
 
 
 def read_frames(source: FrameSource, first: int = 0) -> Iterator[tuple[int, Image | None]]:
-    """Yield the frames of a recording from `first` to its end; `None` where one has no picture."""
+    """Yield the frames of a recording from ``first`` to its end; None: a frame without a picture."""
     for number in count(first):
         try:
             image = source.take(number)
@@ -150,7 +150,7 @@ def _from_detections(path: Path) -> Iterator[DetectedFrame]:
 
 
 def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
-    """Yield the rows of newly final frames, interpolated gaps included."""
+    """Yield the rows of newly final frames, including interpolated ones."""
     if result is None:
         return
     for track in result.tracks:

@@ -1,4 +1,4 @@
-"""``myview track --template``: objects that are known by a picture of each, to MOTChallenge text."""
+"""``myview track --template``: tracks objects from their boxes in the first picture."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _NUMBERS = 4
 
 
 def boxes_from(texts: Sequence[str]) -> NDArray[np.float64]:
-    """Read boxes given as ``LEFT,TOP,WIDTH,HEIGHT`` in pixels; give left, top, right, bottom, ``(n, 4)``.
+    """Parse boxes ``LEFT,TOP,WIDTH,HEIGHT`` in pixels; return (n, 4) left, top, right, bottom.
 
     Raises:
-        UserError: one of them is none.
+        UserError: a text is not such a box.
     """
     boxes = []
     for text in texts:
@@ -46,10 +46,10 @@ def track_templates(
     solver: str | None,
     progress: Callable[[int], None],
 ) -> int:
-    """Follow what is in the boxes of the first picture and write; return the number of objects.
+    """Track the objects in boxes of the first picture and write their tracks; return the number of objects.
 
     Raises:
-        UserError: a box is not in the picture, or something cannot be read or written.
+        UserError: a box is outside the picture, or a file cannot be read or written.
     """
     loaded = config_for_video(video, None, config)
     settings = loaded.track

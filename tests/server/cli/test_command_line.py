@@ -258,7 +258,7 @@ def test_track_writes_a_file_or_refuses(run: Run, tmp_path: Path) -> None:
     write_video(tmp_path / "my view (1).mp4", 12)
     before = written(tmp_path)
     assert "name a video, or its detections" in refusal(run("track", "--out", "t.txt"))
-    assert "no solver is called 'oracle'" in refusal(
+    assert "there is no solver 'oracle'" in refusal(
         run("track", "--det", "det.txt", "--out", "t.txt", "--solver", "oracle")
     )
     assert "no such file" in refusal(run("track", "none.mp4", "--out", "t.txt"))

@@ -76,7 +76,7 @@ def test_the_doctor_says_what_fits() -> None:
     (found,) = descriptor_findings(small_config(), 1024)
     assert found.level is Level.WARNING
     assert "http.viewers_max says 1000" in found.text
-    assert "LimitNOFILE" in found.do
+    assert "LimitNOFILE" in found.remedy
 
 
 def test_the_doctor_tells_of_it(myview: Run, tmp_path: Path) -> None:

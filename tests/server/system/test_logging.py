@@ -22,7 +22,7 @@ from fakes.system.ports import free
 from fakes.timeouts import PATIENCE
 from server.system.errors import UserError
 from server.system.log_format import JsonLines, formatter
-from server.system.log_setup import say_failure
+from server.system.log_setup import report_error
 
 FIELDS = {"time", "level", "process", "logger", "event"}
 
@@ -83,7 +83,7 @@ def test_the_name_of_a_file_that_is_no_utf_8_is_said_all_the_same() -> None:
 
 
 def test_why_a_command_ends_commands_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    say_failure("hall says: \x1b[2Jgone\nand more")
+    report_error("hall says: \x1b[2Jgone\nand more")
     assert capsys.readouterr().err == "myview: hall says: ·[2Jgone and more\n"
 
 

@@ -99,10 +99,10 @@ def test_a_walk_in_the_middle_alone_is_written_only_if_forced(run: Run, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("away",), "away: is not there"),
+        (("away",), "away: does not exist"),
         (("a.txt", "a.txt"), "two cameras are called 'a'"),
         (("det.txt", "a.txt"), "det.txt: has detections, not tracks"),
-        (("empty.txt", "a.txt"), "empty.txt: nobody is in it"),
+        (("empty.txt", "a.txt"), "empty.txt: has no people"),
         (("a.txt",), "two cameras at least"),
         (("a.txt", "b.txt", "--size", "wide"), "--size: 'wide' is not WIDTHxHEIGHT"),
         (("p.csv", "a.txt"), "marked points are one file"),
@@ -138,5 +138,5 @@ def test_videos_are_tracked_first_and_must_have_one_rate(run: Run, tmp_path: Pat
         "detect: {prescan_frames: 0}\n"  # so that twenty frames are too few to know the scene
     )
     ended = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
-    assert (ended.code, ended.err) == (2, "tracking c0\nmyview: c0.mp4: nobody is in it\n")
+    assert (ended.code, ended.err) == (2, "tracking c0\nmyview: c0.mp4: has no people\n")
     assert {it.name for it in tmp_path.iterdir()} == {"c0.mp4", "c1.mp4", "site.yaml"}

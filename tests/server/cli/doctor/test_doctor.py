@@ -57,7 +57,7 @@ def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview:
     before = sorted(tmp_path.iterdir())
     ended = myview("doctor", path, "--json", "--seconds", 20)
     said = json.loads(ended.out)
-    assert (ended.code, ended.err, said["well"]) == (0, "", True)
+    assert (ended.code, ended.err, said["ok"]) == (0, "", True)
     (camera,) = [it for it in said["findings"] if it["check"] == "camera c0"]
     assert camera["level"] == "ok"
     assert camera["text"].startswith("64x48 pixels, 25.0 pictures a second, ")
@@ -88,7 +88,7 @@ def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: R
 def test_a_wrong_configuration_is_all_that_is_said(myview: Run, tmp_path: Path) -> None:
     ended = myview("doctor", site(tmp_path, htp={"port": 1}), "--json")
     said = json.loads(ended.out)
-    assert (ended.code, said["well"]) == (1, False)
+    assert (ended.code, said["ok"]) == (1, False)
     (finding,) = said["findings"]
     assert (finding["check"], finding["level"]) == ("configuration", "bad")
     assert "did you mean 'http'?" in finding["text"]

@@ -52,7 +52,7 @@ def of(findings: list[Finding], check: str) -> Finding:
 def test_the_only_camera_that_was_not_tried_leaves_the_size_unknown(tmp_path: Path) -> None:
     found = of(disk_findings(site(tmp_path), {"c0": AWAY}), "disk")
     assert found.level is Level.WARNING
-    assert found.text.startswith("what 1.0 hours of c0 take is not known; 1000 MB are free")
+    assert found.text.startswith("the size of 1.0 hours of c0 is not known; 1000 MB are free")
 
 
 def test_the_size_is_that_of_the_cameras_that_were_tried_and_says_so(tmp_path: Path) -> None:

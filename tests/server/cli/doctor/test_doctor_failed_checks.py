@@ -159,7 +159,7 @@ def test_a_wrong_configuration_is_named_with_what_to_do(myview: Run, tmp_path: P
 def test_a_missing_file_of_tokens_is_said_once(tmp_path: Path) -> None:
     found = file_findings(config(tmp_path, access={"tokens": "none.yaml"}))
     (said,) = [it for it in found if it.level is Level.BAD]
-    assert (said.check, said.do) == ("access.tokens", "`myview token NAME` prints a line for it")
+    assert (said.check, said.remedy) == ("access.tokens", "`myview token NAME` prints a line for it")
 
 
 @needs_openssl

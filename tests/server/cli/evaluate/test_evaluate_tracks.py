@@ -99,7 +99,7 @@ def test_a_smaller_overlap_may_be_enough(run: Printed, tmp_path: Path) -> None:
 
 def test_what_is_not_there_is_named(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
-    assert refused("--tracks", tracks, "--gt", "nowhere.txt") == "myview: nowhere.txt: is not there"
+    assert refused("--tracks", tracks, "--gt", "nowhere.txt") == "myview: nowhere.txt: does not exist"
 
 
 def test_several_files_belong_together_by_their_names_in_whatever_order(run: Printed, tmp_path: Path) -> None:
@@ -141,7 +141,9 @@ def test_files_that_cannot_be_paired_are_refused(refused: Printed, tmp_path: Pat
     )
     assert f"--gt: {b2}: there are no tracks of that name" in refused("--tracks", a, *each("--gt", (a2, b2)))
     assert "are both called 'a'" in refused(*each("--tracks", (a, a2)), "--gt", a2)
-    assert "cannot tell the cameras apart" in refused(*each("--tracks", (a, a2)), *each("--gt", (b, b2)))
+    assert "the cameras cannot be distinguished" in refused(
+        *each("--tracks", (a, a2)), *each("--gt", (b, b2))
+    )
 
 
 def test_folders_without_common_names_are_refused(refused: Printed, tmp_path: Path) -> None:

@@ -171,8 +171,8 @@ def test_a_file_that_is_none_is_refused(evaluate: Run, hall: Path, lines: list[s
 def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> None:
     path = write(hall / "choices.csv", choices({1: "c0"}))
     for arguments, why in (
-        ([], "name what is to be scored: --tracks, or --views, or both"),
-        (["--tracks", hall, "--plots", hall / "p"], "--plots and --videos are about choices"),
+        ([], "give --tracks, --views, or both"),
+        (["--tracks", hall, "--plots", hall / "p"], "--plots and --videos need --views"),
         (["--views", hall / "none.csv", *SIZE], "none.csv: cannot be read"),
         (["--views", path, "--size", "big", "--fps", 10], "--size: 'big' is not WIDTHxHEIGHT"),
         (["--views", path, "--size", "9x9"], "the number of frames a second is not known"),
@@ -189,9 +189,9 @@ def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> No
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ('{"fps": 3}', "is not what `myview render` writes"),
-        ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [1e999, 9]}}', "is not what `myview render` writes"),
-        ("[" * 100_000, "is not what `myview render` writes"),
+        ('{"fps": 3}', "was not written by `myview render`"),
+        ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [1e999, 9]}}', "was not written by `myview render`"),
+        ("[" * 100_000, "was not written by `myview render`"),
         ('{"fps": 3, "switch_cost_s": NaN, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),
         ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [9, 0]}}', "invalid rate, size or cost"),
         ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),

@@ -75,5 +75,5 @@ def test_a_box_that_cannot_be_followed_is_refused_and_nothing_written(
 
 
 def test_an_unknown_solver_is_refused(video: Path) -> None:
-    with pytest.raises(UserError, match="no solver is called 'oracle'"):
+    with pytest.raises(UserError, match="there is no solver 'oracle'"):
         follow(video, "20,40,32,32", solver="oracle")

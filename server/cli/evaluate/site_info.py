@@ -1,4 +1,4 @@
-"""Frame rate, picture sizes and switch cost for scoring views: from options, videos or `site.json`."""
+"""Frame rate, picture sizes and switch cost for scoring views, from options, videos or `site.json`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.system.errors import UserError
 
 @dataclass(frozen=True, slots=True)
 class SiteOptions:
-    """Options that describe the site; None where not given."""
+    """Options that describe the site; None: not given."""
 
     size: str | None = None
     """WIDTHxHEIGHT of every camera's picture."""
@@ -24,10 +24,10 @@ class SiteOptions:
 
 
 def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str, Path]:
-    """Return each camera's video: by name where the names are the cameras', else in their order.
+    """Return each camera's video, by name if the names are those of the cameras, otherwise in order.
 
     Raises:
-        UserError: a camera has none.
+        UserError: a camera has no video.
     """
     named = {camera_name(path): path for path in videos}
     if all(camera in named for camera in cameras):
@@ -43,9 +43,9 @@ def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str
 def collect_site_info(
     choices: Path, cameras: Sequence[str], videos: Mapping[str, Path], options: SiteOptions
 ) -> SiteInfo:
-    """Return the site's facts: from options, then videos, then `site.json` beside the choices.
+    """Collect the site's properties from options, then videos, then `site.json` beside the choices.
 
-    The rate of `site.json` precedes the videos': the choices' frames are counted by it.
+    The rate of `site.json` takes precedence over that of videos: frames of choices are counted at it.
 
     Raises:
         UserError: the rate or a size is unknown or invalid.
@@ -62,10 +62,10 @@ def collect_site_info(
     fps = options.fps or fps
     without = [camera for camera in cameras if camera not in sizes]
     if without or fps is None:
-        what = f"the size of camera {without[0]}'s picture" if without else "the number of frames a second"
+        missing = f"the size of camera {without[0]}'s picture" if without else "the number of frames a second"
         raise UserError(
-            f"--views: {what} is not known (there is no {SITE_FILE} of a rendering beside {choices}, or it "
-            "lacks it): give --size WIDTHxHEIGHT and --fps, or --videos"
+            f"--views: {missing} is not known (there is no {SITE_FILE} of a rendering beside {choices}, "
+            "or it does not have it): give --size WIDTHxHEIGHT and --fps, or --videos"
         )
     if options.switch_cost_s is not None:
         switch_cost_s = options.switch_cost_s
