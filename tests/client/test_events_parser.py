@@ -52,7 +52,7 @@ def test_events_are_the_same_however_the_bytes_arrive(
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.binary(max_size=40), max_size=10))
-def test_any_bytes_are_survived(pieces: list[bytes]) -> None:
+def test_any_bytes_are_parsed_without_a_crash(pieces: list[bytes]) -> None:
     parser = SseParser()
     for piece in pieces:
         parser.feed(piece)
@@ -79,7 +79,7 @@ async def take(url: str, count: int) -> list[client.Event]:
         await stream.aclose()  # type: ignore[attr-defined]
 
 
-async def test_events_come_as_what_they_are(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_events_are_decoded_to_their_types(hand_made_site: HandMadeSite, site_url: str) -> None:
     async def tell(response: web.StreamResponse) -> None:
         stream = sent("site", SITE) + sent("objects", OBJECTS) + sent("cameras", CAMERAS)
         stream += sent("weather", {"rain": True}) + sent("flag", FLAG) + sent("gop", gop(50, "c1"))
@@ -100,7 +100,7 @@ async def test_events_come_as_what_they_are(hand_made_site: HandMadeSite, site_u
     assert last.cuts == (client.Cut(1, "c0", "c1", 50),)
 
 
-async def test_after_an_interruption_the_events_go_on(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_events_continue_after_an_interruption(hand_made_site: HandMadeSite, site_url: str) -> None:
     async def one(response: web.StreamResponse) -> None:
         await response.write(sent("gop", gop(50, "c0")) + b"event: gop\ndata: {")
 
@@ -113,7 +113,7 @@ async def test_after_an_interruption_the_events_go_on(hand_made_site: HandMadeSi
     assert [event.first for event in gops if isinstance(event, client.Gop)] == [50, 60]
 
 
-async def test_a_server_gone_for_good_ends_the_events(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_a_server_that_stays_away_ends_the_events(hand_made_site: HandMadeSite, site_url: str) -> None:
     async def one(response: web.StreamResponse) -> None:
         await response.write(sent("gop", gop(50, "c0")))
 
@@ -122,7 +122,7 @@ async def test_a_server_gone_for_good_ends_the_events(hand_made_site: HandMadeSi
         await take(site_url, 2)
 
 
-async def test_an_event_that_is_not_understood_is_told(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_an_invalid_event_is_an_error(hand_made_site: HandMadeSite, site_url: str) -> None:
     async def wrong(response: web.StreamResponse) -> None:
         await response.write(sent("gop", {"first": "now"}))
 

@@ -14,13 +14,13 @@ from client.http import server_url
 HASTY = client.HttpSettings(retries=1, backoff_first=0.01, backoff_most=0.01)
 
 
-async def test_the_site_is_told(site_url: str) -> None:
+async def test_the_site_is_fetched(site_url: str) -> None:
     site = await client.site(site_url)
     assert (site.name, site.fps, site.gop, site.cameras) == ("hall", 25.0, 5, ("c0", "c1"))
     assert site.pulse0 is None
 
 
-async def test_the_objects_are_listed_and_later_fields_passed_over(site_url: str) -> None:
+async def test_objects_are_listed_and_unknown_fields_ignored(site_url: str) -> None:
     (one,) = await client.objects(site_url)
     assert (one.object, one.visible, one.camera, one.cameras) == (1, True, "c0", ("c0", "c1"))
 
@@ -30,18 +30,18 @@ async def test_the_cameras_are_listed(site_url: str) -> None:
     assert (camera.camera, camera.state, camera.late) == ("c0", "live", 0)
 
 
-async def test_a_choice_says_what_every_camera_costs(site_url: str) -> None:
+async def test_a_choice_has_the_costs_of_every_camera(site_url: str) -> None:
     choice = await client.choice(site_url, 1)
     assert choice.costs == {"c0": 0.31, "c1": None}
     assert choice.reason == "c0 shows it largest"
 
 
-async def test_an_unknown_object_is_told_in_the_servers_words(site_url: str) -> None:
+async def test_an_unknown_object_is_reported_with_the_servers_text(site_url: str) -> None:
     with pytest.raises(client.NotFoundError, match=r"^there is no such object$"):
         await client.choice(site_url, 7)
 
 
-async def test_nobody_there_is_an_away_error() -> None:
+async def test_an_unreachable_server_is_an_away_error() -> None:
     with socket.socket() as held:  # bound and not listening: nobody can be there
         held.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{held.getsockname()[1]}"
@@ -49,7 +49,7 @@ async def test_nobody_there_is_an_away_error() -> None:
             await client.objects(url)
 
 
-async def test_a_name_that_nobody_has_is_said_to_be_unknown() -> None:
+async def test_an_unknown_host_name_is_reported() -> None:
     with pytest.raises(client.AwayError) as caught:
         await client.objects("http://nobody.invalid")
     assert "ssl" not in str(caught.value)
@@ -66,7 +66,7 @@ async def test_a_name_that_nobody_has_is_said_to_be_unknown() -> None:
         (503, '{"error": ""}', client.AwayError),
     ],
 )
-async def test_other_answers_are_one_clear_line(status: int, body: str, error: type[Exception]) -> None:
+async def test_other_answers_are_reported_in_one_line(status: int, body: str, error: type[Exception]) -> None:
     async def answer(_: web.Request) -> web.Response:
         return web.Response(status=status, text=body)
 
@@ -88,12 +88,12 @@ async def test_other_answers_are_one_clear_line(status: int, body: str, error: t
         ("https://host/myview/", "https://host/myview/"),
     ],
 )
-def test_the_link_of_the_page_is_an_address(typed: str, meant: str) -> None:
+def test_a_link_to_the_page_is_a_valid_address(typed: str, meant: str) -> None:
     assert str(server_url(typed)) == meant
     assert str(server_url(typed) / "api/objects").startswith(meant.rstrip("/") + "/api/")
 
 
 @pytest.mark.parametrize("typed", ["", "ftp://host/", "http://", "http://host:port/"])
-def test_what_is_no_address_is_refused(typed: str) -> None:
+def test_an_invalid_address_is_refused(typed: str) -> None:
     with pytest.raises(ValueError, match="not an address"):
         server_url(typed)

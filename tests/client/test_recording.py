@@ -52,7 +52,7 @@ def only(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-async def test_the_seconds_asked_for_are_recorded_as_sent(
+async def test_the_requested_seconds_are_recorded_unchanged(
     hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
 ) -> None:
     hand_made_site.plays.append(plays(header(), frames(5000, 100), stays=True))
@@ -101,7 +101,7 @@ async def test_progress_names_the_camera_and_counts_the_cuts(
     assert done.out is None
 
 
-async def test_a_recording_goes_on_after_an_interruption(
+async def test_a_recording_continues_after_an_interruption(
     hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
 ) -> None:
     half = fragment(110)[:30]
@@ -114,7 +114,7 @@ async def test_a_recording_goes_on_after_an_interruption(
     assert (done.complete, done.reconnections) == (True, 1)
 
 
-async def test_a_server_gone_for_good_leaves_what_was_recorded(
+async def test_a_server_that_stays_away_leaves_the_recording_so_far(
     hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
 ) -> None:
     hand_made_site.plays.append(plays(header(), frames(100, 10)))
@@ -134,7 +134,7 @@ async def test_a_stream_of_another_format_ends_the_recording(
     assert (tmp_path / "one.mp4").read_bytes() == header() + frames(100, 10)
 
 
-async def test_cancelling_keeps_what_was_recorded(
+async def test_cancelling_keeps_the_recording_so_far(
     hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
 ) -> None:
     hand_made_site.plays.append(plays(header(), frames(100, 10), stays=True))
@@ -179,7 +179,7 @@ async def test_a_failed_recording_leaves_an_older_file_alone(site_url: str, tmp_
         box(b"ftyp") + box(b"moov", box(b"trak")),
     ],
 )
-async def test_what_is_no_such_stream_is_told(
+async def test_an_invalid_stream_is_an_error(
     hand_made_site: HandMadeSite, site_url: str, tmp_path: Path, noise: bytes
 ) -> None:
     hand_made_site.plays.append(plays(noise, stays=True))
@@ -188,7 +188,7 @@ async def test_what_is_no_such_stream_is_told(
     assert only(tmp_path) == []
 
 
-async def test_a_folder_that_is_not_there_is_told(site_url: str, tmp_path: Path) -> None:
+async def test_a_missing_folder_is_an_error(site_url: str, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         await client.record(site_url, 1, tmp_path / "nowhere" / "one.mp4")
 

@@ -95,7 +95,7 @@ def test_a_disk_without_room_for_all_of_it_is_always_reported(source: Path, tmp_
 
 
 @pytest.mark.parametrize("content", [b"", b"#EXTM3U\n#EXTINF:1,\nother.mp4\n", bytes(1000)])
-def test_what_is_no_stream_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_an_invalid_stream_is_refused(tmp_path: Path, content: bytes) -> None:
     part = tmp_path / "part"
     part.write_bytes(content)
     for container in ("mp4", "webm"):

@@ -69,22 +69,20 @@ async def ask_events(url: str) -> object:
         (ask_events, r"a line is larger than \d+ bytes"),
     ],
 )
-async def test_an_answer_without_end_is_given_up(
-    asking: Callable[[str], Awaitable[object]], words: str
-) -> None:
+async def test_an_endless_answer_is_refused(asking: Callable[[str], Awaitable[object]], words: str) -> None:
     async with answering(endless(PIECE)) as url:
         with pytest.raises(client.ContractError, match=words):
             await asking(url)
 
 
-async def test_a_refusal_without_end_is_told_by_its_number() -> None:
+async def test_an_endless_error_response_is_reported_by_its_status() -> None:
     async with answering(endless(PIECE, status=404)) as url:
         with pytest.raises(client.NotFoundError, match=r"^404 Not Found$"):
             await ask(url)
 
 
 @pytest.mark.parametrize("status", [200, 503])
-async def test_an_answer_that_trickles_is_no_answer(status: int) -> None:
+async def test_a_trickling_answer_times_out(status: int) -> None:
     async with answering(endless(b" ", status, pause=0.01)) as url:
         with pytest.raises(client.AwayError, match=r"no answer$"):
             await ask(url, HASTY)
@@ -109,7 +107,7 @@ async def saying(say: Callable[[asyncio.StreamWriter], Awaitable[None]]) -> Asyn
         await over.wait()
 
 
-async def test_heads_that_never_end_are_no_answer() -> None:
+async def test_endless_headers_are_refused() -> None:
     async def trickle(writer: asyncio.StreamWriter) -> None:
         writer.write(b"HTTP/1.1 200 OK\r\n")
         while not writer.is_closing():
@@ -128,7 +126,7 @@ async def test_heads_that_never_end_are_no_answer() -> None:
         (json.dumps(OBJECTS).encode().replace(b"c0", b"\xff"), "does not answer like MyView"),
     ],
 )
-async def test_json_that_no_server_means_is_one_clear_line(body: bytes, words: str) -> None:
+async def test_invalid_json_is_reported_in_one_line(body: bytes, words: str) -> None:
     async def answer(_: web.Request) -> web.Response:
         return web.Response(body=body)
 
@@ -138,7 +136,7 @@ async def test_json_that_no_server_means_is_one_clear_line(body: bytes, words: s
     assert len(str(caught.value).splitlines()) == 1
 
 
-async def test_a_refusal_that_is_no_text_is_told_by_its_number() -> None:
+async def test_an_error_response_without_text_is_reported_by_its_status() -> None:
     async def answer(_: web.Request) -> web.Response:
         return web.Response(status=401, body=b'{"error": "\xff"}')
 
@@ -148,7 +146,7 @@ async def test_a_refusal_that_is_no_text_is_told_by_its_number() -> None:
 
 
 @pytest.mark.parametrize("said", [b"SSH-2.0-OpenSSH\r\n\r\n", b"HTTP/1.1 200 OK\r\nX: " + b"x" * 20_000])
-async def test_what_is_no_http_is_one_clear_line(said: bytes) -> None:
+async def test_another_protocol_is_reported_in_one_line(said: bytes) -> None:
     async def say(writer: asyncio.StreamWriter) -> None:
         writer.write(said)
         await writer.drain()
@@ -169,7 +167,7 @@ async def test_too_many_redirects_are_an_error() -> None:
             await ask(url)
 
 
-async def test_a_token_goes_to_the_server_that_it_is_for_and_not_where_that_leads_on_to() -> None:
+async def test_a_token_is_not_sent_to_another_server_after_a_redirect() -> None:
     came: list[str | None] = []
 
     async def list_nobody(request: web.Request) -> web.Response:
@@ -187,7 +185,7 @@ async def test_a_token_goes_to_the_server_that_it_is_for_and_not_where_that_lead
     assert came == ["Bearer secret", None]
 
 
-async def test_a_status_that_cannot_be_read_is_one_clear_line() -> None:
+async def test_an_invalid_status_is_reported_in_one_line() -> None:
     async with answering(endless(PIECE), "/api/site") as url:
         with pytest.raises(client.ContractError, match="larger than"):
             await ask_status(url)
@@ -209,7 +207,7 @@ async def test_a_status_that_cannot_be_read_is_one_clear_line() -> None:
         "?token=QXZJKV7",
     ],
 )
-async def test_what_is_secret_in_an_address_is_in_no_error(typed: str) -> None:
+async def test_no_error_has_secrets_of_an_address(typed: str) -> None:
     for asking in (ask, ask_status, ask_past, ask_events):
         with pytest.raises((client.ClientError, ValueError)) as refused:
             await asking(typed)
@@ -217,7 +215,7 @@ async def test_what_is_secret_in_an_address_is_in_no_error(typed: str) -> None:
 
 
 @pytest.mark.parametrize("asking", [ask, ask_status, ask_past, ask_events])
-async def test_who_is_no_myview_is_named_by_host_alone(asking: Callable[[str], Awaitable[object]]) -> None:
+async def test_another_server_is_named_only_by_its_host(asking: Callable[[str], Awaitable[object]]) -> None:
     async with answering(endless(PIECE), "/QXZJKV7/{rest:.*}") as url:
         typed = url.replace("http://", "http://me:QXZJKV7@") + "QXZJKV7/?token=QXZJKV7"
         with pytest.raises(client.ContractError, match=r"^http://127\.0\.0\.1:\d+: ") as refused:
@@ -225,7 +223,7 @@ async def test_who_is_no_myview_is_named_by_host_alone(asking: Callable[[str], A
     assert "QXZ" not in str(refused.value)
 
 
-def test_boxes_without_media_are_not_kept_without_end() -> None:
+def test_boxes_without_media_are_limited() -> None:
     reader = Mp4Reader()
     assert len(list(reader.feed(header()))) == 1
     moof, _ = BoxReader().feed(fragment(1))
@@ -234,7 +232,7 @@ def test_boxes_without_media_are_not_kept_without_end() -> None:
         feed_often(reader, large)
 
 
-def test_elements_without_pictures_are_not_kept_without_end() -> None:
+def test_elements_without_pictures_are_limited() -> None:
     size = MAX_ELEMENT // 8
     void = b"\xec" + (size | 1 << 56).to_bytes(8, "big") + bytes(size)
     with pytest.raises(MediaStreamError, match="elements without pictures"):
@@ -246,13 +244,13 @@ def feed_often(reader: Mp4Reader | WebmReader, data: bytes) -> None:
         assert not list(reader.feed(data))
 
 
-def test_lines_of_nothing_are_something_to_keep(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_empty_lines_count_towards_the_event_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("client.sse_parser.MAX_EVENT", 1000)
     SseParser().feed(b"data:\n" * 900)
     with pytest.raises(EventStreamError):
         SseParser().feed(b"data:\n" * 1100)
 
 
-def test_a_size_is_no_promise_to_be_kept() -> None:
+def test_a_stated_size_does_not_reserve_memory() -> None:
     with pytest.raises(MediaStreamError, match="a box of"):
         list(BoxReader().feed(struct.pack(">I4sQ", 1, b"mdat", 1 << 60)))

@@ -66,7 +66,7 @@ def handshake(certificate: Path, key: Path, trusted: Path, host: str | None = No
     """Perform a TLS handshake with a client that trusts ``trusted`` and expects ``host``.
 
     Returns:
-        The server's certificate, as of :meth:`ssl.SSLSocket.getpeercert`.
+        The server's certificate, as a dictionary of ``getpeercert()``.
 
     Raises:
         ssl.SSLCertVerificationError: the client refuses the certificate.

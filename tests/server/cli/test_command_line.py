@@ -75,7 +75,7 @@ COMMANDS = ["sync", "bestview", "up"]
         ({"site": {"fps": float("inf")}}, "site.fps"),
     ],
 )
-def test_a_wrong_configuration_is_refused(
+def test_an_invalid_configuration_is_refused(
     run: Run, tmp_path: Path, command: str, changes: dict[str, Any], why: str
 ) -> None:
     assert why in refusal(run(command, site(tmp_path, **changes)))
@@ -87,7 +87,7 @@ def test_a_missing_configuration_is_refused(run: Run, command: list[str]) -> Non
     assert "none.yaml: cannot read the configuration: No such file" in refusal(run(*arguments))
 
 
-def test_a_configuration_of_odd_keys_or_a_section_from_outside_that_is_none_is_refused(
+def test_keys_that_are_no_text_and_invalid_sections_of_the_environment_are_refused(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "odd.yaml").write_text("1: 2\n")
@@ -96,7 +96,7 @@ def test_a_configuration_of_odd_keys_or_a_section_from_outside_that_is_none_is_r
     assert "environment" in refusal(run("sync", site(tmp_path)))
 
 
-def test_a_key_that_is_no_section_is_none_from_outside_either(
+def test_an_unknown_section_is_refused_in_the_environment_too(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_GROUND__X", "1")
@@ -124,7 +124,7 @@ DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200
     ],
     ids=lambda it: " ".join(it)[:40] if isinstance(it, list) else "",
 )
-def test_what_is_read_or_is_no_file_is_not_replaced_and_what_makes_no_sense_is_not_passed_over(
+def test_inputs_and_special_files_are_not_replaced_and_invalid_options_are_refused(
     run: Run, tmp_path: Path, words: list[str], why: str
 ) -> None:
     (tmp_path / "sub").mkdir()
@@ -137,7 +137,7 @@ def test_what_is_read_or_is_no_file_is_not_replaced_and_what_makes_no_sense_is_n
     assert (tmp_path / "det.txt").read_text() == DETECTIONS
 
 
-def test_a_disk_that_takes_no_more_is_one_line_and_leaves_nothing(run: Run, tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_in_one_line_and_leaves_nothing(run: Run, tmp_path: Path) -> None:
     (tmp_path / "det.txt").write_text(DETECTIONS)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -151,14 +151,12 @@ def test_a_disk_that_takes_no_more_is_one_line_and_leaves_nothing(run: Run, tmp_
     assert written(tmp_path) == {"det.txt"}
 
 
-def test_a_level_of_the_log_that_is_none_is_refused(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_invalid_log_level_is_refused(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYVIEW_LOG", "loud")
     assert "MYVIEW_LOG" in refusal(run("sync", site(tmp_path)))
 
 
-def test_a_camera_that_is_not_configured_is_refused_with_those_that_are(run: Run, tmp_path: Path) -> None:
+def test_an_unknown_camera_is_refused_with_the_known_ones(run: Run, tmp_path: Path) -> None:
     assert "there is no camera 'c9'; there are c0" in refusal(run("camera", site(tmp_path), "c9"))
 
 
@@ -189,7 +187,7 @@ def test_a_port_in_use_is_refused_and_nothing_is_written(
     assert written(tmp_path) == {"c0.mp4", "site.yaml"}
 
 
-def test_the_port_on_the_command_line_goes_before_the_configurations(
+def test_the_port_on_the_command_line_overrides_the_configuration(
     run: Run, tmp_path: Path, taken: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_HTTP__PORT", "1")  # so that what the command sets is undone
@@ -198,14 +196,14 @@ def test_the_port_on_the_command_line_goes_before_the_configurations(
 
 
 @pytest.mark.parametrize("command", ["up", "bestview"])
-def test_an_output_folder_with_something_in_it_is_refused(run: Run, tmp_path: Path, command: str) -> None:
+def test_an_output_folder_that_is_not_empty_is_refused(run: Run, tmp_path: Path, command: str) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("mine")
     line = refusal(run(command, site(tmp_path), "--out", "out"))
     assert "out: exists and is not an empty folder" in line
 
 
-def test_scene_says_which_there_are_and_how_many_look_where_nobody_says(run: Run, tmp_path: Path) -> None:
+def test_scene_lists_the_scenes_and_their_default_cameras(run: Run, tmp_path: Path) -> None:
     shown = run("scene", "--help").out
     assert all(f"{name}:" in shown for name in scene_names())
     ended = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
@@ -232,7 +230,7 @@ def test_scene_writes_a_recording_or_refuses(run: Run, tmp_path: Path) -> None:
     assert written(tmp_path) == {"room"}
 
 
-def test_a_scene_that_is_interrupted_leaves_nothing_half_written(
+def test_an_interrupted_scene_leaves_no_incomplete_files(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[int] = []
@@ -273,7 +271,7 @@ def test_track_writes_a_file_or_refuses(run: Run, tmp_path: Path) -> None:
     assert run("track", "my view (1).mp4", "--out", "v.txt").code == 0
 
 
-def test_track_takes_its_settings_from_a_configuration_wherever_it_is(run: Run, tmp_path: Path) -> None:
+def test_track_reads_settings_from_a_configuration_in_any_folder(run: Run, tmp_path: Path) -> None:
     (tmp_path / "det.txt").write_text("1,-1,10,10,8,20,0.9,-1,-1,-1\n")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "ground.json").write_text('{"homography": {}}')
@@ -285,13 +283,13 @@ def test_track_takes_its_settings_from_a_configuration_wherever_it_is(run: Run, 
 
 @pytest.mark.parametrize("seconds", ["nan", "-1"])
 @pytest.mark.parametrize("command", [["demo", "--no-browser"], ["watch", "http://127.0.0.1:1"]], ids=" ".join)
-def test_seconds_that_are_none_are_refused(run: Run, command: list[str], seconds: str) -> None:
+def test_invalid_seconds_are_refused(run: Run, command: list[str], seconds: str) -> None:
     done = run(*command, "--seconds", seconds)
     assert done.code == 2
     assert "--seconds" in done.err
 
 
-def test_watch_says_in_one_line_that_nobody_is_there_now(run: Run) -> None:
+def test_watch_reports_an_unreachable_server_in_one_line(run: Run) -> None:
     done = run("watch", f"http://127.0.0.1:{free()}")
     assert (done.code, done.out) == (UnavailableError.code, "")
     (line,) = done.err.splitlines()
@@ -326,20 +324,20 @@ def test_render_refuses_and_leaves_nothing(run: Run, tmp_path: Path, arguments: 
     assert written(tmp_path) == before
 
 
-def test_help_names_every_command_of_the_contract(run: Run) -> None:
+def test_help_lists_every_command(run: Run) -> None:
     ended = run("--help")
     assert ended.code == 0
     for command in ("demo", "up", "sync", "camera", "bestview", "render", "track", "scene", "watch"):
         assert command in ended.out
 
 
-def test_it_says_which_version_it_is(run: Run) -> None:
+def test_the_version_is_printed(run: Run) -> None:
     ended = run("--version")
     assert ended.code == 0
     assert ended.out == f"myview {version('myview')}\n"
 
 
-def test_help_does_not_wait_for_what_only_commands_need() -> None:
+def test_help_does_not_import_modules_of_commands() -> None:
     look = "import sys, server.cli.main; print(*{'numpy', 'scipy', 'cv2', 'pydantic'} & set(sys.modules))"
     command = [sys.executable, "-c", look]
     loaded = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)

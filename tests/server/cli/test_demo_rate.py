@@ -18,11 +18,11 @@ THERE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os
 @pytest.mark.parametrize(
     ("there", "fps"), [(0.5, 6.25), (1, 6.25), (2, 12.5), (3.9, 12.5), (4, 25), (64, 25)]
 )
-def test_the_rate_follows_from_the_processors(there: float, fps: float) -> None:
+def test_the_rate_depends_on_the_processors(there: float, fps: float) -> None:
     assert demo_fps(there) == fps
 
 
-def test_the_environment_goes_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_overrides_the_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, config = demo_config(tmp_path, 0, 12.5)
     assert config.site.fps == 12.5
     assert yaml.safe_load(path.read_text())["site"]["width"] == config.site.width
@@ -47,7 +47,7 @@ def put(folder: Path, **files: str) -> None:
         ("what is this", "", THERE),
     ],
 )
-def test_a_container_has_the_least_of_its_groups_limits(
+def test_the_lowest_limit_of_a_containers_groups_counts(
     tmp_path: Path, own: str, above: str, limit: float
 ) -> None:
     put(tmp_path / "groups" / "a" / "b", cpu_max=own)
@@ -57,11 +57,11 @@ def test_a_container_has_the_least_of_its_groups_limits(
 
 
 @pytest.mark.parametrize(("quota", "limit"), [("20000", 0.2), ("-1", THERE)])
-def test_groups_of_the_first_version_count_as_well(tmp_path: Path, quota: str, limit: float) -> None:
+def test_version_1_groups_count(tmp_path: Path, quota: str, limit: float) -> None:
     put(tmp_path / "groups" / "cpu" / "a", cpu_cfs_quota_us=quota, cpu_cfs_period_us="100000")
     (tmp_path / "cgroup").write_text("4:memory:/z\n2:cpu,cpuacct:/a\n")
     assert available_processors(tmp_path / "groups", tmp_path / "cgroup") == limit
 
 
-def test_where_there_are_no_groups_all_processors_count(tmp_path: Path) -> None:
+def test_without_groups_all_processors_count(tmp_path: Path) -> None:
     assert available_processors(tmp_path, tmp_path / "none") == THERE

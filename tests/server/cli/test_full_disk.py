@@ -44,7 +44,9 @@ async def size_of_it(hall: Hall, folder: Path) -> int:
 
 
 @pytest.mark.parametrize("most", [0, 1, 500])
-async def test_a_disk_that_takes_no_picture_is_left_as_it_was(hall: Hall, tmp_path: Path, most: int) -> None:
+async def test_a_disk_without_room_for_a_picture_is_left_unchanged(
+    hall: Hall, tmp_path: Path, most: int
+) -> None:
     out = tmp_path / "one.mp4"
     with (
         files_of_at_most(most),
@@ -54,7 +56,7 @@ async def test_a_disk_that_takes_no_picture_is_left_as_it_was(hall: Hall, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-async def test_an_older_film_is_still_there_where_there_was_no_room_for_a_new_one(
+async def test_an_older_recording_is_kept_if_there_is_no_room_for_a_new_one(
     hall: Hall, tmp_path: Path
 ) -> None:
     out = tmp_path / "one.mp4"
@@ -66,7 +68,7 @@ async def test_an_older_film_is_still_there_where_there_was_no_room_for_a_new_on
 
 
 @pytest.mark.parametrize("part", [0.3, 0.6, 0.95])
-async def test_a_disk_that_fills_up_keeps_whole_pictures_and_nothing_else(
+async def test_a_disk_that_fills_up_keeps_only_complete_pictures(
     hall: Hall, tmp_path: Path, part: float
 ) -> None:
     (tmp_path / "ample").mkdir()
@@ -84,7 +86,9 @@ async def test_a_disk_that_fills_up_keeps_whole_pictures_and_nothing_else(
     assert shown == list(range(shown[0], shown[0] + len(shown))), "each is whole"
 
 
-async def test_a_film_without_room_for_its_boxes_is_kept_without_them(hall: Hall, tmp_path: Path) -> None:
+async def test_a_recording_without_room_for_sidecar_files_is_kept_without_them(
+    hall: Hall, tmp_path: Path
+) -> None:
     out = tmp_path / "one.mp4"
     (tmp_path / "one.ass").mkdir()  # nothing can be written there
     with pytest.raises(UserError, match=r"kept$"):
@@ -104,7 +108,7 @@ async def test_a_film_without_room_for_its_boxes_is_kept_without_them(hall: Hall
         "calibrate {points}",
     ],
 )
-def test_a_command_that_finds_no_room_says_so_in_one_line_and_leaves_nothing(
+def test_a_command_without_disk_space_reports_it_in_one_line_and_leaves_nothing(
     tmp_path: Path, myview: Run, command: str, most: int
 ) -> None:
     (tmp_path / "given").mkdir()

@@ -46,7 +46,7 @@ def written(film: Path, frames: list[Frame]) -> tuple[str, str]:
     return vtt, ass.partition("Effect, Text\n")[2]
 
 
-def test_the_files_are_these_to_the_byte(tmp_path: Path) -> None:
+def test_the_sidecar_files_have_these_bytes(tmp_path: Path) -> None:
     frames = [Frame(7, "c0", (BOX, Box(2, 1.26, 2.0, 3.0, 4.0))), Frame(8, "c1", ())]
     assert written(tmp_path / "one.mp4", frames) == (VTT, DRAWN)
     head = "\n".join(VTT.split("\n")[:3]) + "\n"
@@ -64,7 +64,7 @@ def peak(film: Path, frames: int) -> int:
         tracemalloc.stop()
 
 
-def test_ten_times_as_many_frames_take_no_more_memory(tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path: Path) -> None:
     film = tmp_path / "one.mp4"
     peak(film, 10)  # whatever is there but once
     few, many = peak(film, 100), peak(film, 1000)
@@ -94,13 +94,13 @@ def held(folder: Path, gops: int) -> int:
     return kept
 
 
-def test_boxes_wait_on_the_disk_for_the_end(tmp_path: Path) -> None:
+def test_boxes_are_spooled_to_disk(tmp_path: Path) -> None:
     packed = GOP * 5 * 30  # bytes of a GOP's boxes, at least
     assert held(tmp_path, 500) < 500 * packed / 2
     assert not list(tmp_path.iterdir()), "the file has no name: it goes with the process"
 
 
-def test_what_is_said_again_counts_and_what_comes_late_is_in_its_place(tmp_path: Path) -> None:
+def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path: Path) -> None:
     spool = Spool(tmp_path)
     history = ViewHistory(1, spool=spool)
     for gop in (2, 0, 1):
@@ -114,7 +114,7 @@ def test_what_is_said_again_counts_and_what_comes_late_is_in_its_place(tmp_path:
     spool.close()
 
 
-def test_where_boxes_cannot_be_kept_the_choices_are(tmp_path: Path) -> None:
+def test_without_disk_space_choices_are_kept_without_boxes(tmp_path: Path) -> None:
     history = ViewHistory(1, spool=Spool(tmp_path / "none"))
     history.take(SITE)
     history.take(told(0))
@@ -132,7 +132,7 @@ async def hall() -> AsyncIterator[Hall]:
         yield it
 
 
-async def test_the_film_is_there_before_anything_is_written_beside_it(
+async def test_the_recording_is_finished_before_the_sidecar_files(
     hall: Hall, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "one.mp4"
@@ -148,7 +148,7 @@ async def test_the_film_is_there_before_anything_is_written_beside_it(
     assert names == [["one.mp4"]]
 
 
-async def test_boxes_of_what_is_watched_are_beside_it(hall: Hall, tmp_path: Path) -> None:
+async def test_a_recording_has_sidecar_files_with_boxes(hall: Hall, tmp_path: Path) -> None:
     out = tmp_path / "one.mp4"
     await client.watch(f"http://127.0.0.1:{hall.port}", 1, out, start="p0", end="p25")
     cues = out.with_suffix(".vtt").read_text().strip().split("\n\n")[2:]

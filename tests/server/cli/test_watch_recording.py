@@ -53,7 +53,7 @@ def chosen(hall: Hall) -> dict[int, str]:
     }
 
 
-async def test_the_film_begins_at_0_and_is_the_cameras_own_pictures(hall: Hall, tmp_path: Path) -> None:
+async def test_the_recording_begins_at_0_with_unchanged_pictures(hall: Hall, tmp_path: Path) -> None:
     out = tmp_path / "one.mp4"
     done = await watched(hall, out)
     assert (done.complete, done.cuts, done.fragments) == (True, 1, 28 - FIRST)
@@ -70,7 +70,7 @@ async def test_the_film_begins_at_0_and_is_the_cameras_own_pictures(hall: Hall, 
         assert round(float(next(film.decode(video=0)).time or 0) * FPS) == 10, "the key picture before"
 
 
-async def test_what_is_live_is_recorded_likewise(tmp_path: Path) -> None:
+async def test_a_live_stream_is_recorded_like_the_past(tmp_path: Path) -> None:
     async for hall in opened():
         hall.service.come(*CAMERAS)
         for epoch in range(4):
@@ -89,7 +89,7 @@ async def test_what_is_live_is_recorded_likewise(tmp_path: Path) -> None:
 
 
 @needs_chromium
-async def test_a_browser_plays_the_film_as_a_plain_file_of_its_length(hall: Hall, tmp_path: Path) -> None:
+async def test_a_browser_plays_the_recording_with_its_duration(hall: Hall, tmp_path: Path) -> None:
     await watched(hall, tmp_path / "one.mp4")
     (tmp_path / "page.html").write_text("<video src=one.mp4 muted></video>")
     async with chromium() as browser:
@@ -109,7 +109,7 @@ async def test_a_browser_plays_the_film_as_a_plain_file_of_its_length(hall: Hall
 
 
 @needs_ffprobe
-async def test_ffprobe_has_nothing_to_say_about_the_film(hall: Hall, tmp_path: Path) -> None:
+async def test_ffprobe_reports_no_problem_of_the_recording(hall: Hall, tmp_path: Path) -> None:
     await watched(hall, tmp_path / "one.mp4")
     asked = ["-v", "warning", "-show_entries", "format=start_time,duration", "-of", "csv=p=0"]
     done = subprocess.run(
@@ -118,7 +118,7 @@ async def test_ffprobe_has_nothing_to_say_about_the_film(hall: Hall, tmp_path: P
     assert (done.stderr, done.stdout.strip()) == ("", "0.000000,0.720000")
 
 
-async def test_every_frame_has_its_boxes_beside_it(hall: Hall, tmp_path: Path) -> None:
+async def test_every_frame_has_its_boxes_in_the_sidecar(hall: Hall, tmp_path: Path) -> None:
     await watched(hall, tmp_path / "one.mp4")
     head, note, *cues = (tmp_path / "one.vtt").read_text().strip().split("\n\n")
     assert head == "WEBVTT"
@@ -135,7 +135,7 @@ async def test_every_frame_has_its_boxes_beside_it(hall: Hall, tmp_path: Path) -
         assert everybody == {1: LARGE, 2: SMALL} if content["camera"] == A else {1: LARGE}
 
 
-def test_the_drawn_boxes_are_where_they_belong(tmp_path: Path) -> None:
+def test_drawn_boxes_have_the_right_positions(tmp_path: Path) -> None:
     if shutil.which("ffmpeg") is None or b" ass " not in _ffmpeg("-hide_banner", "-filters"):
         pytest.skip("needs an ffmpeg that draws subtitles")
     site = Site("hall", 25.0, 320, 240, GOP, 25, None, None, 0.0, ("c0",))
@@ -159,7 +159,7 @@ def _ffmpeg(*arguments: str) -> bytes:
     return subprocess.run(["ffmpeg", *arguments], capture_output=True, check=True).stdout
 
 
-async def test_a_moment_that_is_none_leaves_no_file(hall: Hall, tmp_path: Path) -> None:
+async def test_an_invalid_moment_leaves_no_file(hall: Hall, tmp_path: Path) -> None:
     url = f"http://127.0.0.1:{hall.port}"
     with pytest.raises(client.RefusedError, match="'soon' is not a time"):
         await client.watch(url, 1, tmp_path / "one.mp4", start="soon")
@@ -170,7 +170,7 @@ async def test_a_moment_that_is_none_leaves_no_file(hall: Hall, tmp_path: Path) 
     assert not list(tmp_path.iterdir())
 
 
-async def test_the_past_is_listed_and_told_again(hall: Hall) -> None:
+async def test_recorded_spans_and_events_can_be_fetched(hall: Hall) -> None:
     url = f"http://127.0.0.1:{hall.port}"
     (span,) = await client.spans(url, 1)
     assert (span.first, span.frames) == (0, 30)
@@ -179,6 +179,6 @@ async def test_the_past_is_listed_and_told_again(hall: Hall) -> None:
         await client.spans(url, 9)
 
 
-def test_the_command_says_what_it_takes() -> None:
+def test_the_command_explains_its_options() -> None:
     said = CliRunner().invoke(app, ["watch", "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"}).output
     assert all(re.search(rf"{option}\b", said) for option in ("--from", "--to", "--out", "--seconds"))

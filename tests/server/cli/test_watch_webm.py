@@ -24,7 +24,7 @@ from fakes.service.vp8_site import EPOCHS, feed, own
 from server.media.containers.webm import cluster, header
 
 
-async def test_a_film_is_recorded_over_cuts_with_the_boxes_beside_it(free: Hall, tmp_path: Path) -> None:
+async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(free: Hall, tmp_path: Path) -> None:
     out, seconds = tmp_path / "one.webm", 3 * GOP / FPS
     watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{free.port}", 1, out, seconds))
     while not free.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
@@ -47,7 +47,7 @@ async def test_a_film_is_recorded_over_cuts_with_the_boxes_beside_it(free: Hall,
         assert any(np.array_equal(picture, camera[begun + n]) for camera in alone), f"frame {n}"
 
 
-async def test_a_name_of_another_container_is_refused_in_a_line(
+async def test_a_file_name_of_another_container_is_refused_with_one_line(
     free: Hall, busy: Hall, tmp_path: Path
 ) -> None:
     with pytest.raises(client.NotFoundError, match=r"these streams are VP8 .* there is best\.webm"):
@@ -57,7 +57,7 @@ async def test_a_name_of_another_container_is_refused_in_a_line(
     assert not list(tmp_path.iterdir())
 
 
-async def test_who_only_watches_need_not_know_the_container(free: Hall) -> None:
+async def test_watching_without_a_file_uses_the_sites_container(free: Hall) -> None:
     watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{free.port}", 1, None, GOP / FPS))
     while not free.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
         await asyncio.sleep(0.01)
@@ -86,7 +86,7 @@ def take(record: Recording, data: bytes, step: int) -> bool:
 
 @settings(max_examples=15, deadline=None)
 @given(data=st.data())
-def test_however_often_it_was_interrupted_the_film_is_the_same(
+def test_interruptions_do_not_change_the_recording(
     data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     folder = tmp_path_factory.mktemp("film")
@@ -112,7 +112,7 @@ def test_however_often_it_was_interrupted_the_film_is_the_same(
 
 
 @needs_ffmpeg
-def test_ffmpeg_has_nothing_to_complain_of(tmp_path: Path) -> None:
+def test_ffmpeg_plays_the_recording_without_a_warning(tmp_path: Path) -> None:
     part, out = tmp_path / "part", tmp_path / "film.webm"
     with part.open("wb") as file:
         assert take(Recording(file, None, "webm"), stream(0, 40), 1000)
@@ -123,7 +123,7 @@ def test_ffmpeg_has_nothing_to_complain_of(tmp_path: Path) -> None:
         assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
 
 
-def test_another_format_ends_the_recording_and_damage_is_named() -> None:
+def test_a_changed_format_ends_the_recording_and_damage_is_reported() -> None:
     record = Recording(None, None, "webm")
     assert take(record, stream(0, 5), 100)
     with pytest.raises(FormatChangedError):

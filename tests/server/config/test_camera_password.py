@@ -26,7 +26,7 @@ def config_of(folder: Path, source: str = SOURCE) -> Config:
 
 
 @given(st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1))
-def test_any_password_arrives_as_it_is(tmp_path_factory: pytest.TempPathFactory, password: str) -> None:
+def test_any_password_is_passed_unchanged(tmp_path_factory: pytest.TempPathFactory, password: str) -> None:
     folder = tmp_path_factory.mktemp("site")
     (folder / "door.password").write_text(password + "\n", encoding="utf-8")
     filled = fill_in_password(config_of(folder), "door").camera("door")
@@ -35,14 +35,14 @@ def test_any_password_arrives_as_it_is(tmp_path_factory: pytest.TempPathFactory,
     assert (address.username, address.hostname, address.path) == ("viewer", "192.0.2.11", "/stream1")
 
 
-def test_other_processes_need_no_file(tmp_path: Path) -> None:
+def test_other_processes_do_not_need_the_password_file(tmp_path: Path) -> None:
     config = config_of(tmp_path)
     assert config.camera("door").source == SOURCE
     assert fill_in_password(config, "stairs") == config
 
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"\xff\xfe", None])
-def test_what_is_no_password_is_refused_in_one_line(tmp_path: Path, content: bytes | None) -> None:
+def test_an_invalid_password_file_is_refused_with_one_line(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / "door.password").write_bytes(content)
     with pytest.raises(UserError, match=r"^cameras\.door\.password: the file ") as refused:
@@ -50,6 +50,6 @@ def test_what_is_no_password_is_refused_in_one_line(tmp_path: Path, content: byt
     assert "\n" not in str(refused.value)
 
 
-def test_a_password_without_a_place_is_refused(tmp_path: Path) -> None:
+def test_a_password_without_a_placeholder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"cameras\.0\.password: names a file"):
         config_of(tmp_path, "rtsp://viewer@192.0.2.11/")

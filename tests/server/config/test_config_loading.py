@@ -28,20 +28,20 @@ def complaint(content: dict[str, Any], folder: Path = Path()) -> str:
     return text
 
 
-def test_unknown_key_is_refused_and_the_likely_one_is_named() -> None:
+def test_an_unknown_key_is_refused_with_a_suggestion() -> None:
     assert "cameras.0.sourc: unknown key; did you mean 'source'?" in complaint(
         {"cameras": [{"id": "c0", "source": "x", "sourc": "y"}]}
     )
     assert "http.prt: unknown key; did you mean 'port'?" in complaint(site(http={"prt": 1}))
 
 
-def test_unknown_key_in_a_librarys_settings_is_refused_at_any_depth() -> None:
+def test_an_unknown_key_in_nested_settings_is_refused() -> None:
     assert "did you mean 'stride'?" in complaint(site(track={"window": {"strid": 5}}))
     assert "unknown key" in complaint(site(detect={"median": {"no_such": 5}}))
 
 
 @pytest.mark.parametrize("detect", [{"prescan_every": 0}, {"prescan_frames": -1}])
-def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any]) -> None:
+def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, Any]) -> None:
     assert "detect: prescan_frames must be at least 0, and prescan_every at least 1" in complaint(
         site(detect=detect)
     )
@@ -58,11 +58,11 @@ def test_a_recording_cannot_be_looked_at_ahead_in_no_steps(detect: dict[str, Any
         ({"static_foreground": {"check_every": 0}}, "check_every must be at least 1, not 0"),
     ],
 )
-def test_counts_of_nothing_are_refused(detect: dict[str, Any], said: str) -> None:
+def test_counts_of_zero_are_refused(detect: dict[str, Any], said: str) -> None:
     assert said in complaint(site(detect=detect))
 
 
-def test_two_cameras_of_one_name_are_refused() -> None:
+def test_duplicate_camera_ids_are_refused() -> None:
     cameras = [{"id": "c0", "source": "a"}, {"id": "c0", "source": "b"}]
     assert "two cameras are called 'c0'" in complaint({"cameras": cameras})
 
@@ -74,7 +74,7 @@ def test_homography_that_is_not_invertible_is_refused_with_its_camera() -> None:
     assert "not invertible" in text
 
 
-def test_ground_file_is_checked_as_a_cameras_own_homography_is(tmp_path: Path) -> None:
+def test_homographies_of_a_ground_file_are_validated(tmp_path: Path) -> None:
     (tmp_path / "ground.json").write_text('{"homography": {"c0": [[1, 0], [0, 1]]}}')
     assert "camera c0" in complaint(site(ground="ground.json"), tmp_path)
     (tmp_path / "ground.json").write_text("not json")
@@ -85,9 +85,7 @@ def test_ground_file_is_checked_as_a_cameras_own_homography_is(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("unit", "meant"), [("M", "m"), ("metres", "m"), ("meteres", "m"), ("Cm", "cm"), ("millimeter", "mm")]
 )
-def test_a_unit_that_was_meant_for_metres_is_refused_with_what_was_meant(
-    unit: str, meant: str, tmp_path: Path
-) -> None:
+def test_a_misspelled_metric_unit_is_refused_with_a_suggestion(unit: str, meant: str, tmp_path: Path) -> None:
     said = f"{unit!r} is not understood; did you mean {meant!r}?"
     cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
     assert f"cameras.0.ground_unit: {said}" in complaint({"cameras": cameras})
@@ -96,7 +94,7 @@ def test_a_unit_that_was_meant_for_metres_is_refused_with_what_was_meant(
 
 
 @pytest.mark.parametrize("unit", [1, "", ["m"]])
-def test_a_unit_that_is_no_word_is_refused(unit: Any, tmp_path: Path) -> None:
+def test_an_invalid_unit_is_refused(unit: Any, tmp_path: Path) -> None:
     (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
     assert f"unit: {unit!r} is not a unit" in complaint(site(ground="ground.json"), tmp_path)
 
@@ -107,7 +105,7 @@ def test_any_other_word_is_a_unit(unit: str) -> None:
     assert build_config({"cameras": cameras}, where="", folder=Path()).cameras[0].ground_unit == unit
 
 
-def test_a_floor_that_one_camera_has_mirrored_is_refused_with_its_camera() -> None:
+def test_a_mirrored_homography_is_refused_with_its_camera() -> None:
     level = [[3.0, 0.0, -960.0], [0.0, 0.0, 1200.0], [0.0, 1.0, -240.0]]
     down = [[0.02, 0.0, 0.0], [0.0, -0.02, 0.0], [0.0, 0.0, 1.0]]
     past = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 900.0]]
@@ -122,7 +120,7 @@ def test_a_floor_that_one_camera_has_mirrored_is_refused_with_its_camera() -> No
     )
 
 
-def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
+def test_the_lookahead_must_cover_the_stages_of_temporal_consistency() -> None:
     track = {"tracker": "temporal", "temporal": {"window_stages": 2, "stage_s": 0.4}}
     wrong = complaint(site(view={"lookahead": 28}, track=track))
     assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
@@ -130,16 +128,16 @@ def test_with_temporal_consistency_the_lookahead_covers_its_stages() -> None:
     assert enough.track.lag(25.0) == 19
 
 
-def test_stages_without_end_are_refused_before_anybody_counts_their_frames() -> None:
+def test_too_many_stages_are_refused_before_their_frames_are_counted() -> None:
     track = {"tracker": "temporal", "temporal": {"stage_s": float("inf")}}
     assert "track.temporal: window_stages must be 1 to 1000, and stage_s" in complaint(site(track=track))
 
 
-def test_lookahead_shorter_than_the_trackers_lag_is_refused_with_the_least_that_would_do() -> None:
+def test_a_lookahead_below_the_trackers_lag_is_refused_with_the_minimum() -> None:
     assert "must be at least 20" in complaint(site(view={"lookahead": 19}))
 
 
-def test_who_is_settled_must_have_been_told_first() -> None:
+def test_a_person_must_be_published_before_they_are_settled() -> None:
     identity = {"publish_after": 7, "clustering_interval": 4, "settle_after": 14}
     assert "view.identity.settle_after: is 14 frames but must be at least 15" in complaint(
         site(view={"identity": identity})
@@ -169,7 +167,7 @@ def test_unknown_solver_is_refused_with_the_known_ones() -> None:
     assert "columns" in complaint(site(track={"solver": "oracle"}))
 
 
-def test_environment_goes_before_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_overrides_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYVIEW_HTTP__PORT", "9999")
     config = build_config(site(http={"port": 1234}), where="site.yaml", folder=Path())
     assert config.http.port == 9999
@@ -181,7 +179,7 @@ def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.Monke
     assert "MYVIEW_HTP__PORT" in complaint(site())
 
 
-def test_a_list_from_the_environment_is_json_and_who_writes_another_is_told(
+def test_a_list_from_the_environment_must_be_json(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", '["optimality_gap"]')
@@ -198,7 +196,7 @@ def test_paths_are_relative_to_the_configuration(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", ["[1, 2]", "a: [", "", "\x00"])
-def test_what_is_no_mapping_of_sections_is_refused(content: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_mapping_of_sections_is_refused(content: str, tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(content)
     with pytest.raises(UserError, match=r"site\.yaml") as caught:
@@ -214,7 +212,7 @@ def test_every_example_configuration_loads() -> None:
         load_config(example)
 
 
-def test_the_demos_example_is_the_demo() -> None:
+def test_the_demo_configuration_is_that_of_the_demo_command() -> None:
     example = load_config(ROOT / "configs" / "demo.yaml")
     embedded = build_config(DEMO, where="demo", folder=Path())
     assert example == embedded

@@ -64,7 +64,7 @@ def test_the_reference_shows_every_setting_with_its_default() -> None:
     assert not wrong, "configs/demo.yaml: " + "; ".join(wrong)
 
 
-def test_the_reference_is_in_force_when_all_its_comments_are_taken_away() -> None:
+def test_the_reference_is_valid_with_all_settings_uncommented() -> None:
     assert build_config(uncommented(), where="demo.yaml", folder=CONFIGS) == load_config(
         CONFIGS / "demo.yaml"
     )
@@ -81,7 +81,7 @@ def test_every_setting_of_the_reference_is_explained() -> None:
     assert not bare
 
 
-def test_the_reference_names_every_choice() -> None:
+def test_the_reference_names_every_option_value() -> None:
     (line,) = [line for line in REFERENCE.splitlines() if line.strip().startswith("#solver:")]
     assert sorted(line.partition("  # ")[2].split(", ")) == sorted(solver_names())
 
@@ -91,7 +91,7 @@ def test_the_reference_has_a_section_for(section: str) -> None:
     assert re.search(rf"^#?{section}:", REFERENCE, re.MULTILINE)
 
 
-def test_replayed_views_stand_on_the_ground_that_the_scene_writes() -> None:
+def test_replayed_views_have_the_homographies_of_the_scene() -> None:
     content = json.loads((CONFIGS / "room.ground.json").read_text(encoding="utf-8"))
     site = load_config(CONFIGS / "replay.yaml")
     scene = Scene("room", len(site.cameras), 4, 1, site.site.width, site.site.height, site.site.fps)

@@ -36,7 +36,7 @@ def refusal(folder: Path, text: str) -> str:
     return str(refused.value)
 
 
-def test_two_sections_of_one_name_do_not_drop_the_tokens_in_silence(tmp_path: Path) -> None:
+def test_a_duplicate_section_does_not_silently_drop_the_tokens(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(f"{SITE}http:\n  host: 0.0.0.0\naccess:\n  open_to_all: true\n")
     with pytest.raises(UserError, match=r"site\.yaml: 'access' occurs twice, in lines 3 and 7") as refused:
@@ -62,11 +62,11 @@ def test_two_sections_of_one_name_do_not_drop_the_tokens_in_silence(tmp_path: Pa
         ("!!set {a, b, a}\n", "'a' occurs twice, in line 1"),
     ],
 )
-def test_a_key_that_is_there_twice_is_refused_with_its_lines(tmp_path: Path, text: str, said: str) -> None:
+def test_a_duplicate_key_is_refused_with_its_lines(tmp_path: Path, text: str, said: str) -> None:
     assert said in refusal(tmp_path, text)
 
 
-def test_what_a_merge_brings_may_be_said_anew(tmp_path: Path) -> None:
+def test_merged_keys_may_be_overridden(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(
         "usual: &usual {fps: 25, at_end: loop}\n"
@@ -89,12 +89,12 @@ NESTED = st.recursive(KEYS, lambda inner: st.dictionaries(st.text("abc", max_siz
 
 
 @given(NESTED, st.sampled_from([None, 1]))
-def test_json_without_duplicates_is_read_as_it_is(content: Any, indent: int | None) -> None:
+def test_json_without_duplicates_is_read_unchanged(content: Any, indent: int | None) -> None:
     assert parse_json(json.dumps(content, indent=indent)) == content
 
 
 @given(NESTED, KEYS.filter(bool), st.data())
-def test_a_key_twice_in_json_is_found_wherever_it_is(content: Any, inner: Any, data: st.DataObject) -> None:
+def test_a_duplicate_json_key_is_found_at_any_depth(content: Any, inner: Any, data: st.DataObject) -> None:
     key = data.draw(st.sampled_from(sorted(inner)))
     twice = json.dumps(inner)[:-1] + f", {json.dumps(key)}: 0}}"
     text = '{\n"around": ' + json.dumps([content]) + ',\n"here":\n' + twice + "\n}"
@@ -103,7 +103,7 @@ def test_a_key_twice_in_json_is_found_wherever_it_is(content: Any, inner: Any, d
         parse_json(text)
 
 
-def test_a_camera_twice_in_a_ground_file_is_refused_with_both_lines(tmp_path: Path) -> None:
+def test_a_duplicate_camera_in_a_ground_file_is_refused_with_both_lines(tmp_path: Path) -> None:
     matrix = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
     text = f'{{"homography": {{\n"c0": {matrix},\n"c1": {matrix},\n"c\\u0030": {matrix}}}}}'
     (tmp_path / "ground.json").write_text(text)
@@ -112,28 +112,28 @@ def test_a_camera_twice_in_a_ground_file_is_refused_with_both_lines(tmp_path: Pa
         build_config(content, where="site.yaml", folder=tmp_path)
 
 
-def test_a_camera_twice_in_a_file_of_points_is_refused_with_both_lines(tmp_path: Path) -> None:
+def test_a_duplicate_camera_in_a_points_file_is_refused_with_both_lines(tmp_path: Path) -> None:
     path = tmp_path / "points.json"
     path.write_text('{"cameras": {\n"c0": [{"image": [1, 2], "floor": [3, 4]}],\n"c0": []}}')
     with pytest.raises(UserError, match=r"points\.json: 'c0' occurs twice, in lines 2 and 3"):
         read_points(path)
 
 
-def test_a_column_twice_in_a_file_of_points_is_refused(tmp_path: Path) -> None:
+def test_a_duplicate_column_in_a_points_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("camera,image_x,image_y,floor_x,floor_y,image_x\nc0,1,2,3,4,5\n")
     with pytest.raises(UserError, match=r"points\.csv:1: has two columns 'image_x'"):
         read_points(path)
 
 
-def test_a_setting_twice_in_a_token_is_refused_with_both_lines(tmp_path: Path) -> None:
+def test_a_duplicate_key_in_a_token_is_refused_with_both_lines(tmp_path: Path) -> None:
     path = tmp_path / "tokens.yaml"
     path.write_text(f"tokens:\n- name: a\n  sha256: '{SUM}'\n  role: watch\n  role: operate\n")
     with pytest.raises(UserError, match=r"tokens\.yaml: 'role' occurs twice, in lines 4 and 5"):
         read_tokens(path)
 
 
-def test_two_lists_of_tokens_are_refused_with_both_lines(tmp_path: Path) -> None:
+def test_a_duplicate_list_of_tokens_is_refused_with_both_lines(tmp_path: Path) -> None:
     path = tmp_path / "tokens.yaml"
     path.write_text(f"tokens:\n- {{name: a, sha256: '{SUM}', role: watch}}\ntokens: []\n")
     with pytest.raises(UserError, match=r"tokens\.yaml: 'tokens' occurs twice, in lines 1 and 3"):
@@ -164,7 +164,7 @@ def test_two_lists_of_tokens_are_refused_with_both_lines(tmp_path: Path) -> None
         ({"myview_htp__port": "1"}, "myview_htp__port: there is no section 'htp'"),
     ],
 )
-def test_what_the_environment_says_twice_is_refused(
+def test_a_setting_twice_in_the_environment_is_refused(
     variables: dict[str, str], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in variables.items():

@@ -38,26 +38,26 @@ def site(folder: Path, users: str | None = RIGHT, **changes: Any) -> Path:
     return path
 
 
-def test_the_server_knows_all_and_a_process_its_own(tmp_path: Path) -> None:
+def test_the_server_reads_all_passwords_and_a_client_its_own(tmp_path: Path) -> None:
     config = load_config(site(tmp_path))
     assert pulse_users(config) == {"c0": LONG, "bestview": LONG + "!", "auditor": LONG + "?"}
     assert pulse_credentials(config, "c0") == Credentials("c0", LONG)
     assert LONG not in repr(pulse_credentials(config, "c0")), "nor does it stand in any log"
 
 
-def test_without_a_file_nobody_is_asked(tmp_path: Path) -> None:
+def test_without_a_file_no_login_is_needed(tmp_path: Path) -> None:
     config = load_config(site(tmp_path, sync={"port": 7400}))
     assert (pulse_users(config), pulse_credentials(config, "c0")) == (None, None)
 
 
-def test_a_process_needs_no_line_but_its_own(tmp_path: Path) -> None:
+def test_a_client_needs_only_its_own_line(tmp_path: Path) -> None:
     config = load_config(site(tmp_path, f"c0:{LONG}\n"))
     assert pulse_credentials(config, "c0") == Credentials("c0", LONG)
     with pytest.raises(UserError, match="has no line for 'bestview', the name of this process"):
         pulse_credentials(config, "bestview")
 
 
-def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
+def test_every_service_of_a_site_needs_a_line(tmp_path: Path) -> None:
     config = load_config(site(tmp_path, view={"share": {"of": 3}}))
     assert pulse_clients(config) == ("c0", "bestview", "bestview-1", "bestview-2")
     with pytest.raises(UserError, match="has no line for bestview-1, bestview-2: pulses would wait"):
@@ -74,7 +74,7 @@ def test_every_service_of_a_site_has_its_line(tmp_path: Path) -> None:
         (f"c0:{LONG}\n", "has no line for bestview"),
     ],
 )
-def test_a_server_that_could_not_know_who_comes_refuses_with_one_line(
+def test_a_server_with_missing_or_invalid_passwords_fails_with_one_line(
     myview: Run, tmp_path: Path, users: str | None, words: str
 ) -> None:
     path = site(tmp_path, users)
@@ -85,7 +85,7 @@ def test_a_server_that_could_not_know_who_comes_refuses_with_one_line(
     assert "secret" not in line
 
 
-async def test_the_process_lets_in_who_knows_a_password(tmp_path: Path) -> None:
+async def test_the_pulse_server_admits_clients_with_a_password(tmp_path: Path) -> None:
     running = ActiveConfig(site(tmp_path))
     serving = asyncio.create_task(sync_process(running))
     try:

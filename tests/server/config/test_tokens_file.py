@@ -27,7 +27,7 @@ def test_tokens_are_read_in_the_order_of_the_file(tmp_path: Path) -> None:
     ]
 
 
-def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
+def test_a_file_without_tokens_permits_no_access(tmp_path: Path) -> None:
     assert read_tokens(write_tokens(tmp_path / "tokens.yaml")) == ()
 
 
@@ -64,7 +64,7 @@ def test_a_file_without_tokens_lets_nobody_in(tmp_path: Path) -> None:
         ([{"name": "a\nb", "sha256": SUM, "role": "watch"}], "tokens.0.name: has more than one line"),
     ],
 )
-def test_what_is_wrong_in_the_file_is_said_in_one_line(tmp_path: Path, lines: list[Any], error: str) -> None:
+def test_an_invalid_token_is_reported_in_one_line(tmp_path: Path, lines: list[Any], error: str) -> None:
     path = write_tokens(tmp_path / "tokens.yaml", *lines)
     with pytest.raises(UserError) as raised:
         read_tokens(path)
@@ -88,7 +88,7 @@ def test_what_is_wrong_in_the_file_is_said_in_one_line(tmp_path: Path, lines: li
         "tokens: [{1: 2}]",
     ],
 )
-def test_what_is_no_file_of_tokens_is_said_in_one_line(tmp_path: Path, text: str) -> None:
+def test_an_invalid_token_file_is_reported_in_one_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "tokens.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(UserError) as raised:
@@ -97,7 +97,7 @@ def test_what_is_no_file_of_tokens_is_said_in_one_line(tmp_path: Path, text: str
     assert "\n" not in str(raised.value)
 
 
-def test_a_file_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
+def test_a_missing_token_file_is_reported_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"none\.yaml: cannot read the tokens: No such file or directory"):
         read_tokens(tmp_path / "none.yaml")
 
@@ -111,7 +111,7 @@ def test_a_file_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
         (["--camera", "door"], ("watch", None, "door")),
     ],
 )
-def test_a_new_token_comes_with_the_line_that_lets_it_in(
+def test_a_new_token_is_printed_with_its_line_for_the_file(
     myview: Run, tmp_path: Path, options: list[str], limits: tuple[Any, ...]
 ) -> None:
     done = myview("token", "Ann's parents", *options)
@@ -129,5 +129,5 @@ def test_a_new_token_comes_with_the_line_that_lets_it_in(
 
 
 @pytest.mark.parametrize("options", [["--object", "3", "--camera", "c0"], ["--operate", "--object", "3"]])
-def test_what_makes_no_sense_is_refused(myview: Run, options: list[str]) -> None:
+def test_contradictory_options_are_refused(myview: Run, options: list[str]) -> None:
     assert "token: " in refusal(myview("token", "a", *options))

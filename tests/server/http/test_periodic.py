@@ -32,7 +32,7 @@ class Failing:
         self.done.set()
 
 
-async def test_a_turn_that_fails_is_told_once_and_the_next_is_taken(caplog: pytest.LogCaptureFixture) -> None:
+async def test_a_failing_step_is_logged_once_and_retried(caplog: pytest.LogCaptureFixture) -> None:
     failing = Failing(ValueError("one"), ValueError("one"), KeyError("other"))
 
     async def turn() -> None:
@@ -55,7 +55,7 @@ async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
     return not ended and failing.times > 1
 
 
-async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_lists_are_published_after_a_failed_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.http.api.events._LISTS_EVERY_S", 0.001)
     service, failing = FedService(small_config()), Failing(RuntimeError("nobody has thought of this"))
     events = Events(BestViewService(service))
@@ -65,7 +65,7 @@ async def test_what_people_and_cameras_are_is_told_on(monkeypatch: pytest.Monkey
     service.close()
 
 
-async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
+async def test_tokens_are_checked_after_a_failed_reload_and_expired_requests_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.http.access.authorization._CHECK_EVERY_S", 0.001)
@@ -78,14 +78,14 @@ async def test_tokens_are_looked_at_on_and_what_is_over_ends_meanwhile(
     assert over.times >= failing.times > 1
 
 
-async def test_the_certificate_is_looked_at_on(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_the_certificate_is_checked_after_a_failed_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.http.tls._CHECK_EVERY_S", 0.001)
     certificate, failing = Certificate.__new__(Certificate), Failing(RuntimeError("not thought of"))
     monkeypatch.setattr(certificate, "reload_if_changed", failing)
     assert await runs_on(asyncio.create_task(certificate.run()), failing)
 
 
-def test_a_renewal_that_is_seen_half_done_is_read_when_it_is_done(
+def test_a_half_done_renewal_is_loaded_when_it_is_complete(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     class Context:

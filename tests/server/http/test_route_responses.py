@@ -35,7 +35,7 @@ from server.service.streaming.subscriber_queue import Subscriber
         ("/page/none.js", "there is nothing at /page/none.js"),
     ],
 )
-async def test_what_is_not_there_is_404_and_one_line_of_json(busy: Hall, path: str, error: str) -> None:
+async def test_unknown_addresses_get_404_with_one_line_of_json(busy: Hall, path: str, error: str) -> None:
     assert await busy.get(path) == (404, {"error": error})
 
 
@@ -51,16 +51,14 @@ async def test_what_is_not_there_is_404_and_one_line_of_json(busy: Hall, path: s
         ("/cameras/c0/live.mjpeg?to=-5", "to: only .mp4, .ts and HLS can begin in the past"),
     ],
 )
-async def test_what_a_stream_does_not_have_is_refused_and_not_left_out(
-    busy: Hall, path: str, error: str
-) -> None:
+async def test_unsupported_query_parameters_of_streams_are_refused(busy: Hall, path: str, error: str) -> None:
     code, content = await busy.get(path)
     assert code == 400
     assert content["error"].startswith(error)
     assert "\n" not in content["error"]
 
 
-async def test_boxes_and_the_past_are_described_where_they_are(busy: Hall) -> None:
+async def test_overlay_and_time_shift_are_described_where_supported(busy: Hall) -> None:
     described = await busy.get_json("/api/openapi.json")
     for path, item in described["paths"].items():
         queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
@@ -90,7 +88,7 @@ async def test_boxes_and_the_past_are_described_where_they_are(busy: Hall) -> No
         "/page/.",
     ],
 )
-async def test_nothing_outside_the_page_is_given_away(hall: Hall, path: str) -> None:
+async def test_no_file_outside_the_page_is_served(hall: Hall, path: str) -> None:
     # By hand: a client library would tidy the path up before sending it.
     reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
     writer.write(f"GET {path} HTTP/1.0\r\n\r\n".encode())
@@ -101,14 +99,14 @@ async def test_nothing_outside_the_page_is_given_away(hall: Hall, path: str) -> 
     await writer.wait_closed()
 
 
-async def test_a_method_that_is_not_possible_is_405_and_says_what_is(hall: Hall) -> None:
+async def test_an_unsupported_method_gets_405_with_the_allowed_ones(hall: Hall) -> None:
     async with hall.session.post("/api/objects") as answer:
         assert answer.status == 405
         assert answer.headers["Allow"] == "GET,HEAD"
         assert await answer.json() == {"error": "POST is not possible here"}
 
 
-async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
+async def test_a_server_error_gets_500_without_a_traceback(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hall.service, "frame_buffers", {})
@@ -119,7 +117,7 @@ async def test_a_mistake_of_the_servers_own_is_500_without_a_traceback(
 
 
 @pytest.mark.parametrize("version", ["1.0", "1.1"])
-async def test_a_mistake_in_the_middle_of_an_answer_breaks_it_off(
+async def test_a_server_error_during_an_answer_resets_the_connection(
     busy: Hall, monkeypatch: pytest.MonkeyPatch, version: str
 ) -> None:
     """By an end that looks like one a part of a film would be taken for all of it."""
@@ -153,7 +151,7 @@ async def test_a_mistake_in_the_middle_of_an_answer_breaks_it_off(
         ("/", "text/html"),
     ],
 )
-async def test_head_gives_the_headers_and_ends(busy: Hall, path: str, kind: str) -> None:
+async def test_head_returns_only_headers(busy: Hall, path: str, kind: str) -> None:
     for _ in range(2):  # on one connection, which must stay of use
         async with busy.session.head(path) as answer:
             assert answer.status == 200
@@ -162,7 +160,7 @@ async def test_head_gives_the_headers_and_ends(busy: Hall, path: str, kind: str)
     assert busy.service.splicer.viewers == 0
 
 
-async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) -> None:
+async def test_the_description_has_every_route_except_the_page(busy: Hall) -> None:
     app = make_app(BestViewService(busy.service))
     routes = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
     described = await busy.get_json("/api/openapi.json")
@@ -175,9 +173,7 @@ async def test_the_description_has_every_route_that_is_not_the_page(busy: Hall) 
     assert asked == {"from": True, "to": False}
 
 
-async def test_who_asks_for_the_description_again_makes_no_work(
-    busy: Hall, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_the_description_is_built_once(busy: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     first = await busy.get_json("/api/openapi.json")
     monkeypatch.setattr(openapi, "describe", None)
     assert await busy.get_json("/api/openapi.json") == first
@@ -185,7 +181,7 @@ async def test_who_asks_for_the_description_again_makes_no_work(
         assert answer.status == 200
 
 
-async def test_every_answer_is_as_the_description_says(busy: Hall) -> None:
+async def test_every_answer_matches_its_schema(busy: Hall) -> None:
     described = await busy.get_json("/api/openapi.json")
     schemas = described["components"]["schemas"]
     for path, item in described["paths"].items():
@@ -197,7 +193,7 @@ async def test_every_answer_is_as_the_description_says(busy: Hall) -> None:
         assert set(schema["required"]) == set(answer) == set(schema["properties"])
 
 
-async def test_people_can_read_the_description(hall: Hall) -> None:
+async def test_the_description_has_a_readable_page(hall: Hall) -> None:
     async with hall.session.get("/api") as answer:
         text = await answer.text()
     assert answer.content_type == "text/html"
@@ -214,7 +210,7 @@ async def test_the_page_and_its_files_are_served(hall: Hall) -> None:
             assert answer.headers["X-Content-Type-Options"] == "nosniff"
 
 
-async def test_metrics_count_what_happens(busy: Hall) -> None:
+async def test_metrics_are_served(busy: Hall) -> None:
     busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
     busy.service.ingest.tracks(tracks(word(A, 3, {}, without_peers=[15, 17])))
     busy.service.ingest.tracks(tracks(word(B, 3, {})))

@@ -53,7 +53,7 @@ def trusting(tls: TlsSettings) -> ssl.SSLContext:
     return ssl.create_default_context(cafile=str(tls.certificate))
 
 
-async def test_it_is_spoken_and_plain_http_is_not(tls: TlsSettings, tmp_path: Path) -> None:
+async def test_https_is_answered_and_plain_http_is_not(tls: TlsSettings, tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
     async with aclosing(opened(**settings)) as halls, aiohttp.ClientSession() as session:
@@ -73,7 +73,7 @@ async def test_it_is_spoken_and_plain_http_is_not(tls: TlsSettings, tmp_path: Pa
             await session.get(f"http://127.0.0.1:{port}/healthz")
 
 
-async def test_watching_trusts_what_the_usual_variable_names_and_sends_its_token(
+async def test_watch_trusts_the_authority_of_the_environment_and_sends_its_token(
     tls: TlsSettings, tmp_path: Path
 ) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("family"))
@@ -109,7 +109,7 @@ async def is_proven(port: int, trusted: TlsSettings) -> bool:
     return True
 
 
-async def test_a_new_certificate_is_taken_for_new_connections(
+async def test_a_renewed_certificate_is_used_for_new_connections(
     made: tuple[TlsSettings, TlsSettings], tls: TlsSettings, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "server.http.tls")
@@ -138,7 +138,7 @@ async def test_a_new_certificate_is_taken_for_new_connections(
     await server.wait_closed()
 
 
-def test_what_is_no_certificate_is_said_in_one_line(
+def test_an_invalid_certificate_is_reported_in_one_line(
     made: tuple[TlsSettings, TlsSettings], tmp_path: Path
 ) -> None:
     none = TlsSettings(certificate=tmp_path / "none.pem", key=made[0].key)
@@ -157,7 +157,7 @@ def test_what_is_no_certificate_is_said_in_one_line(
         assert "\n" not in str(raised.value)
 
 
-def test_a_key_with_a_password_is_refused_and_not_waited_for(
+def test_a_key_with_a_password_is_refused_without_a_prompt(
     made: tuple[TlsSettings, TlsSettings], tmp_path: Path
 ) -> None:
     locked = tmp_path / "locked.pem"
@@ -182,7 +182,7 @@ def test_one_file_without_the_other_is_refused() -> None:
         TlsSettings(certificate=Path("a.pem"))
 
 
-def test_the_files_lie_beside_the_configuration() -> None:
+def test_certificate_paths_are_relative_to_the_configuration() -> None:
     content = {
         "cameras": [{"id": "c0", "source": "scene:room"}],
         "http": {"tls": {"certificate": "a.pem", "key": "b.pem"}},

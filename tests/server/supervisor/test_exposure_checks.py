@@ -35,16 +35,16 @@ OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
         ("server.example", False),
     ],
 )
-def test_what_only_this_machine_reaches(host: str, here: bool) -> None:
+def test_loopback_hosts_are_recognized(host: str, here: bool) -> None:
     assert is_loopback(host) == here
 
 
-def test_the_defaults_are_for_this_machine_alone() -> None:
+def test_the_defaults_are_reachable_from_this_machine_only() -> None:
     for check in (check_viewers, check_pulses, check_bus):
         check(small_config())
 
 
-def test_viewers_from_elsewhere_take_tokens_or_a_word(tmp_path: Path) -> None:
+def test_viewers_from_elsewhere_need_tokens_or_open_to_all(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"http\.host: .* access\.tokens .* access\.open_to_all: true"):
         check_viewers(small_config(http={"host": OUTSIDE}))
     check_viewers(small_config(http={"host": OUTSIDE}, access={"open_to_all": True}))
@@ -65,7 +65,9 @@ def test_viewers_from_elsewhere_take_tokens_or_a_word(tmp_path: Path) -> None:
         (check_bus, "zenoh", {"listen": "udp/10.0.0.5:7447"}),
     ],
 )
-def test_what_has_no_password_takes_a_network_that_is_trusted(check: Any, section: str, setting: Any) -> None:
+def test_bus_and_pulses_without_passwords_need_a_trusted_network(
+    check: Any, section: str, setting: Any
+) -> None:
     with pytest.raises(UserError, match=rf"{section}\.\w+: .* access\.trusted_network: true"):
         check(small_config(**{section: setting}))
     check(small_config(**{section: setting, "access": {"trusted_network": True}}))
@@ -92,7 +94,7 @@ def test_every_command_that_listens_refuses_with_one_line(
     assert refusal(myview(command, str(path))).startswith(f"myview: {setting}: ")
 
 
-def test_a_bus_that_asks_who_comes_may_be_anywhere_if_it_is_encrypted() -> None:
+def test_an_encrypted_bus_with_users_may_be_exposed() -> None:
     listen = f"{OUTSIDE}:7447"
     check_bus(small_config(zenoh={"listen": f"tls/{listen}", "users": "zenoh.users"}))
     for zenoh in ({"listen": f"tcp/{listen}", "users": "zenoh.users"}, {"listen": f"tls/{listen}"}):
@@ -100,7 +102,7 @@ def test_a_bus_that_asks_who_comes_may_be_anywhere_if_it_is_encrypted() -> None:
             check_bus(small_config(zenoh=zenoh))
 
 
-def test_pulses_that_ask_who_comes_may_be_anywhere() -> None:
+def test_encrypted_pulses_with_users_may_be_exposed() -> None:
     with pytest.raises(UserError, match=r"sync\.bind: .* sync\.users"):
         check_pulses(small_config(sync={"bind": OUTSIDE}))
     with pytest.raises(UserError, match=r"sync\.bind: .* sync\.tls"):
@@ -109,7 +111,7 @@ def test_pulses_that_ask_who_comes_may_be_anywhere() -> None:
     check_pulses(small_config(sync={"bind": OUTSIDE, "users": "sync.users", "tls": tls}))
 
 
-def test_the_secure_example_is_open_to_nobody_without_a_token_or_a_password() -> None:
+def test_the_secure_example_needs_tokens_and_passwords() -> None:
     config = load_config(CONFIGS / "secure.yaml")
     assert not is_loopback(config.http.host)
     assert not config.access.open_to_all

@@ -94,7 +94,7 @@ def secure(secrets: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
 
 
 @pytest.mark.parametrize("users", [None, {"c0": "a password"}])
-async def test_pulses_are_well_while_somebody_greets(
+async def test_the_pulse_server_is_healthy_while_it_sends_its_greeting(
     monkeypatch: pytest.MonkeyPatch, users: dict[str, str] | None
 ) -> None:
     async with PulseServer(25.0, users=users) as server:
@@ -118,7 +118,9 @@ async def _apart(*words: str) -> int:
     return await process.wait()
 
 
-def test_a_camera_is_well_when_its_frames_arrive(plain: Service, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_camera_is_healthy_when_its_frames_arrive(
+    plain: Service, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["camera", "c0"]) == 0
     assert main(["bestview"]) == 0
     for state in (
@@ -132,13 +134,13 @@ def test_a_camera_is_well_when_its_frames_arrive(plain: Service, capsys: pytest.
 
 
 @pytest.mark.usefixtures("plain")
-def test_no_proxy_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_proxy_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("http_proxy", f"http://127.0.0.1:{free_port()}")
     monkeypatch.delenv("no_proxy", raising=False)
     assert main(["bestview"]) == 0
 
 
-def test_what_cannot_be_asked_is_not_well(
+def test_an_unknown_check_is_unhealthy(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{free_port()}")
@@ -147,14 +149,14 @@ def test_what_cannot_be_asked_is_not_well(
         assert capsys.readouterr().out.count("\n") == 1
 
 
-def test_an_answer_that_is_no_service_s_is_not_well(plain: Service) -> None:
+def test_an_invalid_answer_is_unhealthy(plain: Service) -> None:
     plain.cameras = [{"camera": "c0"}]
     assert main(["camera", "c0"]) == 1
 
 
 @needs_openssl
 @pytest.mark.usefixtures("secure")
-def test_by_https_the_certificate_and_the_token_count(
+def test_https_checks_use_the_certificate_and_the_token(
     secrets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert main(["camera", "c0"]) == 0
@@ -168,7 +170,7 @@ def test_by_https_the_certificate_and_the_token_count(
 
 
 @needs_openssl
-def test_what_is_made_for_a_secure_site_fits_together(secrets: Path) -> None:
+def test_generated_secrets_make_a_working_site(secrets: Path) -> None:
     assert (secrets.stat().st_mode & 0o777) == 0o700, "nobody else of the host looks in"
     operator, health = read_tokens(secrets / "web" / "tokens.yaml")
     assert (operator.role, operator.camera) == ("operate", None)
@@ -193,7 +195,7 @@ def made(folder: Path, name: str, camera: str = "c0", **environment: str) -> sub
     return subprocess.run(script, env=surroundings, capture_output=True, text=True, check=False)
 
 
-def test_without_openssl_nothing_is_made_and_that_is_said(tmp_path: Path) -> None:
+def test_without_openssl_no_secrets_are_generated(tmp_path: Path) -> None:
     done = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
     assert (done.returncode, done.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
     assert not (tmp_path / "secrets").exists()
@@ -201,9 +203,7 @@ def test_without_openssl_nothing_is_made_and_that_is_said(tmp_path: Path) -> Non
 
 @needs_openssl
 @pytest.mark.parametrize("camera", ["c 0", "../x", "bestview", "bestview-1", "a: b", ""])
-def test_a_camera_that_cannot_be_called_that_is_refused_before_anything_is_made(
-    tmp_path: Path, camera: str
-) -> None:
+def test_an_invalid_camera_name_is_refused_before_anything_is_generated(tmp_path: Path, camera: str) -> None:
     done = made(tmp_path / "secrets", "cameras.example", camera)
     assert done.returncode == 2
     assert "cannot be a camera's name" in done.stderr
@@ -211,7 +211,7 @@ def test_a_camera_that_cannot_be_called_that_is_refused_before_anything_is_made(
 
 
 @needs_openssl
-def test_a_name_that_no_certificate_takes_is_said_and_a_shorter_one_is_taken_then(tmp_path: Path) -> None:
+def test_a_host_name_too_long_for_a_certificate_is_refused(tmp_path: Path) -> None:
     done = made(tmp_path, f"{'a' * 63}.example")
     assert done.returncode == 1
     assert "too long" in done.stderr
@@ -257,7 +257,7 @@ def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, t
 
 
 @needs_openssl
-def test_a_site_of_before_the_pulses_had_passwords_gets_them(secrets: Path, tmp_path: Path) -> None:
+def test_a_site_without_pulse_passwords_gets_them(secrets: Path, tmp_path: Path) -> None:
     folder = tmp_path / "secrets"
     shutil.copytree(secrets, folder)
     for name in ("pulses", "web/pulses", "cameras/c0/pulses"):

@@ -83,7 +83,7 @@ WINDOW = {"window": 5, "stride": 5, "birth_window": 5}
 
 @settings(max_examples=20)
 @given(st.sets(st.sampled_from(sorted(CHANGES))))
-def test_everything_is_in_force_or_waits_and_is_named(keys: set[str]) -> None:
+def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
     running, wanted = small_config(), changed(keys)
     reload = plan_reload(running, wanted)
     takes = {key: CHANGES[key][0] for key in keys}
@@ -106,7 +106,7 @@ def test_everything_is_in_force_or_waits_and_is_named(keys: set[str]) -> None:
     )
 
 
-def test_a_lookahead_that_tracks_do_not_allow_yet_waits_with_what_allows_it() -> None:
+def test_a_lookahead_below_the_current_lag_waits_for_a_restart() -> None:
     track = {"window": {"window": 15, "stride": 5, "birth_window": 5}}
     running = small_config(track=track, view={"lookahead": 15})
     reload = plan_reload(running, small_config(view={"lookahead": 5, "switch_cost_s": 1.0}))
@@ -117,14 +117,14 @@ def test_a_lookahead_that_tracks_do_not_allow_yet_waits_with_what_allows_it() ->
     assert reload.now.track.window == running.track.window
 
 
-def test_other_cameras_wait_and_those_that_run_stay_as_they_are() -> None:
+def test_a_changed_list_of_cameras_waits_for_a_restart() -> None:
     running = small_config()
     wanted = small_config([{"id": "c0", "source": "scene:room", "offset": 5}, "c1", "c2"])
     reload = plan_reload(running, wanted)
     assert (reload.site, reload.now.cameras) == (("cameras",), running.cameras)
 
 
-def test_cameras_begin_anew_where_sharpness_begins_to_count() -> None:
+def test_cameras_restart_when_sharpness_gets_a_weight() -> None:
     reload = plan_reload(small_config(), small_config(view={"quality": {"sharpness": 0.5}}))
     assert (reload.live, reload.cameras) == (("view.quality.sharpness",), CAMERAS)
 
@@ -133,7 +133,7 @@ def write(path: Path, **changes: Any) -> None:
     path.write_text(yaml.safe_dump({"cameras": [{"id": "c0", "source": "c0.mp4"}], **changes}))
 
 
-def test_what_runs_is_known_to_differ_from_a_file_that_is_wrong_changed_or_mended(tmp_path: Path) -> None:
+def test_the_difference_to_an_invalid_changed_or_repaired_file_is_known(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     write(path)
     running = ActiveConfig(path)
@@ -152,7 +152,7 @@ def test_what_runs_is_known_to_differ_from_a_file_that_is_wrong_changed_or_mende
     assert not running.on_disk().differs
 
 
-def test_a_ground_file_that_has_changed_is_no_longer_what_runs(tmp_path: Path) -> None:
+def test_a_changed_ground_file_is_a_difference(tmp_path: Path) -> None:
     path, ground = tmp_path / "site.yaml", tmp_path / "ground.json"
     write(path, ground="ground.json")
     ground.write_text('{"homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}')
@@ -164,7 +164,7 @@ def test_a_ground_file_that_has_changed_is_no_longer_what_runs(tmp_path: Path) -
     assert running.on_disk().pending_restart == ("cameras.c0.ground",)
 
 
-def test_what_a_supervisor_keeps_is_what_its_processes_run_by(
+def test_processes_use_the_supervisors_active_configuration(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, kept = tmp_path / "site.yaml", tmp_path / "elsewhere" / "kept.yaml"
@@ -179,7 +179,7 @@ def test_what_a_supervisor_keeps_is_what_its_processes_run_by(
     assert "site.fps" in running.on_disk().error
 
 
-def test_a_service_goes_by_it_and_what_was_tried_out_stays_where_nothing_else_is_said() -> None:
+def test_a_service_applies_a_reload_and_keeps_other_trial_settings() -> None:
     service = FedService(small_config())
     service.apply_view_settings(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
     service.apply_config(small_config([{"id": "c0", "source": "scene:room", "offset": 4}, "c1"]))
@@ -198,7 +198,7 @@ def test_a_service_goes_by_it_and_what_was_tried_out_stays_where_nothing_else_is
     "found",
     [ConfigFileState("", ()), ConfigFileState("site.yaml: is wrong", ()), ConfigFileState("", ("site.fps",))],
 )
-async def test_the_operator_and_prometheus_are_told(found: ConfigFileState) -> None:
+async def test_the_operators_page_and_metrics_show_the_difference(found: ConfigFileState) -> None:
     service = FedService(small_config())
     async with (
         asyncio.timeout(PATIENCE),
@@ -237,7 +237,7 @@ async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subproce
             await process.wait()
 
 
-async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_terminal(tmp_path: Path) -> None:
+async def test_a_process_logs_pending_and_invalid_settings_and_ends_with_its_terminal(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
     async with asyncio.timeout(PATIENCE), sync_at_a_terminal(path) as (process, terminal):
         content = yaml.safe_load(path.read_text())
@@ -254,7 +254,7 @@ async def test_a_process_says_what_waits_and_what_is_wrong_and_ends_with_its_ter
         assert await process.wait() == 0
 
 
-def test_a_tracker_by_which_frames_are_final_later_waits_for_a_restart() -> None:
+def test_a_tracker_with_another_lag_waits_for_a_restart() -> None:
     running = small_config(view={"lookahead": 200})
     for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"window_stages": 2}}):
         reload = plan_reload(running, small_config(view={"lookahead": 200}, track=track))

@@ -13,7 +13,7 @@ from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
 from server.supervisor.reload import plan_reload
 
 
-def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:
+def test_passthrough_waits_for_a_pending_codec_change() -> None:
     passing = [{"id": "c0", "source": "scene:room", "h264": "pass"}, "c1"]
     running = small_config(encode={"codec": "vp8"})
     reload = plan_reload(running, small_config(passing))
@@ -23,7 +23,7 @@ def test_whose_h264_passes_waits_for_a_codec_that_can() -> None:
     assert (reload.cameras, reload.site) == (("c0",), ())
 
 
-def test_a_wrong_ground_file_is_wrong_until_it_is_mended(
+def test_an_invalid_ground_file_is_reported_until_it_is_repaired(
     tmp_path: Path,
 ) -> None:
     path, ground = tmp_path / "site.yaml", tmp_path / "ground.json"
@@ -37,7 +37,7 @@ def test_a_wrong_ground_file_is_wrong_until_it_is_mended(
     assert not running.on_disk().differs
 
 
-def test_what_somebody_else_put_where_the_supervisor_kept_it_is_not_gone_by(
+def test_an_active_configuration_of_another_user_is_ignored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, theirs, link = (tmp_path / name for name in ("site.yaml", "theirs.yaml", "link.yaml"))

@@ -46,7 +46,7 @@ def until(seen: list[int], length: int) -> None:
         time.sleep(0.01)
 
 
-def test_a_signal_waits_even_when_another_thread_takes_it(
+def test_a_signal_is_deferred_even_if_another_thread_receives_it(
     handled: tuple[signal.Signals, list[int]], other_thread: int
 ) -> None:
     number, seen = handled
@@ -64,13 +64,13 @@ def test_a_signal_waits_even_when_another_thread_takes_it(
     until(seen, told + 1)  # and it is not put off afterwards
 
 
-def test_nothing_came_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
+def test_without_a_signal_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
     with defer_termination():
         pass
     assert handled[1] == []
 
 
-def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
+def test_a_child_inherits_the_signal_mask_and_can_restore_it() -> None:
     code = (
         "import signal; from server.system.child_process import restore_termination as again\n"
         "def blocked(): return {2, 15} & set(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
@@ -83,7 +83,7 @@ def test_a_child_inherits_the_mask_and_can_lift_it() -> None:
     assert done.stdout.split() == ["2", "0"]
 
 
-def test_a_process_that_is_held_up_ends_all_the_same(tmp_path: Path) -> None:
+def test_a_process_with_a_blocked_thread_exits(tmp_path: Path) -> None:
     started = tmp_path / "started"
     script = (
         "import asyncio, pathlib, sys, time\n"
@@ -98,7 +98,7 @@ def test_a_process_that_is_held_up_ends_all_the_same(tmp_path: Path) -> None:
     assert process.wait(PATIENCE) == 0, "the thread would have slept for a minute"
 
 
-def test_a_process_that_is_told_to_end_while_it_loads_ends_with_0(tmp_path: Path) -> None:
+def test_a_process_terminated_while_loading_exits_with_0(tmp_path: Path) -> None:
     hurried = subprocess.Popen([sys.executable, "-m", "server.cli.main", "sync", str(tmp_path / "none.yaml")])
     status = Path(f"/proc/{hurried.pid}/status")
     until_true(
@@ -132,14 +132,14 @@ _COMMANDS, _WHAT_IT_NEEDS = "server.cli.site_commands", "server.config.loader"
         (["up", "none.yaml"], _WHAT_IT_NEEDS, 0),
     ],
 )
-def test_ctrl_c_while_a_command_still_loads_ends_it_without_a_word(
+def test_ctrl_c_while_a_command_loads_ends_it_silently(
     tmp_path: Path, command: list[str], loads: str, code: int
 ) -> None:
     ended = pressed(tmp_path, command, loads)
     assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", "")
 
 
-def test_a_command_that_is_to_mind_no_ctrl_c_minds_none_while_it_loads(tmp_path: Path) -> None:
+def test_a_command_started_with_ignored_sigint_ignores_it_while_loading(tmp_path: Path) -> None:
     ignored = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
     ended = pressed(tmp_path, ["token", "nobody"], _COMMANDS, ignored)
     assert ended.returncode == 0, ended.stderr
@@ -198,7 +198,7 @@ def waits_for_a_file(pid: int) -> bool:
         ("doctor site.yaml", signal.SIGINT, 130),
     ],
 )
-def test_what_waits_for_a_pipe_ends_without_a_word_when_it_is_told_to(
+def test_a_command_that_waits_for_a_pipe_ends_silently_on_a_signal(
     tmp_path: Path, command: str, number: signal.Signals, code: int
 ) -> None:
     """FFmpeg gives up with an error of its own, which is nobody's mistake."""

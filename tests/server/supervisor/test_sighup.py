@@ -39,7 +39,7 @@ async def turn() -> None:
 
 
 @pytest.mark.parametrize("command", [("sync",), ("camera", "c0"), ("bestview",), ("up",)])
-def test_what_comes_between_reading_and_running_is_not_lost(
+def test_a_sighup_between_reading_and_running_is_not_lost(
     myview: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
     bus = f"tcp/127.0.0.1:{free_port()}"
@@ -64,7 +64,7 @@ def test_what_comes_between_reading_and_running_is_not_lost(
     assert told == ["to read it again"]
 
 
-async def test_those_that_came_early_are_one_and_those_that_come_later_one_each() -> None:
+async def test_early_sighups_count_as_one_and_later_ones_separately() -> None:
     record_early_sighups()
     hang_up()
     hang_up()

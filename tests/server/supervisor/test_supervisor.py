@@ -105,7 +105,7 @@ async def machine(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Machine]:
             await asyncio.gather(it.task, return_exceptions=True)
 
 
-async def test_everything_is_started_and_ended_together(machine: Machine) -> None:
+async def test_all_processes_are_started_and_ended(machine: Machine) -> None:
     task = machine.run()
     processes = await machine.processes(4)
     assert set(processes) == {"bestview", "sync", "c0", "c1"}
@@ -114,7 +114,7 @@ async def test_everything_is_started_and_ended_together(machine: Machine) -> Non
     assert all(process.returncode == -15 for process in processes.values())
 
 
-async def test_the_best_view_and_the_pulses_load_before_any_camera(machine: Machine) -> None:
+async def test_the_best_view_and_the_pulse_server_load_before_any_camera(machine: Machine) -> None:
     machine.loads_at_once = False
     machine.run()
     first = await machine.processes(2)
@@ -125,7 +125,7 @@ async def test_the_best_view_and_the_pulses_load_before_any_camera(machine: Mach
     await machine.processes(1)
 
 
-async def test_no_more_cameras_load_at_a_time_than_there_are_processors(
+async def test_at_most_one_camera_per_processor_loads_at_a_time(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(supervisor, "available_processors", lambda: 2.5)
@@ -148,7 +148,7 @@ async def test_no_more_cameras_load_at_a_time_than_there_are_processors(
     assert list(await machine.processes(1)) == ["c1"]
 
 
-async def test_a_best_view_that_died_waits_for_no_camera_that_loads(machine: Machine) -> None:
+async def test_a_restarted_best_view_does_not_wait_for_loading_cameras(machine: Machine) -> None:
     machine.run()
     processes = await machine.processes(2)
     machine.loads_at_once = False
@@ -159,7 +159,7 @@ async def test_a_best_view_that_died_waits_for_no_camera_that_loads(machine: Mac
         found |= await machine.processes(1)
 
 
-async def test_what_never_says_that_it_has_loaded_keeps_nobody_for_ever(
+async def test_a_process_that_never_reports_loading_delays_others_only_for_a_while(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(supervisor, "_STARTUP_TIMEOUT_S", 0.01)
@@ -169,7 +169,7 @@ async def test_what_never_says_that_it_has_loaded_keeps_nobody_for_ever(
 
 
 @pytest.mark.parametrize("code", [-9, 1, 0])
-async def test_what_dies_or_is_told_to_end_is_started_again_alone(
+async def test_only_the_process_that_died_or_was_terminated_is_restarted(
     machine: Machine, code: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     machine.run()
@@ -182,7 +182,7 @@ async def test_what_dies_or_is_told_to_end_is_started_again_alone(
     assert len(caplog.messages) == 1, "told of once for one cause"
 
 
-async def test_what_is_needed_to_start_is_seen_to_before_every_start(machine: Machine) -> None:
+async def test_the_callback_runs_before_every_start(machine: Machine) -> None:
     seen: list[int] = []
     machine.run(before_start=lambda: seen.append(len(seen)))
     processes = await machine.processes(4)
@@ -192,7 +192,7 @@ async def test_what_is_needed_to_start_is_seen_to_before_every_start(machine: Ma
     assert len(seen) == 5
 
 
-async def test_a_camera_whose_recording_is_over_stays_so_and_the_best_views_end_ends_everything(
+async def test_a_finished_camera_is_not_restarted_and_a_finished_best_view_ends_the_site(
     machine: Machine,
 ) -> None:
     task = machine.run()
@@ -204,7 +204,7 @@ async def test_a_camera_whose_recording_is_over_stays_so_and_the_best_views_end_
     assert processes["c1"].returncode == processes["sync"].returncode == -15
 
 
-async def test_what_refuses_its_input_at_the_start_ends_everything(machine: Machine) -> None:
+async def test_a_process_that_refuses_its_input_at_the_start_ends_the_site(machine: Machine) -> None:
     task = machine.run()
     processes = await machine.processes(4)
     processes["c1"].end(2)
@@ -213,7 +213,7 @@ async def test_what_refuses_its_input_at_the_start_ends_everything(machine: Mach
     assert all(process.returncode is not None for process in processes.values())
 
 
-async def test_what_once_ran_is_tried_again_even_when_it_refuses(machine: Machine) -> None:
+async def test_a_process_that_ran_before_is_restarted_even_if_it_refuses_its_input(machine: Machine) -> None:
     machine.run()
     processes = await machine.processes(4)
     for code in (-9, 2, 2):
@@ -221,7 +221,7 @@ async def test_what_once_ran_is_tried_again_even_when_it_refuses(machine: Machin
         processes |= await machine.processes(1)
 
 
-async def test_a_restarted_best_view_writes_beside_what_it_wrote_before(machine: Machine) -> None:
+async def test_a_restarted_best_view_writes_into_a_new_folder(machine: Machine) -> None:
     machine.run(Path("out"))
     processes = await machine.processes(4)
     written = [processes["bestview"].arguments]

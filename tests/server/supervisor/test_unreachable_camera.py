@@ -91,7 +91,7 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
 
 
 @pytest.mark.timeout(2 * PATIENCE + 10)
-async def test_it_is_said_once_that_a_camera_does_not_answer_and_when_it_does_it_runs(
+async def test_an_unreachable_camera_is_logged_once_and_runs_when_it_answers(
     begin: Callable[..., Site],
 ) -> None:
     site = begin()
@@ -103,7 +103,7 @@ async def test_it_is_said_once_that_a_camera_does_not_answer_and_when_it_does_it
 
 
 @pytest.mark.timeout(2 * PATIENCE + 10)
-async def test_what_is_wrong_with_a_camera_that_was_waited_for_ends_no_others(
+async def test_an_error_of_a_camera_that_answers_late_does_not_end_others(
     begin: Callable[..., Site],
 ) -> None:
     """A mistake at the start ends the site, but the others have begun long ago."""

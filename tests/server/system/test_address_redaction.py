@@ -37,7 +37,7 @@ from server.system.address_redaction import redact_address, redact_addresses, re
         ("scene:room?camera=0&seed=1", "scene:room?camera=0&seed=1"),
     ],
 )
-def test_of_an_address_protocol_and_host_are_shown_and_a_path_is_as_it_is(
+def test_only_protocol_and_host_of_addresses_are_shown_and_paths_are_unchanged(
     address: str, expected: str
 ) -> None:
     assert redact_address(address) == expected
@@ -47,26 +47,26 @@ def test_of_an_address_protocol_and_host_are_shown_and_a_path_is_as_it_is(
 @given(st.sampled_from(PLACES), PASSWORDS)
 @example(PLACES[0], "ps/w")
 @example(PLACES[0], "pa@q/xz")
-def test_nothing_of_a_password_is_shown_wherever_it_stands(place: str, password: str) -> None:
+def test_no_part_of_a_password_is_shown(place: str, password: str) -> None:
     told = redact_address(place.format(password))
     assert not tells(told, password, without=place), told
     assert redact_address(told) == told
 
 
 @given(PASSWORDS.filter(lambda it: not set(it) & set("/?#")))
-def test_the_host_is_shown_where_it_is_surely_that(password: str) -> None:
+def test_the_host_is_shown_if_it_is_unambiguous(password: str) -> None:
     assert redact_address(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
 
 
 @given(st.text())
-def test_any_text_can_be_shown(text: str) -> None:
+def test_any_text_can_be_redacted(text: str) -> None:
     assert isinstance(redact_address(text) + redact_endpoint(text), str)
 
 
 @pytest.mark.parametrize(
     "source", ["rtsp:me:secret@10.0.0.1/", "concat:a|b", "srt://10.0.0.1:9", "/dev/video7"]
 )
-def test_what_ffmpeg_would_open_by_a_protocol_is_no_file(source: str) -> None:
+def test_sources_that_ffmpeg_opens_by_protocol_are_not_files(source: str) -> None:
     assert source_kind(source) is SourceKind.STREAM
 
 
@@ -80,12 +80,12 @@ def test_what_ffmpeg_would_open_by_a_protocol_is_no_file(source: str) -> None:
         ("tls/me:secret@bus:7447", "(not shown)"),
     ],
 )
-def test_of_an_endpoint_of_the_bus_its_settings_are_not_shown(endpoint: str, expected: str) -> None:
+def test_options_of_bus_endpoints_are_hidden(endpoint: str, expected: str) -> None:
     assert redact_endpoint(endpoint) == expected
 
 
 @given(st.sampled_from([it for it in PLACES if not it.startswith(("rtsp//", "user:"))]), PASSWORDS)
-def test_others_words_end_where_an_address_begins(place: str, password: str) -> None:
+def test_texts_are_cut_where_an_address_begins(place: str, password: str) -> None:
     text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
     told = redact_addresses(text)
     assert not tells(told, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"), (

@@ -39,7 +39,7 @@ def test_the_soft_limit_is_raised_to_the_hard_one(low: int) -> None:
     assert descriptor_limit() == min(low, 1 << 20) > 512
 
 
-def test_every_command_raises_it_and_what_it_starts_has_it_too(low: int, myview: Run) -> None:
+def test_every_command_raises_the_limit_for_itself_and_its_children(low: int, myview: Run) -> None:
     assert myview("--version").code == 0
     child = [sys.executable, "-c", "import resource; print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])"]
     shown = subprocess.run(child, check=True, capture_output=True, text=True)
@@ -48,9 +48,7 @@ def test_every_command_raises_it_and_what_it_starts_has_it_too(low: int, myview:
 
 @pytest.mark.parametrize("descriptors", [256, 512, 1024, 4096, 1 << 20])
 @pytest.mark.parametrize("record", [{}, {"folder": "kept"}])
-def test_what_viewers_cannot_take_is_left_for_everything_else(
-    descriptors: int, record: dict[str, Any]
-) -> None:
+def test_descriptors_are_reserved_for_other_uses(descriptors: int, record: dict[str, Any]) -> None:
     config = small_config(record=record, http={"viewers_max": 300, "connections_max": 2000})
     taken = connection_limit(config, descriptors)
     files = min(config.http.viewers_max, taken) if record else 0  # of the past: one for each who watches
@@ -59,14 +57,14 @@ def test_what_viewers_cannot_take_is_left_for_everything_else(
     assert (taken == 2000) == (descriptors >= 4096)
 
 
-def test_without_a_number_there_are_connections_enough_for_all_viewers() -> None:
+def test_the_default_limit_has_connections_for_all_viewers() -> None:
     assert small_config().http.connections == 4000
     assert small_config(http={"viewers_max": 2}).http.connections == 1000
     assert small_config(http={"viewers_max": 9000}).http.connections == 36000
     assert small_config(http={"viewers_max": 9000, "connections_max": 7}).http.connections == 7
 
 
-def test_the_doctor_says_what_fits() -> None:
+def test_the_doctor_reports_the_connections_that_fit() -> None:
     (found,) = descriptor_findings(small_config(), 1 << 20)
     assert found.level is Level.OK
     assert "4000 connections and 1000 viewers" in found.text
@@ -79,14 +77,14 @@ def test_the_doctor_says_what_fits() -> None:
     assert "LimitNOFILE" in found.remedy
 
 
-def test_the_doctor_tells_of_it(myview: Run, tmp_path: Path) -> None:
+def test_the_doctor_includes_the_check_of_open_files(myview: Run, tmp_path: Path) -> None:
     path = written(tmp_path, free())
     said = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
     (found,) = [it for it in said["findings"] if it["check"] == "open files"]
     assert str(descriptor_limit()) in found["text"]
 
 
-def test_a_process_that_can_accept_nobody_says_so_once_and_takes_them_when_it_can(tmp_path: Path) -> None:
+def test_failures_to_accept_are_logged_once_and_connections_are_accepted_later(tmp_path: Path) -> None:
     port, log = free(), tmp_path / "log"
     with running(f"{MYVIEW} sync {written(tmp_path, port)}", log), ExitStack() as silent:
         for _ in range(FEW + 16):  # and no more than wait in the system

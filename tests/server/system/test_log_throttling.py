@@ -42,7 +42,7 @@ def found(camera: str, pulse: int) -> bytes:
     return msgspec.json.encode(FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
 
 
-async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_when_that_is_over(
+async def test_repeated_late_messages_are_logged_rarely_and_when_they_end(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
@@ -63,7 +63,7 @@ async def test_words_that_come_too_late_again_and_again_are_told_of_seldom_and_w
     ]
 
 
-async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame(
+async def test_invalid_messages_of_a_camera_are_logged_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
@@ -89,7 +89,7 @@ async def test_a_camera_that_nobody_understands_is_told_of_once_and_not_by_frame
     assert exchange.bad_messages == 250
 
 
-async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_messages_that_a_camera_cannot_parse_are_in_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
     config = small_config()
     cameras = [it.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for it in config.cameras]
     camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
@@ -104,7 +104,7 @@ async def test_what_a_camera_does_not_understand_is_in_its_status(monkeypatch: p
     assert status.bad_messages == 3
 
 
-def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(
+def test_a_camera_without_sound_is_logged_once_for_many_reopenings(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
@@ -114,7 +114,7 @@ def test_a_camera_without_sound_is_told_of_once_however_often_it_is_opened(
     assert caplog.messages == ["the camera sends no audio; the site is silent"]
 
 
-def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_damage_of_a_looping_recording_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
     def demux(_: Any) -> Any:
         raise av.error.InvalidDataError(1, "damaged")
 
@@ -126,7 +126,7 @@ def test_a_damaged_recording_that_repeats_is_told_of_once(caplog: pytest.LogCapt
     assert caplog.messages == ["hall.mp4: cannot be read any further: damaged"]
 
 
-def test_damaged_sound_that_repeats_is_told_of_once(
+def test_damaged_sound_of_a_looping_recording_is_logged_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def demux(_: Any) -> Any:
@@ -191,7 +191,7 @@ async def test_render_workers_that_die_repeatedly_are_counted_and_logged_once(
     assert caplog.messages == ["rendering object 1: the worker died; starting another"]
 
 
-async def test_a_mistake_in_an_answer_is_told_of_once_however_often_it_is_asked_for(
+async def test_a_server_error_is_logged_once_for_many_requests(
     hall: Hall, caplog: pytest.LogCaptureFixture
 ) -> None:
     hall.service.loss_recorder = None  # type: ignore[assignment]
@@ -203,7 +203,7 @@ async def test_a_mistake_in_an_answer_is_told_of_once_however_often_it_is_asked_
     assert caplog.records[0].exc_info
 
 
-def test_a_folder_that_cannot_be_written_is_told_of_once_however_often_something_is_started(
+def test_an_unwritable_folder_is_logged_once_for_many_starts(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "file").write_text("")

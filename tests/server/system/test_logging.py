@@ -37,7 +37,7 @@ def line(message: str, *values: object, **more: Any) -> dict[str, Any]:
     return dict(json.loads(written))
 
 
-def test_a_line_says_when_how_bad_who_and_what() -> None:
+def test_a_line_has_time_level_process_and_event() -> None:
     before = time.time()
     said = line("camera %s disconnected", "c1", level=logging.WARNING)
     assert datetime.fromisoformat(said.pop("time")).timestamp() == pytest.approx(before, abs=5.0)
@@ -61,7 +61,7 @@ def test_a_line_says_when_how_bad_who_and_what() -> None:
         ("camera %s went to camera %s", ("a", "b"), {"camera": "a"}),
     ],
 )
-def test_whom_a_line_is_about_is_a_field_of_its_own(
+def test_the_camera_or_object_of_a_line_is_a_field(
     message: str, values: tuple[object, ...], about: dict[str, object]
 ) -> None:
     said = line(message, *values)
@@ -70,24 +70,24 @@ def test_whom_a_line_is_about_is_a_field_of_its_own(
 
 
 @given(st.text(), st.text())
-def test_whatever_is_said_is_one_line(camera: str, why: str) -> None:
+def test_every_record_is_one_line(camera: str, why: str) -> None:
     said = line("camera %s: %s", camera, why)
     assert said["event"] == f"camera {camera}: {why}"
     assert said["camera"] == camera
 
 
-def test_the_name_of_a_file_that_is_no_utf_8_is_said_all_the_same() -> None:
+def test_a_file_name_that_is_not_utf_8_is_escaped() -> None:
     said = line("camera %s: cannot read %s", "c\udc80", Path("a\udc81b"))
     assert said["event"] == r"camera c\udc80: cannot read a\udc81b"
     assert said["camera"] == r"c\udc80"
 
 
-def test_why_a_command_ends_commands_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_lines_have_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
     report_error("hall says: \x1b[2Jgone\nand more")
     assert capsys.readouterr().err == "myview: hall says: ·[2Jgone and more\n"
 
 
-def test_a_traceback_is_inside_the_line() -> None:
+def test_a_traceback_is_a_field_of_the_line() -> None:
     try:
         int("what went wrong")
     except ValueError:
@@ -95,7 +95,7 @@ def test_a_traceback_is_inside_the_line() -> None:
     assert "ValueError: invalid literal" in said["traceback"]
 
 
-def test_another_format_than_there_is_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_format_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYVIEW_LOG_FORMAT", "xml")
     with pytest.raises(UserError, match="MYVIEW_LOG_FORMAT: is 'xml', not text or json"):
         formatter("c0")
@@ -139,7 +139,7 @@ def test_every_line_of_a_whole_site_can_be_parsed(tmp_path: Path) -> None:
     assert "camera c0 connected" in {it["event"] for it in lines if it.get("camera") == "c0"}
 
 
-def test_why_a_process_does_not_start_is_a_line_of_its_log(tmp_path: Path) -> None:
+def test_the_reason_why_a_process_does_not_start_is_logged(tmp_path: Path) -> None:
     with started("camera", site(tmp_path), "c9") as refused:
         _, written = refused.communicate(timeout=PATIENCE)
         assert refused.returncode == 2

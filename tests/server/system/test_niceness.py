@@ -34,21 +34,19 @@ def nicer_by(*steps: int) -> int:
 
 
 @pytest.mark.parametrize(("steps", "by"), [((4,), 4), ((4, 4), 4), ((4, 2), 4), ((0,), 0)])
-def test_a_process_is_nicer_than_who_has_started_it_however_often_it_is_told(
-    steps: tuple[int, ...], by: int
-) -> None:
+def test_a_process_is_nicer_than_its_parent_after_repeated_calls(steps: tuple[int, ...], by: int) -> None:
     assert nicer_by(*steps) == BEFORE + by
 
 
-def test_nobody_is_nicer_than_the_system_knows() -> None:
+def test_the_niceness_is_at_most_the_systems_maximum() -> None:
     assert nicer_by(19) == 19
 
 
-def test_who_is_gone_already_is_no_trouble() -> None:
+def test_a_process_that_has_exited_is_ignored() -> None:
     lower_priority(NOBODY, 5)
 
 
-async def test_what_the_service_starts_yields_to_it_and_goes_before_the_cameras() -> None:
+async def test_workers_have_a_priority_between_service_and_cameras() -> None:
     process = await start_worker("server.service.rendering.worker")
     try:
         assert BEFORE < niceness(process.pid) < BEFORE + 10
@@ -57,7 +55,7 @@ async def test_what_the_service_starts_yields_to_it_and_goes_before_the_cameras(
         await process.wait()
 
 
-def test_a_camera_that_is_started_by_itself_is_nicer_too(tmp_path: Path) -> None:
+def test_a_camera_started_without_a_supervisor_is_nicer(tmp_path: Path) -> None:
     bus = f"tcp/127.0.0.1:{free_port()}"
     content = {
         "site": {"niceness": 3},

@@ -65,7 +65,7 @@ def door(source: str, **changes: Any) -> dict[str, Any]:
 
 @settings(max_examples=30)  # each writes out all settings
 @given(st.sampled_from(PLACES), PASSWORDS)
-def test_an_operator_is_shown_no_password_of_a_source(place: str, password: str) -> None:
+def test_the_operators_page_shows_no_password_of_a_source(place: str, password: str) -> None:
     def told(secret: str) -> str:
         source = place.format(secret)
         return written(built(cameras=[door(source)], sound={"source": source}))
@@ -75,7 +75,7 @@ def test_an_operator_is_shown_no_password_of_a_source(place: str, password: str)
 
 @settings(max_examples=20)
 @given(PASSWORDS.filter(lambda it: not set(it) & set(" /#?")))
-def test_an_operator_is_shown_no_secret_of_other_settings(password: str) -> None:
+def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
     def told(secret: str) -> str:
         options = {"headers": f"Authorization: Basic {secret}", "rtsp_transport": secret}
         file = f"{secret}.password"  # who misunderstands the setting writes the password itself
@@ -115,7 +115,7 @@ def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
 
 @settings(max_examples=30)
 @given(st.sampled_from(PLACES), PASSWORDS)
-def test_no_complaint_about_a_configuration_repeats_a_password(place: str, password: str) -> None:
+def test_no_configuration_error_repeats_a_password(place: str, password: str) -> None:
     address = place.format(password)
     secrets = zip(misplaced(address, password), misplaced(place.format(HARMLESS), HARMLESS), strict=True)
     for content, harmless in secrets:
@@ -144,7 +144,7 @@ def test_no_complaint_about_a_configuration_repeats_a_password(place: str, passw
     ],
 )
 @pytest.mark.parametrize("loader", ["with libyaml", "without libyaml"])
-def test_what_is_no_yaml_is_not_repeated(
+def test_yaml_errors_do_not_repeat_the_content(
     text: str, loader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if loader == "without libyaml":
@@ -164,7 +164,7 @@ def test_what_is_no_yaml_is_not_repeated(
 
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize("password", NAIVE)
-def test_why_a_camera_cannot_be_opened_is_said_without_its_password(source: str, password: str) -> None:
+def test_errors_of_opening_a_camera_do_not_have_its_password(source: str, password: str) -> None:
     address = source.format(password)
     config = built(cameras=[door(address, h264="auto")], sound={"source": address})
     for attempt in (
@@ -203,7 +203,7 @@ def test_the_doctor_shows_no_password(myview: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["render", "track", "calibrate"])
-def test_an_address_instead_of_a_recording_is_not_repeated(command: str, myview: Run, tmp_path: Path) -> None:
+def test_an_address_given_as_a_recording_is_not_repeated(command: str, myview: Run, tmp_path: Path) -> None:
     for password in NAIVE:
         ended = myview(command, f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", "--out", tmp_path / "out")
         assert ended.code == 2
@@ -212,7 +212,7 @@ def test_an_address_instead_of_a_recording_is_not_repeated(command: str, myview:
 
 @pytest.mark.parametrize("lines", [TextLines(), JsonLines("door")])
 @pytest.mark.parametrize("password", NAIVE)
-def test_a_traceback_in_the_log_ends_where_an_address_begins(lines: logging.Formatter, password: str) -> None:
+def test_logged_tracebacks_are_cut_where_an_address_begins(lines: logging.Formatter, password: str) -> None:
     try:
         av.open(f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", timeout=(5.0, 5.0))
     except (av.error.FFmpegError, OSError):

@@ -60,7 +60,7 @@ def modes(folder: Path) -> dict[bool, set[int]]:
 
 @pytest.mark.parametrize("who", ["whoever", "nobody"])
 @pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
-def test_recordings_are_closed_to_others(tmp_path: Path, who: str, mask: int) -> None:
+def test_recordings_are_private(tmp_path: Path, who: str, mask: int) -> None:
     with folder_of(who, tmp_path) as around, umask(mask):
         store = written_folder(
             RecordingFolder(around / "site" / "kept", AMPLE), [gop_record(gop, {1: A}) for gop in range(7)]
@@ -74,9 +74,7 @@ def test_recordings_are_closed_to_others(tmp_path: Path, who: str, mask: int) ->
 
 @pytest.mark.parametrize("who", ["whoever", "nobody"])
 @pytest.mark.parametrize("mask", [0o000, 0o022])
-def test_what_a_live_service_writes_down_of_people_is_closed_to_others(
-    tmp_path: Path, who: str, mask: int
-) -> None:
+def test_decision_files_of_a_live_service_are_private(tmp_path: Path, who: str, mask: int) -> None:
     with folder_of(who, tmp_path) as around, umask(mask):
         recorder = LiveDecisionWriter(around / "out" / "today", CAMERAS, FITS)
         recorder.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
@@ -84,13 +82,13 @@ def test_what_a_live_service_writes_down_of_people_is_closed_to_others(
         assert modes(around) == {True: {0o700}, False: {0o600}}
 
 
-def test_what_somebody_renders_is_theirs_to_share(tmp_path: Path) -> None:
+def test_renderings_follow_the_umask(tmp_path: Path) -> None:
     with umask(0o022):
         DecisionWriter(tmp_path / "out", CAMERAS, FITS).close()
     assert modes(tmp_path) == {True: {0o755}, False: {0o644}}
 
 
-def test_a_folder_that_was_there_is_left_as_it_is_and_told_of(
+def test_an_existing_folder_is_unchanged_and_reported(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = tmp_path / "kept"
@@ -112,7 +110,7 @@ def test_a_folder_that_was_there_is_left_as_it_is_and_told_of(
     assert (found.level, found.text) == (Level.OK, f"{folder} can be written")
 
 
-def test_runs_that_an_earlier_version_left_open_are_closed_and_nobody_elses(tmp_path: Path) -> None:
+def test_own_runs_of_earlier_versions_become_private(tmp_path: Path) -> None:
     written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(0, {1: A})]).close()
     (run,) = (it for it in tmp_path.iterdir() if it.is_dir())
     run.chmod(0o755)
@@ -127,7 +125,7 @@ def test_runs_that_an_earlier_version_left_open_are_closed_and_nobody_elses(tmp_
     assert stat.S_IMODE(other.stat().st_mode) == 0o755
 
 
-def test_a_private_folder_is_made_with_those_above_it_or_is_there(tmp_path: Path) -> None:
+def test_a_private_folder_is_created_with_its_parents(tmp_path: Path) -> None:
     make_private_folder(tmp_path / "a" / "b" / "c")
     make_private_folder(tmp_path / "a" / "b" / "c")
     (tmp_path / "a" / "file").write_text("")

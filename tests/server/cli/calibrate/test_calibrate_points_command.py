@@ -34,7 +34,7 @@ def write_json(path: Path, cameras: dict[str, list[dict[str, list[float]]]]) -> 
     return path
 
 
-def test_json_becomes_a_ground_file_that_a_configuration_takes(run: Run, tmp_path: Path) -> None:
+def test_json_points_become_a_ground_file_that_a_configuration_loads(run: Run, tmp_path: Path) -> None:
     points = write_json(tmp_path / "points.json", {"c0": pairs(), "c1": pairs()[:4]})
     code, out, err = run(points, "--out", "ground.json")
     assert (code, err) == (0, "")
@@ -48,7 +48,7 @@ def test_json_becomes_a_ground_file_that_a_configuration_takes(run: Run, tmp_pat
         assert np.allclose(to_ground(np.array(camera.ground), image), FLOOR, atol=1e-3)
 
 
-def test_csv_and_json_say_the_same(run: Run, tmp_path: Path) -> None:
+def test_csv_and_json_points_give_the_same_result(run: Run, tmp_path: Path) -> None:
     write_json(tmp_path / "a.json", {"c0": pairs()})
     lines = [",".join(map(repr, ["c0", *pair["image"], *pair["floor"]])).replace("'", "") for pair in pairs()]
     (tmp_path / "b.csv").write_text("\n".join(["camera,image_x,image_y,floor_x,floor_y", *lines]) + "\n")
@@ -73,7 +73,7 @@ def test_csv_and_json_say_the_same(run: Run, tmp_path: Path) -> None:
         ("p.csv", "camera,image_x,image_y,floor_x,floor_y\nc0,1,2,3,4\n", "camera c0: 1 pair; at least 4"),
     ],
 )
-def test_what_is_no_file_of_points_is_refused_in_a_line(
+def test_an_invalid_points_file_is_refused_with_one_line(
     run: Run, tmp_path: Path, name: str, text: str, words: str
 ) -> None:
     (tmp_path / name).write_text(text)
@@ -83,7 +83,7 @@ def test_what_is_no_file_of_points_is_refused_in_a_line(
     assert sorted(path.name for path in tmp_path.iterdir()) == [name]
 
 
-def test_a_wrong_pair_is_named_and_nothing_is_written(run: Run, tmp_path: Path) -> None:
+def test_an_inconsistent_pair_is_named_and_nothing_is_written(run: Run, tmp_path: Path) -> None:
     wrong = pairs()
     wrong[4]["image"][0] += 120.0
     write_json(tmp_path / "points.json", {"c0": wrong})

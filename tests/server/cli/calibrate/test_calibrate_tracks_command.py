@@ -72,7 +72,7 @@ def test_tracks_become_a_ground_file_and_an_offset_to_copy(run: Run, tmp_path: P
     assert content["left_out"] == {}
 
 
-def test_who_stands_in_one_place_is_told_to_walk_and_nothing_is_written(run: Run, tmp_path: Path) -> None:
+def test_a_walk_in_one_place_is_refused_and_nothing_is_written(run: Run, tmp_path: Path) -> None:
     write_walk(tmp_path / "tracks", 100, lambda frames: np.zeros((len(frames), 2)))
     code, out, err = run("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
@@ -80,7 +80,7 @@ def test_who_stands_in_one_place_is_told_to_walk_and_nothing_is_written(run: Run
     assert [it.name for it in tmp_path.iterdir()] == ["tracks"]
 
 
-def test_a_walk_in_the_middle_alone_is_written_only_if_forced(run: Run, tmp_path: Path) -> None:
+def test_a_walk_only_in_the_middle_is_written_only_with_force(run: Run, tmp_path: Path) -> None:
     def near_the_middle(frames: np.ndarray) -> np.ndarray:
         return np.column_stack([0.7 * np.sin(frames / 23.0), 0.7 * np.sin(frames / 15.0 + 1)])
 
@@ -110,7 +110,7 @@ def test_a_walk_in_the_middle_alone_is_written_only_if_forced(run: Run, tmp_path
         (("a.txt", "b.txt", "--plan", "ground.json"), "the floor plan would be written there too"),
     ],
 )
-def test_what_cannot_be_a_walk_is_refused_in_a_line(
+def test_invalid_walks_are_refused_with_one_line(
     run: Run, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     for name, text in (
@@ -128,7 +128,7 @@ def test_what_cannot_be_a_walk_is_refused_in_a_line(
     assert not (tmp_path / "ground.json").exists()
 
 
-def test_videos_are_tracked_first_and_must_have_one_rate(run: Run, tmp_path: Path) -> None:
+def test_videos_are_tracked_first_and_must_have_equal_rates(run: Run, tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 20)
     write_video(tmp_path / "c1.mp4", 20, fps=30)
     line = refusal(run("c0.mp4", "c1.mp4", "--out", "ground.json"))

@@ -51,7 +51,7 @@ def only(findings: list[Finding], check: str) -> Said:
     return said
 
 
-def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview: Run, tmp_path: Path) -> None:
+def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: Run, tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 12)
     path = site(tmp_path, record={"folder": "kept"})
     before = sorted(tmp_path.iterdir())
@@ -67,7 +67,7 @@ def test_a_site_that_is_well_is_said_to_be_so_and_nothing_is_left_behind(myview:
     assert sorted(tmp_path.iterdir()) == before
 
 
-async def test_a_scene_that_there_is_not_is_its_cameras_fault_alone(tmp_path: Path) -> None:
+async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -> None:
     there = config(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
     found = [it async for it in run_checks(there, 1.0)]
     assert only(found, "camera c0").level is Level.BAD
@@ -75,7 +75,7 @@ async def test_a_scene_that_there_is_not_is_its_cameras_fault_alone(tmp_path: Pa
     assert {it.check for it in found if it.level is Level.BAD} == {"camera c0"}
 
 
-def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: Run, tmp_path: Path) -> None:
+def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(myview: Run, tmp_path: Path) -> None:
     ended = myview("doctor", site(tmp_path))
     assert (ended.code, ended.err) == (1, "")
     (line,) = [it for it in ended.out.splitlines() if "camera c0" in it]
@@ -85,7 +85,7 @@ def test_a_missing_camera_is_one_line_with_what_to_do_and_an_exit_code(myview: R
     assert ended.out.splitlines()[-1].endswith("1 bad")
 
 
-def test_a_wrong_configuration_is_all_that_is_said(myview: Run, tmp_path: Path) -> None:
+def test_an_invalid_configuration_is_the_only_finding(myview: Run, tmp_path: Path) -> None:
     ended = myview("doctor", site(tmp_path, htp={"port": 1}), "--json")
     said = json.loads(ended.out)
     assert (ended.code, said["ok"]) == (1, False)
@@ -101,20 +101,20 @@ def taken() -> Iterator[int]:
         yield int(server.getsockname()[1])
 
 
-async def test_a_port_that_something_else_has_is_bad(tmp_path: Path, taken: int) -> None:
+async def test_a_port_used_by_another_program_is_bad(tmp_path: Path, taken: int) -> None:
     found, runs = await port_findings(config(tmp_path, sync={"port": taken}))
     assert not runs
     assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is used by another program")
     assert {only(found, it).level for it in ("http.port", "zenoh.listen")} == {Level.OK}
 
 
-async def test_an_address_of_another_machine_cannot_be_listened_on(tmp_path: Path) -> None:
+async def test_an_address_of_another_machine_is_bad(tmp_path: Path) -> None:
     found, _ = await port_findings(config(tmp_path, sync={"bind": "192.0.2.7", "port": 7}))
     assert only(found, "sync.port").level is Level.BAD
     assert "192.0.2.7:7" in only(found, "sync.port").text
 
 
-async def test_ports_of_the_very_site_are_no_reason_to_worry(hall: Hall, tmp_path: Path, taken: int) -> None:
+async def test_ports_used_by_this_site_are_ok(hall: Hall, tmp_path: Path, taken: int) -> None:
     cameras = [{"id": it, "source": "scene:room"} for it in hall.service.config.camera_ids]
     changes: Any = {
         "http": {"port": hall.port},
@@ -130,7 +130,7 @@ async def test_ports_of_the_very_site_are_no_reason_to_worry(hall: Hall, tmp_pat
     assert only(found, "zenoh.listen").level is Level.BAD
 
 
-async def test_the_pulse_servers_clock_is_compared_where_it_runs(tmp_path: Path) -> None:
+async def test_the_clock_of_a_running_pulse_server_is_compared(tmp_path: Path) -> None:
     there = config(tmp_path)
     assert "is not running" in only(await clock_findings(there), "pulse server").text
     async with PulseServer(FPS, port=there.sync.port):
@@ -139,7 +139,7 @@ async def test_the_pulse_servers_clock_is_compared_where_it_runs(tmp_path: Path)
     assert "ms off this machine's" in found.text
 
 
-async def test_a_closed_pulse_server_is_this_site_s_where_it_knows_one_of_its_passwords(
+async def test_a_pulse_server_that_accepts_a_password_of_this_site_is_its_own(
     tmp_path: Path,
 ) -> None:
     users = {"c0": "0" * 32, "bestview": "1" * 32}
@@ -160,7 +160,9 @@ async def test_a_closed_pulse_server_is_this_site_s_where_it_knows_one_of_its_pa
         assert server.clients()[0].name == "bestview", "who asks takes nobody's place"
 
 
-async def test_what_is_no_pulse_server_is_left_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_server_of_another_protocol_is_not_a_pulse_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(machine, "_ANSWER_S", PATIENCE)
     there, left = config(tmp_path), asyncio.Event()
 
@@ -194,7 +196,7 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
     assert all(it.level is Level.WARNING for it in doubts)
 
 
-def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path, taken: int) -> None:
+def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Path, taken: int) -> None:
     write_video(tmp_path / "c0.mp4", 12)
     silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{taken}/live"}
     both = config(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
@@ -221,7 +223,9 @@ def test_cameras_are_tried_at_once_and_a_dead_one_holds_nobody_up(tmp_path: Path
         (CameraProbe(size=(320, 180)), "are smaller than the site's"),
     ],
 )
-def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: CameraProbe, words: str) -> None:
+def test_a_camera_that_does_not_fit_the_site_is_a_warning(
+    tmp_path: Path, found: CameraProbe, words: str
+) -> None:
     small = config(tmp_path, site={"width": 640, "height": 360})
     assert len(of(camera_findings(small, {"c0": CameraProbe(size=(640, 360))}, runs=False), "camera c0")) == 1
     fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
@@ -229,7 +233,7 @@ def test_a_camera_that_does_not_fit_is_doubted(tmp_path: Path, found: CameraProb
     assert words in doubt.text
 
 
-def test_a_password_from_a_file_is_used_and_others_should_not_read_it(tmp_path: Path, taken: int) -> None:
+def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, taken: int) -> None:
     cameras = [
         {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{taken}/live", "password": "secret"}
     ]
@@ -252,7 +256,7 @@ def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
         assert words in found.text
 
 
-def test_a_sounds_password_is_not_shown(tmp_path: Path) -> None:
+def test_the_password_of_a_sound_source_is_not_shown(tmp_path: Path) -> None:
     there = config(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
     said = only(sound_findings(there), "sound").text
     assert "127.0.0.1" in said
@@ -266,7 +270,7 @@ def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
     assert "rtsp://...: cannot open" in shown
 
 
-def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None:
+def test_the_size_of_the_recording_is_compared_with_the_disk(tmp_path: Path) -> None:
     record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "max_mb": 1e6}
     probes = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1000.0)}
     small = config(tmp_path, record=record)
@@ -284,7 +288,7 @@ def test_what_a_recording_takes_is_held_against_the_disk(tmp_path: Path) -> None
     assert "about 6 minutes are kept" in only(less, "record.max_mb").text
 
 
-def test_what_a_running_site_removes_meanwhile_is_not_counted(
+def test_files_removed_by_a_running_site_are_not_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "kept").mkdir()
@@ -310,7 +314,7 @@ def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
     )
 
 
-def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None:
+def test_files_that_others_can_read_or_write_are_reported(tmp_path: Path) -> None:
     tokens, users = tmp_path / "tokens.yaml", tmp_path / "users"
     tokens.write_text("tokens: []\n")
     users.write_text("bestview:secret word\n")
@@ -334,28 +338,26 @@ def test_files_that_others_can_read_or_write_are_told_of(tmp_path: Path) -> None
     assert of(file_findings(config(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
 
 
-def test_a_site_that_is_open_by_accident_is_bad(tmp_path: Path) -> None:
+def test_a_site_exposed_by_accident_is_bad(tmp_path: Path) -> None:
     found = only(file_findings(config(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
     assert found.level is Level.BAD
     assert "http.host" in found.text
 
 
-def test_a_camera_without_a_place_among_those_that_have_one_is_told_of(tmp_path: Path) -> None:
+def test_a_camera_without_a_homography_among_calibrated_ones_is_a_warning(tmp_path: Path) -> None:
     ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
     said = only(file_findings(config(tmp_path, cameras=cameras)), "ground")
     assert said == (Level.WARNING, "c1: no homography: people are matched by appearance alone there")
 
 
-def test_the_processors_are_those_that_this_process_may_use(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_available_processors_are_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "available_processors", lambda: 0.5)
     said = only(machine_findings(config(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
     assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 
 
-def test_a_machine_that_is_too_small_is_told_of(tmp_path: Path) -> None:
+def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
     small = config(tmp_path)
     fine, busy = ({"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
     assert only(machine_findings(small, fine), "processor").level is Level.OK
@@ -385,7 +387,7 @@ def expired(folder: Path) -> tuple[Path, Path]:
 
 
 @needs_openssl
-def test_a_certificate_is_good_for_as_long_as_it_says(tmp_path: Path) -> None:
+def test_a_certificate_is_ok_until_shortly_before_it_expires(tmp_path: Path) -> None:
     def made(name: str, *until: str) -> tuple[Path, Path]:
         certificate, key = tmp_path / f"{name}.pem", tmp_path / f"{name}.key"
         request = [

@@ -49,13 +49,13 @@ def of(findings: list[Finding], check: str) -> Finding:
     return found
 
 
-def test_the_only_camera_that_was_not_tried_leaves_the_size_unknown(tmp_path: Path) -> None:
+def test_without_any_probed_camera_the_size_is_unknown(tmp_path: Path) -> None:
     found = of(disk_findings(site(tmp_path), {"c0": AWAY}), "disk")
     assert found.level is Level.WARNING
     assert found.text.startswith("the size of 1.0 hours of c0 is not known; 1000 MB are free")
 
 
-def test_the_size_is_that_of_the_cameras_that_were_tried_and_says_so(tmp_path: Path) -> None:
+def test_the_size_is_that_of_probed_cameras_and_names_the_others(tmp_path: Path) -> None:
     both = site(tmp_path, ("c0", "c1"))
     found = of(disk_findings(both, {"c0": AWAY, "c1": GOOD}), "disk")
     one = (1000 + INDEX_KBPS) * HOUR_S / 8000
@@ -66,7 +66,7 @@ def test_the_size_is_that_of_the_cameras_that_were_tried_and_says_so(tmp_path: P
     assert (found.level, found.text.split(" take")[0]) == (Level.OK, "1.0 hours of these cameras")
 
 
-def test_what_is_known_not_to_fit_is_bad_whatever_else_comes(tmp_path: Path) -> None:
+def test_a_recording_that_surely_does_not_fit_is_bad(tmp_path: Path) -> None:
     large = CameraProbe(size=(64, 48), kbps=10_000.0)
     findings = disk_findings(site(tmp_path, ("c0", "c1")), {"c0": AWAY, "c1": large})
     assert of(findings, "disk").level is Level.BAD
@@ -75,7 +75,7 @@ def test_what_is_known_not_to_fit_is_bad_whatever_else_comes(tmp_path: Path) -> 
     assert "at most 6 minutes are kept" in of(findings, "record.max_mb").text
 
 
-def test_a_cap_of_the_encoder_is_what_a_camera_takes_that_was_not_tried(tmp_path: Path) -> None:
+def test_the_encoders_limit_is_assumed_for_cameras_that_were_not_probed(tmp_path: Path) -> None:
     capped = site(tmp_path, encode={"max_kbps": 500})
     found = of(disk_findings(capped, {"c0": AWAY}), "disk")
     assert found.level is Level.OK
@@ -83,7 +83,7 @@ def test_a_cap_of_the_encoder_is_what_a_camera_takes_that_was_not_tried(tmp_path
     assert "max_kbps" not in of(disk_findings(capped, {"c0": GOOD}), "disk").text
 
 
-def test_the_cap_is_not_that_of_a_camera_which_encodes_itself(tmp_path: Path) -> None:
+def test_the_encoders_limit_is_not_assumed_for_passthrough_cameras(tmp_path: Path) -> None:
     own = site(tmp_path, h264="auto", encode={"max_kbps": 500})
     passing = CameraProbe(size=(64, 48), kbps=4000.0, passes=True)
     assert needed_mb(own, {"c0": passing}) == pytest.approx((4000 + INDEX_KBPS) * HOUR_S / 8000)
@@ -91,7 +91,7 @@ def test_the_cap_is_not_that_of_a_camera_which_encodes_itself(tmp_path: Path) ->
     assert of(disk_findings(own, {"c0": AWAY}), "disk").level is Level.WARNING
 
 
-def test_a_name_that_no_folder_can_have_is_one_line(tmp_path: Path) -> None:
+def test_an_invalid_folder_name_is_reported_in_one_line(tmp_path: Path) -> None:
     (found,) = disk_findings(site(tmp_path, record={"folder": 300 * "a"}), {"c0": GOOD})
     assert (found.check, found.level) == ("record.folder", Level.BAD)
     assert found.text.endswith("cannot write there: File name too long")
@@ -113,7 +113,7 @@ for it in disk_findings(config, {}):
 """As somebody who is not root, who may enter every folder."""
 
 
-def test_a_folder_behind_one_that_is_closed_is_one_line_which_names_that(tmp_path: Path) -> None:
+def test_an_inaccessible_parent_folder_is_named_in_one_line(tmp_path: Path) -> None:
     with tempfile.TemporaryDirectory() as outside:  # tests' own folders are closed to others themselves
         Path(outside).chmod(0o755)
         closed = Path(outside) / "closed"

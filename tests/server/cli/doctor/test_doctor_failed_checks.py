@@ -46,7 +46,7 @@ BROKEN = [(Level.BAD, "/closed/door: Permission denied")]
         ("machine_findings", {"processor", "memory"}),
     ],
 )
-async def test_a_check_that_fails_loses_no_other_s_findings(
+async def test_a_failed_check_does_not_lose_others_findings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
 ) -> None:
     there = config(tmp_path)
@@ -58,7 +58,7 @@ async def test_a_check_that_fails_loses_no_other_s_findings(
     assert {it.check for it in found if it is not said} == before - lost
 
 
-async def test_nor_does_one_of_several_ports_or_files(
+async def test_a_failed_check_of_one_port_or_file_does_not_lose_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     there = config(tmp_path)
@@ -72,7 +72,7 @@ async def test_nor_does_one_of_several_ports_or_files(
     assert of(file_findings(there), "ground")[0][0] is Level.OK
 
 
-async def test_a_mistake_is_told_without_a_password(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*_: object) -> None:
         raise RuntimeError("cannot be: rtsp://me:hunter2@door/live")
 
@@ -83,7 +83,7 @@ async def test_a_mistake_is_told_without_a_password(tmp_path: Path, monkeypatch:
     assert of(found, "memory")
 
 
-async def test_findings_are_told_as_they_are_found(
+async def test_findings_are_printed_as_they_are_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     told = []
@@ -103,7 +103,7 @@ async def test_findings_are_told_as_they_are_found(
     assert after.splitlines()[-1].endswith(" bad")
 
 
-async def test_a_server_that_nobody_knows_is_bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_an_unresolvable_server_is_bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = {"connect": "tcp/bus:7447", "listen": "tcp/127.0.0.1:7447"}
     there = config(tmp_path, sync={"host": "pulses", "port": 7400}, zenoh=ends)
 
@@ -118,7 +118,7 @@ async def test_a_server_that_nobody_knows_is_bad(tmp_path: Path, monkeypatch: py
     assert of(found, "zenoh.connect")[0][0] is Level.BAD
 
 
-async def test_a_way_on_this_machine_leads_to_who_listens(tmp_path: Path) -> None:
+async def test_an_address_of_this_machine_must_lead_to_a_listener(tmp_path: Path) -> None:
     port, other = free(), free()
     fine = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
     assert {it.level for it in await reachability_findings(fine)} == {Level.OK}
@@ -132,14 +132,14 @@ async def test_a_way_on_this_machine_leads_to_who_listens(tmp_path: Path) -> Non
     assert of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD
 
 
-async def test_two_ports_that_are_one_are_bad(tmp_path: Path) -> None:
+async def test_two_services_on_one_port_are_bad(tmp_path: Path) -> None:
     port = free()
     found, _ = await port_findings(config(tmp_path, http={"port": port}, sync={"port": port}))
     assert of(found, "sync.port") == [(Level.BAD, f"127.0.0.1:{port} is also the address of http.port")]
     assert of(found, "zenoh.listen")[0][0] is Level.OK
 
 
-def test_a_device_is_one_camera_s(tmp_path: Path) -> None:
+def test_a_device_shared_by_two_cameras_is_bad(tmp_path: Path) -> None:
     sources = {"c0": "/dev/video9", "c1": "/dev/video9", "c2": "c.mp4", "c3": "c.mp4"}
     there = config(tmp_path, cameras=[{"id": it, "source": source} for it, source in sources.items()])
     found = camera_findings(there, {}, runs=False)
@@ -147,7 +147,7 @@ def test_a_device_is_one_camera_s(tmp_path: Path) -> None:
     assert [(it.check, it.level, it.text) for it in found] == [("camera c1", Level.BAD, text)]
 
 
-def test_a_wrong_configuration_is_named_with_what_to_do(myview: Run, tmp_path: Path) -> None:
+def test_an_invalid_configuration_is_reported_with_a_remedy(myview: Run, tmp_path: Path) -> None:
     path = site(tmp_path, ground="none.json")
     ended = myview("doctor", path)
     assert (ended.code, ended.err) == (1, "")
@@ -156,14 +156,14 @@ def test_a_wrong_configuration_is_named_with_what_to_do(myview: Run, tmp_path: P
     assert f"{why} → fix the configuration" in line
 
 
-def test_a_missing_file_of_tokens_is_said_once(tmp_path: Path) -> None:
+def test_a_missing_token_file_is_reported_once(tmp_path: Path) -> None:
     found = file_findings(config(tmp_path, access={"tokens": "none.yaml"}))
     (said,) = [it for it in found if it.level is Level.BAD]
     assert (said.check, said.remedy) == ("access.tokens", "`myview token NAME` prints a line for it")
 
 
 @needs_openssl
-def test_the_router_s_certificate_is_for_the_host_that_cameras_look_for(tmp_path: Path) -> None:
+def test_the_routers_certificate_must_be_for_the_host_of_zenoh_connect(tmp_path: Path) -> None:
     made = "-newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes"
     for line in (
         f"req -x509 {made} -days 100 -subj /CN=authority -out a.pem -keyout a.key",

@@ -84,25 +84,25 @@ def test_a_rendered_folder_against_packed_truth(run: Printed, tmp_path: Path) ->
     assert numbers["joint"]["idf1"] == 0.5
 
 
-def test_nobody_found_is_a_score_too(run: Printed, tmp_path: Path) -> None:
+def test_empty_tracks_are_scored(run: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", "")
     table = rows(run("--tracks", tracks, "--gt", write(tmp_path / "gt.txt", people((1,)))))
     assert table["c0"][4] == "0.0"
 
 
-def test_a_smaller_overlap_may_be_enough(run: Printed, tmp_path: Path) -> None:
+def test_the_iou_threshold_is_configurable(run: Printed, tmp_path: Path) -> None:
     truth = write(tmp_path / "gt.txt", people((1,)))
     moved = write(tmp_path / "c0.txt", people((1,)).replace(",1,0.00,0.00,", ",1,16.00,0.00,"))
     assert rows(run("--tracks", moved, "--gt", truth))["c0"][6] == "0.0"
     assert rows(run("--tracks", moved, "--gt", truth, "--iou", 0.4))["c0"][6] == "100.0"
 
 
-def test_what_is_not_there_is_named(refused: Printed, tmp_path: Path) -> None:
+def test_a_missing_file_is_named(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     assert refused("--tracks", tracks, "--gt", "nowhere.txt") == "myview: nowhere.txt: does not exist"
 
 
-def test_several_files_belong_together_by_their_names_in_whatever_order(run: Printed, tmp_path: Path) -> None:
+def test_files_are_paired_by_name_in_any_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / "seen" / f"c{it}.txt", people((it + 1,))) for it in range(3)]
     there = [write(tmp_path / "gt" / f"c{it}.txt.gz", people((it + 1,))) for it in (2, 0, 1)]
     once = rows(run(*each("--gt", there), *each("--tracks", found)))
@@ -111,14 +111,14 @@ def test_several_files_belong_together_by_their_names_in_whatever_order(run: Pri
     assert rows(run(*each("--gt", there), "--tracks", tmp_path / "seen")) == once
 
 
-def test_a_second_value_without_its_option_is_refused(myview: Run, tmp_path: Path) -> None:
+def test_a_second_value_without_a_repeated_option_is_refused(myview: Run, tmp_path: Path) -> None:
     a, b = (write(tmp_path / f"{name}.txt", people((1,))) for name in "ab")
     ended = myview("evaluate", "--gt", a, b, "--tracks", a, b)
     assert ended.code == 2
     assert "unexpected extra argument" in ended.err
 
 
-def test_files_of_other_names_belong_together_in_their_order(run: Printed, tmp_path: Path) -> None:
+def test_files_without_common_names_are_paired_by_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / f"{name}.txt", people((1,))) for name in ("left", "right")]
     there = [write(tmp_path / name / "gt.txt", people((1,))) for name in ("a", "b")]
     assert list(rows(run(*each("--gt", there), *each("--tracks", found)))) == [
@@ -158,13 +158,13 @@ def test_a_folder_without_tracks_is_refused(refused: Printed, tmp_path: Path) ->
     assert "no .txt or .txt.gz files" in refused("--tracks", tmp_path / "empty", "--gt", tmp_path / "empty")
 
 
-def test_frames_that_never_meet_are_refused(refused: Printed, tmp_path: Path) -> None:
+def test_files_without_a_common_frame_are_refused(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     truth = write(tmp_path / "gt.txt", people((1,), range(100, 121)))
     assert "frames 1 to 5 here, 100 to 120 there" in refused("--tracks", tracks, "--gt", truth)
 
 
-def test_truth_of_nobody_is_refused(refused: Printed, tmp_path: Path) -> None:
+def test_ground_truth_without_people_is_refused(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "c0.txt", people((1,)))
     truth = write(tmp_path / "gt.txt", people((1,)).replace(",1.00,-1,", ",0,-1,"))
     assert "no person in it counts" in refused("--tracks", tracks, "--gt", truth)
@@ -176,7 +176,7 @@ def test_a_malformed_row_is_named(refused: Printed, tmp_path: Path) -> None:
     assert f"{tracks}:6: " in refused("--tracks", tracks, "--gt", truth)
 
 
-def test_detections_are_not_tracks(refused: Printed, tmp_path: Path) -> None:
+def test_detections_are_refused_as_tracks(refused: Printed, tmp_path: Path) -> None:
     tracks = write(tmp_path / "det.txt", people((-1, -1)))
     truth = write(tmp_path / "gt.txt", people((1,)))
     assert "these are detections, not tracks" in refused("--tracks", tracks, "--gt", truth)

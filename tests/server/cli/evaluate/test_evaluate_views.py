@@ -65,7 +65,7 @@ def test_the_best_choices_agree_with_the_optimum(evaluate: Run, hall: Path) -> N
     assert table["2"][:4] == ["2", "2", "20", "100.0"]
 
 
-def test_worse_choices_cost_more_and_everything_is_in_the_file(evaluate: Run, hall: Path) -> None:
+def test_worse_choices_cost_more_and_the_json_file_has_all_scores(evaluate: Run, hall: Path) -> None:
     shown = [
         *choices({1: "c0"}),
         *choices({2: "c1"}, range(1, 11))[1:],
@@ -87,7 +87,7 @@ def test_worse_choices_cost_more_and_everything_is_in_the_file(evaluate: Run, ha
     assert (content["fps"], content["switch_cost_s"]) == (10.0, 0.2)
 
 
-def test_objects_are_told_apart_by_their_tracks(evaluate: Run, hall: Path) -> None:
+def test_objects_are_matched_to_people_by_their_tracks(evaluate: Run, hall: Path) -> None:
     write(hall / "seen" / "tracks" / "c0.txt", boxes({7: BIG, 4: SMALL}, range(1, 16)))
     write(hall / "seen" / "tracks" / "c1.txt", boxes({7: SMALL, 4: BIG}, range(1, 16)))
     path = write(hall / "seen" / "choices.csv", choices({7: "c0", 4: "c1", 9: "c1"}, range(1, 16)))
@@ -101,7 +101,7 @@ def test_objects_are_told_apart_by_their_tracks(evaluate: Run, hall: Path) -> No
     assert "none of its objects" in evaluate("--gt", hall, "--views", path, *SIZE)[2]
 
 
-def test_an_object_that_changes_people_stands_for_one_of_them(evaluate: Run, hall: Path) -> None:
+def test_an_object_that_switches_people_matches_one_of_them(evaluate: Run, hall: Path) -> None:
     halves = [*boxes({5: BIG}, range(1, 13)), *boxes({5: SMALL}, range(13, 21))]
     write(hall / "tracks" / "c0.txt", halves)
     write(hall / "tracks" / "c1.txt", [])
@@ -114,7 +114,7 @@ def test_an_object_that_changes_people_stands_for_one_of_them(evaluate: Run, hal
     assert table["2"][6] == "0.0"
 
 
-def test_who_is_hidden_is_not_visible_unless_told_otherwise(evaluate: Run, tmp_path: Path) -> None:
+def test_a_hidden_person_is_not_visible_by_default(evaluate: Run, tmp_path: Path) -> None:
     write(tmp_path / "gt" / "c0.txt", boxes({1: BIG}, end="1,1,0.1"))
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
     path = write(tmp_path / "choices.csv", choices({1: "c0"}))
@@ -122,7 +122,7 @@ def test_who_is_hidden_is_not_visible_unless_told_otherwise(evaluate: Run, tmp_p
     assert [judged(it)["all"][4] for it in told] == ["0.0", "100.0"]
 
 
-def test_a_rendering_tells_rate_and_sizes_itself(evaluate: Run, hall: Path) -> None:
+def test_rate_and_sizes_are_read_from_a_rendering(evaluate: Run, hall: Path) -> None:
     path = write(hall / "choices.csv", choices({1: "c1", 2: "c1"}))
     assert "size of camera c0's picture is not known" in evaluate("--gt", hall, "--views", path)[2]
     site = {"fps": 10.0, "switch_cost_s": 0.3, "sizes": {"c0": [100, 100], "c1": [50, 50]}}
@@ -161,14 +161,14 @@ def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: Run, hal
         (["frame,object,camera", "1,1,c9"], "camera 'c9' is not among those that are scored (c0, c1)"),
     ],
 )
-def test_a_file_that_is_none_is_refused(evaluate: Run, hall: Path, lines: list[str], why: str) -> None:
+def test_an_invalid_choices_file_is_refused(evaluate: Run, hall: Path, lines: list[str], why: str) -> None:
     code, out, err = evaluate("--gt", hall, "--views", write(hall / "choices.csv", lines), *SIZE)
     assert (code, out) == (BAD_INPUT, "")
     assert why in err
     assert len(err.splitlines()) == 1
 
 
-def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> None:
+def test_invalid_options_are_refused(evaluate: Run, hall: Path) -> None:
     path = write(hall / "choices.csv", choices({1: "c0"}))
     for arguments, why in (
         ([], "give --tracks, --views, or both"),
@@ -197,20 +197,20 @@ def test_options_that_make_no_sense_are_refused(evaluate: Run, hall: Path) -> No
         ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),
     ],
 )
-def test_a_site_that_makes_no_sense_is_refused(evaluate: Run, hall: Path, text: str, why: str) -> None:
+def test_an_invalid_site_file_is_refused(evaluate: Run, hall: Path, text: str, why: str) -> None:
     path = write(hall / "choices.csv", choices({1: "c0"}))
     (hall / "site.json").write_text(text)
     assert why in refusal(evaluate("--gt", hall, "--views", path))
 
 
-def test_somebody_twice_in_a_frame_is_refused(evaluate: Run, hall: Path) -> None:
+def test_a_person_twice_in_a_frame_is_refused(evaluate: Run, hall: Path) -> None:
     write(hall / "gt" / "c1.txt", [*boxes({2: SMALL}), *boxes({2: BIG}, range(7, 9))])
     path = write(hall / "choices.csv", choices({1: "c0"}))
     line = refusal(evaluate("--gt", hall, "--views", path, *SIZE))
     assert line.endswith("--gt: camera c1: person 2 is twice in frame 7")
 
 
-def test_all_that_is_asked_for_is_written_or_nothing(evaluate: Run, hall: Path) -> None:
+def test_all_requested_files_are_written_or_none(evaluate: Run, hall: Path) -> None:
     path = write(hall / "choices.csv", choices({1: "c0"}))
     given = ("--gt", hall, "--views", path, *SIZE, "--plots", hall / "plots")
     assert "cannot write there" in refusal(evaluate(*given, "--json", path / "numbers.json"))

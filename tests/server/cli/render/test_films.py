@@ -38,7 +38,7 @@ SITE = SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS)
 Codec = Literal["h264", "vp8"]
 
 
-def test_the_files_are_these_bytes(tmp_path: Path) -> None:
+def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
     fits = {
         A: Letterbox((2 * WIDTH, 2 * HEIGHT), (WIDTH, HEIGHT)),
         B: Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)),
@@ -102,7 +102,7 @@ def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(
         np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), alone[seed][2 * GOP + number])
 
 
-def test_a_film_ends_with_the_last_gop_in_which_the_person_was_about(tmp_path: Path) -> None:
+def test_a_film_ends_with_the_last_gop_of_the_person(tmp_path: Path) -> None:
     it, _ = films(tmp_path / "best")
     story = [(0, False), (1, True), (2, False), (3, True), (4, True)]
     for gop, away in story:
@@ -113,9 +113,7 @@ def test_a_film_ends_with_the_last_gop_in_which_the_person_was_about(tmp_path: P
 
 
 @pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
-def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
-    tmp_path: Path, codec: Codec, container: str
-) -> None:
+def test_gaps_in_films_are_filled_as_in_live_streams(tmp_path: Path, codec: Codec, container: str) -> None:
     it, frame_buffers = films(tmp_path / "best", codec)
     for pulse in (3 * GOP + 2, *range(5 * GOP, 6 * GOP)):
         del frame_buffers[A]._pictures[pulse]
@@ -140,7 +138,7 @@ def test_what_cannot_be_shown_or_did_not_come_is_bridged_as_it_is_live(
 
 
 @pytest.mark.parametrize("codec", ["aac", "opus"])
-def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
+def test_a_film_has_the_sites_sound_in_sync(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
     recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
     config = small_config(sound={"source": str(recording), "codec": codec})
     stream_format, track = stream_format_for(config.encode.codec, config.site.size), Soundtrack(config)
@@ -148,7 +146,7 @@ def test_a_film_has_the_sites_sound_in_step(tmp_path: Path, codec: Literal["aac"
     for unit in flashing(recording):
         for frame_buffer in frame_buffers.values():
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
-    it = FilmWriter(tmp_path / "best", frame_buffers, stream_format, config.site, track.frame_buffer)
+    it = FilmWriter(tmp_path / "best", frame_buffers, stream_format, config.site, track.audio_buffer)
     begin = 3
     for gop in range(begin, SOUNDING // GOP):
         track.read(gop * GOP, (gop + 1) * GOP)

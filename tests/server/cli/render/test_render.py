@@ -41,7 +41,7 @@ def render(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=ROOT)
 
 
-def test_two_views_become_films_tracks_choices_and_plots_and_the_shorter_one_is_said_once(
+def test_two_views_become_films_tracks_choices_and_plots_with_one_warning_of_lengths(
     views: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
@@ -79,7 +79,7 @@ def test_two_views_become_films_tracks_choices_and_plots_and_the_shorter_one_is_
 
 
 @pytest.mark.slow
-def test_the_sound_of_the_configuration_is_under_every_film(views: Path, tmp_path: Path) -> None:
+def test_every_film_has_the_configured_sound(views: Path, tmp_path: Path) -> None:
     write_flashes(tmp_path / "beeps.wav", 80, codec="pcm_s16le", pictures=False)
     (tmp_path / "site.yaml").write_text("sound: {source: beeps.wav}", encoding="utf-8")
     out = tmp_path / "out"
@@ -94,7 +94,7 @@ def test_the_sound_of_the_configuration_is_under_every_film(views: Path, tmp_pat
         assert [25 * at for at in beeps(data)] == pytest.approx(expected, abs=1)
 
 
-def test_an_error_on_the_way_leaves_nothing(tmp_path: Path) -> None:
+def test_an_error_while_rendering_leaves_nothing(tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 25)
     damage(write_video(tmp_path / "c1.mp4", 5), [0, 1, 2, 3, 4])
     before = sorted(tmp_path.iterdir())
@@ -127,9 +127,7 @@ def begun(folder: Path) -> Iterator[subprocess.Popen[str]]:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-def test_a_rendering_that_is_broken_off_leaves_nothing(
-    tmp_path: Path, number: signal.Signals, code: int
-) -> None:
+def test_an_interrupted_rendering_leaves_nothing(tmp_path: Path, number: signal.Signals, code: int) -> None:
     with begun(tmp_path) as process:
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE)
@@ -138,7 +136,7 @@ def test_a_rendering_that_is_broken_off_leaves_nothing(
     assert not list(tmp_path.glob("*out*"))
 
 
-def test_a_view_is_named_after_its_file_as_far_as_a_camera_can_be() -> None:
+def test_a_view_is_named_after_its_file_with_valid_characters() -> None:
     names = ["c0.mp4", "my view (1).mp4", "ä.mp4", "-x.mp4", f"{'long' * 20}.mp4", "a/b/hall-2.avi"]
     assert [camera_name(Path(name)) for name in names] == [
         "c0",
@@ -150,21 +148,21 @@ def test_a_view_is_named_after_its_file_as_far_as_a_camera_can_be() -> None:
     ]
 
 
-def test_a_recording_is_played_once_whatever_the_configuration_says(tmp_path: Path) -> None:
+def test_a_recording_is_played_once_regardless_of_the_configuration(tmp_path: Path) -> None:
     path = write_video(tmp_path / "c0.mp4", 3)
     base = {"cameras": [{"id": "c0", "source": "elsewhere", "at_end": "loop", "offset": 7}]}
     [camera] = config_for_videos([path], base=base).cameras
     assert (camera.at_end, camera.offset, camera.source) == ("stop", 7, str(path))
 
 
-def test_rate_and_size_are_the_first_views_unless_the_configuration_says(tmp_path: Path) -> None:
+def test_rate_and_size_are_those_of_the_first_view_unless_configured(tmp_path: Path) -> None:
     path = write_video(tmp_path / "c0.mp4", 3)
     site = config_for_videos([path]).site
     assert (site.fps, site.width, site.height) == (25.0, 64, 48)
     assert config_for_videos([path], base={"site": {"fps": 10}}).site.fps == 10
 
 
-def test_a_port_that_is_free_is_given_even_if_the_wanted_one_is_not() -> None:
+def test_another_free_port_replaces_a_preferred_one_in_use() -> None:
     first = free_port()
     assert free_port(first) == first
     assert free_port(1) != 0

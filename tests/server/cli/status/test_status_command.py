@@ -42,7 +42,7 @@ def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> st
     return said.get()
 
 
-async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
+async def test_a_sites_status_is_shown(busy: Hall) -> None:
     solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
     busy.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False))
     busy.service.ingest.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
@@ -68,7 +68,7 @@ async def test_a_site_is_shown_as_it_is(busy: Hall) -> None:
     assert "not recording" in text
 
 
-async def test_a_site_that_is_not_ready_says_why_and_is_a_failure(
+async def test_a_site_that_is_not_ready_exits_with_1_and_the_reason(
     hall: Hall, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert not await status_once(url(hall), None, as_json=False)
@@ -83,7 +83,7 @@ async def test_a_site_that_is_not_ready_says_why_and_is_a_failure(
     assert [it["camera"] for it in told["cameras"]] == list(CAMERAS)
 
 
-async def test_who_sees_one_camera_alone_is_shown_it_alone_and_no_metrics(tmp_path: Path) -> None:
+async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Path) -> None:
     async with locked(tmp_path) as hall:
         see(hall)
         now = await client.status(url(hall), client.HttpSettings(token=token_of("door")))
@@ -97,7 +97,7 @@ async def test_who_sees_one_camera_alone_is_shown_it_alone_and_no_metrics(tmp_pa
             await status_once(url(hall), None, as_json=False)
 
 
-async def test_nothing_that_is_said_commands_the_terminal(busy: Hall) -> None:
+async def test_no_text_of_the_server_controls_the_terminal(busy: Hall) -> None:
     now = await client.status(url(busy))
     evil = "\x1b[2J\x1b]0;owned\x07\nnew [red]line"
     camera = msgspec.structs.replace(now.cameras[0], message=evil, state=evil, camera=evil)
@@ -114,7 +114,7 @@ async def test_nothing_that_is_said_commands_the_terminal(busy: Hall) -> None:
     assert all(it.isprintable() or it == "\n" for it in said)
 
 
-async def test_rates_are_between_two_looks_at_one_run(busy: Hall) -> None:
+async def test_rates_are_between_two_snapshots_of_one_run(busy: Hall) -> None:
     one = await client.status(url(busy))
     assert one.service is not None
     later = msgspec.structs.replace(
@@ -129,7 +129,7 @@ async def test_rates_are_between_two_looks_at_one_run(busy: Hall) -> None:
     assert Rates.between(one, restarted) == Rates()
 
 
-async def test_a_server_that_goes_and_comes_back_is_waited_for(
+async def test_an_unreachable_server_is_retried(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(command, "_EVERY_S", 0.01)
@@ -157,7 +157,7 @@ async def test_a_server_that_goes_and_comes_back_is_waited_for(
                 await live
 
 
-async def test_the_picture_says_that_the_server_is_away_and_that_it_was_restarted(
+async def test_the_display_shows_an_unreachable_and_a_restarted_server(
     busy: Hall, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now = await client.status(url(busy))
@@ -183,7 +183,7 @@ async def test_the_picture_says_that_the_server_is_away_and_that_it_was_restarte
     assert said.index("trying again") < said.index("the service was restarted")
 
 
-async def test_what_is_no_myview_or_not_there_is_one_line(hall: Hall) -> None:
+async def test_another_or_a_missing_server_is_reported_in_one_line(hall: Hall) -> None:
     with pytest.raises(UserError, match="is not an address"):
         await status_once("ftp://hall", None, as_json=False)
     with pytest.raises(UnavailableError, match="status: http"):
@@ -192,14 +192,14 @@ async def test_what_is_no_myview_or_not_there_is_one_line(hall: Hall) -> None:
         await status_once(f"{url(hall)}/api", None, as_json=False)
 
 
-def test_numbers_that_are_none_are_passed_over() -> None:
+def test_values_that_are_not_finite_are_ignored() -> None:
     found = Metrics("myview_pulse +Inf\nmyview_decided_pulse NaN\nmyview_recorded_bytes 7\n")
     assert found.get("myview_pulse") is None
     assert (service_of(found).decided_pulse, service_of(found).recorded_bytes) == (0, 7)
 
 
 @pytest.mark.parametrize("wrong", [{"fps": 0.0}, {"now": 1e300}])
-async def test_a_site_that_no_site_is_like_is_one_line(hall: Hall, wrong: dict[str, float]) -> None:
+async def test_an_invalid_site_is_reported_in_one_line(hall: Hall, wrong: dict[str, float]) -> None:
     async def site(_: web.Request) -> web.Response:
         here = await client.site(url(hall))
         return web.json_response({**msgspec.to_builtins(here), **wrong})

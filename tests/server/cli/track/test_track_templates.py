@@ -48,7 +48,7 @@ def follow(video: Path, text: str, **other: str) -> int:
     return track_templates(video, boxes_from([text]), out, None, other.get("solver"), lambda _done: None)
 
 
-def test_the_object_is_in_every_frame_where_it_is(video: Path) -> None:
+def test_the_object_is_tracked_in_every_frame(video: Path) -> None:
     assert follow(video, f"{FIRST[0]},{FIRST[1]},{SIDE},{SIDE}") == 1
     rows = read_rows(video.parent / "t.txt")
     assert [row.frame for row in rows] == list(range(1, FRAMES + 1))
@@ -58,7 +58,7 @@ def test_the_object_is_in_every_frame_where_it_is(video: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["1,2,3", "a,b,c,d", "-1,0,10,10", "0,0,0,10", ""])
-def test_what_is_no_box_is_refused(text: str) -> None:
+def test_an_invalid_box_is_refused(text: str) -> None:
     with pytest.raises(UserError, match="LEFT,TOP,WIDTH,HEIGHT"):
         boxes_from([text])
 
@@ -66,7 +66,7 @@ def test_what_is_no_box_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "said"), [("180,40,32,32", "is not inside the 192x128"), ("20,40,2,32", "4 pixels a side")]
 )
-def test_a_box_that_cannot_be_followed_is_refused_and_nothing_written(
+def test_a_box_that_cannot_be_tracked_is_refused_and_nothing_is_written(
     video: Path, text: str, said: str
 ) -> None:
     with pytest.raises(UserError, match=said):

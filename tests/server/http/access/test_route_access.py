@@ -130,7 +130,7 @@ async def status(hall: Hall, method: str, path: str, who: str) -> int:
         return answer.status
 
 
-async def test_every_route_lets_in_whom_it_should_and_nobody_else(site: Hall) -> None:
+async def test_every_route_admits_exactly_the_permitted_tokens(site: Hall) -> None:
     routes = all_routes(site)
     assert len(routes) > 60
     wrong = []
@@ -145,7 +145,7 @@ async def test_every_route_lets_in_whom_it_should_and_nobody_else(site: Hall) ->
     assert wrong == []
 
 
-async def test_what_is_limited_is_limited_to_one_person_or_one_camera(site: Hall) -> None:
+async def test_a_limited_token_sees_only_its_person_or_camera(site: Hall) -> None:
     for method, path in all_routes(site):
         if "{object}" in path:
             assert await status(site, method, filled(path, number=2), "family") == 403, path
@@ -153,12 +153,12 @@ async def test_what_is_limited_is_limited_to_one_person_or_one_camera(site: Hall
             assert await status(site, method, filled(path, camera=B), "door") == 403, path
 
 
-async def test_who_is_not_there_is_not_told_apart_from_who_may_not_be_seen(site: Hall) -> None:
+async def test_unknown_and_forbidden_people_get_the_same_answer(site: Hall) -> None:
     assert await status(site, "GET", "/objects/99/best.mp4", "family") == 403
     assert await status(site, "GET", "/cameras/none/live.mp4", "door") == 403
 
 
-async def test_a_view_that_is_held_shows_the_camera_and_so_is_not_for_who_may_see_one_person(
+async def test_a_token_for_one_person_cannot_fix_the_view_to_a_camera(
     site: Hall,
 ) -> None:
     assert await status(site, "GET", "/objects/1/best.mp4?camera=c0", "family") == 403
@@ -166,7 +166,7 @@ async def test_a_view_that_is_held_shows_the_camera_and_so_is_not_for_who_may_se
     assert await status(site, "GET", "/objects/1/best.mp4?prefer=c0", "family") == 200
 
 
-async def test_who_may_see_a_person_may_see_whom_they_turned_out_to_be(site: Hall) -> None:
+async def test_a_token_for_a_person_follows_a_merge_of_their_number(site: Hall) -> None:
     assert await status(site, "GET", "/objects/2/best.mp4", "family") == 403
     site.service.decider.people.merge(2, 1)
     site.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
@@ -174,7 +174,7 @@ async def test_who_may_see_a_person_may_see_whom_they_turned_out_to_be(site: Hal
     assert await status(site, "GET", "/objects/1/best.mp4", "family") == 200
 
 
-async def test_health_asks_nobody_who_they_are_and_has_nobody_wait(site: Hall) -> None:
+async def test_health_checks_need_no_token_and_are_not_rate_limited(site: Hall) -> None:
     wrong = {"Authorization": "Bearer nothing-that-was-given"}
     for _ in range(100):
         async with site.session.get("/api/site", headers=wrong) as answer:
@@ -185,7 +185,7 @@ async def test_health_asks_nobody_who_they_are_and_has_nobody_wait(site: Hall) -
         assert answer.status == 200
 
 
-async def test_a_route_that_nobody_has_decided_about_is_closed() -> None:
+async def test_a_route_without_an_access_rule_is_refused() -> None:
     async def handler(_: web.Request) -> web.Response:
         return web.Response()
 

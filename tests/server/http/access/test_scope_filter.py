@@ -55,13 +55,13 @@ def people_in(gop: dict[str, Any]) -> set[int]:
     return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | told
 
 
-async def test_one_person_alone_is_listed(site: Hall) -> None:
+async def test_only_the_scoped_person_is_listed(site: Hall) -> None:
     assert [it["object"] for it in (await get(site, "/api/objects", "desk"))["objects"]] == [1, 2]
     assert [it["object"] for it in (await get(site, "/api/objects", "family"))["objects"]] == [1]
     assert (await get(site, "/api/objects", "door"))["objects"] == []
 
 
-async def test_one_camera_alone_is_listed_and_what_is_wrong_with_others_is_not_told(site: Hall) -> None:
+async def test_only_the_scoped_camera_is_listed_without_others_errors(site: Hall) -> None:
     site.service.ingest.states[B].refused = "its parameters are not those of camera c0"
     everything = (await get(site, "/api/cameras", "desk"))["cameras"]
     assert [it["camera"] for it in everything] == [A, B]
@@ -74,7 +74,7 @@ async def test_one_camera_alone_is_listed_and_what_is_wrong_with_others_is_not_t
     assert (await get(site, "/api/site", "family"))["cameras"] == [A, B]
 
 
-async def test_events_are_of_one_person_alone_from_the_first_to_the_next(site: Hall) -> None:
+async def test_events_are_limited_to_the_scoped_person(site: Hall) -> None:
     async with (
         site.session.get("/api/events", headers=bearer("family")) as theirs,
         site.session.get("/api/events", headers=bearer("desk")) as all_of_it,
@@ -92,14 +92,14 @@ async def test_events_are_of_one_person_alone_from_the_first_to_the_next(site: H
         assert [it["choices"]["1"] for it in gops] == [it["choices"]["1"] for it in every]
 
 
-async def test_events_are_of_one_camera_alone(site: Hall) -> None:
+async def test_events_are_limited_to_the_scoped_camera(site: Hall) -> None:
     async with site.session.get("/api/events", headers=bearer("door")) as answer:
         gops = [content for name, content in await events(answer, 0) if name == "gop"]
     assert all(set(gop["boxes"]) == {A} for gop in gops)
     assert not any(gop["choices"] or gop["cuts"] for gop in gops)
 
 
-async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "server.service.operator_assist.flag_budget._COOLDOWN_S", -1.0
     )  # both have a flag, though they are of one
@@ -128,7 +128,7 @@ async def test_flags_are_of_who_may_be_seen_alone(site: Hall, monkeypatch: pytes
         assert names.index("flag") < names.index("gop"), "who comes is told what is open"
 
 
-async def test_the_past_is_of_one_person_alone(site: Hall) -> None:
+async def test_recorded_decisions_are_limited_to_the_scoped_person(site: Hall) -> None:
     everything = await get(site, "/api/past?from=p0", "desk")
     theirs = await get(site, "/api/past?from=p0", "family")
     assert {it for gop in everything for it in people_in({"merged": [], "split": [], **gop})} == {1, 2}
@@ -136,13 +136,13 @@ async def test_the_past_is_of_one_person_alone(site: Hall) -> None:
     assert [it["first"] for it in theirs] == [it["first"] for it in everything]
 
 
-async def test_whoever_is_gone_leaves_nothing_behind(site: Hall) -> None:
+async def test_the_last_subscriber_of_a_scope_leaves_no_state(site: Hall) -> None:
     for who in ("family", "door", "desk"):
         async with site.session.get("/api/events", headers=bearer(who)) as answer:
             await events(answer, 0)
 
 
-async def test_a_playlist_names_its_segments_with_the_token_it_was_asked_for_with(site: Hall) -> None:
+async def test_playlist_uris_have_the_token_of_the_request(site: Hall) -> None:
     for epoch in range(3, 12):
         site.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
     token = token_of("family")
@@ -161,7 +161,7 @@ async def test_a_playlist_names_its_segments_with_the_token_it_was_asked_for_wit
         assert "token=" not in await answer.text()
 
 
-async def test_no_token_is_ever_written_to_a_log(site: Hall, caplog: pytest.LogCaptureFixture) -> None:
+async def test_no_token_is_logged(site: Hall, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG)
     for token in (token_of("desk"), "a wrong one that is as long as a right one"):
         for path in ("/api/objects", "/objects/1/best.mp4", "/api/nothing", "/objects/99/best.mp4"):

@@ -37,9 +37,7 @@ HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "webm"])
-async def test_the_picture_stands_and_then_is_grey_and_comes_back_with_the_person(
-    tmp_path: Path, form: str
-) -> None:
+async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: Path, form: str) -> None:
     codec = "vp8" if form == "webm" else "h264"
     async with left(tmp_path, encode={"codec": codec}) as hall:
         told = go_on(hall, range(3))
@@ -60,7 +58,7 @@ async def test_the_picture_stands_and_then_is_grey_and_comes_back_with_the_perso
     assert grey[-1] < max(narrow), "who comes back is shown again"
 
 
-async def test_who_comes_while_the_person_is_away_begins_with_grey(tmp_path: Path) -> None:
+async def test_a_stream_opened_while_the_person_is_away_begins_with_gray(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
         told = go_on(hall, range(14))
         theirs = await begun(hall, "/objects/1/best.mp4", "family")
@@ -70,7 +68,7 @@ async def test_who_comes_while_the_person_is_away_begins_with_grey(tmp_path: Pat
     equal(shown, expected(told))
 
 
-async def test_a_camera_that_is_preferred_is_grey_without_the_person_too(tmp_path: Path) -> None:
+async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
         told = go_on(hall, range(3))
         theirs = await begun(hall, "/objects/1/best.mp4?prefer=c0", "family")
@@ -89,9 +87,7 @@ async def listed(hall: Hall, pattern: str, who: str) -> bytes:
 
 
 @pytest.mark.parametrize("pattern", [r"^[0-9]+\.m4s$", r'PART:.*URI="([0-9.]+\.m4s)"'])
-async def test_segments_and_their_parts_are_grey_too_and_everybody_elses_are_not(
-    tmp_path: Path, pattern: str
-) -> None:
+async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: Path, pattern: str) -> None:
     async with left(tmp_path, http=HLS) as hall:
         told = go_on(hall, range(EPOCHS - 5))
         narrow, full = [decoded(await listed(hall, pattern, who)) for who in ("family", "desk")]
@@ -104,7 +100,7 @@ async def test_segments_and_their_parts_are_grey_too_and_everybody_elses_are_not
     assert any(map(is_gray, narrow.values()))
 
 
-async def test_the_room_is_not_heard_without_the_person(tmp_path: Path) -> None:
+async def test_sound_is_silent_without_the_person(tmp_path: Path) -> None:
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
     async with left(tmp_path, sound={"source": str(recording)}) as hall:
         sends(hall.service, recording)
@@ -118,7 +114,7 @@ async def test_the_room_is_not_heard_without_the_person(tmp_path: Path) -> None:
 
 @needs_chromium
 @pytest.mark.parametrize("form", ["mp4", "webm"])
-async def test_a_browser_plays_on_through_what_stands_and_what_is_grey(tmp_path: Path, form: str) -> None:
+async def test_a_browser_plays_held_and_gray_pictures_without_a_break(tmp_path: Path, form: str) -> None:
     codec = "vp8" if form == "webm" else "h264"
     async with left(tmp_path, encode={"codec": codec}) as hall:
         go_on(hall, range(3))
@@ -133,7 +129,7 @@ async def test_a_browser_plays_on_through_what_stands_and_what_is_grey(tmp_path:
     assert told["range"][1] == pytest.approx((EPOCHS - 1) * GOP / FPS, abs=1e-3)
 
 
-async def test_grey_is_written_once_for_all_who_are_shown_it(tmp_path: Path) -> None:
+async def test_gray_pictures_are_encoded_once_for_all_viewers(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
         for epoch in range(2):
             hall.service.feed(epoch, {camera: {1: LARGE, 2: LARGE} for camera in CAMERAS})
@@ -145,7 +141,7 @@ async def test_grey_is_written_once_for_all_who_are_shown_it(tmp_path: Path) -> 
     assert pieces[0].random_access
 
 
-async def test_a_site_without_tokens_has_no_such_streams(tmp_path: Path) -> None:
+async def test_a_site_without_tokens_has_no_scoped_streams(tmp_path: Path) -> None:
     async with left(tmp_path, access={"tokens": None}) as hall:
         told = go_on(hall, range(14))
         assert told[-1].choices[1]

@@ -29,7 +29,7 @@ def picture_of(jpeg: bytes) -> Image:
 
 
 @pytest.mark.parametrize("query", ["", "?overlay=1"])
-async def test_pictures_are_grey_without_the_person(tmp_path: Path, query: str) -> None:
+async def test_scoped_pictures_are_gray_without_the_person(tmp_path: Path, query: str) -> None:
     async with left(tmp_path) as hall:
         go_on(hall, range(12))
         theirs = picture_of(await fetched(hall, f"/objects/1/best.jpg{query}", "family"))
@@ -45,7 +45,7 @@ async def test_pictures_are_grey_without_the_person(tmp_path: Path, query: str) 
     assert all(map(is_nearly_grey, several))
 
 
-async def test_a_film_with_boxes_is_grey_without_the_person(tmp_path: Path) -> None:
+async def test_a_scoped_stream_with_boxes_is_gray_without_the_person(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
         go_on(hall, range(12))
         async with await begun(hall, "/objects/1/best.mp4?overlay=1", "family") as film:
@@ -57,7 +57,7 @@ async def test_a_film_with_boxes_is_grey_without_the_person(tmp_path: Path) -> N
     assert all(map(is_nearly_grey, pictures))
 
 
-async def test_no_box_is_drawn_but_that_of_whom_a_token_may_see(tmp_path: Path) -> None:
+async def test_only_the_box_of_the_scoped_person_is_drawn(tmp_path: Path) -> None:
     path = write_tokens(tmp_path / "tokens.yaml", line_of("family"), line_of("desk"))
     async with aclosing(drawn_room(access={"tokens": str(path)})) as rooms:
         room = await anext(rooms)

@@ -59,7 +59,7 @@ async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts"])
-async def test_what_was_is_grey_without_the_person(kept: Kept, form: str) -> None:
+async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form: str) -> None:
     hall, told = kept
     path = f"/objects/1/best.{form}?from=p0&to=p{len(told) * GOP}"
     narrow, full = [decoded(await fetched(hall, path, who)) for who in ("family", "desk")]
@@ -70,7 +70,7 @@ async def test_what_was_is_grey_without_the_person(kept: Kept, form: str) -> Non
     assert sum(map(is_gray, narrow.values())) > 8 * GOP
 
 
-async def test_what_begins_in_the_past_goes_on_with_what_is_shown_now(tmp_path: Path) -> None:
+async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
         told = go_on(hall, range(12))
         theirs = await begun(hall, "/objects/1/best.mp4?from=p25", "family")
@@ -84,7 +84,7 @@ async def test_what_begins_in_the_past_goes_on_with_what_is_shown_now(tmp_path: 
     equal(shown, right)
 
 
-async def test_segments_of_the_past_are_grey_without_the_person(
+async def test_recorded_segments_are_gray_without_the_person(
     kept: Kept,
 ) -> None:
     hall, told = kept
@@ -106,7 +106,7 @@ async def test_segments_of_the_past_are_grey_without_the_person(
 
 
 @pytest.mark.parametrize("hls", [False, True])
-async def test_the_room_of_the_past_is_not_heard_without_the_person(tmp_path: Path, *, hls: bool) -> None:
+async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hls: bool) -> None:
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
     async with left(tmp_path, sound={"source": str(recording)}, record=record, http=HLS) as hall:

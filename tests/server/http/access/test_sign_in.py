@@ -59,7 +59,7 @@ async def asked(
         return answer.status, (await answer.json()).get("error", "")
 
 
-async def test_without_tokens_anybody_may_watch_and_this_machine_may_operate(hall: Hall) -> None:
+async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_operate(hall: Hall) -> None:
     session = await hall.get_json(SESSION)
     assert session == {"by_token": False, "name": None, "role": "operate", "object": None, "camera": None}
     assert await asked(hall, CAMERAS, Host=f"localhost:{hall.port}") == (200, "")
@@ -80,7 +80,7 @@ async def test_without_tokens_anybody_may_watch_and_this_machine_may_operate(hal
         ("Referer", "https://cameras.example/operator"),
     ],
 )
-async def test_without_tokens_nobody_else_may_operate_and_one_line_says_what_to_set(
+async def test_without_tokens_other_machines_cannot_operate_and_get_instructions(
     hall: Hall, head: str, value: str
 ) -> None:
     status, error = await asked(hall, CAMERAS, **{head.replace("-", "_"): value})
@@ -89,7 +89,7 @@ async def test_without_tokens_nobody_else_may_operate_and_one_line_says_what_to_
     assert "\n" not in error
 
 
-def test_what_browsers_and_programs_send_by_themselves_is_no_proxy() -> None:
+def test_usual_headers_of_browsers_and_programs_are_not_proxy_headers() -> None:
     heads = {
         "Host": "localhost",
         "User-Agent": "Mozilla/5.0",
@@ -129,14 +129,16 @@ def test_what_browsers_and_programs_send_by_themselves_is_no_proxy() -> None:
         ("localhost", False),
     ],
 )
-def test_which_addresses_are_this_machine(address: str, here: bool) -> None:
+def test_loopback_addresses_are_this_machine(address: str, here: bool) -> None:
     request = make_mocked_request("GET", CAMERAS, headers={"Host": "localhost"})
     assert is_local_request(request.clone(remote=address)) == here
 
 
 @pytest.mark.parametrize("path", [SESSION, "/api/operator/view_selection"])
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
-async def test_no_page_of_another_site_learns_or_changes_anything(hall: Hall, site: str, path: str) -> None:
+async def test_pages_of_other_sites_can_neither_read_nor_change_anything(
+    hall: Hall, site: str, path: str
+) -> None:
     assert (await asked(hall, path, Sec_Fetch_Site=site))[0] == 403
     assert (await asked(hall, path, method="DELETE", Sec_Fetch_Site=site))[0] == 403
     for method in ("PUT", "POST", "DELETE"):
@@ -147,7 +149,7 @@ async def test_no_page_of_another_site_learns_or_changes_anything(hall: Hall, si
     assert (await asked(hall, path, method="OPTIONS", **asks))[0] == 403
 
 
-async def test_a_token_is_needed_where_there_are_some_and_nobody_is_told_of_them(site: Hall) -> None:
+async def test_with_tokens_requests_need_one_and_answers_reveal_none(site: Hall) -> None:
     for path in (SESSION, CAMERAS, "/api/objects"):
         async with site.session.get(path) as answer:
             assert answer.status == 401
@@ -163,7 +165,7 @@ async def test_a_token_is_needed_where_there_are_some_and_nobody_is_told_of_them
     assert not any(line_of(name)["sha256"] in told for name in ("lead", "desk"))
 
 
-async def test_a_token_is_told_what_it_is_for(site: Hall) -> None:
+async def test_a_session_describes_the_permissions_of_its_token(site: Hall) -> None:
     async with site.session.get(SESSION, headers=bearer("family")) as answer:
         assert await answer.json() == {
             "by_token": True,
@@ -176,7 +178,7 @@ async def test_a_token_is_told_what_it_is_for(site: Hall) -> None:
     assert (status, error) == (403, "the token 'desk' is only for watching")
 
 
-async def test_players_name_the_token_in_the_address(site: Hall) -> None:
+async def test_players_send_the_token_in_the_query(site: Hall) -> None:
     async with site.session.get("/api/objects", params={"token": token_of("desk")}) as answer:
         assert answer.status == 200
     async with site.session.get("/api/objects", params={"token": "wrong"}) as answer:
@@ -192,7 +194,7 @@ async def sign_in(hall: Hall, name: str) -> str:
     return f"{cookie.key}={cookie.value}"
 
 
-async def test_who_signs_in_has_a_cookie_that_no_script_reads_and_signs_out(site: Hall) -> None:
+async def test_signing_in_sets_an_http_only_cookie_until_signing_out(site: Hall) -> None:
     async with site.session.post(SESSION, headers=MINE, json={"token": token_of("lead")}) as answer:
         assert answer.status == 200
         [cookie] = answer.cookies.values()
@@ -207,20 +209,20 @@ async def test_who_signs_in_has_a_cookie_that_no_script_reads_and_signs_out(site
     assert (await asked(site, CAMERAS, Cookie=kept))[0] == 401  # not only forgotten by the browser
 
 
-async def test_behind_a_proxy_that_encrypts_the_cookie_is_never_sent_in_the_open(site: Hall) -> None:
+async def test_behind_an_https_proxy_the_cookie_is_secure(site: Hall) -> None:
     heads = {**MINE, "X-Forwarded-Proto": "https"}
     async with site.session.post(SESSION, headers=heads, json={"token": token_of("desk")}) as answer:
         [cookie] = answer.cookies.values()
     assert cookie["secure"]
 
 
-async def test_a_token_that_is_named_goes_before_the_sign_in(site: Hall) -> None:
+async def test_a_token_takes_precedence_over_a_session(site: Hall) -> None:
     kept = await sign_in(site, "desk")
     assert (await asked(site, CAMERAS, Cookie=kept))[0] == 403
     assert (await asked(site, CAMERAS, Cookie=kept, **bearer("lead")))[0] == 200
 
 
-async def test_who_signs_in_to_another_service_of_the_machine_stays_signed_in_here(
+async def test_signing_in_to_another_service_of_the_machine_keeps_this_session(
     site: Hall, tmp_path: Path
 ) -> None:
     url = f"http://127.0.0.1:{site.port}{SESSION}"
@@ -239,7 +241,7 @@ async def test_who_signs_in_to_another_service_of_the_machine_stays_signed_in_he
     assert known
 
 
-def test_a_session_ends_and_so_does_the_oldest_of_very_many_of_one_token() -> None:
+def test_a_session_expires_and_a_token_has_a_limited_number_of_sessions() -> None:
     now = [0.0]
     sessions = Sessions(lambda: now[0])
     keys = [token_digest(sessions.open("a")) for _ in range(1024)]
@@ -256,7 +258,7 @@ def test_a_session_ends_and_so_does_the_oldest_of_very_many_of_one_token() -> No
 @pytest.mark.parametrize(
     "head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE_PREFIX}_hall_0=".encode() + b"\xff"]
 )
-async def test_bytes_that_are_no_text_are_no_token_and_no_sign_in(site: Hall, head: bytes) -> None:
+async def test_invalid_bytes_are_neither_a_token_nor_a_session(site: Hall, head: bytes) -> None:
     reader, writer = await asyncio.open_connection("127.0.0.1", site.port)
     writer.write(f"GET {SESSION} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode() + head)
     writer.write(b"\r\n\r\n")
@@ -265,7 +267,7 @@ async def test_bytes_that_are_no_text_are_no_token_and_no_sign_in(site: Hall, he
     await writer.wait_closed()
 
 
-async def test_wrong_tokens_are_limited_in_rate_and_a_right_one_waits_too_unless_it_was_here_before(
+async def test_wrong_tokens_are_rate_limited_but_known_valid_ones_are_not(
     site: Hall,
 ) -> None:
     assert (await asked(site, **bearer("desk")))[0] == 200
@@ -281,7 +283,7 @@ async def test_wrong_tokens_are_limited_in_rate_and_a_right_one_waits_too_unless
         assert "myview_wrong_tokens_total 5.0" in (await answer.text()).splitlines()
 
 
-def test_nobody_is_told_to_wait_for_no_time(tmp_path: Path) -> None:
+def test_retry_after_is_never_zero(tmp_path: Path) -> None:
     now = [0.0]
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
     authenticator = Authenticator(tokens, now=lambda: now[0])
@@ -296,12 +298,12 @@ def test_nobody_is_told_to_wait_for_no_time(tmp_path: Path) -> None:
     assert authenticator.check_token(request, token_of("desk")) == Credential(token_digest(token_of("desk")))
 
 
-async def test_a_cookie_that_has_run_out_is_no_wrong_token(site: Hall) -> None:
+async def test_an_expired_cookie_does_not_count_as_a_wrong_token(site: Hall) -> None:
     codes = [(await asked(site, Cookie=f"{COOKIE_PREFIX}_hall_0={it}"))[0] for it in range(9)]
     assert codes == 9 * [401]
 
 
-def test_failures_are_forgotten_one_by_one_and_each_address_has_its_own() -> None:
+def test_wrong_tokens_are_forgiven_one_by_one_for_each_address() -> None:
     now = [0.0]
     failures = WrongTokenRateLimit(lambda: now[0])
     for _ in range(6):
@@ -318,7 +320,7 @@ def test_failures_are_forgotten_one_by_one_and_each_address_has_its_own() -> Non
 
 
 @pytest.mark.parametrize("body", ["", "no JSON", "[]", '{"token": 7}', '{"token": "x", "more": 1}'])
-async def test_what_is_no_sign_in_is_said_in_one_line(site: Hall, body: str) -> None:
+async def test_an_invalid_sign_in_is_refused_with_one_line(site: Hall, body: str) -> None:
     async with site.session.post(SESSION, headers=MINE, data=body) as answer:
         assert answer.status == 400
         error = (await answer.json())["error"]
@@ -327,18 +329,18 @@ async def test_what_is_no_sign_in_is_said_in_one_line(site: Hall, body: str) -> 
 
 
 @pytest.mark.parametrize("packing", ["gzip", "deflate"])
-async def test_nothing_is_unpacked_for_who_has_not_shown_a_token(site: Hall, packing: str) -> None:
+async def test_request_bodies_are_not_decompressed(site: Hall, packing: str) -> None:
     heads = {**MINE, "Content-Encoding": packing}
     packed = compress(b'{"token": "x"}') if packing == "gzip" else b"nothing packed"
     async with site.session.post(SESSION, headers=heads, data=packed) as answer:
         assert answer.status == 400
 
 
-async def test_there_is_nothing_to_sign_in_to_without_tokens(hall: Hall) -> None:
+async def test_signing_in_without_tokens_is_refused(hall: Hall) -> None:
     assert (await asked(hall, method="POST", json={"token": "x"}, **{CSRF_HEADER: "1"}))[0] == 400
 
 
-async def test_the_page_itself_is_for_everybody_and_tells_nothing(site: Hall) -> None:
+async def test_the_page_is_public_and_reveals_nothing(site: Hall) -> None:
     for path in ("/", "/operator"):
         async with site.session.get(path, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
             assert answer.status == 200

@@ -50,7 +50,7 @@ async def watching(
         assert complaints == []
 
 
-async def test_who_signs_in_watches_until_they_sign_out(browser: Browser, tmp_path: Path) -> None:
+async def test_a_viewer_watches_from_signing_in_to_signing_out(browser: Browser, tmp_path: Path) -> None:
     async with watching(browser, tmp_path) as (_, page, _):
         field = page.get_by_label("Watching needs a token")
         await field.fill("wrong")
@@ -68,7 +68,7 @@ async def test_who_signs_in_watches_until_they_sign_out(browser: Browser, tmp_pa
         await expect(page.locator("#people li")).to_have_count(0)
 
 
-async def test_a_link_with_a_token_opens_on_one_person_and_tells_it_to_nobody(
+async def test_a_link_with_a_token_opens_a_person_and_drops_the_token_from_the_url(
     browser: Browser, tmp_path: Path
 ) -> None:
     token = token_of("family")
@@ -81,7 +81,9 @@ async def test_a_link_with_a_token_opens_on_one_person_and_tells_it_to_nobody(
         assert not any(token in it for it in asked)
 
 
-async def test_who_is_not_let_in_any_more_is_asked_for_a_token(browser: Browser, tmp_path: Path) -> None:
+async def test_a_viewer_whose_token_is_revoked_is_shown_the_sign_in_form(
+    browser: Browser, tmp_path: Path
+) -> None:
     async with watching(browser, tmp_path) as (_, page, _):
         field = page.get_by_label("Watching needs a token")
         await field.fill(token_of("desk"))
@@ -91,7 +93,7 @@ async def test_who_is_not_let_in_any_more_is_asked_for_a_token(browser: Browser,
         await expect(field).to_be_visible()
 
 
-async def test_axe_finds_no_fault_in_signing_in(browser: Browser, tmp_path: Path) -> None:
+async def test_axe_finds_no_violation_in_the_sign_in_form(browser: Browser, tmp_path: Path) -> None:
     if not AXE.exists():
         pytest.skip("axe-core is not there: make node_modules/.installed")
     async with watching(browser, tmp_path) as (_, page, _):

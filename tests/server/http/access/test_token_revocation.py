@@ -56,9 +56,7 @@ async def ended(answer: aiohttp.ClientResponse) -> None:
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/api/events"])
-async def test_streams_of_a_token_that_is_taken_away_end_and_others_go_on(
-    site: Hall, tmp_path: Path, path: str
-) -> None:
+async def test_revoking_a_token_ends_only_its_streams(site: Hall, tmp_path: Path, path: str) -> None:
     by_head = await stream(site, path, **bearer("desk"))
     by_address = await stream(site, f"{path}?token={token_of('desk')}")
     other = await stream(site, path, **bearer("lead"))
@@ -72,7 +70,9 @@ async def test_streams_of_a_token_that_is_taken_away_end_and_others_go_on(
     other.close()
 
 
-async def test_so_do_those_of_a_sign_in_by_it_and_of_who_signs_out(site: Hall, tmp_path: Path) -> None:
+async def test_streams_of_its_sessions_end_too_and_those_of_a_signed_out_session(
+    site: Hall, tmp_path: Path
+) -> None:
     kept = []
     for name in ("desk", "desk", "lead"):
         async with site.session.post(
@@ -92,7 +92,7 @@ async def test_so_do_those_of_a_sign_in_by_it_and_of_who_signs_out(site: Hall, t
 
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mp4", "/api/events"])
 @pytest.mark.parametrize("less", [{"camera": "c1"}, {"object": 9, "made": LATER}])
-async def test_what_a_token_may_no_longer_see_ends_too(
+async def test_streams_outside_a_narrowed_scope_end(
     site: Hall, tmp_path: Path, path: str, less: dict[str, object]
 ) -> None:
     answer = await stream(site, path, **bearer("desk"))
@@ -101,7 +101,7 @@ async def test_what_a_token_may_no_longer_see_ends_too(
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/objects/1/best.mjpeg"])
-async def test_a_persons_stream_ends_when_its_token_becomes_one_for_that_person_alone(
+async def test_a_persons_stream_ends_when_its_token_becomes_limited_to_that_person(
     site: Hall, tmp_path: Path, path: str
 ) -> None:
     """It would go on with the room when the person has left."""
@@ -110,7 +110,7 @@ async def test_a_persons_stream_ends_when_its_token_becomes_one_for_that_person_
     await ended(answer)
 
 
-async def test_what_it_may_see_as_before_goes_on(site: Hall, tmp_path: Path) -> None:
+async def test_streams_within_a_changed_scope_continue(site: Hall, tmp_path: Path) -> None:
     camera = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
     events = await stream(site, "/api/events", **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", camera="c0"))
@@ -120,7 +120,7 @@ async def test_what_it_may_see_as_before_goes_on(site: Hall, tmp_path: Path) -> 
     camera.close()
 
 
-async def test_a_disk_that_hangs_keeps_no_token_in_force(site: Hall, tmp_path: Path) -> None:
+async def test_a_blocked_disk_does_not_delay_revocation(site: Hall, tmp_path: Path) -> None:
     """All threads for recordings wait for it; the file of tokens is on another one."""
     answer = await stream(site, "/api/events", **bearer("desk"))
     hangs = threading.Event()
@@ -134,7 +134,7 @@ async def test_a_disk_that_hangs_keeps_no_token_in_force(site: Hall, tmp_path: P
         await asyncio.gather(*waiting)
 
 
-async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
+async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
     site: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looked, hangs = threading.Event(), threading.Event()
@@ -158,7 +158,7 @@ async def test_a_sign_in_ends_in_time_though_the_disk_with_the_tokens_hangs(
         hangs.set()
 
 
-async def test_a_new_token_lets_in_without_a_restart(site: Hall, tmp_path: Path) -> None:
+async def test_a_new_token_is_valid_without_a_restart(site: Hall, tmp_path: Path) -> None:
     old = await stream(site, "/api/events", **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", line_of("guest", role="watch"))
     await ended(old)
@@ -167,7 +167,7 @@ async def test_a_new_token_lets_in_without_a_restart(site: Hall, tmp_path: Path)
 
 
 @pytest.mark.parametrize(("remembered", "then"), [(None, 403), (4e9, 403), (1000.0, 404)])
-async def test_a_person_s_token_is_void_when_people_were_numbered_anew_since(
+async def test_a_token_for_a_person_is_void_after_numbers_restarted(
     tmp_path: Path, remembered: float | None, then: int
 ) -> None:
     """Object 1 may be somebody else; where the cameras remember who it is the token goes on."""
@@ -214,7 +214,7 @@ def looked(tmp_path: Path) -> Looked:
 
 
 @pytest.mark.parametrize("text", ["tokens: [", "tokens:\n- {name: desk}\n", "", None])
-def test_a_file_that_makes_no_sense_leaves_the_old_one_in_force_and_says_so_once(
+def test_an_invalid_token_file_keeps_the_old_tokens_and_is_logged_once(
     looked: Looked, text: str | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -234,7 +234,7 @@ def test_a_file_that_makes_no_sense_leaves_the_old_one_in_force_and_says_so_once
     assert (looked.has("desk"), looked.has("lead")) == (False, True)
 
 
-def test_a_file_that_is_being_written_is_left_until_it_is_still(looked: Looked) -> None:
+def test_a_token_file_is_reloaded_only_when_it_stays_unchanged(looked: Looked) -> None:
     looked.file.reload_if_changed()
     write_tokens(looked.path)  # as far as it has come: a list of nobody
     looked.file.reload_if_changed()
@@ -247,7 +247,7 @@ def test_a_file_that_is_being_written_is_left_until_it_is_still(looked: Looked) 
     assert looked.has("lead")
 
 
-def test_a_file_that_is_replaced_by_another_of_the_same_size_and_time_is_read(looked: Looked) -> None:
+def test_a_replaced_file_of_equal_size_and_time_is_reloaded(looked: Looked) -> None:
     other = write_tokens(looked.path.with_name("new.yaml"), line_of("lead"))
     before = looked.path.stat()
     os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))

@@ -51,7 +51,7 @@ async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(hall
         assert (answer.status, await answer.text()) == (200, "ok\n")
 
 
-async def test_health_is_answered_however_much_comes_from_the_cameras(hall: Hall) -> None:
+async def test_health_checks_are_answered_under_a_flood_of_camera_messages(hall: Hall) -> None:
     """There is one more message for so long that nobody would wait for the last one."""
     flood: Inbox[int] = Inbox(lambda left: flood.put(left - 1) if left else None, turn_s=0.0)
     flood.put(100_000)
@@ -61,7 +61,7 @@ async def test_health_is_answered_however_much_comes_from_the_cameras(hall: Hall
     assert flood.waiting
 
 
-async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) -> None:
+async def test_all_people_are_listed_with_the_cameras_that_show_and_see_them(busy: Hall) -> None:
     one, two = (await busy.get_json("/api/objects"))["objects"]
     assert one == {
         "object": 1,
@@ -77,7 +77,7 @@ async def test_everybody_is_listed_with_who_shows_and_who_sees_them(busy: Hall) 
     assert (two["object"], two["camera"], two["cameras"]) == (2, A, [A])
 
 
-async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
+async def test_the_cameras_are_listed_with_their_state(busy: Hall) -> None:
     busy.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
     c0, c1 = (await busy.get_json("/api/cameras"))["cameras"]
     assert c0 == {
@@ -97,14 +97,14 @@ async def test_the_cameras_are_listed_with_how_they_are(busy: Hall) -> None:
         assert (answer.status, await answer.text()) == (200, "2 of 2 cameras\n")
 
 
-async def test_a_refused_camera_says_why(busy: Hall) -> None:
+async def test_a_refused_camera_is_listed_with_the_reason(busy: Hall) -> None:
     busy.service.ingest.video(video(A, encoded(5, crf=40)[0]))
     c0 = (await busy.get_json("/api/cameras"))["cameras"][0]
     assert c0["state"] == "refused"
     assert "parameter sets differ" in c0["message"]
 
 
-async def test_a_choice_of_the_last_minute_is_explained_from_the_first_question_on(busy: Hall) -> None:
+async def test_past_choices_are_explained_from_the_first_request_on(busy: Hall) -> None:
     newest = await busy.get_json("/api/objects/1/choice")
     busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
     assert (await busy.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
@@ -147,7 +147,7 @@ async def test_a_choice_is_explained(busy: Hall) -> None:
     }
 
 
-async def test_a_thumbnail_is_the_chosen_cameras_and_its_address_changes_with_it(busy: Hall) -> None:
+async def test_a_thumbnail_is_of_the_chosen_camera_and_its_url_changes_with_it(busy: Hall) -> None:
     busy.service.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
     busy.service.ingest.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
     one = (await busy.get_json("/api/objects"))["objects"][0]

@@ -28,7 +28,7 @@ async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, 
     return told
 
 
-async def test_events_begin_with_what_a_newcomer_must_know_and_go_on_with_every_gop(busy: Hall) -> None:
+async def test_events_begin_with_the_current_state_and_continue_with_every_gop(busy: Hall) -> None:
     async with busy.session.get("/api/events") as answer:
         assert answer.content_type == "text/event-stream"
         told = await events(answer, 5)
@@ -44,7 +44,7 @@ async def test_events_begin_with_what_a_newcomer_must_know_and_go_on_with_every_
     assert gop["cuts"] == []
 
 
-async def test_a_cut_is_told_with_both_cameras(busy: Hall) -> None:
+async def test_a_cut_event_has_both_cameras(busy: Hall) -> None:
     for epoch in range(3, 6):
         busy.service.feed(epoch, {A: {1: LARGE}, B: {}})
     async with busy.session.get("/api/events") as answer:
@@ -53,7 +53,7 @@ async def test_a_cut_is_told_with_both_cameras(busy: Hall) -> None:
     assert cuts == [{"object": 1, "pulse": 3 * GOP, "from": B, "to": A}]
 
 
-async def test_the_gop_is_told_before_its_video_is_sent(hall: Hall) -> None:
+async def test_the_event_of_a_gop_is_sent_before_its_video(hall: Hall) -> None:
     order: list[str] = []
     hall.service.on_decision.append(lambda _: order.append("told"))
     sent = hall.service.splicer.publish_decision
@@ -69,7 +69,7 @@ async def test_the_gop_is_told_before_its_video_is_sent(hall: Hall) -> None:
     assert order == ["told", "sent"] * 3
 
 
-async def test_who_fell_behind_is_told_again_what_goes_on_to_hold(busy: Hall) -> None:
+async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(busy: Hall) -> None:
     told = Events(BestViewService(busy.service))
     reader = told.join(ALL)
     for epoch in range(3, 120):

@@ -73,32 +73,32 @@ async def status(hall: Hall, path: str, **heads: str) -> int:
 
 
 @pytest.mark.parametrize("begin", ["", "GET /api/site HTTP/1.1\r\nHost: ha", "\r\n\r\n", "\x16\x03\x01"])
-async def test_a_request_that_does_not_come_whole_is_not_waited_for(begin: str) -> None:
+async def test_an_incomplete_request_times_out(begin: str) -> None:
     async with small(request_timeout_s=SOON) as hall:
         assert b" 200 " not in await over(await silent(hall, begin))
 
 
-async def test_what_follows_a_head_is_not_waited_for_either(tmp_path: Path) -> None:
+async def test_an_incomplete_body_times_out(tmp_path: Path) -> None:
     async with locked(tmp_path, http={"request_timeout_s": SOON}) as hall:
         head = f"POST /api/session HTTP/1.1\r\nHost: hall\r\n{CSRF_HEADER}: 1\r\nContent-Length: 99\r\n\r\n{{"
         assert await over(await silent(hall, head)) == b""
 
 
-async def test_what_nobody_reads_is_not_kept_either(tmp_path: Path) -> None:
+async def test_a_body_above_the_limit_is_refused(tmp_path: Path) -> None:
     async with locked(tmp_path) as hall:
         body = b" " * 70_000
         async with hall.session.post("/api/session", data=body, headers={CSRF_HEADER: "1"}) as answer:
             assert answer.status == 413
 
 
-async def test_a_connection_that_asks_for_nothing_more_is_closed() -> None:
+async def test_an_idle_connection_is_closed() -> None:
     async with small(keepalive_timeout_s=SOON) as hall:
         said = await over(await silent(hall, GET.format("/healthz", "")))
         assert said.endswith(b"ok\n")
 
 
 @needs_openssl
-async def test_who_does_not_begin_https_is_not_waited_for(tmp_path: Path) -> None:
+async def test_a_missing_tls_handshake_times_out(tmp_path: Path) -> None:
     tls = make_certificate(tmp_path, "hall")
     async with small(request_timeout_s=SOON, tls=tls.model_dump()) as hall:
         for begin in ("", "GET / HTTP/1.1\r\n\r\n"):
@@ -106,7 +106,7 @@ async def test_who_does_not_begin_https_is_not_waited_for(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.ts", "/api/events"])
-async def test_an_endless_answer_is_no_connection_that_asks_for_nothing(path: str) -> None:
+async def test_a_connection_with_an_endless_answer_is_not_idle(path: str) -> None:
     async with small(request_timeout_s=1.0, keepalive_timeout_s=SOON) as hall:
         reader, writer = await stream(hall, path)
         await over(await silent(hall))  # that one was as quiet, and came later
@@ -117,7 +117,7 @@ async def test_an_endless_answer_is_no_connection_that_asks_for_nothing(path: st
         writer.close()
 
 
-async def test_where_places_are_taken_who_has_asked_for_nothing_longest_makes_way() -> None:
+async def test_at_the_limit_the_longest_waiting_connection_is_closed() -> None:
     async with small(connections_max=3) as hall:
         first, second, third = [await silent(hall) for _ in range(3)]
         for _ in range(3):
@@ -129,7 +129,7 @@ async def test_where_places_are_taken_who_has_asked_for_nothing_longest_makes_wa
             writer.close()
 
 
-async def test_where_all_are_busy_operators_get_in_and_others_are_told_to_come_again() -> None:
+async def test_when_all_are_busy_operators_are_admitted_and_others_get_503() -> None:
     async with small(connections_max=2) as hall, AsyncExitStack() as stack:
         for _ in range(2):
             _, writer = await stream(hall)
@@ -147,7 +147,7 @@ async def test_where_all_are_busy_operators_get_in_and_others_are_told_to_come_a
             writer.close()
 
 
-async def test_where_all_are_busy_who_operates_is_known_by_token_or_sign_in(tmp_path: Path) -> None:
+async def test_when_all_are_busy_operators_are_recognized_by_token_or_session(tmp_path: Path) -> None:
     async with locked(tmp_path, http={"connections_max": 1}) as hall:
         see(hall)
         async with hall.session.post(
@@ -163,7 +163,7 @@ async def test_where_all_are_busy_who_operates_is_known_by_token_or_sign_in(tmp_
         writer.close()
 
 
-def test_a_service_keeps_what_it_needs_however_many_come(tmp_path: Path) -> None:
+def test_a_flood_of_connections_leaves_descriptors_for_the_service(tmp_path: Path) -> None:
     path, log = written(tmp_path, 1), tmp_path / "log"
     port = int(path.read_text().partition("http:\n  port: ")[2].split()[0])
     ask = b"GET /%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
@@ -230,7 +230,7 @@ ACTS = st.lists(
 
 
 @given(ACTS)
-def test_no_more_than_may_be_are_there_and_whoever_is_busy_stays(acts: list[tuple[str, str, int]]) -> None:
+def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str, int]]) -> None:
     clock, there, busy = Clock(), list[Connection](), set[int]()
     places = ConnectionLimiter(BOUNDS, clock)
     for act, address, which in acts:
@@ -269,7 +269,7 @@ def test_no_more_than_may_be_are_there_and_whoever_is_busy_stays(acts: list[tupl
     assert not places._sending
 
 
-def test_of_one_address_the_own_make_way_and_then_it_is_told_to_come_again() -> None:
+def test_at_the_limit_of_an_address_its_own_connections_are_closed_first() -> None:
     places = ConnectionLimiter(BOUNDS)
     own = [places.admit("10.0.0.1", Fake()) for _ in range(3)]
     assert all(it is not None for it in own)
@@ -285,7 +285,7 @@ def test_of_one_address_the_own_make_way_and_then_it_is_told_to_come_again() -> 
     assert (fifth.is_reserved, other.is_reserved) == (True, False)
 
 
-def test_this_machine_and_a_proxy_on_it_are_bound_by_all_places_only() -> None:
+def test_loopback_addresses_have_no_limit_per_address() -> None:
     places = ConnectionLimiter(BOUNDS)
     for _ in range(BOUNDS.most):
         it = places.admit("127.0.0.1", Fake())
@@ -294,7 +294,7 @@ def test_this_machine_and_a_proxy_on_it_are_bound_by_all_places_only() -> None:
         places.busy(it)
 
 
-def test_who_comes_in_great_numbers_takes_no_operators_place_from_another() -> None:
+def test_a_large_network_does_not_take_reserved_connections_from_others() -> None:
     places = ConnectionLimiter(BOUNDS)
     for number in range(BOUNDS.most):
         it = places.admit(f"10.0.1.{number}", Fake())
@@ -308,7 +308,7 @@ def test_who_comes_in_great_numbers_takes_no_operators_place_from_another() -> N
     assert not operator.closed
 
 
-def test_an_answer_that_nobody_takes_ends_and_one_that_is_taken_slowly_does_not() -> None:
+def test_a_stalled_answer_ends_and_a_slow_one_does_not() -> None:
     clock = Clock()
     places = ConnectionLimiter(BOUNDS, clock)
     wires = {name: Fake() for name in ("slow", "stalled")}
@@ -336,5 +336,5 @@ def test_an_answer_that_nobody_takes_ends_and_one_that_is_taken_slowly_does_not(
         ("?", "?", True),
     ],
 )
-def test_whose_addresses_are_one(one: str, other: str, same: bool) -> None:
+def test_addresses_of_one_customer_are_one_network(one: str, other: str, same: bool) -> None:
     assert (network_of(one) == network_of(other)) == same

@@ -65,7 +65,7 @@ async def joined(stack: AsyncExitStack, hall: Hall, path: str, **heads: str) -> 
     return Viewer(answer) if answer.status == 200 else answer.status
 
 
-async def test_one_token_with_many_players_leaves_others_their_streams(tmp_path: Path) -> None:
+async def test_a_token_with_many_players_does_not_take_others_streams(tmp_path: Path) -> None:
     async with site(tmp_path, viewers_max=20) as hall:
         flood = [await fetched(hall, DOOR, "door", f"player {it}") for it in range(40)]
         assert flood == [200] * 20 + [503] * 20
@@ -87,7 +87,9 @@ async def test_one_token_with_many_players_leaves_others_their_streams(tmp_path:
         ("/api/events", "viewers_max"),
     ],
 )
-async def test_one_token_with_many_connections_does_either(tmp_path: Path, path: str, bound: str) -> None:
+async def test_a_token_with_many_connections_does_not_take_others_streams(
+    tmp_path: Path, path: str, bound: str
+) -> None:
     async with site(tmp_path, **{bound: 3}) as hall, AsyncExitStack() as stack:
         door, desk, lead = bearer("door"), bearer("desk"), bearer("lead")
         flood = [await joined(stack, hall, path, **door) for _ in range(4)]
@@ -109,7 +111,7 @@ async def test_one_token_with_many_connections_does_either(tmp_path: Path, path:
             await it.ends()
 
 
-async def test_a_stream_that_came_from_the_past_makes_way_in_the_present(tmp_path: Path) -> None:
+async def test_a_stream_that_has_caught_up_can_be_evicted_like_live_ones(tmp_path: Path) -> None:
     async with site(tmp_path, viewers_per_object=2) as hall, AsyncExitStack() as stack:
         flood = [
             await joined(stack, hall, "/cameras/c0/live.mp4?from=-1", **bearer("door")) for _ in range(2)
@@ -122,7 +124,7 @@ async def test_a_stream_that_came_from_the_past_makes_way_in_the_present(tmp_pat
         await flood[1].ends()
 
 
-async def test_without_tokens_it_is_by_address_and_this_machine_operates() -> None:
+async def test_without_tokens_shares_are_by_address_and_this_machine_operates() -> None:
     async for hall in opened(http={"viewers_max": 2}):
         see(hall)
         async with AsyncExitStack() as stack:
@@ -140,7 +142,7 @@ CLIENTS = [*map(ClientIdentity, "abc"), ClientIdentity("o", is_operator=True)]
 
 
 @given(st.lists(st.tuples(st.sampled_from(CLIENTS), st.sampled_from("xy"), st.integers(1, 2)), max_size=40))
-def test_shares_come_to_be_equal_and_stay_so(comes: list[tuple[ClientIdentity, str, int]]) -> None:
+def test_shares_become_equal_and_stay_equal(comes: list[tuple[ClientIdentity, str, int]]) -> None:
     shares, most, there = FairShare(), 6, dict[Slot, None]()
 
     def ended(place: Slot) -> None:
@@ -175,7 +177,7 @@ def test_shares_come_to_be_equal_and_stay_so(comes: list[tuple[ClientIdentity, s
     assert not shares.ending()
 
 
-def test_of_one_stream_only_its_own_places_are_taken() -> None:
+def test_the_limit_of_one_stream_evicts_only_its_viewers() -> None:
     shares = FairShare()
     ended: list[str] = []
     for stream in "xxxyy":

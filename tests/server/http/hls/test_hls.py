@@ -83,14 +83,14 @@ async def test_playlists_change_only_as_the_rfc_allows(path: str) -> None:
         assert (await text_of(hall, path + "index.m3u8")).endswith("#EXT-X-ENDLIST\n")
 
 
-async def test_the_time_of_day_is_that_of_the_pulses(busy: Hall) -> None:
+async def test_wall_clock_times_follow_from_pulses(busy: Hall) -> None:
     busy.service.pulse0 = 1_800_000_000.25
     busy.service.splicer.close()
     text = await text_of(busy, "/objects/1/" + SEGMENT)
     assert [when.timestamp() for _, _, when in entries(text)] == [1_800_000_000.25]
 
 
-async def test_a_segment_never_changes_and_says_so(busy: Hall) -> None:
+async def test_a_segment_is_immutable_and_cacheable(busy: Hall) -> None:
     feed(busy, range(3, 8))
     listed = entries_without_time(await text_of(busy, "/objects/1/" + SEGMENT))
     for uri in ["init.mp4", *listed]:
@@ -112,7 +112,7 @@ def entries_without_time(text: str) -> list[str]:
     return [line for line in text.splitlines() if not line.startswith("#")]
 
 
-async def test_before_the_first_segment_players_are_told_to_come_again(busy: Hall) -> None:
+async def test_before_the_first_segment_players_get_503(busy: Hall) -> None:
     async with busy.session.get("/objects/1/" + SEGMENT) as answer:
         assert answer.status == 503
         assert int(answer.headers["Retry-After"]) > 0
@@ -132,11 +132,11 @@ async def test_before_the_first_segment_players_are_told_to_come_again(busy: Hal
         ("/cameras/c0/hls/1.ts", "there is nothing at /cameras/c0/hls/1.ts"),
     ],
 )
-async def test_what_is_not_there_is_404(busy: Hall, path: str, error: str) -> None:
+async def test_unknown_segments_get_404(busy: Hall, path: str, error: str) -> None:
     assert await busy.get(path) == (404, {"error": error})
 
 
-async def test_nobody_has_to_ask_first_for_there_to_be_segments(busy: Hall) -> None:
+async def test_segments_exist_before_the_first_request(busy: Hall) -> None:
     feed(busy, range(3, 8))
     async with busy.session.get("/objects/1/hls/0.m4s") as answer:
         assert (await answer.read()).count(b"moof") == FPS // GOP * GOP

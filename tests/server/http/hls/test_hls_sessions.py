@@ -46,7 +46,9 @@ ACTS = st.lists(
 
 
 @given(ACTS)
-def test_who_has_asked_lately_or_waits_is_counted(acts: list[tuple[str, int, int, str | None, int]]) -> None:
+def test_players_that_fetched_recently_or_wait_are_counted(
+    acts: list[tuple[str, int, int, str | None, int]],
+) -> None:
     """Against a count from the beginning, over all that anybody has asked."""
     clock = Clock()
     shares = FairShare()
@@ -115,9 +117,7 @@ async def viewers_in_metrics(hall: Hall) -> float:
 
 
 @pytest.mark.parametrize("path", PATHS)
-async def test_players_that_fetch_take_places_and_one_more_is_told_to_come_again(
-    hall: Hall, path: str
-) -> None:
+async def test_hls_players_take_slots_and_one_more_gets_503(hall: Hall, path: str) -> None:
     for player in ("one", "two", "one", "two"):
         assert await status(hall, f"/objects/1/hls/{path}", player) == 200
     assert await viewers_in_metrics(hall) == 2
@@ -129,21 +129,21 @@ async def test_players_that_fetch_take_places_and_one_more_is_told_to_come_again
         assert await status(hall, f"/objects/1/hls/{other}", "two") == 200, "who is there goes on"
 
 
-async def test_who_is_connected_leaves_fewer_places_to_who_fetches(hall: Hall) -> None:
+async def test_connected_viewers_reduce_the_slots_for_hls_players(hall: Hall) -> None:
     async with hall.session.get("/objects/2/best.mp4"):
         assert await status(hall, "/cameras/c0/hls/index.m3u8", "one") == 200
         assert await status(hall, "/cameras/c0/hls/index.m3u8", "two") == 503
         assert await viewers_in_metrics(hall) == 2
 
 
-async def test_head_takes_no_place(hall: Hall) -> None:
+async def test_head_takes_no_slot(hall: Hall) -> None:
     for path in PATHS:
         async with hall.session.head(f"/objects/1/hls/{path}") as answer:
             assert answer.status == 200
     assert await viewers_in_metrics(hall) == 0
 
 
-async def test_players_of_one_address_and_name_are_told_apart_while_they_wait(hall: Hall) -> None:
+async def test_blocked_players_of_one_address_and_user_agent_are_counted_separately(hall: Hall) -> None:
     coming = "/objects/1/hls/index.m3u8?_HLS_msn=3"
     waiting = [asyncio.create_task(status(hall, coming, "same")) for _ in range(2)]
     while await viewers_in_metrics(hall) < 2:  # noqa: ASYNC110 — they come one after the other
@@ -157,7 +157,7 @@ async def test_players_of_one_address_and_name_are_told_apart_while_they_wait(ha
     assert await viewers_in_metrics(hall) == 1, "they cannot be told apart any more"
 
 
-async def test_no_more_of_one_stream_than_it_takes() -> None:
+async def test_the_viewer_limit_of_one_stream_includes_hls_players() -> None:
     async for hall in opened(http={"viewers_per_object": 1, "hls_segment_s": 0.4}):
         hall.service.come(*CAMERAS)
         for epoch in range(5):

@@ -122,7 +122,7 @@ def found(text: str, pattern: str) -> str:
     return str(it)
 
 
-async def test_playlists_keep_to_the_draft_and_go_on_part_by_part(hall: Hall) -> None:
+async def test_playlists_follow_the_draft_and_grow_part_by_part(hall: Hall) -> None:
     shows(hall, range(PARTS))
     before = read(await text_of(hall))
     for gop in range(PARTS, 45):
@@ -140,7 +140,7 @@ async def test_playlists_keep_to_the_draft_and_go_on_part_by_part(hall: Hall) ->
     assert read(await text_of(hall)).hint is None
 
 
-async def test_a_playlist_is_written_once_for_all_who_ask_and_anew_for_the_next_part(hall: Hall) -> None:
+async def test_a_playlist_is_written_once_per_part_for_all_players(hall: Hall) -> None:
     shows(hall, range(PARTS))
     reel = hall.service.splicer.segmenter_of_person(1)
     assert reel is not None
@@ -153,7 +153,7 @@ async def test_a_playlist_is_written_once_for_all_who_ask_and_anew_for_the_next_
     assert _cached(reel, 1_800_000_000.0).endswith("#EXT-X-ENDLIST\n")
 
 
-async def test_who_asks_for_a_part_is_answered_as_soon_as_it_is_there(hall: Hall) -> None:
+async def test_a_blocked_request_is_answered_when_its_part_exists(hall: Hall) -> None:
     shows(hall, range(PARTS + 1))
     waiting = {
         query: asyncio.create_task(text_of(hall, query))
@@ -176,7 +176,7 @@ async def test_who_asks_for_a_part_is_answered_as_soon_as_it_is_there(hall: Hall
     assert [it.uri for it in read(await last).parts[2]] == ["2.0.m4s"]
 
 
-async def test_the_end_is_an_answer_to_all_who_wait(hall: Hall) -> None:
+async def test_the_end_of_a_stream_answers_blocked_requests(hall: Hall) -> None:
     shows(hall, range(2 * PARTS))
     waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=2&_HLS_part=0"))
     part = asyncio.create_task(hall.get(STREAM + "2.0.m4s"))
@@ -195,15 +195,15 @@ async def test_the_end_is_an_answer_to_all_who_wait(hall: Hall) -> None:
         ("_HLS_msn=99", "_HLS_msn=99: is too far ahead; the newest segment is 1"),
     ],
 )
-async def test_what_cannot_be_asked_is_told_in_one_line(hall: Hall, query: str, error: str) -> None:
+async def test_an_invalid_blocking_request_is_refused_with_one_line(
+    hall: Hall, query: str, error: str
+) -> None:
     shows(hall, range(PARTS + 1))
     assert await hall.get(f"{STREAM}index.m3u8?{query}") == (400, {"error": error})
     assert (await hall.get(STREAM + "7.0.m4s"))[0] == 404
 
 
-async def test_what_never_comes_is_not_waited_for_for_ever(
-    hall: Hall, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_blocked_request_times_out(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     shows(hall, range(PARTS + 1))
     monkeypatch.setattr("server.http.hls.live_playlist._MAX_BLOCK", 0.05)
     async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
@@ -227,7 +227,7 @@ def is_independent(reel: HlsSegmenter, gop: int) -> bool:
     return part is not None and part.independent
 
 
-async def test_parts_show_what_their_segments_show_and_any_that_says_so_can_be_begun_with(
+async def test_parts_equal_their_segments_and_independent_ones_are_decodable(
     hall: Hall,
 ) -> None:
     gops = 8 * PARTS
@@ -252,7 +252,7 @@ async def test_parts_show_what_their_segments_show_and_any_that_says_so_can_be_b
 
 
 @needs_ffmpeg
-async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Hall) -> None:
+async def test_ffmpeg_ignores_parts_and_plays_without_a_warning(hall: Hall) -> None:
     shows(hall, range(4 * PARTS + 1))
     url = f"http://127.0.0.1:{hall.port}{STREAM}index.m3u8"
     command = ["ffmpeg", "-v", "error", "-live_start_index", "0", "-i", url, "-f", "framecrc", "-"]
@@ -270,7 +270,7 @@ async def test_ffmpeg_which_does_not_know_parts_plays_on_without_a_word(hall: Ha
     assert sum(not line.startswith("#") for line in done.stdout.splitlines()) == 8 * PARTS * GOP
 
 
-async def test_gops_that_are_too_short_are_no_parts_but_segments_can_be_waited_for() -> None:
+async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> None:
     async for hall in opened(http=HTTP, encode={"gop": 2}, view={"lookahead": 10}):
         hall.service.come(*CAMERAS)
         gops = 40

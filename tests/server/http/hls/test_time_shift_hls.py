@@ -57,7 +57,7 @@ async def played(hall: Hall, stream: str, listed: list[int]) -> list[tuple[int, 
     return list(shown.items())
 
 
-async def test_a_part_of_the_past_is_a_list_of_all_its_segments_that_ends(hall: Hall) -> None:
+async def test_a_time_range_is_a_complete_playlist_of_its_segments(hall: Hall) -> None:
     shows(hall, range(GOPS))
     await until_written(hall, GOPS)
     forget(hall)
@@ -73,7 +73,7 @@ async def test_a_part_of_the_past_is_a_list_of_all_its_segments_that_ends(hall: 
 
 
 @pytest.mark.parametrize("stream", ["/objects/1", "/cameras/c0"])
-async def test_a_segment_has_the_bytes_that_it_had_when_it_was_new(hall: Hall, stream: str) -> None:
+async def test_a_recorded_segment_has_the_bytes_of_the_live_one(hall: Hall, stream: str) -> None:
     choices = {gop: A if gop % 7 < 3 else B if gop % 7 < 5 else None for gop in range(GOPS)}
     new: dict[int, bytes] = {}
     for gop in range(GOPS):
@@ -91,7 +91,7 @@ async def test_a_segment_has_the_bytes_that_it_had_when_it_was_new(hall: Hall, s
         assert await fetch(hall, f"{stream}/hls/{number}.m4s") == data, number
 
 
-async def test_without_an_end_it_grows_and_nothing_moves(hall: Hall) -> None:
+async def test_an_endless_playlist_grows_without_changing_listed_segments(hall: Hall) -> None:
     shows(hall, range(21))
     await until_written(hall, 21)
     before = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=live")
@@ -104,7 +104,7 @@ async def test_without_an_end_it_grows_and_nothing_moves(hall: Hall) -> None:
     assert after.startswith(before)
 
 
-async def test_an_end_that_is_yet_to_come_is_grown_towards(hall: Hall) -> None:
+async def test_a_playlist_grows_until_an_end_in_the_future(hall: Hall) -> None:
     shows(hall, range(21))
     before = await text(hall, "/objects/1/hls/index.m3u8?from=p0&to=p115")
     assert numbers(before) == list(range(10))
@@ -115,7 +115,7 @@ async def test_an_end_that_is_yet_to_come_is_grown_towards(hall: Hall) -> None:
     assert after.endswith("#EXT-X-ENDLIST\n")
 
 
-async def test_moments_that_move_name_a_playlist_that_does_not(hall: Hall) -> None:
+async def test_relative_moments_redirect_to_a_playlist_with_pulses(hall: Hall) -> None:
     shows(hall, range(20))
     head = await text(hall, "/objects/1/hls/index.m3u8?from=-2&to=-1")
     assert head.splitlines()[-1] == "index.m3u8?from=p50&to=p75"
@@ -130,7 +130,7 @@ async def test_moments_that_move_name_a_playlist_that_does_not(hall: Hall) -> No
     assert numbers(await text(hall, "/objects/1/hls/index.m3u8?from=p50&to=p75")) == [5, 6, 7]
 
 
-async def test_where_nobody_is_shown_for_long_the_last_picture_stands_in_every_segment(hall: Hall) -> None:
+async def test_without_a_view_every_segment_holds_the_last_picture(hall: Hall) -> None:
     choices = {gop: A if gop < 5 or gop >= 35 else None for gop in range(GOPS)}
     shows(hall, range(GOPS), choices)
     await until_written(hall, GOPS)
@@ -144,7 +144,7 @@ async def test_where_nobody_is_shown_for_long_the_last_picture_stands_in_every_s
             np.testing.assert_array_equal(picture, expected, str(pulse))
 
 
-async def test_the_memory_is_the_past_where_nothing_is_recorded() -> None:
+async def test_without_recording_the_buffer_serves_time_shift() -> None:
     async for hall in opened(http=HTTP):
         hall.service.come(*CAMERAS)
         shows(hall, range(20))
@@ -154,7 +154,7 @@ async def test_the_memory_is_the_past_where_nothing_is_recorded() -> None:
         assert [pulse for pulse, _ in shown] == list(range(20, 100))
 
 
-async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: Hall) -> None:
+async def test_segments_of_a_forgotten_person_can_be_fetched(hall: Hall) -> None:
     shows(hall, range(21))
     await until_written(hall, 21)
     hall.service.splicer.forget([], [])
@@ -180,13 +180,15 @@ async def test_what_was_somebodys_can_be_fetched_when_they_are_forgotten(hall: H
         ("/objects/1/hls/999999999999.m4s", 404, "no segment 999999999999: expired, or not available yet"),
     ],
 )  # fmt: skip
-async def test_what_cannot_be_had_is_told_in_one_line(hall: Hall, path: str, status: int, error: str) -> None:
+async def test_an_unavailable_time_range_is_refused_with_one_line(
+    hall: Hall, path: str, status: int, error: str
+) -> None:
     shows(hall, range(21))
     assert await hall.get(path) == (status, {"error": error})
 
 
 @needs_ffmpeg
-async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -> None:
+async def test_ffmpeg_plays_a_time_range_with_sound_to_the_end(tmp_path: Path) -> None:
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
     async for hall in opened(record=record, http=HTTP, sound={"source": str(recording)}):
@@ -211,7 +213,7 @@ async def test_ffmpeg_plays_the_past_with_its_sound_to_the_end(tmp_path: Path) -
 
 
 @needs_chromium
-async def test_chromium_plays_the_past_to_its_end(hall: Hall) -> None:
+async def test_chromium_plays_a_time_range_to_the_end(hall: Hall) -> None:
     shows(hall, range(20))
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)

@@ -32,7 +32,7 @@ async def samples(hall: Hall) -> dict[tuple[str, ...], float]:
     return found
 
 
-async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> None:
+async def test_a_cameras_stages_are_measured_by_its_reported_times(hall: Hall) -> None:
     see(hall)
     unit = encoded(0)[15]
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, taken=100.03, encoded=100.04)
@@ -55,7 +55,7 @@ async def test_a_cameras_stages_are_measured_by_its_own_times(hall: Hall) -> Non
     assert told["myview_camera_gap_total", A] == pytest.approx(0.2)
 
 
-async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: Hall) -> None:
+async def test_metrics_of_a_cameras_status_appear_once_it_was_received(busy: Hall) -> None:
     before = await samples(busy)
     assert ("myview_camera_waiting_frames", A) not in before
     busy.service.ingest.status(status(A, waiting=7, fps=12.5, synchronized=False))
@@ -65,14 +65,14 @@ async def test_what_a_camera_says_of_itself_is_there_once_it_has_said_it(busy: H
     assert told["myview_camera_synchronized", A] == 0
 
 
-async def test_messages_that_were_not_understood_are_counted_whoever_heard_them(hall: Hall) -> None:
+async def test_invalid_messages_are_counted_at_every_receiver(hall: Hall) -> None:
     hall.service.ingest.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
     hall.service.ingest.status(status(B, bad_messages=3))
     told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
     assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "received"): 3}
 
 
-def test_the_alert_is_about_both() -> None:
+def test_the_alert_covers_invalid_messages_at_both_receivers() -> None:
     [alert] = [it for it in ALERTS if it["alert"] == "MyViewInvalidMessages"]
     assert [it.name for it in selectors(alert["expr"])] == [_BAD]
     assert "way" not in alert["expr"]
@@ -81,7 +81,7 @@ def test_the_alert_is_about_both() -> None:
 _BAD = "myview_camera_bad_messages_total"
 
 
-async def test_deciding_and_sending_are_counted_by_epoch_and_by_gop(busy: Hall) -> None:
+async def test_decisions_are_counted_by_epoch_and_sending_by_gop(busy: Hall) -> None:
     told = await samples(busy)
     assert told["myview_decide_seconds_count",] == 3
     assert told["myview_send_seconds_count",] == busy.service.decision_state.end // GOP == 2
@@ -94,7 +94,7 @@ async def test_deciding_and_sending_are_counted_by_epoch_and_by_gop(busy: Hall) 
     assert told["myview_decided_pulse",] == 3 * GOP
 
 
-async def test_pictures_that_did_not_come_are_counted(hall: Hall) -> None:
+async def test_missing_pictures_are_counted(hall: Hall) -> None:
     hall.service.come(*CAMERAS)
     frame_buffer = hall.service.frame_buffers[A]
     for epoch in range(2):
@@ -106,7 +106,7 @@ async def test_pictures_that_did_not_come_are_counted(hall: Hall) -> None:
     assert told["myview_camera_lost_pictures_total", B] == 0
 
 
-async def test_viewers_are_counted_by_kind_and_what_is_sent_to_them_in_bytes(busy: Hall) -> None:
+async def test_viewers_are_counted_by_kind_and_sent_bytes_are_counted(busy: Hall) -> None:
     before = await samples(busy)
     async with (
         busy.session.get("/objects/1/best.mp4") as best,
@@ -125,7 +125,7 @@ async def test_viewers_are_counted_by_kind_and_what_is_sent_to_them_in_bytes(bus
     assert answers >= size
 
 
-async def test_what_slow_viewers_lose_stays_counted_when_they_have_gone() -> None:
+async def test_gops_lost_by_slow_viewers_stay_counted_after_they_leave() -> None:
     sent, slow = Traffic(), Subscriber([], max_gops=2)
     sent.join(slow)
     for number in range(4):
@@ -142,7 +142,7 @@ def measured(lag: LoopLag, what: str) -> float:
     return next(it.value for it in family.samples if it.name.endswith(what))
 
 
-async def test_a_loop_that_is_held_up_is_late() -> None:
+async def test_a_blocked_event_loop_is_measured_as_late() -> None:
     lag = LoopLag(every_s=0.001)
     task = asyncio.create_task(lag.run())
     await asyncio.sleep(0)
@@ -162,7 +162,7 @@ async def ready(hall: Hall) -> tuple[int, str]:
     return answer.status, words.strip()
 
 
-async def test_a_site_is_ready_when_pulses_and_frames_come_and_decisions_keep_up(hall: Hall) -> None:
+async def test_a_site_is_ready_when_pulses_and_frames_arrive_and_decisions_keep_up(hall: Hall) -> None:
     code, words = await ready(hall)
     assert code == 503
     assert words.split("; ") == [

@@ -30,7 +30,7 @@ async def printed(hall: Hall) -> Printed:
         return Printed.of(await answer.text())
 
 
-async def test_every_expression_gives_series_that_have_the_labels_it_shows(busy: Hall) -> None:
+async def test_every_expression_yields_series_with_the_labels_in_its_legend(busy: Hall) -> None:
     there = await printed(busy)
     assert len(ASKED) > 50
     for asked in ASKED:
@@ -41,7 +41,7 @@ async def test_every_expression_gives_series_that_have_the_labels_it_shows(busy:
         assert all(asked.shown <= dict(it).keys() for it in series), asked.place
 
 
-async def test_whatever_is_printed_can_be_looked_at(busy: Hall) -> None:
+async def test_every_exported_metric_is_used_by_a_panel_or_alert(busy: Hall) -> None:
     looked_at = {it.name for asked in ASKED for it in selectors(asked.expression)}
     for name in (await printed(busy)).samples:
         if name.startswith("myview_") and not name.endswith(("_created", "_sum", "_count")):
@@ -81,7 +81,7 @@ h_bucket{camera="c0",le="+Inf"} 1
         ("histogram_quantile(0.5, rate(h_bucket[5m]))", [{"camera": "c0"}]),
     ],
 )
-def test_what_an_expression_gives_is_known(expression: str, series: list[dict[str, str]]) -> None:
+def test_the_evaluator_yields_known_results(expression: str, series: list[dict[str, str]]) -> None:
     assert given(expression, Printed.of(SAID)) == {frozenset(it.items()) for it in series}
 
 
@@ -95,12 +95,12 @@ def test_what_an_expression_gives_is_known(expression: str, series: list[dict[st
         ("rate(a_total[5m)", "."),
     ],
 )
-def test_what_makes_no_sense_is_noticed(expression: str, words: str) -> None:
+def test_the_evaluator_reports_invalid_expressions(expression: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         given(expression, Printed.of(SAID))
 
 
-def test_every_alert_says_how_bad_it_is_and_has_a_name_of_its_own() -> None:
+def test_every_alert_has_a_severity_and_a_unique_name() -> None:
     names = [alert["alert"] for alert in ALERTS]
     assert len(names) == len(set(names)) > 10
     for alert in ALERTS:
@@ -108,14 +108,14 @@ def test_every_alert_says_how_bad_it_is_and_has_a_name_of_its_own() -> None:
         assert len(alert["annotations"]["summary"]) > 20
 
 
-def test_prometheus_reads_the_alerts_and_the_page_of_the_demo() -> None:
+def test_prometheus_scrapes_the_demo_and_loads_the_alert_rules() -> None:
     assert [(CONFIGS / "prometheus" / name).is_file() for name in SCRAPING["rule_files"]] == [True]
     (job,) = SCRAPING["scrape_configs"]
     assert job["job_name"] == VARIABLES[1]["current"]["value"] == "myview"
     assert job["static_configs"] == [{"targets": ["127.0.0.1:8080"]}]
 
 
-def test_panels_have_their_own_places() -> None:
+def test_panels_do_not_overlap() -> None:
     covered: set[tuple[int, int]] = set()
     for panel in DASHBOARD["panels"]:
         at = panel["gridPos"]

@@ -13,7 +13,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 
 
-async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:
+async def test_every_camera_is_listed_with_its_measurements(busy: Hall) -> None:
     busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
     told = (await busy.get_json("/api/operator/cameras"))["cameras"]
     plain = (await busy.get_json("/api/cameras"))["cameras"]
@@ -27,7 +27,7 @@ async def test_every_camera_is_told_with_what_is_measured(busy: Hall) -> None:
     assert (first["certified"], first["windows"], first["last_error"]) == (None, 0, None)
 
 
-async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall) -> None:
+async def test_the_last_error_is_shown_until_the_next_one(busy: Hall) -> None:
     async def trouble() -> str:
         camera = (await busy.get_json("/api/operator/cameras"))["cameras"][0]
         return str(camera["last_error"]["text"])
@@ -43,7 +43,7 @@ async def test_what_went_wrong_last_is_told_until_something_else_does(busy: Hall
     assert await trouble() == "its process disconnected"
 
 
-async def test_the_floor_has_the_calibrated_cameras_that_have_spoken() -> None:
+async def test_the_floor_shows_calibrated_cameras_whose_size_is_known() -> None:
     plan = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
     cameras = [{"id": A, "source": "scene:room", "ground": plan}, B]
     async with aclosing(opened(cameras=cameras)) as halls:
@@ -58,7 +58,7 @@ async def test_the_floor_has_the_calibrated_cameras_that_have_spoken() -> None:
     assert corners == [0.0, 4.8, 6.4, 4.8, 6.4, 0.0, 0.0, 0.0]
 
 
-async def test_the_pulse_servers_clients_are_told_and_who_is_missing() -> None:
+async def test_the_pulse_servers_clients_and_missing_ones_are_listed() -> None:
     async with (
         PulseServer(25.0) as server,
         PulseClient("127.0.0.1", server.port, A) as camera,
@@ -76,7 +76,7 @@ async def test_the_pulse_servers_clients_are_told_and_who_is_missing() -> None:
     assert told["missing"] == [B, "bestview"]
 
 
-async def test_a_closed_pulse_server_tells_it_to_the_service_whose_password_it_knows() -> None:
+async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() -> None:
     users = {A: "a" * 32, "bestview": "b" * 32}
     async with (
         PulseServer(25.0, users=users) as server,
@@ -93,7 +93,7 @@ async def test_a_closed_pulse_server_tells_it_to_the_service_whose_password_it_k
 
 
 @pytest.mark.parametrize("port", [1])
-async def test_a_pulse_server_that_is_away_is_said_in_one_line(port: int) -> None:
+async def test_an_unreachable_pulse_server_is_reported_in_one_line(port: int) -> None:
     async with aclosing(opened(sync={"port": port})) as halls:
         told = await (await anext(halls)).get_json("/api/operator/pulses")
     assert told["error"].startswith(f"there is no pulse server at 127.0.0.1:{port}")

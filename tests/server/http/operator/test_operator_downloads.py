@@ -19,7 +19,7 @@ async def rows(hall: Hall, what: str, span: str) -> list[dict[str, str]]:
         return list(csv.DictReader(io.StringIO(await answer.text())))
 
 
-async def test_every_box_and_choice_of_the_span_is_a_line(busy: Hall) -> None:
+async def test_every_box_and_choice_of_the_time_range_is_a_line(busy: Hall) -> None:
     busy.service.pulse0 = 1_000_000.0
     tracks = await rows(busy, "tracks", "from=p2&to=p4")
     assert [(it["frame"], it["camera"], it["object"]) for it in tracks] == [
@@ -36,14 +36,14 @@ async def test_every_box_and_choice_of_the_span_is_a_line(busy: Hall) -> None:
     ]
 
 
-async def test_without_an_end_it_is_all_that_is_decided(busy: Hall) -> None:
+async def test_without_an_end_the_download_has_all_decisions(busy: Hall) -> None:
     frames = {int(it["frame"]) for it in await rows(busy, "tracks", "from=p0")}
     assert frames == set(range(1, busy.service.decision_state.end + 1))
     assert await rows(busy, "tracks", "from=p900") == []
 
 
 @pytest.mark.parametrize("span", ["", "from=soon", "from=p5&to=p5"])
-async def test_what_is_no_span_is_refused(busy: Hall, span: str) -> None:
+async def test_an_invalid_time_range_is_refused(busy: Hall, span: str) -> None:
     status, content = await busy.get(f"/api/operator/choices.csv?{span}")
     assert status == 400
     assert "\n" not in content["error"]

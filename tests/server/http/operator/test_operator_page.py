@@ -72,7 +72,7 @@ async def operating(
     assert complaints == []
 
 
-async def test_who_has_a_token_signs_in_and_out(browser: Browser, tmp_path: Path) -> None:
+async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", line_of("lead"), line_of("desk"))
     async with operating(browser, access={"tokens": str(tokens)}) as (_, page):
         field = page.get_by_label("An operator's token")
@@ -99,14 +99,14 @@ async def test_who_has_a_token_signs_in_and_out(browser: Browser, tmp_path: Path
         await expect(field).to_be_visible()
 
 
-async def test_without_a_token_there_is_nothing_to_sign_in_to(browser: Browser) -> None:
+async def test_a_site_without_tokens_shows_no_sign_in_form(browser: Browser) -> None:
     async with operating(browser) as (hall, page):
         await expect(page.locator("#site")).to_have_text(hall.service.config.site.name)
         await expect(page.get_by_label("An operator's token")).to_be_hidden()
         await expect(page.get_by_role("button", name="Sign out")).to_be_hidden()
 
 
-async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> None:
+async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
     async with operating(browser, "#cameras") as (hall, page):
         await expect(page.locator(".camera-tile .state")).to_have_text(["Starting", "Starting"])
         see(hall)
@@ -126,7 +126,7 @@ async def test_every_camera_has_a_tile_that_says_how_it_is(browser: Browser) -> 
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
 
 
-async def test_the_floor_plan_has_cameras_and_people_where_they_stand(browser: Browser) -> None:
+async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:
     cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
     async with operating(browser, "#floor", cameras=cameras) as (hall, page):
         await expect(page.locator("#floor-words")).to_have_text("No camera has reported yet.")
@@ -142,14 +142,14 @@ async def test_the_floor_plan_has_cameras_and_people_where_they_stand(browser: B
         assert await page.locator("#plan .way").nth(1).get_attribute("points") is not None
 
 
-async def test_a_site_that_is_not_calibrated_says_what_to_do(browser: Browser) -> None:
+async def test_an_uncalibrated_site_shows_how_to_calibrate(browser: Browser) -> None:
     async with operating(browser, "#floor") as (hall, page):
         see(hall)
         await expect(page.locator("#floor-words")).to_contain_text("No camera is calibrated")
         await expect(page.locator("#plan")).to_be_hidden()
 
 
-async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(browser: Browser) -> None:
+async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browser) -> None:
     async with operating(browser, "#known") as (hall, page):
         people = hall.service.decider.people
         people._registry = IdentityRegistry(hall.service.config.view.identity, dict.fromkeys(CAMERAS))
@@ -177,7 +177,7 @@ async def test_people_are_named_merged_and_parted_and_the_viewers_page_says_so(b
         await expect(page).to_have_title(f"Person {first}, Ann · MyView")
 
 
-async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -> None:
+async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
     async with operating(browser, "#flagged") as (hall, page):
         await expect(page.locator("#flag-none")).to_have_text("None so far.")
         see(hall)
@@ -203,7 +203,7 @@ async def test_flags_are_listed_with_what_has_become_of_them(browser: Browser) -
         await expect(page.locator("#flag-none")).to_have_text("None so far.")
 
 
-async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
+async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browser) -> None:
     async with operating(browser, "#downloads") as (hall, page):
         end = int(time.time())
         hall.service.pulse0 = end - 0.2  # five frames before
@@ -226,7 +226,7 @@ async def test_a_span_of_the_past_is_downloaded(browser: Browser) -> None:
         await expect(page.locator("#download-tables")).to_have_text("The end is not after the start.")
 
 
-async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes_late(
+async def test_a_late_picture_of_another_camera_does_not_replace_the_selected_one(
     browser: Browser,
 ) -> None:
     async with operating(browser, "#configuration") as (hall, page):  # which asks for no picture
@@ -252,7 +252,7 @@ async def test_the_picture_is_of_the_camera_that_is_marked_though_anothers_comes
         assert await image.get_attribute("src") == shown
 
 
-async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_they_come(
+async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_load(
     browser: Browser,
 ) -> None:
     cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
@@ -274,7 +274,7 @@ async def test_areas_of_the_configuration_are_there_whatever_is_pressed_before_t
         )
 
 
-async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser) -> None:
+async def test_ignored_areas_become_configuration_lines(browser: Browser) -> None:
     known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
     cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
     async with operating(browser, "#zones", cameras=cameras) as (hall, page):
@@ -303,9 +303,7 @@ async def test_areas_to_ignore_become_lines_of_a_configuration(browser: Browser)
         assert "ignore: []" in await lines.input_value()
 
 
-async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
-    browser: Browser, tmp_path: Path
-) -> None:
+async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, tmp_path: Path) -> None:
     async with operating(browser, "#zones") as (hall, page):
         see(hall)
         await page.reload()
@@ -331,9 +329,7 @@ async def test_places_on_the_floor_become_a_file_that_calibrate_takes(
     np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
 
 
-async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes_floor(
-    browser: Browser, tmp_path: Path
-) -> None:
+async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browser, tmp_path: Path) -> None:
     async with operating(browser, "#calibration", patience=280, **SITE) as (hall, page):
         walking, state = hall.service.walk_session, page.locator("#walk-state")
         await expect(state).to_have_text("No walk yet.")
@@ -365,7 +361,7 @@ async def test_a_walk_is_started_watched_and_finished_and_its_file_is_the_scenes
     assert np.median(errors_on_floor([np.array(matrices[it]) for it in CAMERAS])) < 0.15  # metres
 
 
-async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Browser) -> None:
+async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browser) -> None:
     async with operating(browser, "#view-selection") as (hall, page):
         decider, lines = hall.service.decider, page.get_by_label("Lines for the configuration")
         cost = page.get_by_label("Cut cost λ, s")
@@ -395,7 +391,7 @@ async def test_what_is_tried_out_holds_and_the_file_can_be_had_back(browser: Bro
         assert decider.view == hall.service.config.view
 
 
-async def test_the_configuration_shows_what_differs_and_finds_the_rest(browser: Browser) -> None:
+async def test_the_configuration_shows_differences_and_can_be_searched(browser: Browser) -> None:
     async with operating(browser, "#configuration") as (_, page):
         rows = page.locator("#settings tr")
         await expect(rows.filter(has_text="encode.gop")).to_have_text("encode.gop510")
@@ -407,7 +403,7 @@ async def test_the_configuration_shows_what_differs_and_finds_the_rest(browser: 
         await expect(page.get_by_text("No matching setting.")).to_be_visible()
 
 
-async def test_at_every_width_nothing_overflows_and_axe_finds_no_serious_fault(browser: Browser) -> None:
+async def test_no_width_overflows_and_axe_finds_no_serious_violation(browser: Browser) -> None:
     axe = AXE.read_text(encoding="utf-8") if AXE.exists() else ""
     async with operating(browser, axe=axe) as (hall, page):
         see(hall)
@@ -441,7 +437,7 @@ async def serious_faults(page: Page) -> list[Any]:
     ]
 
 
-async def test_sections_are_reached_by_keyboard_and_kept_in_the_address(browser: Browser) -> None:
+async def test_sections_are_reached_by_keyboard_and_stored_in_the_url(browser: Browser) -> None:
     async with operating(browser) as (_, page):
         await expect(page.locator("#cameras")).to_be_visible()
         for section in SECTIONS[1:]:

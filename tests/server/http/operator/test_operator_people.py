@@ -46,7 +46,7 @@ async def objects(hall: Hall) -> dict[int, Any]:
     return {it["object"]: it for it in (await hall.get_json("/api/objects"))["objects"]}
 
 
-async def test_a_name_goes_with_the_person_wherever_they_are_listed(busy: Hall) -> None:
+async def test_a_persons_name_appears_in_every_list(busy: Hall) -> None:
     assert (await say(busy, object=1, name=" Ann  Lee "))[0] == 200
     assert (await objects(busy))[1]["name"] == "Ann Lee"
     assert (await objects(busy))[2]["name"] is None
@@ -55,7 +55,7 @@ async def test_a_name_goes_with_the_person_wherever_they_are_listed(busy: Hall) 
     assert (await objects(busy))[1]["name"] is None
 
 
-async def test_a_name_is_listed_as_it_is(busy: Hall, capsys: pytest.CaptureFixture[str]) -> None:
+async def test_a_name_is_listed_unchanged(busy: Hall, capsys: pytest.CaptureFixture[str]) -> None:
     await say(busy, object=1, name="Ann [bold]")
     await run_watch(f"http://127.0.0.1:{busy.port}", None, None, None, None, None)
     lines = capsys.readouterr().out.splitlines()
@@ -63,7 +63,7 @@ async def test_a_name_is_listed_as_it_is(busy: Hall, capsys: pytest.CaptureFixtu
     assert any(it.split()[:2] == ["2", "yes"] for it in lines)
 
 
-async def test_two_that_are_one_are_one_to_everybody_from_the_next_gop_on(real: Hall) -> None:
+async def test_merged_people_have_one_number_from_the_next_gop_on(real: Hall) -> None:
     people = await objects(real)
     kept, lost = sorted(people)[:2]
     told: list[Any] = []
@@ -82,7 +82,7 @@ async def test_two_that_are_one_are_one_to_everybody_from_the_next_gop_on(real: 
     assert (await say(real, object=kept, merge=lost))[0] == 400
 
 
-async def test_whom_a_camera_shows_is_somebody_new_to_everybody(real: Hall) -> None:
+async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: Hall) -> None:
     who = real.service.decider.people.number(A, 1, 10)
     assert who is not None
     told: list[Any] = []
@@ -112,7 +112,7 @@ async def test_whom_a_camera_shows_is_somebody_new_to_everybody(real: Hall) -> N
         ({"object": "1"}, 400, "the request's JSON: "),
     ],
 )
-async def test_what_cannot_be_is_said_in_one_line(
+async def test_an_invalid_edit_is_refused_with_one_line(
     busy: Hall, said: dict[str, Any], status: int, error: str
 ) -> None:
     told = await say(busy, **said)
@@ -120,7 +120,7 @@ async def test_what_cannot_be_is_said_in_one_line(
     assert told[1]["error"].startswith(error)
 
 
-async def test_services_that_share_a_site_agree_who_is_who_by_themselves() -> None:
+async def test_people_cannot_be_edited_on_a_sharded_site() -> None:
     async with aclosing(opened(view={"share": {"of": 2}})) as halls:
         hall = await anext(halls)
         status, told = await say(hall, object=1, name="Ann")

@@ -46,14 +46,14 @@ def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -
 TRIED = small_config(view={"switch_cost_s": 3.0, "quality": {"centering": 0.7, "size": 0.0}}).view
 
 
-def test_tuned_from_the_beginning_is_configured_so() -> None:
+def test_settings_tuned_before_the_start_equal_configured_ones() -> None:
     config = small_config()
     so = config.model_copy(update={"view": TRIED.model_copy(update={"identity": config.view.identity})})
     assert decided(config, TRIED) == decided(so)
     assert decided(config, TRIED) != decided(config)
 
 
-def test_tuned_meanwhile_holds_from_the_next_gop_on_and_what_was_said_is_weighed_anew() -> None:
+def test_settings_tuned_while_running_apply_from_the_next_gop_on_to_buffered_views_too() -> None:
     config = small_config()
     tuned, before = decided(config, TRIED, after=6), decided(config)
     done = sum(it.first < 5 * 5 for it in tuned)
@@ -69,7 +69,7 @@ def test_tuned_meanwhile_holds_from_the_next_gop_on_and_what_was_said_is_weighed
                 assert seen.views[camera].terms == pytest.approx(meant.views[camera].terms)
 
 
-def test_tuned_back_goes_on_as_ever() -> None:
+def test_settings_can_be_tuned_back() -> None:
     config = small_config()
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.apply_view_settings(TRIED)
@@ -80,7 +80,7 @@ def test_tuned_back_goes_on_as_ever() -> None:
     assert np.isclose(decider.switch_cost, 1.0)
 
 
-async def test_what_is_tried_out_is_in_force_at_once_with_its_lines(busy: Hall) -> None:
+async def test_trial_settings_are_in_force_at_once_with_configuration_lines(busy: Hall) -> None:
     at_first = await busy.get_json(CHOOSING)
     assert at_first["values"] == at_first["file"]
     status, tried = await put(busy, {"switch_cost_s": 2, "quality.facing": 0.5, "quality.relative": False})
@@ -111,7 +111,7 @@ async def test_what_is_tried_out_is_in_force_at_once_with_its_lines(busy: Hall) 
         ([], "the request's JSON: "),
     ],
 )
-async def test_what_makes_no_sense_changes_nothing(busy: Hall, json: Any, error: str) -> None:
+async def test_invalid_trial_settings_change_nothing(busy: Hall, json: Any, error: str) -> None:
     status, told = await put(busy, json)
     assert status == 400
     assert told["error"].startswith(error)
@@ -137,7 +137,7 @@ async def open_hall() -> AsyncIterator[Hall]:
         yield await anext(halls)
 
 
-async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall) -> None:
+async def test_the_configuration_shows_differences_and_no_secrets(open_hall: Hall) -> None:
     settings = {it["key"]: it for it in (await open_hall.get_json("/api/operator/config"))["settings"]}
     assert settings["encode.gop"] == {"key": "encode.gop", "value": "5", "default": "10", "differs": True}
     assert settings["view.quality.truncation"]["differs"] is False
@@ -157,7 +157,7 @@ async def test_the_configuration_says_what_differs_and_no_secret(open_hall: Hall
         "rtsp://10.0.0.1:554/user=admin_password=hush_channel=1.sdp?real_stream",
     ],
 )
-def test_a_password_is_not_shown_wherever_a_camera_has_it(source: str) -> None:
+def test_a_password_is_hidden_wherever_a_source_has_it(source: str) -> None:
     config = small_config(cameras=[{"id": A, "source": source}])
     [shown] = [it.value for it in settings_of(config) if it.key == f"cameras.{A}.source"]
     assert shown.strip("'") in {"rtsp://10.0.0.1/...", "http://10.0.0.1/...", "rtsp://10.0.0.1:554/..."}

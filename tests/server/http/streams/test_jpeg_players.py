@@ -66,7 +66,7 @@ async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -
 
 @needs_ffmpeg
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mjpeg", "/objects/1/best.mp4?overlay=1"])
-async def test_ffmpeg_reads_it_without_a_complaint(going: Drawn, path: str) -> None:
+async def test_ffmpeg_reads_mjpeg_without_a_warning(going: Drawn, path: str) -> None:
     reading = await asyncio.create_subprocess_exec(
         *("ffmpeg", "-v", "warning", "-nostdin", "-i", f"http://127.0.0.1:{going.port}{path}"),
         *("-frames:v", "15", "-f", "framecrc", "-"),

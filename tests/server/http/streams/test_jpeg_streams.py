@@ -42,7 +42,7 @@ def difference(image: Image, other: Image) -> float:
     return float(np.abs(image.astype(np.int16) - other).mean())
 
 
-async def test_boxes_are_on_the_very_frame_that_they_belong_to(drawn: Drawn) -> None:
+async def test_boxes_are_drawn_on_their_frames(drawn: Drawn) -> None:
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as answer:
         assert answer.status == 200
         assert answer.content_type == "video/mp4"
@@ -80,7 +80,7 @@ async def test_boxes_are_on_the_very_frame_that_they_belong_to(drawn: Drawn) -> 
     assert at < after - 1
 
 
-async def test_a_still_is_the_newest_frame_and_is_kept_nowhere(drawn: Drawn) -> None:
+async def test_a_still_is_the_newest_frame_and_not_cached(drawn: Drawn) -> None:
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
         assert answer.status == 200
         assert answer.content_type == "image/jpeg"
@@ -115,7 +115,7 @@ async def test_a_cameras_boxes_belong_to_decided_frames(drawn: Drawn) -> None:
             assert beside.any(), "a line where the edge of the box is"
 
 
-async def test_multipart_jpeg_goes_on_with_the_newest_picture(drawn: Drawn) -> None:
+async def test_multipart_jpeg_continues_with_the_newest_picture(drawn: Drawn) -> None:
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
         assert answer.content_type == "multipart/x-mixed-replace"
         pulses = []
@@ -130,7 +130,7 @@ async def test_multipart_jpeg_goes_on_with_the_newest_picture(drawn: Drawn) -> N
     assert pulses == sorted(set(pulses))
 
 
-async def test_pictures_of_a_person_are_shown_one_by_one_though_they_come_by_gops(drawn: Drawn) -> None:
+async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn: Drawn) -> None:
     loop = asyncio.get_running_loop()
     came: dict[int, float] = {}
     going = asyncio.create_task(drawn.keep_going(GOP / FPS))
@@ -147,7 +147,7 @@ async def test_pictures_of_a_person_are_shown_one_by_one_though_they_come_by_gop
     assert max(max(gop) - min(gop) for gop in gops[1:] if gop) > 0.4 * GOP / FPS, "they do not come in bursts"
 
 
-async def test_fewer_pictures_are_given_when_fewer_are_wanted(drawn: Drawn) -> None:
+async def test_the_requested_rate_limits_pictures(drawn: Drawn) -> None:
     async with drawn.session.get("/cameras/c0/live.mjpeg?fps=5") as answer:
         reading = parts(answer)
         first = await anext(reading)
@@ -162,7 +162,7 @@ async def test_fewer_pictures_are_given_when_fewer_are_wanted(drawn: Drawn) -> N
         assert content["error"].startswith(f"fps={rate}: must be")
 
 
-async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> None:
+async def test_one_worker_renders_a_stream_for_all_viewers(drawn: Drawn) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     film = f"/objects/{SOMEBODY}/best.mp4?overlay=1"
     async with drawn.session.get(film) as one, drawn.session.get(film) as other:
@@ -176,7 +176,7 @@ async def test_one_process_draws_for_all_who_watch_one_stream(drawn: Drawn) -> N
     assert first[:length] == second[:length]
 
 
-async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
+async def test_a_killed_worker_is_replaced_and_its_streams_continue(
     drawn: Drawn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
@@ -204,7 +204,7 @@ async def test_a_process_that_is_killed_is_replaced_and_the_streams_go_on(
     assert len(times) >= 4 * GOP
 
 
-async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> None:
+async def test_a_worker_ends_after_its_last_viewer(drawn: Drawn) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     pictures._linger_s = 0.2
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
@@ -219,7 +219,7 @@ async def test_a_process_ends_some_time_after_its_last_viewer(drawn: Drawn) -> N
         os.kill(pid, 0)
 
 
-async def test_a_process_that_hangs_slows_nobody_down(drawn: Drawn) -> None:
+async def test_a_hanging_worker_does_not_delay_others(drawn: Drawn) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
         await anext(parts(answer))
@@ -235,7 +235,7 @@ async def test_a_process_that_hangs_slows_nobody_down(drawn: Drawn) -> None:
         os.kill(source.pid, signal.SIGCONT)
 
 
-async def test_no_more_pictures_are_made_than_the_server_may() -> None:
+async def test_the_number_of_rendered_streams_is_limited() -> None:
     async for drawn in drawn_room(http={"pictures_max": 1}):
         async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
             await anext(parts(answer))
@@ -251,7 +251,7 @@ async def test_no_more_pictures_are_made_than_the_server_may() -> None:
             assert other.status == 200, "one that nobody watches any more makes place"
 
 
-async def test_pictures_count_among_all_that_is_watched() -> None:
+async def test_rendered_streams_count_towards_the_viewer_limit() -> None:
     async for drawn in drawn_room(http={"viewers_max": 2, "viewers_per_object": 1}):
         async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:  # and the process that draws it
             await anext(parts(answer))
@@ -267,14 +267,14 @@ async def test_pictures_count_among_all_that_is_watched() -> None:
             assert "viewers_per_object" in content["error"]
 
 
-async def test_who_cannot_be_shown_now_is_503(hall: Hall) -> None:
+async def test_a_person_who_cannot_be_shown_gets_503(hall: Hall) -> None:
     code, content = await hall.get("/cameras/c0/live.jpg")
     assert (code, content) == (503, {"error": "there is no picture of camera c0 now"})
     code, content = await hall.get(f"/cameras/{B}/live.mjpeg?overlay=1")
     assert code == 503
 
 
-async def test_processes_end_with_the_service() -> None:
+async def test_workers_end_with_the_service() -> None:
     pids = []
     async for drawn in drawn_room():
         async with drawn.session.get("/cameras/c0/live.jpg") as answer:

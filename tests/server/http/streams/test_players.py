@@ -211,7 +211,7 @@ async def test_vlc_plays_across_cuts_without_a_warning(live: Hall, shared: Path)
 
 
 @needs_chromium
-async def test_chromium_plays_hls_by_itself_up_to_the_end(live: Hall) -> None:
+async def test_chromium_plays_hls_natively_to_the_end(live: Hall) -> None:
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{live.port}/healthz")

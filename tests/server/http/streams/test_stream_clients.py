@@ -37,7 +37,7 @@ async def deserted(hall: Hall) -> None:
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_head_takes_no_place_and_leaves_the_connection_of_use(busy: Hall, path: str) -> None:
+async def test_head_takes_no_slot_and_keeps_the_connection_usable(busy: Hall, path: str) -> None:
     reader, writer, head = await asked(busy, GET.format(path).replace("GET", "HEAD"))
     for _ in range(2):
         assert head.startswith("http/1.1 200")
@@ -52,7 +52,7 @@ async def test_head_takes_no_place_and_leaves_the_connection_of_use(busy: Hall, 
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_an_old_client_gets_a_plain_stream_that_ends_with_the_connection(busy: Hall, path: str) -> None:
+async def test_an_http_1_0_client_gets_a_stream_until_the_connection_closes(busy: Hall, path: str) -> None:
     reader, writer, head = await asked(busy, f"GET {path} HTTP/1.0\r\n\r\n")
     assert head.startswith("http/1.0 200")
     assert "chunked" not in head
@@ -66,7 +66,7 @@ async def test_an_old_client_gets_a_plain_stream_that_ends_with_the_connection(b
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_a_player_that_asks_for_ranges_gets_the_stream_and_no_promise(busy: Hall, path: str) -> None:
+async def test_a_range_request_gets_the_whole_stream(busy: Hall, path: str) -> None:
     for ranges in ("bytes=0-", "bytes=0-1", "bytes=1000000-"):
         async with busy.session.get(path, headers={"Range": ranges}) as answer:
             assert answer.status == 200
@@ -74,7 +74,7 @@ async def test_a_player_that_asks_for_ranges_gets_the_stream_and_no_promise(busy
 
 
 @pytest.mark.parametrize("path", [*STREAMS, "/objects/1/hls/index.m3u8", "/api/objects", "/api/events"])
-async def test_pages_of_other_origins_may_ask(busy: Hall, path: str) -> None:
+async def test_pages_of_other_origins_may_request_streams(busy: Hall, path: str) -> None:
     asking = {"Origin": "http://elsewhere", "Access-Control-Request-Method": "GET"}
     async with busy.session.options(path, headers=asking) as answer:
         assert answer.status == 204
@@ -87,7 +87,7 @@ async def test_pages_of_other_origins_may_ask(busy: Hall, path: str) -> None:
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_a_connection_that_is_torn_off_frees_its_place(busy: Hall, path: str) -> None:
+async def test_a_broken_connection_frees_its_slot(busy: Hall, path: str) -> None:
     _, writer, _ = await asked(busy, GET.format(path))
     assert busy.service.splicer.viewers == 1
     writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -96,7 +96,7 @@ async def test_a_connection_that_is_torn_off_frees_its_place(busy: Hall, path: s
 
 
 @pytest.mark.parametrize("limit", ["viewers_max", "viewers_per_object"])
-async def test_beyond_the_limit_a_viewer_is_told_when_to_come_again(limit: str) -> None:
+async def test_beyond_the_limit_a_viewer_gets_503_with_retry_after(limit: str) -> None:
     async for hall in opened(http={limit: 2}):
         hall.service.come(*CAMERAS)
         for epoch in range(3):
@@ -116,7 +116,7 @@ async def test_beyond_the_limit_a_viewer_is_told_when_to_come_again(limit: str) 
             assert answer.status == 200, "there is room again"
 
 
-async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(busy: Hall) -> None:
+async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(busy: Hall) -> None:
     channel = busy.service.splicer.persons[1]
     stalled = socket.socket()
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -151,7 +151,7 @@ async def test_a_viewer_that_does_not_read_loses_whole_gops_and_harms_nobody(bus
     writer.close()
 
 
-async def test_a_viewer_who_is_gone_while_the_server_waits_for_it_is_forgotten(busy: Hall) -> None:
+async def test_a_viewer_that_disconnects_while_blocked_is_removed(busy: Hall) -> None:
     channel = busy.service.splicer.persons[1]
     _, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     for _ in range(100):
@@ -161,7 +161,7 @@ async def test_a_viewer_who_is_gone_while_the_server_waits_for_it_is_forgotten(b
     await deserted(busy)
 
 
-async def test_a_transport_stream_is_packed_only_when_somebody_watches_one(busy: Hall) -> None:
+async def test_transport_streams_are_muxed_only_while_watched(busy: Hall) -> None:
     kept = busy.service.splicer.persons[1]._backlog
     assert not any("mpegts" in vars(piece) for piece in kept)
     async with busy.session.get("/objects/1/best.ts") as one, busy.session.get("/objects/1/best.ts") as two:

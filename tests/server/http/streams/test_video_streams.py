@@ -28,7 +28,7 @@ def last_fragment(data: bytes) -> bytes:
     return data[start:] if size and len(data) - start == size else b"\x00never"
 
 
-async def test_the_best_view_is_playable_from_its_first_byte_at_the_pulses_times(busy: Hall) -> None:
+async def test_the_best_view_is_playable_from_the_first_byte_with_times_of_pulses(busy: Hall) -> None:
     async with busy.session.get("/objects/1/best.mp4") as answer:
         assert answer.status == 200
         assert answer.content_type == "video/mp4"
@@ -49,9 +49,7 @@ async def test_the_best_view_is_playable_from_its_first_byte_at_the_pulses_times
 
 
 @pytest.mark.parametrize("how", ["camera", "prefer"])
-async def test_a_stream_shows_the_camera_that_is_held_or_preferred_whichever_is_best(
-    busy: Hall, how: str
-) -> None:
+async def test_a_stream_shows_its_fixed_or_preferred_camera(busy: Hall, how: str) -> None:
     assert (await busy.get_json("/api/objects/1/choice"))["camera"] == B
     async with busy.session.get(f"/objects/1/best.mp4?{how}={A}") as answer:
         data = await read_stream(answer, GOP)
@@ -82,13 +80,13 @@ async def test_a_stream_shows_the_camera_that_is_held_or_preferred_whichever_is_
         ("/objects/1/best.ts?prefer=c0&from=-1", 400),
     ],
 )
-async def test_what_cannot_be_held_or_preferred_is_said(busy: Hall, path: str, status: int) -> None:
+async def test_an_invalid_fixed_or_preferred_camera_is_refused(busy: Hall, path: str, status: int) -> None:
     code, content = await busy.get(path)
     assert code == status
     assert "camera" in content["error"] or "object 7" in content["error"]
 
 
-async def test_a_cameras_own_stream_begins_with_its_newest_gop(busy: Hall) -> None:
+async def test_a_camera_stream_begins_with_its_newest_gop(busy: Hall) -> None:
     async with busy.session.get("/cameras/c0/live.mp4") as answer:
         data = await read_stream(answer, GOP)
     with av.open(io.BytesIO(data), "r") as stream:
@@ -96,7 +94,7 @@ async def test_a_cameras_own_stream_begins_with_its_newest_gop(busy: Hall) -> No
     assert times == list(range(2 * GOP, 3 * GOP))
 
 
-async def test_a_viewer_who_leaves_is_forgotten(busy: Hall) -> None:
+async def test_a_viewer_who_leaves_is_removed(busy: Hall) -> None:
     async with busy.session.get("/objects/1/best.mp4") as answer:
         await read_stream(answer, GOP)
         assert busy.service.splicer.viewers == 1
@@ -105,7 +103,7 @@ async def test_a_viewer_who_leaves_is_forgotten(busy: Hall) -> None:
         await asyncio.sleep(0.01)
 
 
-async def test_an_old_client_gets_a_plain_stream_that_is_not_chunked(busy: Hall) -> None:
+async def test_an_http_1_0_client_gets_a_stream_that_is_not_chunked(busy: Hall) -> None:
     reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
     writer.write(b"GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     head = (await reader.readuntil(b"\r\n\r\n")).lower()
@@ -119,7 +117,7 @@ async def test_an_old_client_gets_a_plain_stream_that_is_not_chunked(busy: Hall)
     await writer.wait_closed()
 
 
-async def test_viewers_old_and_new_are_sent_the_same_bytes_as_each_gop_comes(busy: Hall) -> None:
+async def test_all_viewers_receive_the_same_bytes_of_each_gop(busy: Hall) -> None:
     connections = [await asyncio.open_connection("127.0.0.1", busy.port) for _ in range(3)]
     for (_, writer), version in zip(connections, ["1.0", "1.1", "1.1"], strict=True):
         writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: hall\r\n\r\n".encode())
@@ -142,7 +140,7 @@ async def test_viewers_old_and_new_are_sent_the_same_bytes_as_each_gop_comes(bus
         await writer.wait_closed()
 
 
-async def test_one_viewer_more_than_the_server_takes_gets_503_and_when_to_try_again() -> None:
+async def test_a_viewer_beyond_the_limit_gets_503_with_retry_after() -> None:
     async for hall in opened(http={"viewers_max": 1}):
         hall.service.come(*CAMERAS)
         for epoch in range(3):

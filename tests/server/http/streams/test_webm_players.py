@@ -91,7 +91,7 @@ LOST = 22
 
 
 @needs_chromium
-async def test_chromium_plays_over_cuts_and_what_is_missing_to_the_end(free: Hall) -> None:
+async def test_chromium_plays_across_cuts_and_gaps_to_the_end(free: Hall) -> None:
     splicer, frame_buffers = free.service.splicer, free.service.frame_buffers
     splicer.forget([], [])  # begin with somebody new
     for seed, camera in enumerate((A, B)):
@@ -167,13 +167,13 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
         *("/api/objects/1/past", "/api/cameras/c0/past"),
     ],
 )
-async def test_what_there_is_not_is_refused_in_a_line(free: Hall, path: str) -> None:
+async def test_mp4_addresses_of_a_vp8_site_are_refused_with_one_line(free: Hall, path: str) -> None:
     code, content = await free.get(path)
     assert code == 404
     assert "VP8 (encode.codec): there is best.webm" in content["error"]
 
 
-async def test_jpeg_is_made_of_it_with_boxes_and_without(free: Hall) -> None:
+async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(free: Hall) -> None:
     pictures = {}
     for path in ("/objects/1/best.jpg", "/objects/1/best.jpg?overlay=1", "/cameras/c1/live.jpg"):
         async with free.session.get(path) as answer:
@@ -189,7 +189,9 @@ async def test_jpeg_is_made_of_it_with_boxes_and_without(free: Hall) -> None:
     assert np.abs(plain.astype(float) - boxed).max() > 50, "there are boxes in it"
 
 
-async def test_whom_nobody_knows_and_another_sites_webm_are_refused_in_a_line(free: Hall, busy: Hall) -> None:
+async def test_unknown_people_and_webm_of_an_h264_site_are_refused_with_one_line(
+    free: Hall, busy: Hall
+) -> None:
     assert await free.get("/objects/9/best.webm") == (404, {"error": "there is no object 9"})
     code, content = await free.get("/cameras/c9/live.webm")
     assert (code, content["error"]) == (404, "there is no camera 'c9'; there are c0, c1")
@@ -200,7 +202,7 @@ async def test_whom_nobody_knows_and_another_sites_webm_are_refused_in_a_line(fr
     assert "H.264 (encode.codec): there is best.mp4" in content["error"]
 
 
-async def test_the_site_says_what_its_streams_are(free: Hall, busy: Hall) -> None:
+async def test_the_site_names_codec_and_container(free: Hall, busy: Hall) -> None:
     site = await free.get_json("/api/site")
     assert (site["codec"], site["container"]) == ("vp8", "webm")
     site = await busy.get_json("/api/site")
