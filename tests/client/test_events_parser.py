@@ -1,4 +1,4 @@
-"""Server-sent events: the parser, and the stream that comes back after an interruption."""
+"""Server-sent events: the parser, and the event stream after an interruption."""
 
 from __future__ import annotations
 

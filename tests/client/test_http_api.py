@@ -1,4 +1,4 @@
-"""What is asked once: the site, the objects, the cameras, a choice; and how errors are told."""
+"""Single requests of the client: site, objects, cameras, choices; and their errors."""
 
 from __future__ import annotations
 

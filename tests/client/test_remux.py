@@ -1,4 +1,4 @@
-"""From a recorded stream to a film: the same pictures and sound, from time 0, whole or not at all."""
+"""Remuxing of a recording: unchanged pictures and sound from time 0, complete or not at all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever a server sends, however long it goes on: a client takes so much of it, and says why in a line."""
+"""An untrusted server: the client limits what it reads, and reports errors in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line: exit code 0, or one line that says what is wrong, and nothing half-written."""
+"""The command line: exit code 0, or a one-line error and no incomplete files."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def site(folder: Path, **changes: Any) -> Path:
 
 @pytest.fixture
 def taken() -> Iterator[int]:
-    """Yield a port that somebody listens on."""
+    """Yield a port in use."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield int(server.getsockname()[1])
 

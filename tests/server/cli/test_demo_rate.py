@@ -1,4 +1,4 @@
-"""The demo runs at a rate that the machine can do, or that it is told."""
+"""The demo runs at a rate that the machine can sustain, or at a configured one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A full disk: nothing empty or half-written is left; of what is recorded live, what came before is kept."""
+"""A full disk: no empty or incomplete files are left; live recordings keep what came before."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is watched for a day is written down as what is watched for a minute: its length takes no memory."""
+"""Long recordings: memory does not grow with their length."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def told(gop: int) -> Gop:
 
 
 def held(folder: Path, gops: int) -> int:
-    """Return the bytes of memory that stay when so much has been said."""
+    """Return the bytes of memory in use after so many events."""
     spool = Spool(folder)
     history = ViewHistory(1, spool=spool)
     history.take(told(0))

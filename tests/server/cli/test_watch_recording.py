@@ -1,4 +1,4 @@
-"""What `myview watch --out` leaves: a film that plays everywhere, and beside it who is where in it."""
+"""`myview watch --out` writes a file that plays everywhere, and sidecar files with boxes."""
 
 from __future__ import annotations
 

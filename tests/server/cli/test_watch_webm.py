@@ -1,4 +1,4 @@
-"""`watch --out x.webm`: a film of a site of VP8, from time 0, that is whole and can be searched."""
+"""`watch --out x.webm` writes a complete, seekable file from time 0."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A camera's password may stand in a file that its own process alone reads."""
+"""Camera passwords from files that only the camera's process reads."""
 
 from __future__ import annotations
 

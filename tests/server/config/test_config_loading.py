@@ -1,4 +1,4 @@
-"""A configuration is right, or one line says what is wrong with it."""
+"""A configuration is valid, or refused with a one-line error."""
 
 from __future__ import annotations
 

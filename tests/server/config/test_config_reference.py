@@ -1,4 +1,4 @@
-"""configs/demo.yaml shows every setting with its true default, and the other examples hold together."""
+"""configs/demo.yaml has every setting with its default, and the other examples are consistent."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SETTING = re.compile(r"^( *)#(?=\w)", re.MULTILINE)
 
 
 def uncommented() -> dict[str, Any]:
-    """Read the reference with every default taken out of its comment."""
+    """Read the reference with all commented defaults uncommented."""
     content = yaml.safe_load(SETTING.sub(r"\1", REFERENCE))
     assert isinstance(content, dict)
     return content

@@ -1,4 +1,4 @@
-"""What stands twice in a file that people write is refused, with both lines: or the last would count."""
+"""Duplicate keys in files are refused with both lines: parsers would keep only the last."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pulses with users: every process of a site logs in, over TLS, and what is wrong is one line."""
+"""Pulse server with users: every process logs in over TLS, and errors are one line."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ async def test_the_pulse_server_admits_clients_with_a_password(tmp_path: Path) -
 
 
 async def _pulses_come(config: Config) -> None:
-    """Come as all whom the server waits for."""
+    """Connect as all clients that the server waits for."""
     sync = config.sync
 
     async def first(name: str) -> None:

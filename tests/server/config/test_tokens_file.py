@@ -1,4 +1,4 @@
-"""The file of tokens, and the command that makes one."""
+"""The token file, and the command that generates tokens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the server does again and again outlives what goes wrong once, and it is told."""
+"""Periodic tasks survive errors, which are logged."""
 
 from __future__ import annotations
 

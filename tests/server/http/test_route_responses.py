@@ -1,4 +1,4 @@
-"""What every address answers: errors in one line, HEAD, the page, the description, metrics."""
+"""Responses of all routes: one-line errors, HEAD, the page, the API description, metrics."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ async def test_a_server_error_gets_500_without_a_traceback(
 async def test_a_server_error_during_an_answer_resets_the_connection(
     busy: Hall, monkeypatch: pytest.MonkeyPatch, version: str
 ) -> None:
-    """By an end that looks like one a part of a film would be taken for all of it."""
+    """After an orderly close a client would take a part of a stream for all of it."""
 
     async def some(_: Subscriber) -> AsyncIterator[SimpleNamespace]:
         yield SimpleNamespace(data=b"some of it")

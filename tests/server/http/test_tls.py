@@ -1,4 +1,4 @@
-"""HTTPS from files: it is spoken, a new certificate takes no restart, and a bad one changes nothing."""
+"""HTTPS: certificates are reloaded without a restart, and invalid ones change nothing."""
 
 from __future__ import annotations
 

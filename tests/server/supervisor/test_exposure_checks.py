@@ -1,4 +1,4 @@
-"""A site is not open to other machines by accident."""
+"""A site is not exposed to other machines by accident."""
 
 from __future__ import annotations
 

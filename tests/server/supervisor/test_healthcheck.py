@@ -1,4 +1,4 @@
-"""The containers' health checks tell who is well from who is not, by HTTPS and with a token, too."""
+"""The containers' health checks, also over HTTPS and with a token."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A configuration that is read again: what becomes of each change, and what runs while the file is wrong."""
+"""Reloading the configuration: the effect of each change, and invalid files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of a configuration has to wait for what, and a wrong file that is mended."""
+"""Settings that wait for others at a reload, and files that are repaired."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ending well: a signal that comes while processes are being started waits until each is known."""
+"""Shutdown: signals are deferred while processes start, and processes exit in time."""
 
 from __future__ import annotations
 
@@ -201,7 +201,7 @@ def waits_for_a_file(pid: int) -> bool:
 def test_a_command_that_waits_for_a_pipe_ends_silently_on_a_signal(
     tmp_path: Path, command: str, number: signal.Signals, code: int
 ) -> None:
-    """FFmpeg gives up with an error of its own, which is nobody's mistake."""
+    """FFmpeg fails with its own error when interrupted, which is not a bug."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "site.yaml").write_text("cameras: [{id: c0, source: pipe}]", encoding="ascii")
     before = sorted(tmp_path.iterdir())

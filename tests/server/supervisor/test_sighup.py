@@ -1,4 +1,4 @@
-"""SIGHUP while a process starts: what is written into its configuration by then is read all the same."""
+"""SIGHUP while a process starts: changes of its configuration until then are read."""
 
 from __future__ import annotations
 

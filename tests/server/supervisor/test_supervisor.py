@@ -1,4 +1,4 @@
-"""The supervisor: what dies is restarted, what is done stays done, what was refused ends everything."""
+"""The supervisor restarts processes that die, not those that have finished, and ends on refused input."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
 
 
 class Process:
-    """A process by hand; ``told`` is what it closes once it has loaded."""
+    """A simulated process; ``told`` is the descriptor that it closes once it has loaded."""
 
     pid = NOBODY
 
@@ -54,7 +54,7 @@ class Process:
 
 
 class Machine:
-    """A machine on which a supervisor starts processes by hand; they load at once, or when told to."""
+    """A simulated machine for a supervisor; processes load at once, or when the test lets them."""
 
     def __init__(self) -> None:
         self.loads_at_once = True

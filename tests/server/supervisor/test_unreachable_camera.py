@@ -1,4 +1,4 @@
-"""A network camera that does not answer when its process starts is waited for."""
+"""A network camera that does not answer when its process starts is retried."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from server.system.errors import UnavailableError
 
 
 class Lines(logging.Handler):
-    """What is said in the log, for who waits for it."""
+    """A log handler that lets a test wait for lines."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,7 +34,7 @@ class Lines(logging.Handler):
         self._more.set()
 
     async def until(self, said: Callable[[str], bool]) -> None:
-        """Wait until a line says so."""
+        """Wait until a line has this text."""
         async with asyncio.timeout(PATIENCE):
             while not any(said(line) for line in self.lines):
                 self._more.clear()

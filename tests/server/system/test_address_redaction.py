@@ -1,4 +1,4 @@
-"""Addresses as they may be shown: protocol and host, and nothing that could be a password."""
+"""Redacted addresses: protocol and host, and nothing that could be a password."""
 
 from __future__ import annotations
 

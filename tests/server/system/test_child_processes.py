@@ -1,4 +1,4 @@
-"""One module starts child processes, so that limits, priorities and signals are looked after in one place."""
+"""One module starts all child processes, with their limits, priorities and signals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many files may be open: as many as the system lets be, with some kept for what is no viewer."""
+"""File descriptors: the limit is raised, and some are reserved for uses other than viewers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fails for every frame, message or attempt is one event of the log, and not a line for each."""
+"""Repeated failures are one log event, not a line for each frame, message or attempt."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ KEYS = ZenohKeys("hall")
 
 
 def found(camera: str, pulse: int) -> bytes:
-    """Return what a camera says of a frame."""
+    """Return a message of a camera about a frame."""
     return msgspec.json.encode(FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
 
 

@@ -1,4 +1,4 @@
-"""No line that MyView writes has a camera's password in it, however the password stands in the address."""
+"""No output of MyView has a camera's password."""
 
 from __future__ import annotations
 

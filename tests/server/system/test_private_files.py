@@ -1,4 +1,4 @@
-"""What is written about people is for the user that writes it alone, whatever the umask."""
+"""Files about people are private to the user, regardless of the umask."""
 
 from __future__ import annotations
 

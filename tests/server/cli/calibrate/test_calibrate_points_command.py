@@ -1,4 +1,4 @@
-"""`myview calibrate POINTS`: a file that the configuration takes, or one line that says what is wrong."""
+"""`myview calibrate POINTS` writes a file that the configuration loads, or prints a one-line error."""
 
 from __future__ import annotations
 

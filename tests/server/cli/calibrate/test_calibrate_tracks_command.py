@@ -1,4 +1,4 @@
-"""`myview calibrate TRACKS`: a file that the configuration takes, words, and refusals that leave nothing."""
+"""`myview calibrate TRACKS` writes a file that the configuration loads and a report, or leaves nothing."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def camera(east: float, north: float) -> np.ndarray:
 
 
 def write_walk(folder: Path, frames: int, way: Callable[[np.ndarray], np.ndarray]) -> Path:
-    """Write what two cameras see of somebody; the second one's recording begins `OFFSET` frames later."""
+    """Write two cameras' tracks of a person; the second recording begins `OFFSET` frames later."""
     folder.mkdir()
     place = way(np.arange(frames))
     for name, where, offset in (("c0", (-4.0, -1.0), 0), ("c1", (1.0, -4.5), OFFSET)):

@@ -1,4 +1,4 @@
-"""`myview doctor` says of a configuration what will not work, and what to do."""
+"""`myview doctor` reports what will not work in a configuration, with remedies."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_an_invalid_configuration_is_the_only_finding(myview: Run, tmp_path: Pat
 
 @pytest.fixture
 def taken() -> Iterator[int]:
-    """Yield a port that somebody listens on who never answers."""
+    """Yield a port with a listener that never answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield int(server.getsockname()[1])
 
@@ -367,7 +367,7 @@ def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
 
 
 def expired(folder: Path) -> tuple[Path, Path]:
-    """Make a certificate whose time is over, which takes an authority: that may say when it begins."""
+    """Create an expired certificate, signed by an authority, since only that can set its start."""
     certificate, key, asked, settings = (folder / it for it in ("over.pem", "over.key", "asked", "settings"))
     (folder / "known").touch()
     (folder / "serial").write_text("01\n")

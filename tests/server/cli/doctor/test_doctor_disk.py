@@ -1,4 +1,4 @@
-"""`myview doctor` of what is recorded: a size that was not measured is not said to be one."""
+"""`myview doctor` and the size of recordings: unknown bit rates are named."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def site(folder: Path, cameras: tuple[str, ...] = ("c0",), h264: str = "encode",
 
 @pytest.fixture(autouse=True)
 def disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let so much be free, whatever this machine has."""
+    """Simulate the free space of the disk."""
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=FREE_MB * 1e6))
 
 

@@ -1,4 +1,4 @@
-"""`myview doctor`: a check that fails itself is a finding, too; cameras find their server."""
+"""`myview doctor`: a check that fails itself is a finding; cameras can reach their server."""
 
 from __future__ import annotations
 

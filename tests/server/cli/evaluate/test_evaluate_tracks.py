@@ -1,4 +1,4 @@
-"""`myview evaluate`: tables and numbers from files, and one line for what cannot be compared."""
+"""`myview evaluate`: tables and JSON from files, and one-line errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run(myview: Run) -> Printed:
 
 @pytest.fixture
 def refused(myview: Run) -> Printed:
-    """Return a function that runs `myview evaluate` and gives the one line that says what is wrong."""
+    """Return a function that runs `myview evaluate` and returns its one-line error."""
     return lambda *arguments: refusal(myview("evaluate", *arguments))
 
 

@@ -1,4 +1,4 @@
-"""`myview evaluate --views`: choices beside the optimum, by number or through the tracks."""
+"""`myview evaluate --views`: choices compared with the optimum, matched by number or by tracks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written down: tracks and choices to the byte, and a film per person."""
+"""Files of a rendering: tracks and choices byte for byte, and a film per person."""
 
 from __future__ import annotations
 

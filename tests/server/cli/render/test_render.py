@@ -1,4 +1,4 @@
-"""`myview render` as a process: all of it is there, or nothing."""
+"""`myview render` as a process: it writes everything or nothing."""
 
 from __future__ import annotations
 

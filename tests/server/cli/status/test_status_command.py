@@ -1,4 +1,4 @@
-"""`myview status` says of a site what the site says of itself, once or again and again."""
+"""`myview status` shows a site's status, once or live."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`myview track --template` follows what is in a box of the first picture, or says what is wrong."""
+"""`myview track --template` tracks the contents of boxes in the first picture, or prints an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every address of the server, and who may have its answer: a new one without a decision fails here."""
+"""Access rules of all routes: a new route without a rule fails here."""
 
 from __future__ import annotations
 

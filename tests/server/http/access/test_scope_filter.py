@@ -1,4 +1,4 @@
-"""Who may see one person, or one camera, is told of nobody and nothing else."""
+"""A token for one person or one camera reveals nothing of others."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ async def events(answer: aiohttp.ClientResponse, last: int) -> list[tuple[str, A
 
 
 def people_in(gop: dict[str, Any]) -> set[int]:
-    """Return everybody of whom a GOP says anything."""
+    """Return the numbers of all people in a GOP event."""
     boxes = {box[0] for frames in gop["boxes"].values() for frame in frames for box in frame}
     told = {it[key] for it in gop["merged"] + gop["split"] for key in ("kept",)}
     return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | told

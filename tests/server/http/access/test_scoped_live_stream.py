@@ -1,4 +1,4 @@
-"""Who may see one person alone is shown no room without them: a held picture, and then grey."""
+"""Streams for a token limited to one person: without the person the picture is held, then gray."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stills, multipart JPEG and drawn boxes show nobody but whom a token may see, drawn by real processes."""
+"""Stills, MJPEG and drawn boxes for a token limited to one person, rendered by real processes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The past shows a person to who may see them alone, and no room without them."""
+"""Time shift for a token limited to one person: gray and silent without the person."""
 
 from __future__ import annotations
 

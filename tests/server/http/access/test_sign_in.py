@@ -1,4 +1,4 @@
-"""Who may operate without tokens, and signing in with one: what a page of another site can do is nothing."""
+"""Access without tokens, and signing in with one; pages of other sites can do nothing."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ async def site(tmp_path: Path) -> AsyncIterator[Hall]:
 async def asked(
     hall: Hall, path: str = SESSION, method: str = "GET", json: object = None, **headers: str
 ) -> tuple[int, str]:
-    """Return the status and the error; heads are given with _ for -."""
+    """Return the status and the error; headers are named with _ for -."""
     heads = {name.replace("_", "-"): value for name, value in headers.items()}
     async with hall.session.request(method, path, headers=heads, json=json) as answer:
         assert "Access-Control-Allow-Origin" not in answer.headers

@@ -1,4 +1,4 @@
-"""Signing in on the viewer's page, in a browser: what it then shows is what the token is for."""
+"""Signing in on the viewer's page, in a browser: the page shows what the token permits."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ async def browser() -> AsyncIterator[Browser]:
 async def watching(
     browser: Browser, folder: Path, address: str = ""
 ) -> AsyncIterator[tuple[Hall, Page, list[str]]]:
-    """Open the page of a site that takes tokens and has two people; give what was asked of it, too."""
+    """Open the page of a site with tokens and two people; also yield the requests that it received."""
     async with locked(folder) as hall:
         see(hall)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})

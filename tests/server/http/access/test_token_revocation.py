@@ -1,4 +1,4 @@
-"""A token that is taken away holds nothing open, and takes no restart."""
+"""Revoking a token ends its open answers, without a restart."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ async def test_a_new_token_is_valid_without_a_restart(site: Hall, tmp_path: Path
 async def test_a_token_for_a_person_is_void_after_numbers_restarted(
     tmp_path: Path, remembered: float | None, then: int
 ) -> None:
-    """Object 1 may be somebody else; where the cameras remember who it is the token goes on."""
+    """Object 1 may be another person; if the cameras have retained the numbers, the token stays valid."""
     async with locked(tmp_path) as hall:
         write_tokens(
             tmp_path / "tokens.yaml",

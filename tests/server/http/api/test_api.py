@@ -1,4 +1,4 @@
-"""The API: who is there, which camera shows them, and why."""
+"""The API: people, the cameras that show them, and the reasons."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(hall
 
 
 async def test_health_checks_are_answered_under_a_flood_of_camera_messages(hall: Hall) -> None:
-    """There is one more message for so long that nobody would wait for the last one."""
+    """Messages arrive faster than they can be processed, for longer than a health check waits."""
     flood: Inbox[int] = Inbox(lambda left: flood.put(left - 1) if left else None, turn_s=0.0)
     flood.put(100_000)
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""Server-sent events: all that a newcomer must know, then every GOP before its video."""
+"""Server-sent events: the current state first, then every GOP before its video."""
 
 from __future__ import annotations
 

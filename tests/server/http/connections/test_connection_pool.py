@@ -1,4 +1,4 @@
-"""Connections have places: whoever asks for nothing makes way and is cut off, and operators always get in."""
+"""Connection limits: idle connections make way, and operators are always admitted."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ GET = "GET {} HTTP/1.1\r\nHost: localhost\r\n{}\r\n"
 
 @asynccontextmanager
 async def small(**http: Any) -> AsyncIterator[Hall]:
-    """Serve a hall with people in it; nobody is cut off while a test is slow, but where it says so."""
+    """Serve a site with people; timeouts are long unless a test sets them."""
     async with aclosing(opened(http={"request_timeout_s": 60.0, **http})) as halls:
         hall = await anext(halls)
         see(hall)
@@ -41,14 +41,14 @@ async def small(**http: Any) -> AsyncIterator[Hall]:
 
 
 async def silent(hall: Hall, begin: str = "") -> Pair:
-    """Connect, and say what is no whole request."""
+    """Connect, and send an incomplete request."""
     reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
     writer.write(begin.encode())
     return reader, writer
 
 
 async def over(pair: Pair) -> bytes:
-    """Wait until the server ends a connection; give what it said."""
+    """Wait until the server closes a connection; return what it sent."""
     reader, writer = pair
     try:
         return await reader.read()
@@ -201,7 +201,7 @@ class Fake:
 
 
 class Clock:
-    """Seconds that pass when the test says so."""
+    """A clock that the test advances."""
 
     now = 0.0
 

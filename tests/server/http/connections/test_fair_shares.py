@@ -1,4 +1,4 @@
-"""Nobody takes everybody's streams away: whoever holds fewer gets a place of whoever holds the most."""
+"""Fair shares: a client with fewer streams gets a slot of the client with the most."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DOOR = "/cameras/c0/hls/index.m3u8"
 
 
 class Viewer:
-    """Somebody who watches or is told, until somebody else gets the place."""
+    """A client that watches or receives events until its slot is evicted."""
 
     def __init__(self, answer: aiohttp.ClientResponse) -> None:
         self._answer = answer

@@ -1,4 +1,4 @@
-"""HLS over HTTP, held against the rules of RFC 8216 and what players expect."""
+"""HLS over HTTP, compared with RFC 8216 and the expectations of players."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def tag(text: str, name: str) -> str:
 
 
 def entries(text: str) -> list[tuple[float, str, datetime]]:
-    """Return each segment's seconds, address and time of day; whatever breaks a rule of RFC 8216 fails."""
+    """Return each segment's duration, URL and wall-clock time, and check the rules of RFC 8216."""
     assert text.startswith("#EXTM3U\n"), "4.3.1.1"
     assert text.endswith("\n")
     assert "\r" not in text
@@ -49,7 +49,7 @@ def entries(text: str) -> list[tuple[float, str, datetime]]:
 
 
 def feed(hall: Hall, epochs: range) -> None:
-    """Feed a person who is larger in the other camera every other GOP: there are cuts."""
+    """Feed a person who is larger in alternating cameras, which causes cuts."""
     for epoch in epochs:
         hall.service.feed(
             epoch, {A: {1: SMALL}, B: {1: LARGE}} if epoch % 4 < 2 else {A: {1: LARGE}, B: {1: SMALL}}

@@ -1,4 +1,4 @@
-"""Who fetches a stream is counted: while an answer is awaited, for a while after, and against the limits."""
+"""HLS players count as viewers while they wait for an answer, and for a while afterwards."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PATHS = ["init.mp4", "index.m3u8", "0.m4s", "0.0.m4s"]
 
 
 class Clock:
-    """Seconds that pass when the test says so."""
+    """A clock that the test advances."""
 
     now = 0.0
 
@@ -49,7 +49,7 @@ ACTS = st.lists(
 def test_players_that_fetched_recently_or_wait_are_counted(
     acts: list[tuple[str, int, int, str | None, int]],
 ) -> None:
-    """Against a count from the beginning, over all that anybody has asked."""
+    """Compare with a count over all requests so far."""
     clock = Clock()
     shares = FairShare()
     readers = HlsSessions(KEPT_S / 3, shares, clock)

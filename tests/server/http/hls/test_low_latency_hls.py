@@ -1,4 +1,4 @@
-"""Parts of segments, held against draft-pantos-hls-rfc8216bis: what players that know them rely on."""
+"""Low-Latency HLS: parts of segments, compared with draft-pantos-hls-rfc8216bis."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Read:
 
 
 def read(text: str) -> Read:
-    """Read a playlist; whatever breaks a rule of the draft fails."""
+    """Parse a playlist, and check the rules of the draft."""
     target = int(found(text, r"#EXT-X-TARGETDURATION:(\d+)"))
     part_target = float(found(text, r"#EXT-X-PART-INF:PART-TARGET=([\d.]+)"))
     control = found(text, r"#EXT-X-SERVER-CONTROL:(.*)")

@@ -1,4 +1,4 @@
-"""The past as HLS: segments are found again at their addresses, and are what they were when they were new."""
+"""Time shift over HLS: recorded segments keep the URLs and bytes of live ones."""
 
 from __future__ import annotations
 

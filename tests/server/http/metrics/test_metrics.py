@@ -1,4 +1,4 @@
-"""What /metrics says of every stage, and whether /readyz means it."""
+"""/metrics of every stage, and /readyz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files for Prometheus and Grafana ask for nothing that /metrics does not say."""
+"""The files for Prometheus and Grafana use only metrics that exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the operator is told of the cameras and of the pulses."""
+"""The operator's view of cameras and pulses."""
 
 from __future__ import annotations
 

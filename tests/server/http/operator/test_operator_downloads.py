@@ -1,4 +1,4 @@
-"""Tracks and choices of a time span, as files."""
+"""Tracks and choices of a time range, as files."""
 
 from __future__ import annotations
 

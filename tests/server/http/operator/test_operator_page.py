@@ -1,4 +1,4 @@
-"""The operator's page in a browser, on a served site: it signs in, and what it does the site does."""
+"""The operator's page in a browser, on a served site: signing in, and every action."""
 
 from __future__ import annotations
 

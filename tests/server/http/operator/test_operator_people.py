@@ -1,4 +1,4 @@
-"""What the operator says of people, as the API and the viewers then know it."""
+"""Identity overrides by the operator, as the API and viewers show them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PEOPLE = "/api/operator/people"
 
 @pytest.fixture
 async def real() -> AsyncIterator[Hall]:
-    """Serve a site that works out itself who is who: one in both cameras, another in c0 alone."""
+    """Serve a site with two people: one in both cameras, the other only in c0."""
     async with aclosing(opened()) as halls:
         hall = await anext(halls)
         config = hall.service.config

@@ -1,4 +1,4 @@
-"""The configuration as the operator reads it, and what of the choice can be tried out."""
+"""The configuration on the operator's page, and trial settings of view selection."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ async def put(hall: Hall, json: Any) -> tuple[int, Any]:
 
 
 def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -> list[Any]:
-    """Return what is decided of two people who are now large in one camera, now in the other."""
+    """Return the decisions for two people who are larger in alternating cameras."""
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decisions = []

@@ -1,4 +1,4 @@
-"""What people watch pictures with: an <img> and a <video> in Chromium, and ffmpeg."""
+"""Players of rendered streams: <img> and <video> in Chromium, and ffmpeg."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ async (address) => {
 
 @pytest.fixture
 async def going() -> AsyncIterator[Drawn]:
-    """A site that goes on in real time."""
+    """A site that runs in real time."""
     async for drawn in drawn_room():
         task = asyncio.create_task(drawn.keep_going(GOP / FPS))
         yield drawn

@@ -1,4 +1,4 @@
-"""Pictures over HTTP, drawn by real processes: boxes on their own frames, the newest first."""
+"""JPEG streams over HTTP, rendered by real processes: boxes on their frames, newest frames first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Players that people use: nothing to complain of, and pixel for pixel the cameras' own pictures."""
+"""Common players play without warnings, and show the cameras' pictures pixel by pixel."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Played:
 
 
 async def played(hall: Hall, *commands: Sequence[str], user: str | None = None) -> list[Played]:
-    """Run players, one for each of the paths, while the site goes on and ends."""
+    """Run a player for each path while the site runs and ends."""
     pipe = asyncio.subprocess.PIPE
     players = [
         await asyncio.create_subprocess_exec(*it, stdout=pipe, stderr=pipe, user=user) for it in commands
@@ -171,7 +171,7 @@ VLC = (
 
 
 def check_order(hall: Hall, path: str, pictures: list[bytes]) -> None:
-    """Find each picture in a camera; who keeps time may hold one, or leave one out, but not go back."""
+    """Find each picture in a camera; a player may repeat or skip pictures, but not go back."""
     known = {it.tobytes(): (pulse, camera) for camera in range(2) for pulse, it in enumerate(own(camera))}
     assert len(known) == 2 * EPOCHS * STRIDE, "no picture is like another"
     shown = [known[it] for it in pictures]

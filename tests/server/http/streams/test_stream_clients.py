@@ -1,4 +1,4 @@
-"""Streams behave towards all who ask: old clients, players with ranges, other origins, the slow."""
+"""Streams for all kinds of clients: HTTP/1.0, range requests, other origins, slow connections."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ async def asked(hall: Hall, request: str) -> tuple[asyncio.StreamReader, asyncio
 
 
 async def deserted(hall: Hall) -> None:
-    """Wait until nobody watches any more."""
+    """Wait until there are no viewers."""
     while hall.service.splicer.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
         await asyncio.sleep(0.005)
 

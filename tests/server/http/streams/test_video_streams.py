@@ -1,4 +1,4 @@
-"""Video over HTTP: playable from the first byte, at the pulses' times, for old clients too."""
+"""Video over HTTP: playable from the first byte, with the times of pulses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A site of VP8: players have nothing to complain of, and whatever it does not have is refused in a line."""
+"""A VP8 site: players show no warnings, and unsupported addresses are refused with one line."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
 
 
 async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]]:
-    """Run a player on each of the paths while the site goes on and ends: code, output, complaints."""
+    """Run a player for each path while the site runs and ends; return exit code, output and warnings."""
     pipe = asyncio.subprocess.PIPE
     urls = [f"http://127.0.0.1:{hall.port}{path}" for path in PATHS]
     players = [
