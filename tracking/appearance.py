@@ -22,9 +22,8 @@ def gray_histograms(
 ) -> Floats:
     """Return the gray histogram of each box, shape (K, bins), rows summing to 1 (paper II.D, Example 1).
 
-    `gray` is (H, W); `boxes` (K, 4) in pixels are cut to the image; `mask` (H, W), where given, leaves
-    only its non-zero pixels in. A box that holds no pixel gets the uniform histogram: it looks like
-    nothing in particular.
+    `gray` is (H, W); `boxes` (K, 4) in pixels are clipped to the image; pixels where `mask` (H, W) is 0 are
+    left out. A box without pixels gets the uniform histogram.
 
     Raises:
         ValueError: `bins` is not between 1 and 256.
@@ -51,10 +50,10 @@ def _pixel_ranges(boxes: Floats, shape: tuple[int, ...]) -> NDArray[np.int64]:
 def appearance_distance(
     first: Floats, second: Floats, measure: AppearanceMeasure = "bhattacharyya"
 ) -> Floats:
-    """Compare all rows with all rows: g(.) of paper II.B, 0 for alike to 1 for nothing in common.
+    """Return the distances of all pairs of rows: g(.) of paper II.B, 0 for identical to 1 for disjoint.
 
-    `first` is (..., I, B) and `second` (..., J, B); the result is (..., I, J). Where no appearance is
-    known (B = 0 on either side) everything is alike: 0.
+    `first` is (..., I, B) and `second` (..., J, B); the result is (..., I, J). Empty
+    histograms (B = 0 on either side) have distance 0.
     """
     if first.shape[-1] == 0 or second.shape[-1] == 0:
         lead = np.broadcast_shapes(first.shape[:-2], second.shape[:-2])
@@ -62,5 +61,5 @@ def appearance_distance(
     if measure == "intersection":
         shared = np.minimum(first[..., :, None, :], second[..., None, :, :]).sum(axis=-1)
         return np.asarray(np.clip(1.0 - shared, 0.0, 1.0))
-    likeness = np.sqrt(first) @ np.sqrt(np.swapaxes(second, -1, -2))
-    return np.asarray(np.sqrt(np.clip(1.0 - likeness, 0.0, 1.0)))
+    coefficients = np.sqrt(first) @ np.sqrt(np.swapaxes(second, -1, -2))
+    return np.asarray(np.sqrt(np.clip(1.0 - coefficients, 0.0, 1.0)))

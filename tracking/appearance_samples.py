@@ -14,7 +14,7 @@ from tracking.types import Detections
 from tracking.window import AppearanceSample, WindowTrack
 
 _MAX_OVERLAP = 0.2
-"""Overlap (IoU) above which another object occludes the box, hidden ones included."""
+"""Overlap (IoU) above which another object, itself occluded or not, occludes the box."""
 
 
 def add_appearance_samples(
@@ -23,9 +23,9 @@ def add_appearance_samples(
     first: int,
     final: Sequence[Detections],
 ) -> tuple[WindowTrack, ...]:
-    """Return the tracks with how they look in the final frames of the window, of which `first` is the first.
+    """Return the tracks with appearance samples of the window's final frames, which begin at `first`.
 
-    `states` are the observations that each of the tracks is in, frame by frame, -1 where hidden.
+    `states`: for each track the index of its detection in each frame, -1 where occluded.
     """
     if not tracks:
         return ()
@@ -44,12 +44,12 @@ def _samples_of_runs(
 ) -> tuple[AppearanceSample, ...]:
     """Return one sample per run of consecutive unoccluded frames."""
     runs: list[tuple[int, list[Floats]]] = []
-    for place, detections in enumerate(final):
-        if not unoccluded[place] or states[place] == OCCLUDED or not detections.histograms.shape[1]:
+    for offset, detections in enumerate(final):
+        if not unoccluded[offset] or states[offset] == OCCLUDED or not detections.histograms.shape[1]:
             continue
-        histogram = detections.histograms[states[place]]
-        if runs and runs[-1][0] + len(runs[-1][1]) == first + place:
+        histogram = detections.histograms[states[offset]]
+        if runs and runs[-1][0] + len(runs[-1][1]) == first + offset:
             runs[-1][1].append(histogram)
         else:
-            runs.append((first + place, [histogram]))
-    return tuple(AppearanceSample(at, at + len(run) - 1, np.mean(run, axis=0)) for at, run in runs)
+            runs.append((first + offset, [histogram]))
+    return tuple(AppearanceSample(start, start + len(run) - 1, np.mean(run, axis=0)) for start, run in runs)

@@ -9,24 +9,24 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats
 
 _ROUNDING_ERROR = float(np.finfo(np.float64).eps)
-"""An overlap that is the least one but for its last digit is enough."""
+"""A similarity may be below the minimum by this much."""
 
 
 def assign_pairs(
-    similarity: Floats, least: float, bonus: Floats | None = None
+    similarity: Floats, min_similarity: float, bonus: Floats | None = None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Assign rows to columns so that the total similarity (and bonus) is largest.
+    """Assign rows to columns so that the total similarity plus bonus is largest.
 
     Args:
         similarity: `(T, R)`.
-        least: pairs that are less similar are no pairs.
+        min_similarity: least similarity of a pair.
         bonus: `(T, R)`, added to the similarity of pairs.
 
     Returns:
         `(P,)` rows and `(P,)` columns of the pairs.
     """
-    possible = similarity >= least - _ROUNDING_ERROR
-    worth = np.where(possible, similarity if bonus is None else similarity + bonus, 0.0)
-    rows, columns = scipy.optimize.linear_sum_assignment(worth, maximize=True)
+    possible = similarity >= min_similarity - _ROUNDING_ERROR
+    value = np.where(possible, similarity if bonus is None else similarity + bonus, 0.0)
+    rows, columns = scipy.optimize.linear_sum_assignment(value, maximize=True)
     paired = possible[rows, columns]
     return rows[paired], columns[paired]

@@ -29,14 +29,13 @@ from benchmarks.temporal_consistency.blob_merges import count_merges, count_wron
 from benchmarks.temporal_consistency.overhead_room import SIZE, BlobSequence, OverheadClip, render_sequence
 from benchmarks.temporal_consistency.plots import PUBLISHED, PUBLISHED_EDGES, plot
 from tracking.baselines.temporal_consistency import TemporalSettings
-from tracking.baselines.temporal_consistency.edge_search import cheapest_path_by_edges
 from tracking.baselines.temporal_consistency.graph import (
     WindowGraph,
     count_joint_edges,
     count_unpruned_edges,
     prune_links,
 )
-from tracking.baselines.temporal_consistency.groups import solve_joint_path
+from tracking.baselines.temporal_consistency.joint_path import cheapest_path_by_edges, solve_joint_path
 from tracking.baselines.temporal_consistency.window import StageDecision, TemporalWindow
 
 STAGES = (1, 2, 5, 10)

@@ -1,7 +1,6 @@
 """Gaussian mixtures over colors, and posterior color probabilities (Todor 2009, chapter 9).
 
-Colors are told apart in steps of eight: whatever is asked of a pixel's color is worked out once for each
-step, and looked up from then on.
+Colors are quantized in steps of eight: a function of the color is computed once per step and then looked up.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ _STEP = 8
 _LEVELS = 256 // _STEP
 COLOR_CODES = _LEVELS**3
 _MIN_VARIANCE = _STEP**2 / 2
-"""Added to the variance of every channel: no color is surer than a step is wide."""
+"""Added to the variance of every channel, because of the quantization."""
 _MAX_PIXELS = 1000
-"""That a mixture is fitted to, spread evenly over those that there are."""
+"""Pixels that a mixture is fitted to, spread evenly over all."""
 _MAX_ITERATIONS = 20
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, _MAX_ITERATIONS, 1e-2)
 
@@ -30,7 +29,7 @@ _axis = np.arange(_LEVELS) * float(_STEP) + (_STEP - 1) / 2
 CODE_COLORS: Floats = np.stack(np.meshgrid(_axis, _axis, _axis, indexing="ij"), axis=-1).reshape(
     COLOR_CODES, 3
 )
-"""The color in the middle of each step."""
+"""The color in the middle of each quantization step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,36 +48,35 @@ class GaussianMixture:
 
     def densities(self, colors: Floats) -> Floats:
         """Return the densities p(I) of colors `(..., 3)`."""
-        parts = [
-            share * multivariate_normal.pdf(colors, mean, covariance)
-            for share, mean, covariance in zip(self.weights, self.means, self.covariances, strict=True)
+        components = [
+            weight * multivariate_normal.pdf(colors, mean, covariance)
+            for weight, mean, covariance in zip(self.weights, self.means, self.covariances, strict=True)
         ]
-        return np.asarray(np.sum(parts, axis=0))
+        return np.asarray(np.sum(components, axis=0))
 
 
-def fit_mixture(pixels: Image, parts: int) -> GaussianMixture:
-    """Fit a mixture to pixels `(N, 3)` by expectation and maximization; N is at least 1.
+def fit_mixture(pixels: Image, components: int) -> GaussianMixture:
+    """Fit a mixture to pixels `(N, 3)`, N at least 1, by expectation maximization.
 
-    It begins with groups along the axis on which they differ most, not by chance: the same pixels give the
-    same mixture.
+    The initial groups are quantiles along the principal axis, so that the result is deterministic.
     """
-    spread = np.linspace(0, len(pixels) - 1, min(len(pixels), _MAX_PIXELS)).astype(np.int64)
-    colors = pixels[spread].astype(np.float64)
-    everywhere = np.cov(colors.T, bias=True) + _MIN_VARIANCE * np.eye(3)
-    if len(colors) < 2 * parts:
-        return GaussianMixture(np.ones(1), colors.mean(axis=0)[None], everywhere[None])
-    along = colors @ np.linalg.eigh(everywhere).eigenvectors[:, -1]
-    order = np.argsort(np.argsort(along, kind="stable"))
-    belongs = np.eye(parts)[order * parts // len(colors)]
+    sampled = np.linspace(0, len(pixels) - 1, min(len(pixels), _MAX_PIXELS)).astype(np.int64)
+    colors = pixels[sampled].astype(np.float64)
+    covariance = np.cov(colors.T, bias=True) + _MIN_VARIANCE * np.eye(3)
+    if len(colors) < 2 * components:
+        return GaussianMixture(np.ones(1), colors.mean(axis=0)[None], covariance[None])
+    projections = colors @ np.linalg.eigh(covariance).eigenvectors[:, -1]
+    order = np.argsort(np.argsort(projections, kind="stable"))
+    memberships = np.eye(components)[order * components // len(colors)]
     model = cv2.ml.EM.create()
-    model.setClustersNumber(parts)
+    model.setClustersNumber(components)
     model.setCovarianceMatrixType(cv2.ml.EM_COV_MAT_GENERIC)
     model.setTermCriteria(_STOP)
-    model.trainM(colors, belongs)
-    covariances = np.stack([np.asarray(it, dtype=np.float64) for it in model.getCovs()])
-    shares = np.asarray(model.getWeights(), dtype=np.float64).ravel()
+    model.trainM(colors, memberships)
+    covariances = np.stack([np.asarray(matrix, dtype=np.float64) for matrix in model.getCovs()])
+    weights = np.asarray(model.getWeights(), dtype=np.float64).ravel()
     return GaussianMixture(
-        shares, np.asarray(model.getMeans(), np.float64), covariances + _MIN_VARIANCE * np.eye(3)
+        weights, np.asarray(model.getMeans(), np.float64), covariances + _MIN_VARIANCE * np.eye(3)
     )
 
 
@@ -88,7 +86,9 @@ def color_codes(image: Image) -> NDArray[np.int32]:
     return np.asarray((steps[..., 0] * _LEVELS + steps[..., 1]) * _LEVELS + steps[..., 2])
 
 
-def posterior(mine: Floats, others: Floats, prior: float) -> Plane:
+def posterior(object_likelihood: Floats, background_likelihood: Floats, prior: float) -> Plane:
     """Compute p(O|I) by Bayes' rule from p(I|O) and p(I|B), each over all color codes."""
-    joint = prior * mine
-    return np.asarray(joint / np.maximum(joint + (1.0 - prior) * others, 1e-300), dtype=np.float32)
+    joint = prior * object_likelihood
+    return np.asarray(
+        joint / np.maximum(joint + (1.0 - prior) * background_likelihood, 1e-300), dtype=np.float32
+    )

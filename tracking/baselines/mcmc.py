@@ -1,8 +1,8 @@
-"""One filter for all objects: MCMC with an interaction prior (Khan, Balch, Dellaert, ECCV 2004).
+"""One filter for all targets: MCMC with an interaction prior (Khan, Balch, Dellaert, ECCV 2004).
 
 A sample is the joint state of all targets. In each image the Markov chain starts at a propagated sample of
-the previous image. Then one target at a time, drawn at random, is proposed to move differently, which is
-accepted with probability min(1, ratio) of `exp(-λ d²) Π exp(-g overlap)`: the color likelihood times the
+the previous image. Then a new state is proposed for one target at a time, drawn at random,
+and accepted with probability min(1, ratio) of `exp(-λ d²) Π exp(-g overlap)`: the color likelihood times the
 pairwise prior against overlapping targets. Samples after the burn-in are kept for the next image.
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.baselines.color_integral import (
+from tracking.baselines.integral_histograms import (
     ColorIntegralCache,
     ColorIntegralImage,
     color_distance,
@@ -30,16 +30,16 @@ _MAX_DISTANCE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class McmcSettings:
-    """The chain.
+    """The Markov chain.
 
     Raises:
         ValueError: a setting is out of range.
     """
 
-    samples: int = 60  # kept of each picture
-    thinning: int = 2  # proposals for each object between two of them
-    burn_in: int = 20  # proposals for each object before the first
-    seed: int = 1  # of everything drawn
+    samples: int = 60  # samples kept per image
+    thinning: int = 2  # proposals per target between two samples
+    burn_in: int = 20  # proposals per target before the first sample
+    seed: int = 1  # of the random numbers
 
     def __post_init__(self) -> None:
         if self.samples < 1 or self.thinning < 1 or self.burn_in < 0:
@@ -53,8 +53,8 @@ class McmcTarget:
     Attributes:
         colors: `(2, 64)` of the upper and the lower half.
         aspect: width over height.
-        states: `(P, 5)`, the samples: middle, height, step, in pixels.
-        box: `(4,)`, the mean.
+        states: `(P, 5)`, the samples: center, height and velocity, in pixels.
+        box: `(4,)`, the mean box.
     """
 
     colors: Floats
@@ -80,55 +80,62 @@ class McmcFilter:
         colors = self._colors.get(image).histograms(upper_and_lower_halves(box))
         return McmcTarget(colors, aspect, np.tile(start, (self._settings.samples, 1)), box.copy())
 
-    def predict(self, image: Image | None, objects: Sequence[McmcTarget]) -> Floats:
-        """Run the Markov chain: `(N, 4)`, NaN for targets whose colors are not found."""
-        boxes = np.full((len(objects), BOX_SIDES), np.nan)
-        if image is None or not objects:
+    def predict(self, image: Image | None, targets: Sequence[McmcTarget]) -> Floats:
+        """Run the Markov chain: `(N, 4)`, NaN for lost targets."""
+        boxes = np.full((len(targets), BOX_SIDES), np.nan)
+        if image is None or not targets:
             return boxes
-        field, before = self._colors.get(image), np.stack([item.states for item in objects], axis=1)
-        samples, distances = self._chain(field, objects, before)
-        for row, item in enumerate(objects):
-            item.states = samples[:, row]
-            item.box = particle_boxes(item.states.mean(axis=0), item.aspect)
+        integral, before = self._colors.get(image), np.stack([target.states for target in targets], axis=1)
+        samples, distances = self._chain(integral, targets, before)
+        for row, target in enumerate(targets):
+            target.states = samples[:, row]
+            target.box = particle_boxes(target.states.mean(axis=0), target.aspect)
             if float(distances[:, row].mean()) <= _MAX_DISTANCE:
-                boxes[row] = item.box
+                boxes[row] = target.box
         return boxes
 
-    def update(self, known: McmcTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
-        """Return the target's own box: a detection does not move it."""
-        return known.box
+    def update(self, target: McmcTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+        """Return the target's box; detections are not used."""
+        return target.box
 
     def _chain(
-        self, field: ColorIntegralImage, objects: Sequence[McmcTarget], before: Floats
+        self, integral: ColorIntegralImage, targets: Sequence[McmcTarget], before: Floats
     ) -> tuple[Floats, Floats]:
         """Run the chain; return its samples `(P, N, 5)` and color distances `(P, N)`."""
-        count, plan, rng = len(objects), self._settings, self._rng
-        steps = (plan.burn_in + plan.thinning * plan.samples) * count
+        count, settings, rng = len(targets), self._settings, self._rng
+        steps = (settings.burn_in + settings.thinning * settings.samples) * count
         moving = rng.integers(count, size=steps)
-        # A proposal does not depend on the chain's state: all are drawn and compared at once.
+        # Proposals do not depend on the chain's state: all are drawn and compared at once.
         proposed = propagate(rng, before[rng.integers(len(before), size=steps), moving])
-        aspects = np.array([item.aspect for item in objects])
+        aspects = np.array([target.aspect for target in targets])
         boxes = particle_boxes(proposed, aspects[moving])
-        far = np.empty(steps)
-        for row, item in enumerate(objects):
-            mine = moving == row
-            far[mine] = color_distance(field, boxes[mine], item.colors)
+        new_distances = np.empty(steps)
+        for row, target in enumerate(targets):
+            moves = moving == row
+            new_distances[moves] = color_distance(integral, boxes[moves], target.colors)
         log_uniform = np.log(rng.random(steps))
-        now = propagate(rng, before[rng.integers(len(before))])
-        places = particle_boxes(now, aspects)
-        unlike_now = np.array(
-            [float(color_distance(field, places[n], it.colors)) for n, it in enumerate(objects)]
+        state = propagate(rng, before[rng.integers(len(before))])
+        current = particle_boxes(state, aspects)
+        current_distances = np.array(
+            [float(color_distance(integral, current[n], target.colors)) for n, target in enumerate(targets)]
         )
-        kept, distances = np.empty((plan.samples, count, now.shape[1])), np.empty((plan.samples, count))
+        samples, distances = (
+            np.empty((settings.samples, count, state.shape[1])),
+            np.empty((settings.samples, count)),
+        )
         for step in range(steps):
             n = moving[step]
-            gain = _LAMBDA * (unlike_now[n] - far[step])
+            gain = _LAMBDA * (current_distances[n] - new_distances[step])
             if count > 1:
-                others = np.delete(places, n, axis=0)
-                gain += _OVERLAP_WEIGHT * float((iou(places[n], others) - iou(boxes[step], others)).sum())
+                others = np.delete(current, n, axis=0)
+                gain += _OVERLAP_WEIGHT * float((iou(current[n], others) - iou(boxes[step], others)).sum())
             if log_uniform[step] < gain:
-                now[n], places[n], unlike_now[n] = proposed[step], boxes[step], far[step]
-            place, rest = divmod(step + 1 - plan.burn_in * count, plan.thinning * count)
-            if place >= 1 and not rest:
-                kept[place - 1], distances[place - 1] = now, unlike_now
-        return kept, distances
+                state[n], current[n], current_distances[n] = (
+                    proposed[step],
+                    boxes[step],
+                    new_distances[step],
+                )
+            index, remainder = divmod(step + 1 - settings.burn_in * count, settings.thinning * count)
+            if index >= 1 and not remainder:
+                samples[index - 1], distances[index - 1] = state, current_distances
+        return samples, distances

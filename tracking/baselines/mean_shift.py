@@ -1,8 +1,8 @@
 """Prediction by mean shift on color back-projection (Comaniciu et al. 2000; Bradski 1998).
 
-A histogram over hue and saturation is taken of the core of the first box, divided by that of the ring
-around it: colors that the background shares count little. The box moves to the densest pixels of these
-colors. It keeps its size.
+The hue-saturation histogram of the first box's core is divided by that of the surrounding ring, so that
+colors shared with the background count little. The box moves to the mode of these colors; its size is
+constant.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from tracking.detectors.base import Image, Plane
 _BINS = (16, 16)
 _RANGES = [0, 180, 0, 256]
 _CORE, _RING = 0.6, 1.6
-"""Of a box, its middle; and what surrounds it, as a multiple of its sides."""
+"""Sides of the core and of the surrounding box, as multiples of the box's."""
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.5)
 _FLOOR = 1e-3
 _MIN_PROBABILITY = 0.05
-"""Mean probability in a box below which nobody of these colors is there."""
+"""Mean probability in a box below which the target counts as lost."""
 
 
 @dataclass(slots=True)
@@ -35,51 +35,51 @@ class MeanShiftTarget:
 
 
 class MeanShift:
-    """Climbs to the place of somebody's colors."""
+    """Mean shift on the back-projection of each target's colors."""
 
     name = "mean-shift"
     uses_image = True
 
     def initialize(self, image: Image, box: Floats) -> MeanShiftTarget:
         """Create a target with the colors in its box."""
-        space = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
-        mine, around = (_histogram(space, _scale_box(box, share)) for share in (_CORE, _RING))
-        ratio = np.minimum(mine / np.maximum(around, _FLOOR), 1.0) * (mine > _FLOOR)
+        hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
+        core, ring = (_histogram(hsv, _scale_box(box, factor)) for factor in (_CORE, _RING))
+        ratio = np.minimum(core / np.maximum(ring, _FLOOR), 1.0) * (core > _FLOOR)
         return MeanShiftTarget((255.0 * ratio).astype(np.float32), box.copy())
 
-    def predict(self, image: Image | None, objects: Sequence[MeanShiftTarget]) -> Floats:
+    def predict(self, image: Image | None, targets: Sequence[MeanShiftTarget]) -> Floats:
         """Move each target to the mode of its colors: `(N, 4)`, NaN where they are not found."""
-        boxes = np.full((len(objects), BOX_SIDES), np.nan)
+        boxes = np.full((len(targets), BOX_SIDES), np.nan)
         if image is None:
             return boxes
-        space = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
-        for row, item in enumerate(objects):
-            likely = cv2.calcBackProject([space], [0, 1], item.colors, _RANGES, 1)
-            left, top = (round(it) for it in item.box[:2])
-            wide, tall = (max(round(it), 1) for it in item.box[2:] - item.box[:2])
-            _, (x, y, width, height) = cv2.meanShift(likely, (left, top, wide, tall), _STOP)
-            inside = likely[max(y, 0) : y + height, max(x, 0) : x + width]
+        hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
+        for row, target in enumerate(targets):
+            probability = cv2.calcBackProject([hsv], [0, 1], target.colors, _RANGES, 1)
+            left, top = (round(edge) for edge in target.box[:2])
+            width, height = (max(round(side), 1) for side in target.box[2:] - target.box[:2])
+            _, (x, y, width, height) = cv2.meanShift(probability, (left, top, width, height), _STOP)
+            inside = probability[max(y, 0) : y + height, max(x, 0) : x + width]
             if inside.size and float(inside.mean()) >= 255 * _MIN_PROBABILITY:
-                size = item.box[2:] - item.box[:2]
+                size = target.box[2:] - target.box[:2]
                 middle = np.array([x + width / 2, y + height / 2])
-                item.box = boxes[row] = np.concatenate([middle - size / 2, middle + size / 2])
+                target.box = boxes[row] = np.concatenate([middle - size / 2, middle + size / 2])
         return boxes
 
-    def update(self, known: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
-        """Return the target's own box: a detection does not move it."""
-        return known.box
+    def update(self, target: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+        """Return the target's box; detections are not used."""
+        return target.box
 
 
-def _scale_box(box: Floats, share: float) -> Floats:
-    middle, half = (box[:2] + box[2:]) / 2, share * (box[2:] - box[:2]) / 2
+def _scale_box(box: Floats, factor: float) -> Floats:
+    middle, half = (box[:2] + box[2:]) / 2, factor * (box[2:] - box[:2]) / 2
     return np.asarray(np.concatenate([middle - half, middle + half]))
 
 
-def _histogram(space: cv2.typing.MatLike, box: Floats) -> Floats:
+def _histogram(hsv: cv2.typing.MatLike, box: Floats) -> Floats:
     """Return the hue-saturation histogram of a box, `(16, 16)`; zeros outside the image."""
-    high, wide = space.shape[:2]
-    left, top, right, bottom = np.clip(np.rint(box), 0, [wide, high, wide, high]).astype(int).tolist()
+    height, width = hsv.shape[:2]
+    left, top, right, bottom = np.clip(np.rint(box), 0, [width, height, width, height]).astype(int).tolist()
     if left >= right or top >= bottom:
         return np.zeros(_BINS)
-    counts = cv2.calcHist([space[top:bottom, left:right]], [0, 1], None, list(_BINS), _RANGES)
+    counts = cv2.calcHist([hsv[top:bottom, left:right]], [0, 1], None, list(_BINS), _RANGES)
     return np.asarray(np.asarray(counts, dtype=np.float64) / ((right - left) * (bottom - top)))

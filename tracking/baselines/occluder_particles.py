@@ -1,8 +1,8 @@
 """Occlusion as particles: the second cue of occlusion cues (Todor 2009, chapter 9).
 
-A particle holds the share of the target that each other target hides, at least 0 and together at most 1;
-the rest is visible. The thesis leaves open how this holds for more than two targets. Here a particle has
-one share for each nearby target, a new neighbor starts at 0, and after adding noise, shares below 0 are
+A particle holds the share of the target that each other target hides, at least 0 and at most 1 in total; the
+remaining share is visible. The thesis does not say how this extends to more than two targets. Here a particle
+has one share for each nearby target. A new neighbor starts at 0. After adding noise, shares below 0 are
 clipped and a sum above 1 is scaled to 1.
 """
 
@@ -19,11 +19,11 @@ from tracking.boxes import Floats
 
 @dataclass(slots=True)
 class OccluderParticles:
-    """What hides one object.
+    """Particles of what occludes one target.
 
     Attributes:
-        occluder_ids: numbers of those who are near.
-        states: `(P, len(who))`, the share that each hides.
+        occluder_ids: ids of the nearby targets.
+        states: `(P, len(occluder_ids))`, the share that each hides.
         weights: `(P,)`, which sum to 1.
     """
 
@@ -38,12 +38,12 @@ class OccluderParticles:
 
     @property
     def visible_and_hidden_shares(self) -> Floats:
-        """Return the visible share, then each occluder's share: `(P, 1 + occluders)`, rows sum to 1."""
+        """The visible share, then each occluder's share: `(P, 1 + occluders)`, rows sum to 1."""
         return np.column_stack([1.0 - self.states.sum(axis=1), self.states])
 
     @property
     def hidden_share(self) -> Floats:
-        """Return the share hidden by all occluders together, `(P,)`."""
+        """The share hidden by all occluders together, `(P,)`."""
         return np.asarray(self.states.sum(axis=1))
 
     def propagate(
@@ -51,19 +51,19 @@ class OccluderParticles:
     ) -> None:
         """Resample, update the set of nearby occluders, and add noise to their shares.
 
-        The share `jumps` of the particles becomes not hidden, and as many wholly hidden by somebody (mixed
-        states: Isard, Blake, ICCV 1998): people come out, and go behind others, faster than the noise is.
+        A share `jumps` of the particles becomes visible, and as many entirely hidden by one occluder (mixed
+        states: Isard, Blake, ICCV 1998): occlusions begin and end faster than the noise can follow.
         """
         states, self.weights = resample_if_degenerate(rng, self.states, self.weights)
         known = {number: states[:, column] for column, number in enumerate(self.occluder_ids)}
-        nothing = np.zeros(len(states))
+        unknown = np.zeros(len(states))
         self.occluder_ids = tuple(near)
-        moved = np.stack([known.get(it, nothing) for it in near], axis=1) if near else states[:, :0]
+        moved = np.stack([known.get(number, unknown) for number in near], axis=1) if near else states[:, :0]
         moved = np.maximum(moved + noise * rng.standard_normal(moved.shape), 0.0)
         moved /= np.maximum(moved.sum(axis=1, keepdims=True), 1.0)
         if near:
-            luck, by = rng.random(len(moved)), rng.integers(len(near), size=len(moved))
+            luck, occluder = rng.random(len(moved)), rng.integers(len(near), size=len(moved))
             moved[luck < 2 * jumps] = 0.0
-            behind = luck < jumps
-            moved[behind, by[behind]] = 1.0
+            hidden = luck < jumps
+            moved[hidden, occluder[hidden]] = 1.0
         self.states = moved

@@ -1,7 +1,7 @@
 """Prediction by KLT optical flow of corners (Lucas, Kanade 1981; Shi, Tomasi 1994; Kalal et al., ICPR 2010).
 
-The corners in a box are tracked to the next image and back. Those that return to their start move the box
-by the median of their steps, and scale it by the median change of the distances between them.
+The corners in a box are tracked to the next image and back. The box is moved by the median step of those
+that return to their start, and scaled by the median change of the distances between them.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from tracking.detectors.base import Image, Mask, Plane
 
 _CORNERS = 40
 _QUALITY, _MIN_CORNER_DISTANCE = 0.01, 3.0
-"""Of the best corner's; and pixels between two corners."""
+"""Least quality relative to the best corner; least pixels between two corners."""
 _WINDOW, _LEVELS = (11, 11), 3
 _MAX_RETURN_ERROR = 1.0
-"""Pixels from its place at which a corner that was followed back must end."""
+"""Pixels between a corner and its position after tracking forth and back."""
 _MIN_CORNERS = 4
-"""Corners that a step is told from."""
+"""Tracked corners needed for a prediction."""
 _BORDER_SHARE = 0.15
-"""Of a box's width on either side in which its corners are the background's."""
+"""Share of a box's width on either side whose corners are ignored: they are mostly background."""
 _MAX_GROWTH = 1.1
-"""Factor by which a box may change from one picture to the next."""
+"""Maximum factor by which a box may grow or shrink between two images."""
 
 
 @dataclass(slots=True)
@@ -46,32 +46,32 @@ class OpticalFlow:
     def __init__(self) -> None:
         self._before: Mask | None = None
 
-    def initialize(self, image: Image, box: Floats) -> FlowTarget:  # noqa: ARG002 — the next picture tells
-        """Create a target; its corners are detected when the next image comes."""
+    def initialize(self, image: Image, box: Floats) -> FlowTarget:  # noqa: ARG002 — corners are detected in the next call
+        """Create a target; its corners are detected with the next image."""
         return FlowTarget(box.copy())
 
-    def predict(self, image: Image | None, objects: Sequence[FlowTarget]) -> Floats:
-        """Track the targets' corners: `(N, 4)`, NaN where too few were tracked back."""
-        boxes = np.full((len(objects), BOX_SIDES), np.nan)
+    def predict(self, image: Image | None, targets: Sequence[FlowTarget]) -> Floats:
+        """Track the targets' corners: `(N, 4)`, NaN where too few returned to their start."""
+        boxes = np.full((len(targets), BOX_SIDES), np.nan)
         if image is None:
             return boxes
         now: Mask = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         before, self._before = self._before, now
         if before is None or before.shape != now.shape:
             return boxes
-        for row, item in enumerate(objects):
-            moved = _tracked_box(before, now, item.box)
+        for row, target in enumerate(targets):
+            moved = _tracked_box(before, now, target.box)
             if moved is not None:
-                boxes[row] = item.box = moved
+                boxes[row] = target.box = moved
         return boxes
 
-    def update(self, known: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
-        """Return the target's own box: a detection does not move it."""
-        return known.box
+    def update(self, target: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+        """Return the target's box; detections are not used."""
+        return target.box
 
 
 def _tracked_box(before: Mask, now: Mask, box: Floats) -> Floats | None:
-    """Return the box `(4,)` moved to the next image, or `None` where too few corners were tracked."""
+    """Return the box `(4,)` moved to the next image, or `None` if too few corners were tracked."""
     mask = np.zeros_like(before)
     inset = _BORDER_SHARE * (box[2] - box[0])
     left, right = round(box[0] + inset), round(box[2] - inset)
@@ -80,10 +80,10 @@ def _tracked_box(before: Mask, now: Mask, box: Floats) -> Floats | None:
     if found is None or len(found) < _MIN_CORNERS:
         return None
     corners = np.asarray(found, dtype=np.float32)
-    there, reached = _flow(before, now, corners)
-    back, returned = _flow(now, before, there)
-    start, end = corners[:, 0], there[:, 0]
-    kept = reached & returned & (np.hypot(*(back[:, 0] - start).T) <= _MAX_RETURN_ERROR)
+    forward, found_forward = _flow(before, now, corners)
+    back, found_back = _flow(now, before, forward)
+    start, end = corners[:, 0], forward[:, 0]
+    kept = found_forward & found_back & (np.hypot(*(back[:, 0] - start).T) <= _MAX_RETURN_ERROR)
     if np.count_nonzero(kept) < _MIN_CORNERS:
         return None
     start, end = start[kept].astype(np.float64), end[kept].astype(np.float64)
@@ -95,16 +95,16 @@ def _tracked_box(before: Mask, now: Mask, box: Floats) -> Floats | None:
 
 def _flow(before: Mask, now: Mask, corners: Plane) -> tuple[Plane, NDArray[np.bool_]]:
     """Track corners `(P, 1, 2)` into the next image: positions, and `(P,)` whether each was found."""
-    there, found, _ = cv2.calcOpticalFlowPyrLK(
+    moved, found, _ = cv2.calcOpticalFlowPyrLK(
         before, now, corners, np.empty(0, dtype=np.float32), winSize=_WINDOW, maxLevel=_LEVELS
     )
-    return np.asarray(there, dtype=np.float32), np.asarray(found)[:, 0] == 1
+    return np.asarray(moved, dtype=np.float32), np.asarray(found)[:, 0] == 1
 
 
 def _growth(start: Floats, end: Floats) -> float:
     """Return the median ratio of the distances between points `(P, 2)` before and after."""
     first, second = np.triu_indices(len(start), 1)
-    was = np.hypot(*(start[first] - start[second]).T)
-    now = np.hypot(*(end[first] - end[second]).T)
-    apart = was > _MIN_CORNER_DISTANCE
-    return float(np.median(now[apart] / was[apart])) if apart.any() else 1.0
+    distances_before = np.hypot(*(start[first] - start[second]).T)
+    distances_after = np.hypot(*(end[first] - end[second]).T)
+    apart = distances_before > _MIN_CORNER_DISTANCE
+    return float(np.median(distances_after[apart] / distances_before[apart])) if apart.any() else 1.0

@@ -1,12 +1,12 @@
 """Particle filters with an overlap factor between similar targets (Todor 2009, section 8.3).
 
 A particle has the weight `exp(-λ Σ D²)`, summed over the parts of its box's core and the three color
-channels; D² is one minus the Bhattacharyya coefficient of a part's histogram and its reference from the
+channels. D² is one minus the Bhattacharyya coefficient of a part's histogram and its reference from the
 first box.
 
-A particle's weight is also multiplied by the square of its overlap factor: the share of its target's own
-particles among all particles in its cell. So two similar targets do not end on the same person
-("kidnapping" of independent filters). A target that looks less like its reference than in its first images
+A particle's weight is also multiplied by the square of its overlap factor: the share of its target's
+particles among all particles in its cell. This keeps two similar targets from converging to the same person
+("kidnapping" of independent filters). A target that is less similar to its reference than in its first images
 is occluded; the overlap factor is then not applied, since it would push the target to the next similar
 person.
 """
@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tracking.baselines.part_histograms import (
+from tracking.baselines.integral_histograms import (
     PartHistograms,
     bhattacharyya_coefficient,
     core_boxes,
@@ -36,26 +36,26 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 
 _MAX_DISTANCE = 0.5
-"""Mean D² above which nobody of these colors is among the particles."""
+"""Mean D² above which the target counts as lost."""
 
 
 @dataclass(frozen=True, slots=True)
 class SeparatedParticleSettings:
-    """The filters.
+    """Settings of the particle filters.
 
     Raises:
         ValueError: a setting is out of range.
     """
 
-    particles: int = 100  # of each object
-    rows: int = 4  # of parts of a box
+    particles: int = 100  # per target
+    rows: int = 4  # of parts in a box
     columns: int = 2
-    sharpness: float = 8.0  # λ, of a sum over parts and channels
-    cell_pixels: int = 4  # R, pixels: particles nearer than this overlap
-    overlap_power: float = 2.0  # of the overlap factor; 0: independent filters
-    reference_frames: int = 20  # pictures in which somebody's own likeness is learned
-    min_relative_similarity: float = 0.9  # of that likeness below which somebody is behind another
-    seed: int = 1  # of all noise
+    sharpness: float = 8.0  # λ, for a sum over parts and channels
+    cell_pixels: int = 4  # R: side of the cells in which particles overlap
+    overlap_power: float = 2.0  # exponent of the overlap factor; 0: independent filters
+    reference_frames: int = 20  # images in which a target's similarity to its reference is learned
+    min_relative_similarity: float = 0.9  # share of that similarity below which a target is occluded
+    seed: int = 1  # of the random numbers
 
     def __post_init__(self) -> None:
         if min(self.particles, self.rows, self.columns, self.cell_pixels, self.reference_frames) < 1:
@@ -69,7 +69,7 @@ class SeparatedTarget(ParticleTarget):
     """State of one target, whose colors are part histograms `(parts, 3, 8)`.
 
     Attributes:
-        reference_similarities: how like themselves they were in their first pictures.
+        reference_similarities: similarities to the reference in the first images.
     """
 
     reference_similarities: list[float] = field(default_factory=list)
@@ -86,75 +86,81 @@ class SeparatedParticles:
         self._rng = np.random.default_rng(self._settings.seed)
 
     def initialize(self, image: Image, box: Floats) -> SeparatedTarget:
-        """Create a target: take its part histograms and put all particles at its box."""
+        """Create a target from the part histograms of its box, with all particles at the box."""
         count, (start, aspect) = self._settings.particles, initial_state(box)
         colors = PartHistograms(image, box).histograms(self._parts(box))
         return SeparatedTarget(
             colors, aspect, np.tile(start, (count, 1)), np.full(count, 1.0 / count), box.copy()
         )
 
-    def predict(self, image: Image | None, objects: Sequence[SeparatedTarget]) -> Floats:
-        """Propagate, weigh and separate the particles: `(N, 4)`, NaN where none matches its target."""
-        boxes = np.full((len(objects), BOX_SIDES), np.nan)
+    def predict(self, image: Image | None, targets: Sequence[SeparatedTarget]) -> Floats:
+        """Propagate, weigh and separate the particles; return `(N, 4)`, NaN for lost targets."""
+        boxes = np.full((len(targets), BOX_SIDES), np.nan)
         if image is None:
             return boxes
-        seen = [self._weigh(image, item) for item in objects]
-        factors = overlap_factors([item.states[:, :2] for item in objects], self._settings.cell_pixels)
-        for row, (item, (places, unlike), factor) in enumerate(zip(objects, seen, factors, strict=True)):
-            if not self._is_occluded(places, item):
-                weights = item.weights * factor**self._settings.overlap_power
-                item.weights = weights / weights.sum()
-            item.box = particle_boxes(item.weights @ item.states, item.aspect)
-            if float(item.weights @ unlike) <= _MAX_DISTANCE:
-                boxes[row] = item.box
+        weighed = [self._weigh(image, target) for target in targets]
+        factors = overlap_factors([target.states[:, :2] for target in targets], self._settings.cell_pixels)
+        for row, (target, (histograms, distances), factor) in enumerate(
+            zip(targets, weighed, factors, strict=True)
+        ):
+            if not self._is_occluded(histograms, target):
+                weights = target.weights * factor**self._settings.overlap_power
+                target.weights = weights / weights.sum()
+            target.box = particle_boxes(target.weights @ target.states, target.aspect)
+            if float(target.weights @ distances) <= _MAX_DISTANCE:
+                boxes[row] = target.box
         return boxes
 
-    def update(self, known: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — the image alone decides
-        """Return the target's own box: a detection does not move it."""
-        return known.box
+    def update(self, target: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+        """Return the target's box; detections are not used."""
+        return target.box
 
     def _parts(self, boxes: Floats) -> Floats:
         return split_boxes(core_boxes(boxes), self._settings.rows, self._settings.columns)
 
-    def _weigh(self, image: Image, item: SeparatedTarget) -> tuple[PartHistograms, Floats]:
-        """Propagate and weigh one target's particles: the histograms there, and their D² `(P,)`."""
-        states, item.weights = resample_if_degenerate(self._rng, item.states, item.weights)
-        item.states = propagate(self._rng, states)
-        places = particle_boxes(item.states, item.aspect)
-        around = np.concatenate([places[:, :2].min(axis=0), places[:, 2:].max(axis=0)])
-        colors = PartHistograms(image, around)
-        distances = 1.0 - bhattacharyya_coefficient(colors.histograms(self._parts(places)), item.colors)
+    def _weigh(self, image: Image, target: SeparatedTarget) -> tuple[PartHistograms, Floats]:
+        """Propagate and weigh a target's particles; return their region's histograms and mean D² `(P,)`."""
+        states, target.weights = resample_if_degenerate(self._rng, target.states, target.weights)
+        target.states = propagate(self._rng, states)
+        boxes = particle_boxes(target.states, target.aspect)
+        region = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+        histograms = PartHistograms(image, region)
+        distances = 1.0 - bhattacharyya_coefficient(histograms.histograms(self._parts(boxes)), target.colors)
         total = distances.sum(axis=(-2, -1))
-        item.weights = reweight(item.weights, total, self._settings.sharpness)
-        return colors, distances.mean(axis=(-2, -1))
+        target.weights = reweight(target.weights, total, self._settings.sharpness)
+        return histograms, distances.mean(axis=(-2, -1))
 
-    def _is_occluded(self, colors: PartHistograms, item: SeparatedTarget) -> bool:
-        """Return whether a target looks less like its reference than in its first images: it is occluded."""
-        box = particle_boxes(item.weights @ item.states, item.aspect)
-        alike = float(bhattacharyya_coefficient(colors.histograms(self._parts(box)), item.colors).mean())
-        if len(item.reference_similarities) < self._settings.reference_frames:
-            item.reference_similarities.append(alike)
+    def _is_occluded(self, histograms: PartHistograms, target: SeparatedTarget) -> bool:
+        """Return whether a target is less similar to its reference than in its first images."""
+        box = particle_boxes(target.weights @ target.states, target.aspect)
+        similarity = float(
+            bhattacharyya_coefficient(histograms.histograms(self._parts(box)), target.colors).mean()
+        )
+        if len(target.reference_similarities) < self._settings.reference_frames:
+            target.reference_similarities.append(similarity)
             return False
-        return alike < self._settings.min_relative_similarity * float(np.mean(item.reference_similarities))
+        return similarity < self._settings.min_relative_similarity * float(
+            np.mean(target.reference_similarities)
+        )
 
 
-def overlap_factors(middles: Sequence[Floats], reduced: int) -> list[Floats]:
-    """Compute the overlap factor of each object's particles.
+def overlap_factors(centers: Sequence[Floats], cell_pixels: int) -> list[Floats]:
+    """Compute the overlap factor of each target's particles.
 
     Args:
-        middles: of each object `(P, 2)`, x and y in pixels.
-        reduced: pixels that a cell is wide and high, R.
+        centers: for each target `(P, 2)`, x and y of its particles in pixels.
+        cell_pixels: side of a cell, R.
 
     Returns:
-        Of each object `(P,)`, in (0, 1]: 1 where nobody else has particles.
+        For each target `(P,)`, in (0, 1]: 1 where no other target has particles.
     """
-    if not middles:
+    if not centers:
         return []
-    owner = np.repeat(np.arange(len(middles)), [len(it) for it in middles])
-    cells = np.floor(np.concatenate(middles) / reduced).astype(np.int64)
+    owner = np.repeat(np.arange(len(centers)), [len(points) for points in centers])
+    cells = np.floor(np.concatenate(centers) / cell_pixels).astype(np.int64)
     _, cell = np.unique(cells, axis=0, return_inverse=True)
     cell = cell.ravel()
-    counts = np.zeros((len(middles), int(cell.max(initial=-1)) + 1))
+    counts = np.zeros((len(centers), int(cell.max(initial=-1)) + 1))
     np.add.at(counts, (owner, cell), 1.0)
     factors = counts[owner, cell] / counts.sum(axis=0)[cell]
-    return [factors[owner == number] for number in range(len(middles))]
+    return [factors[owner == number] for number in range(len(centers))]

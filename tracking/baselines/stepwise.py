@@ -1,9 +1,9 @@
 """Frame-by-frame trackers: one assignment per frame, decisions are final.
 
-All of them start, match and end tracks in the same way, so that a comparison measures the prediction
-method. A detection that overlaps no track starts a new one, which is confirmed in its third consecutive
-frame. In each frame tracks and detections are matched by one assignment over their overlaps (IoU). A track
-without a match for `max_missed_frames` frames ends, and its id with it.
+All of them start, match and end tracks in the same way, so that comparisons measure the prediction method
+only. A detection that overlaps no track starts a new one, which is confirmed in its third consecutive frame.
+In each frame tracks and detections are matched by one assignment over their overlaps (IoU). A track without a
+match for `max_missed_frames` frames ends; its id is not used again.
 """
 
 from __future__ import annotations
@@ -25,50 +25,46 @@ from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, WindowTrack
 
 S = TypeVar("S")
-"""What a method remembers of one object."""
+"""A prediction method's state of one target."""
 
 
 class PredictionMethod(Protocol, Generic[S]):
-    """How a tracker predicts targets from image to image. Deterministic: no clock, its own seed."""
+    """Predicts targets from image to image. Deterministic: no clock, and only seeded random numbers."""
 
     name: str
     uses_image: bool
-    """It looks at the picture: where it says that somebody is counts without a detection there, too."""
+    """Whether it uses the image: its predictions then count for some frames without a detection."""
 
     def initialize(self, image: Image, box: Floats) -> S:
         """Create a target from a box `(4,)`. A method that does not use images gets an empty one."""
         ...
 
-    def predict(self, image: Image | None, objects: Sequence[S]) -> Floats:
+    def predict(self, image: Image | None, targets: Sequence[S]) -> Floats:
         """Predict the boxes in the next image: `(N, 4)`, NaN for targets that are lost."""
         ...
 
-    def update(self, known: S, box: Floats) -> Floats:
+    def update(self, target: S, box: Floats) -> Floats:
         """Update a target with its matched detection `(4,)`; return its new box `(4,)`."""
         ...
 
 
-_NO_PICTURE: Image = np.empty((0, 0, 3), dtype=np.uint8)
+_NO_IMAGE: Image = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
 class StepwiseSettings:
-    """When tracks start, match and end.
+    """Settings of initiation, association and termination.
 
     Raises:
         ValueError: a setting is out of range.
     """
 
-    min_birth_score: float = 0.5  # least score of a detection that somebody new begins with
-    max_birth_iou: float = (
-        0.3  # overlap (IoU) with a known object above which a detection is not somebody new
-    )
-    min_match_iou: float = 0.3  # least overlap (IoU) of an object and the detection it is matched with
-    confirm_frames: int = 3  # frames in a row in which somebody new must be matched
-    max_missed_frames: int = 25  # frames without a match after which an object is gone
-    max_unmatched_frames: int = (
-        5  # frames without a match in which a method that looks at the picture is believed
-    )
+    min_birth_score: float = 0.5  # least score of a detection that starts a track
+    max_birth_iou: float = 0.3  # overlap (IoU) with a track above which a detection starts none
+    min_match_iou: float = 0.3  # least overlap (IoU) of a track and its matched detection
+    confirm_frames: int = 3  # consecutive matched frames that confirm a track
+    max_missed_frames: int = 25  # frames without a match after which a track ends
+    max_unmatched_frames: int = 5  # frames without a match in which an image-based prediction is published
 
     def __post_init__(self) -> None:
         shares = (self.min_birth_score, self.max_birth_iou, self.min_match_iou)
@@ -87,7 +83,7 @@ class StepwiseTrack(Generic[S]):
     """One track of a frame-by-frame tracker."""
 
     id: int
-    """Published id; 0 while the track is not published."""
+    """Published id; 0 before the track is published."""
     target: S
     box: Floats
     serial: int
@@ -96,11 +92,11 @@ class StepwiseTrack(Generic[S]):
     missed_frames: int = 0
     """Frames since the last match."""
     observations: dict[int, tuple[Floats, int]] = field(default_factory=dict)
-    """By frame of the window: the box, and which detection it is, -1 for none."""
+    """By frame of the window: the box, and the index of its detection, -1 for none."""
 
 
 class StepwiseTracker(Generic[S]):
-    """Frame-by-frame tracker around a prediction method. Its results are final at once."""
+    """Frame-by-frame tracker with a prediction method. Its results are final immediately."""
 
     def __init__(
         self, method: PredictionMethod[S], window: WindowSettings, settings: StepwiseSettings | None = None
@@ -110,16 +106,16 @@ class StepwiseTracker(Generic[S]):
         self._objects: list[StepwiseTrack[S]] = []
         self._ended: list[StepwiseTrack[S]] = []
         """Tracks that ended since the last result."""
-        self._numbers = self._serials = 0
+        self._last_id = self._last_serial = 0
         self._detections: dict[int, Detections] = {}
         self._first: int | None = None
         self._last: int | None = None
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take a frame; return a result where one or more windows end.
+        """Add a frame; return a result if one or more windows end.
 
-        A frame number that is left out is a frame of which nothing is known. After a gap longer than
-        `forget_after` of the window everybody is forgotten, and the frames of the gap are in no result.
+        Skipped frame numbers are frames without data. After a gap longer than `forget_after` of the window
+        all tracks are dropped, and the frames of the gap are in no result.
 
         Raises:
             ValueError: the frame number is not larger than the last one.
@@ -139,13 +135,13 @@ class StepwiseTracker(Generic[S]):
         return self._result(frame) if (frame + 1) // stride > (before + 1) // stride else None
 
     def flush(self) -> WindowResult | None:
-        """Finish the recording; `None` where everything was published already."""
+        """End the recording; return the last result, or `None` if all frames were published."""
         if self._first is None or self._last is None or self._last < self._first:
             return None
         return self._result(self._last)
 
     def _restart(self, frame: int, detections: Detections, image: Image | None) -> WindowResult | None:
-        """Start again after a long gap, so that no result has to span it."""
+        """Restart after a long gap, so that no result spans it."""
         result = self.flush()
         self._objects, self._detections = [], {frame: detections}
         self._first = self._last = frame
@@ -154,114 +150,123 @@ class StepwiseTracker(Generic[S]):
 
     def _skip_frames(self, frames: int) -> None:
         """Count frames without data as missed."""
-        for item in self._objects:
-            item.missed_frames += frames
+        for track in self._objects:
+            track.missed_frames += frames
         self._end_lost_tracks()
 
     def _step(self, frame: int, detections: Detections, image: Image | None) -> None:
-        moved = self._method.predict(image, [item.target for item in self._objects])
-        for item, box in zip(self._objects, moved, strict=True):
-            item.box = box if not np.isnan(box).any() else item.box
-        taken = self._match(frame, detections)
-        for item in self._objects:
-            if frame not in item.observations:
-                item.missed_frames += 1
-                if item.matches < self._settings.confirm_frames:
-                    item.missed_frames = self._settings.max_missed_frames  # nobody yet, and not there
-                elif self._method.uses_image and item.missed_frames <= self._settings.max_unmatched_frames:
-                    item.observations[frame] = (item.box, OCCLUDED)
+        moved = self._method.predict(image, [track.target for track in self._objects])
+        for track, box in zip(self._objects, moved, strict=True):
+            track.box = box if not np.isnan(box).any() else track.box
+        matched = self._match(frame, detections)
+        for track in self._objects:
+            if frame not in track.observations:
+                track.missed_frames += 1
+                if track.matches < self._settings.confirm_frames:
+                    track.missed_frames = (
+                        self._settings.max_missed_frames
+                    )  # an unconfirmed track ends at its first miss
+                elif self._method.uses_image and track.missed_frames <= self._settings.max_unmatched_frames:
+                    track.observations[frame] = (track.box, OCCLUDED)
         self._end_lost_tracks()
-        self._start_tracks(frame, detections, taken, image)
+        self._start_tracks(frame, detections, matched, image)
 
     def _match(self, frame: int, detections: Detections) -> NDArray[np.bool_]:
-        """Match tracks with detections; return which detections are taken, `(K,)`."""
-        taken = np.zeros(len(detections), dtype=np.bool_)
+        """Match tracks with detections; return which detections are matched, `(K,)`."""
+        matched = np.zeros(len(detections), dtype=np.bool_)
         if not self._objects or not len(detections):
-            return taken
-        places = np.stack([item.box for item in self._objects])
-        overlaps = iou(places[:, None], detections.boxes[None])
+            return matched
+        boxes = np.stack([track.box for track in self._objects])
+        overlaps = iou(boxes[:, None], detections.boxes[None])
         for row, column in zip(*assign_pairs(overlaps, max(self._settings.min_match_iou, 1e-9)), strict=True):
-            item = self._objects[row]
-            item.box = self._method.update(item.target, detections.boxes[column])
-            item.matches, item.missed_frames = item.matches + 1, 0
-            item.observations[frame] = (item.box, int(column))
-            taken[column] = True
-        return taken
+            track = self._objects[row]
+            track.box = self._method.update(track.target, detections.boxes[column])
+            track.matches, track.missed_frames = track.matches + 1, 0
+            track.observations[frame] = (track.box, int(column))
+            matched[column] = True
+        return matched
 
     def _start_tracks(
-        self, frame: int, detections: Detections, taken: NDArray[np.bool_], image: Image | None
+        self, frame: int, detections: Detections, matched: NDArray[np.bool_], image: Image | None
     ) -> None:
         """Start tracks from unmatched detections, in descending order of score."""
         if image is None:
             if self._method.uses_image:
-                return  # there is nothing to know them by
-            image = _NO_PICTURE
+                return  # no appearance to track them by
+            image = _NO_IMAGE
         order = np.argsort(-detections.scores, kind="stable")
-        for place in (int(it) for it in order if not taken[it]):
-            box = detections.boxes[place]
-            if detections.scores[place] < self._settings.min_birth_score:
+        for index in (int(row) for row in order if not matched[row]):
+            box = detections.boxes[index]
+            if detections.scores[index] < self._settings.min_birth_score:
                 break
-            near = [item.box for item in self._objects]
+            near = [track.box for track in self._objects]
             if near and float(iou(box[None], np.stack(near)).max()) > self._settings.max_birth_iou:
                 continue
-            self._serials += 1
-            item = StepwiseTrack(0, self._method.initialize(image, box), box, self._serials)
-            item.observations[frame] = (box, place)
-            self._objects.append(item)
+            self._last_serial += 1
+            track = StepwiseTrack(0, self._method.initialize(image, box), box, self._last_serial)
+            track.observations[frame] = (box, index)
+            self._objects.append(track)
 
     def _end_lost_tracks(self) -> None:
-        gone = [item for item in self._objects if item.missed_frames >= self._settings.max_missed_frames]
-        self._ended += [item for item in gone if item.matches >= self._settings.confirm_frames]
+        lost = [track for track in self._objects if track.missed_frames >= self._settings.max_missed_frames]
+        self._ended += [track for track in lost if track.matches >= self._settings.confirm_frames]
         self._objects = [
-            item for item in self._objects if item.missed_frames < self._settings.max_missed_frames
+            track for track in self._objects if track.missed_frames < self._settings.max_missed_frames
         ]
 
     def _result(self, last: int) -> WindowResult:
         """Return the result for all frames not yet published."""
         first = last if self._first is None else self._first
         frames = range(first, last + 1)
-        confirmed = [item for item in self._all_tracks() if self._is_confirmed(item)]
-        for item in confirmed:
-            if not item.id:
-                self._numbers += 1
-                item.id = self._numbers
-        confirmed = sorted((item for item in confirmed if item.observations), key=lambda item: item.id)
-        seen = [self._detections.get(frame, Detections.empty(self._bins())) for frame in frames]
-        tracks = [self._track(item, frames, seen) for item in confirmed]
+        confirmed = [track for track in self._all_tracks() if self._is_confirmed(track)]
+        for track in confirmed:
+            if not track.id:
+                self._last_id += 1
+                track.id = self._last_id
+        confirmed = sorted((track for track in confirmed if track.observations), key=lambda track: track.id)
+        detections = [self._detections.get(frame, Detections.empty(self._bins())) for frame in frames]
+        tracks = [self._window_track(track, frames, detections) for track in confirmed]
         states = [
             np.array(
-                [item.observations[it][1] if it in item.observations else OCCLUDED for it in frames],
+                [
+                    track.observations[frame][1] if frame in track.observations else OCCLUDED
+                    for frame in frames
+                ],
                 dtype=np.int64,
             )
-            for item in confirmed
+            for track in confirmed
         ]
         report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
-        result = WindowResult(first, last, last, add_appearance_samples(tracks, states, first, seen), report)
-        for item in self._all_tracks():
-            # Unconfirmed tracks are not published; once confirmed, they are from the next window on.
-            item.observations = {}
+        result = WindowResult(
+            first, last, last, add_appearance_samples(tracks, states, first, detections), report
+        )
+        for track in self._all_tracks():
+            # An unconfirmed track is published from the window in which it is confirmed.
+            track.observations = {}
         self._ended, self._detections, self._first = [], {}, last + 1
         return result
 
     def _all_tracks(self) -> Iterable[StepwiseTrack[S]]:
-        """Return all tracks that may have something to publish."""
+        """Return all tracks that may have unpublished observations."""
         return (*self._ended, *self._objects)
 
-    def _is_confirmed(self, item: StepwiseTrack[S]) -> bool:
+    def _is_confirmed(self, track: StepwiseTrack[S]) -> bool:
         """Return whether a track is confirmed."""
-        return item.matches >= self._settings.confirm_frames
+        return track.matches >= self._settings.confirm_frames
 
     def _bins(self) -> int:
-        return next((seen.histograms.shape[1] for seen in self._detections.values()), 0)
+        return next((detections.histograms.shape[1] for detections in self._detections.values()), 0)
 
-    def _track(self, item: StepwiseTrack[S], frames: range, seen: list[Detections]) -> WindowTrack:
+    def _window_track(
+        self, track: StepwiseTrack[S], frames: range, detections: list[Detections]
+    ) -> WindowTrack:
         boxes = np.full((len(frames), BOX_SIDES), np.nan)
-        looks, scores = [], 0.0
+        histograms, score = [], 0.0
         for row, frame in enumerate(frames):
-            if frame in item.observations:
-                boxes[row], place = item.observations[frame]
-                if place != OCCLUDED:
-                    looks.append(seen[row].histograms[place])
-                    scores += float(seen[row].scores[place])
-        histogram = mean_histogram(np.stack(looks)) if looks else np.empty(self._bins())
-        return WindowTrack(item.id, boxes, boxes, histogram, scores / len(frames))
+            if frame in track.observations:
+                boxes[row], index = track.observations[frame]
+                if index != OCCLUDED:
+                    histograms.append(detections[row].histograms[index])
+                    score += float(detections[row].scores[index])
+        histogram = mean_histogram(np.stack(histograms)) if histograms else np.empty(self._bins())
+        return WindowTrack(track.id, boxes, boxes, histogram, score / len(frames))

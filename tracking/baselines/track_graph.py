@@ -1,10 +1,10 @@
 """Track graph: identities are restored when a merged group splits (Todor 2009, chapter 7).
 
-Tracks are predicted by a Kalman filter and matched by assignment. A track that is no longer detected where
-another one covers it merges into that track, which then stands for several people. A new track that starts
-beside such a group splits from it: after some frames `departed_member` decides who left and who stays. The
-original sees the whole recording first; here a split is decided after some frames, and what was published
-before stays.
+Tracks are predicted by a Kalman filter and matched by assignment. A track that is no longer detected and is
+covered by another one merges into that track, which then represents a group of people. A new track that
+starts beside a group splits from it: after some frames `departed_member` decides which member split off. The
+original method processes the whole recording; here a split is decided after some frames, and earlier results
+stay.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from tracking.baselines.track_groups import (
     KalmanTrack,
     MeanAppearance,
     SplitCandidate,
+    TrackEnd,
     TrackGraphSettings,
     TrackGroup,
+    departed_member,
 )
-from tracking.baselines.track_links import TrackEnd, departed_member
 from tracking.boxes import Floats, areas, intersections
 from tracking.detectors.base import Image
 from tracking.solvers.base import OCCLUDED
@@ -31,7 +32,7 @@ from tracking.types import Detections
 from tracking.window import WindowSettings
 
 _VELOCITY = slice(4, 6)
-"""Of the filter's state: that of the middle."""
+"""The velocity of the center in the filter's state."""
 
 
 class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
@@ -70,28 +71,32 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         """Remove ended groups, members that stayed too long, and ended split candidates."""
         alive = {item.serial for item in self._objects}
         self._split_candidates = {
-            it: candidate
-            for it, candidate in self._split_candidates.items()
-            if it in alive and candidate.host.serial in alive and candidate.host.serial in self._groups
+            serial: candidate
+            for serial, candidate in self._split_candidates.items()
+            if serial in alive and candidate.host.serial in alive and candidate.host.serial in self._groups
         }
         for serial, group in list(self._groups.items()):
-            long = [frame - end.frame > self._graph.max_group_frames for end in group.entries[1:]]
-            gone = [serial not in alive or it for it in long]
-            self._ended += [item for item, it in zip(group.merged_tracks, gone, strict=True) if it]
-            group.entries[1:] = [end for end, it in zip(group.entries[1:], gone, strict=True) if not it]
-            group.merged_tracks = [item for item, it in zip(group.merged_tracks, gone, strict=True) if not it]
+            expired = [frame - end.frame > self._graph.max_group_frames for end in group.entries[1:]]
+            gone = [serial not in alive or too_long for too_long in expired]
+            self._ended += [item for item, ended in zip(group.merged_tracks, gone, strict=True) if ended]
+            group.entries[1:] = [end for end, ended in zip(group.entries[1:], gone, strict=True) if not ended]
+            group.merged_tracks = [
+                item for item, ended in zip(group.merged_tracks, gone, strict=True) if not ended
+            ]
             if not group.merged_tracks:
                 del self._groups[serial]
         known = {item.serial for item in self._all_tracks()}
-        self._appearances = {serial: look for serial, look in self._appearances.items() if serial in known}
+        self._appearances = {
+            serial: appearance for serial, appearance in self._appearances.items() if serial in known
+        }
 
     def _learn(self, frame: int, detections: Detections) -> None:
-        """Update the appearance of matched tracks: single, split candidate, or the rest of a group."""
+        """Update the appearance of matched tracks: single ones, split candidates and their hosts."""
         for item in self._objects:
-            _, place = item.observations.get(frame, (item.box, OCCLUDED))
-            if place == OCCLUDED:
+            _, index = item.observations.get(frame, (item.box, OCCLUDED))
+            if index == OCCLUDED:
                 continue
-            histogram = detections.histograms[place]
+            histogram = detections.histograms[index]
             if item.serial in self._split_candidates:
                 self._split_candidates[item.serial].appearance.add(histogram)
             elif item.serial in self._groups:
@@ -103,46 +108,48 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
 
     def _merge(self, frame: int) -> None:
         """Merge tracks that are no longer detected into the track that covers them."""
-        sure = [item for item in self._objects if self._is_confirmed(item)]
-        for item in sure:
-            hosts = [it for it in sure if it.missed_frames == 0 and it in self._objects]
+        confirmed = [item for item in self._objects if self._is_confirmed(item)]
+        for item in confirmed:
+            hosts = [other for other in confirmed if other.missed_frames == 0 and other in self._objects]
             if item.missed_frames < self._graph.merge_after_frames or not hosts:
                 continue
-            shared = intersections(np.stack([it.box for it in hosts]), item.box)
+            shared = intersections(np.stack([host.box for host in hosts]), item.box)
             best = int(np.argmax(shared))
             if shared[best] >= self._graph.min_covered_share * float(areas(item.box)):
                 self._join(hosts[best], item, frame)
 
     def _join(self, host: KalmanTrack, item: KalmanTrack, frame: int) -> None:
-        """Merge two tracks; `item` may be of several people itself."""
+        """Merge `item`, which may be a group itself, into `host`."""
         group = self._groups.setdefault(host.serial, TrackGroup([self._end(host, frame)]))
         merged = self._groups.pop(item.serial, None)
         group.entries += [self._end(item, frame)] if merged is None else merged.entries
         group.merged_tracks += [item] if merged is None else [item, *merged.merged_tracks]
         self._objects.remove(item)
         self._split_candidates = {
-            it: candidate for it, candidate in self._split_candidates.items() if candidate.host is not item
+            serial: candidate
+            for serial, candidate in self._split_candidates.items()
+            if candidate.host is not item
         }
 
     def _end(self, item: KalmanTrack, frame: int) -> TrackEnd:
         """Return the end of a track that enters a group."""
-        step = np.asarray(item.target.statePost, dtype=np.float64)[_VELOCITY, 0]
-        return _ended(frame, item.box, step, self._appearances[item.serial].mean)
+        velocity = np.asarray(item.target.statePost, dtype=np.float64)[_VELOCITY, 0]
+        return _track_end(frame, item.box, velocity, self._appearances[item.serial].mean)
 
     def _add_split_candidates(self, frame: int) -> None:
         """Register new tracks beside a group as split candidates."""
-        hosts = [it for it in self._objects if it.serial in self._groups]
+        hosts = [other for other in self._objects if other.serial in self._groups]
         for item in self._objects:
             if item.matches > 1 or frame not in item.observations or not hosts:
                 continue
-            near = intersections(np.stack([self._around(it.box) for it in hosts]), item.box)
+            near = intersections(np.stack([self._around(host.box) for host in hosts]), item.box)
             host = hosts[int(np.argmax(near))]
             if near.max() > 0.0 and item is not host:
-                look, rest = (
+                appearance, host_appearance = (
                     MeanAppearance(np.zeros_like(self._appearances[host.serial].total)) for _ in range(2)
                 )
                 self._split_candidates[item.serial] = SplitCandidate(
-                    item, host, frame, item.box, host.box, look, rest
+                    item, host, frame, item.box, host.box, appearance, host_appearance
                 )
 
     def _around(self, box: Floats) -> Floats:
@@ -150,7 +157,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         return np.asarray(box + np.array([-margin, -margin, margin, margin]))
 
     def _split(self) -> None:
-        """Decide the identity of split candidates seen for long enough."""
+        """Decide the identity of split candidates that were observed long enough."""
         for serial, candidate in list(self._split_candidates.items()):
             enough = (
                 candidate.track.matches >= self._graph.split_decision_frames
@@ -163,48 +170,52 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             del self._split_candidates[serial]
             if group is None:
                 continue
-            still = np.zeros(2)
-            out = _ended(candidate.first_frame, candidate.first_box, still, candidate.appearance.mean)
-            rest = _ended(
-                candidate.first_frame, candidate.first_host_box, still, candidate.host_appearance.mean
+            no_velocity = np.zeros(2)
+            split = _track_end(
+                candidate.first_frame, candidate.first_box, no_velocity, candidate.appearance.mean
             )
-            left = departed_member(
-                group.entries, out, rest, self._graph.motion_frames, self._graph.max_distance
+            remaining = _track_end(
+                candidate.first_frame, candidate.first_host_box, no_velocity, candidate.host_appearance.mean
             )
-            if left is not None:
-                self._reassign_tracks(candidate, group, left)
+            departed = departed_member(
+                group.entries, split, remaining, self._graph.motion_frames, self._graph.max_distance
+            )
+            if departed is not None:
+                self._reassign_tracks(candidate, group, departed)
 
-    def _reassign_tracks(self, candidate: SplitCandidate, group: TrackGroup, left: int) -> None:
-        """Reassign the tracks after a split: member `left` of the group has left it."""
+    def _reassign_tracks(self, candidate: SplitCandidate, group: TrackGroup, departed: int) -> None:
+        """Reassign the tracks after a split: member `departed` of the group has left it."""
         host = candidate.host
         del self._groups[host.serial]
-        followed, place = host, left
-        if left == 0:
-            # The host itself left: the next member of the group takes over its track.
-            followed, place = group.merged_tracks[0], 1
-            self._objects.append(followed)
-            _take_over(followed, host, candidate.first_frame)
+        continued, index = host, departed
+        if departed == 0:
+            # The host itself left: the next member of the group continues its track.
+            continued, index = group.merged_tracks[0], 1
+            self._objects.append(continued)
+            _take_over(continued, host, candidate.first_frame)
             _take_over(host, candidate.track, candidate.first_frame)
             group.entries[0], group.entries[1] = group.entries[1], group.entries[0]
         else:
-            self._objects.append(group.merged_tracks[left - 1])
-            _take_over(group.merged_tracks[left - 1], candidate.track, candidate.first_frame)
+            self._objects.append(group.merged_tracks[departed - 1])
+            _take_over(group.merged_tracks[departed - 1], candidate.track, candidate.first_frame)
         self._objects.remove(candidate.track)
-        del group.entries[place], group.merged_tracks[place - 1]
+        del group.entries[index], group.merged_tracks[index - 1]
         if group.merged_tracks:
-            self._groups[followed.serial] = group
+            self._groups[continued.serial] = group
         for other in self._split_candidates.values():
-            other.host = followed if other.host is host else other.host
+            other.host = continued if other.host is host else other.host
 
 
-def _ended(frame: int, box: Floats, step: Floats, look: Floats) -> TrackEnd:
-    return TrackEnd(frame, (box[:2] + box[2:]) / 2, step, float(box[3] - box[1]), look)
+def _track_end(frame: int, box: Floats, velocity: Floats, histogram: Floats) -> TrackEnd:
+    return TrackEnd(frame, (box[:2] + box[2:]) / 2, velocity, float(box[3] - box[1]), histogram)
 
 
 def _take_over(item: KalmanTrack, track: KalmanTrack, first: int) -> None:
-    """Continue `item` as `track`, with its observations from the frame `first` on."""
+    """Let `item` continue `track`, with its observations from the frame `first` on."""
     item.target, item.box, item.missed_frames = track.target, track.box, track.missed_frames
     item.observations.update(
         {frame: track.observations[frame] for frame in track.observations if frame >= first}
     )
-    track.observations = {frame: it for frame, it in track.observations.items() if frame < first}
+    track.observations = {
+        frame: observation for frame, observation in track.observations.items() if frame < first
+    }

@@ -18,8 +18,7 @@ from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSe
 from tracking.detectors.hog import HogDetector, HogSettings
 from tracking.detectors.mot_file import MotFileDetector, MotFileSettings
 from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
-from tracking.detectors.subimage_appearance import SubimageSettings
-from tracking.detectors.template import TemplateDetector, TemplateSettings
+from tracking.detectors.template import SubimageSettings, TemplateDetector, TemplateSettings
 
 __all__ = [
     "PAPER_DETECTOR",

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fakes.tracking.strolls import Stroll, final_boxes, seen_at
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
 from tracking.baselines import StepwiseSettings
-from tracking.baselines.color_integral import BINS, ColorIntegralImage
+from tracking.baselines.integral_histograms import BINS, ColorIntegralImage
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.registry import (

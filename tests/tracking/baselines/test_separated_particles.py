@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.crossings import BLUE, RED, Clothes, Crossing, times_kept
-from tracking.baselines.part_histograms import (
+from tracking.baselines.integral_histograms import (
     CHANNELS,
     LEVELS,
     PartHistograms,

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
-from tracking.baselines.temporal_consistency.background import YuvBackground
-from tracking.baselines.temporal_consistency.blobs import Blob, BlobDetector
+from tracking.baselines.temporal_consistency.blobs import Blob, BlobDetector, YuvBackground
 from tracking.baselines.temporal_consistency.distance import (
     blob_gap,
     distance_cost,

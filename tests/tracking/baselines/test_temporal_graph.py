@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.baselines.temporal_consistency.edge_search import cheapest_path_by_edges
 from tracking.baselines.temporal_consistency.graph import (
     WindowGraph,
     count_joint_edges,
@@ -18,8 +17,11 @@ from tracking.baselines.temporal_consistency.graph import (
     merge_costs,
     prune_links,
 )
-from tracking.baselines.temporal_consistency.groups import solve_joint_path
-from tracking.baselines.temporal_consistency.per_person_search import cheapest_joint_path
+from tracking.baselines.temporal_consistency.joint_path import (
+    cheapest_joint_path,
+    cheapest_path_by_edges,
+    solve_joint_path,
+)
 
 _MANY = 100_000
 

@@ -219,4 +219,4 @@ def test_settings_of_blobs_that_make_no_sense_are_refused(wrong: dict[str, float
 
 def test_however_little_floor_is_in_the_picture_foreground_grows_by_a_part_of_it() -> None:
     blobs = BlobDetector((64, 48), 0.001, BlobSettings(dilation_m=1.0))
-    assert blobs._grow.shape == (13, 13)
+    assert blobs._kernel.shape == (13, 13)

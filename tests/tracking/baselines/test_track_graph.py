@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from fakes.tracking.strolls import BINS, Stroll, final_boxes, look, seen_at
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.appearance import appearance_distance
-from tracking.baselines.track_groups import TrackGraphSettings
-from tracking.baselines.track_links import TrackEnd, departed_member
+from tracking.baselines.track_groups import TrackEnd, TrackGraphSettings, departed_member
 from tracking.boxes import iou
 from tracking.registry import Tracker, create_tracker
 

@@ -10,7 +10,7 @@ import pytest
 from tracking.appearance import appearance_distance
 from tracking.boxes import iou
 from tracking.detectors import SubimageSettings, TemplateDetector, TemplateSettings
-from tracking.detectors.subimage_appearance import subimage_histograms
+from tracking.detectors.template import subimage_histograms
 
 Picture = npt.NDArray[np.uint8]
 TOY = (120, 90, 32, 40)  # left, top, width, height

@@ -1,4 +1,7 @@
-"""Blob segmentation: connected foreground of one person, several, or none (section 3)."""
+"""Blob segmentation: connected foreground of one person, several, or none (section 3).
+
+The background is a Gaussian of each pixel in YUV (Wren et al., PAMI 1997).
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,85 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from tracking.baselines.temporal_consistency.background import YuvBackground
 from tracking.baselines.temporal_consistency.regional_appearance import uv_histogram
 from tracking.baselines.temporal_consistency.settings import BlobSettings
 from tracking.boxes import Floats
-from tracking.detectors.base import Image, Mask
+from tracking.detectors.background.color_gain import apply_gains, channel_gains
+from tracking.detectors.base import Image, Mask, Plane
+
+_INLIERS = 3.0
+"""Robust standard deviations from the median within which a sample counts as background."""
+_MAD = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution."""
+
+
+class YuvBackground:
+    """Mean and covariance of each pixel, `(H, W, 3)` and `(H, W, 3, 3)`."""
+
+    def __init__(self, images: Sequence[Image], settings: BlobSettings) -> None:
+        """Learn from images of the room, empty or with people who keep moving.
+
+        The report's room is empty. Here only samples near the median count, so that people who walk through
+        are left out.
+
+        Raises:
+            ValueError: there is no image.
+        """
+        if not images:
+            raise ValueError("a background needs at least one image")
+        self._reference = images[0]
+        levels = np.stack([_yuv(self._normalized(image)) for image in images])
+        median = np.median(levels, axis=0)
+        floors = np.array([settings.brightness_floor, settings.chroma_floor, settings.chroma_floor])
+        spread = np.maximum(_MAD * np.median(np.abs(levels - median), axis=0), floors)
+        inliers = (np.abs(levels - median) <= _INLIERS * spread).all(axis=-1)
+        count = np.maximum(inliers.sum(axis=0), 1)[..., None]
+        mean = np.where(
+            inliers.any(axis=0)[..., None], (levels * inliers[..., None]).sum(axis=0) / count, median
+        )
+        deviations = np.where(inliers[..., None], levels - mean, 0.0)
+        covariance = np.einsum("n...i,n...j->...ij", deviations, deviations) / count[..., None]
+        self._mean: Plane = mean.astype(np.float32)
+        self._whitening = _whitening(covariance + np.diag(floors**2))
+        self._rate = settings.learn_rate
+        self._squared = np.float32(settings.threshold**2)
+
+    def foreground(self, image: Image) -> Mask:
+        """Return the foreground mask `(H, W)`: pixels farther from the background than the threshold."""
+        distance = self.distance(image)
+        return np.where(distance > self._squared, np.uint8(255), np.uint8(0))
+
+    def distance(self, image: Image) -> Plane:
+        """Return the squared Mahalanobis distance of every pixel from the background, `(H, W)`."""
+        y, u, v = cv2.split(_yuv(self._normalized(image)) - self._mean)
+        # With the Cholesky factor L of the inverse covariance, |L' d|^2 is d' C^-1 d.
+        a, b, c, d, e, f = self._whitening
+        return np.asarray(np.square(a * y + b * u + c * v) + np.square(d * u + e * v) + np.square(f * v))
+
+    def learn(self, image: Image, unoccupied: Mask) -> None:
+        """Update the mean with an image where `unoccupied` is 255."""
+        cv2.accumulateWeighted(_yuv(self._normalized(image)), self._mean, self._rate, mask=unoccupied)
+
+    def _normalized(self, image: Image) -> Image:
+        """Return the image at the exposure of the reference image."""
+        return apply_gains(image, 1.0 / channel_gains(image, self._reference))
+
+
+def _yuv(image: Image) -> Plane:
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YUV), dtype=np.float32)
+
+
+def _whitening(covariance: Floats) -> tuple[Plane, ...]:
+    """Return the six entries of the transposed Cholesky factors of the inverses `(H, W, 3, 3)`."""
+    factors = np.linalg.cholesky(np.linalg.inv(covariance)).astype(np.float32)
+    upper = ((0, 0), (1, 0), (2, 0), (1, 1), (2, 1), (2, 2))
+    return tuple(np.ascontiguousarray(factors[..., row, column]) for row, column in upper)
+
 
 _MEDIAN = 3
-"""Pixels of the median filter that takes lonely pixels out."""
-_MOST_GROWN = 0.1
-"""Of the picture's width, by how much the foreground grows at most."""
+"""Side of the median filter that removes isolated pixels."""
+_MAX_DILATION = 0.1
+"""Maximum dilation of the foreground, as a share of the image's width."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,9 +98,9 @@ class Blob:
 
     Attributes:
         box: `(4,)`, left, top, right, bottom.
-        mask: `(h, w)`, 255 where the box is filled.
-        area: pixels that are.
-        colors: `(64,)`, shares of the colors of its foreground.
+        mask: `(h, w)`, the pixels of the box that belong to it, 255.
+        area: number of these pixels.
+        colors: `(64,)`, UV histogram of its foreground.
     """
 
     box: Floats
@@ -38,7 +110,7 @@ class Blob:
 
     @property
     def center(self) -> Floats:
-        """Where it is, `(2,)`: the middle of its box."""
+        """Where it is, `(2,)`: the median of its box."""
         return (self.box[:2] + self.box[2:]) / 2.0
 
 
@@ -46,8 +118,8 @@ class BlobDetector:
     """Segments one camera's images into blobs; people who stand close together share one.
 
     Attributes:
-        size: of the working picture, width and height.
-        pixels_per_meter: pixels of it that are a meter of floor.
+        size: width and height of the working image.
+        pixels_per_meter: pixels of the working image per meter of floor.
     """
 
     def __init__(self, size: tuple[int, int], room_m: float, settings: BlobSettings) -> None:
@@ -57,10 +129,10 @@ class BlobDetector:
         scale = min(1.0, settings.work_width / width)
         self.size = max(round(width * scale), 1), max(round(height * scale), 1)
         self.pixels_per_meter = self.size[0] / room_m
-        self._least = settings.min_area_m2 * self.pixels_per_meter**2
-        # However little floor is in the picture: more than a part of it joins nothing that belongs together.
-        grow = 2 * round(min(settings.dilation_m * self.pixels_per_meter, self.size[0] * _MOST_GROWN)) + 1
-        self._grow = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grow, grow)), dtype=np.uint8)
+        self._min_area = settings.min_area_m2 * self.pixels_per_meter**2
+        # Limited by the image's width: a larger dilation would join separate people.
+        grow = 2 * round(min(settings.dilation_m * self.pixels_per_meter, self.size[0] * _MAX_DILATION)) + 1
+        self._kernel = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grow, grow)), dtype=np.uint8)
         self._background: YuvBackground | None = None
 
     @property
@@ -75,32 +147,32 @@ class BlobDetector:
         return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
     def prepare(self, images: Sequence[Image]) -> None:
-        """Learn the background from working pictures.
+        """Learn the background from working images.
 
         Raises:
-            ValueError: there is none.
+            ValueError: there is no image.
         """
         self._background = YuvBackground(images, self._settings)
 
     def detect(self, image: Image, *, learn: bool) -> tuple[Blob, ...]:
         """Return the blobs of a working image, from left to right; none while the background is unknown.
 
-        `learn`: what is around them goes into the background.
+        `learn`: update the background outside the blobs.
         """
         if self._background is None:
             return ()
-        seen = np.asarray(cv2.medianBlur(self._background.foreground(image), _MEDIAN), dtype=np.uint8)
-        grown = np.asarray(cv2.dilate(seen, self._grow), dtype=np.uint8)
+        filtered = np.asarray(cv2.medianBlur(self._background.foreground(image), _MEDIAN), dtype=np.uint8)
+        grown = np.asarray(cv2.dilate(filtered, self._kernel), dtype=np.uint8)
         if learn:
             self._background.learn(image, np.asarray(cv2.bitwise_not(grown), dtype=np.uint8))
         count, labels, stats, _ = cv2.connectedComponentsWithStats(grown, connectivity=8)
-        found = []
+        blobs = []
         for label in range(1, count):
-            left, top, wide, high, area = stats[label].tolist()
-            if area < self._least:
+            left, top, width, height, area = stats[label].tolist()
+            if area < self._min_area:
                 continue
-            part = slice(top, top + high), slice(left, left + wide)
-            shape = np.where(labels[part] == label, np.uint8(255), np.uint8(0))
-            box = np.array([left, top, left + wide, top + high], dtype=np.float64)
-            found.append(Blob(box, shape, area, uv_histogram(image[part], shape & seen[part])))
-        return tuple(sorted(found, key=lambda blob: tuple(blob.box.tolist())))
+            part = slice(top, top + height), slice(left, left + width)
+            mask = np.where(labels[part] == label, np.uint8(255), np.uint8(0))
+            box = np.array([left, top, left + width, top + height], dtype=np.float64)
+            blobs.append(Blob(box, mask, area, uv_histogram(image[part], mask & filtered[part])))
+        return tuple(sorted(blobs, key=lambda blob: tuple(blob.box.tolist())))

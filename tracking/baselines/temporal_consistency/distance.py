@@ -13,19 +13,20 @@ from tracking.baselines.temporal_consistency.settings import TemporalSettings
 from tracking.boxes import Floats, intersections
 
 _HEIGHT, _MIDDLE, _WIDTH = 50.0, 2.0, 0.15
-"""Of the sigmoid in g(x)."""
+"""Parameters of the sigmoid in g(x)."""
 
 
 def is_nested(first: Floats, second: Floats) -> bool:
     """Return whether one of two boxes `(4,)` lies within the other."""
-    out = bool((first[:2] <= second[:2]).all() and (first[2:] >= second[2:]).all())
-    return out or bool((second[:2] <= first[:2]).all() and (second[2:] >= first[2:]).all())
+    contains = bool((first[:2] <= second[:2]).all() and (first[2:] >= second[2:]).all())
+    return contains or bool((second[:2] <= first[:2]).all() and (second[2:] >= first[2:]).all())
 
 
 def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSettings) -> float:
     """Return the distance score d_s in meters; `meter` is one meter in pixels.
 
-    0 where one box is within the other, `partly` where they overlap, else `apart` and the gap between them.
+    0 if one box is within the other, `partial_overlap_m` if they overlap, otherwise `no_overlap_m` plus the
+    gap.
     """
     if is_nested(before.box, after.box):
         return 0.0
@@ -37,7 +38,7 @@ def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSe
 def blob_gap(first: Blob, second: Blob) -> float:
     """Return the gap in pixels between two blobs along the line between their centers.
 
-    Of edges, not of middles: who leaves a crowd moves its middle further than anybody has gone.
+    Between edges, not centers: when a person leaves a crowd, its center moves further than anyone has walked.
     """
     start, end = first.center, second.center
     length = math.hypot(*(end - start).tolist())
@@ -45,7 +46,7 @@ def blob_gap(first: Blob, second: Blob) -> float:
     line = start + (end - start) * np.linspace(0.0, 1.0, steps + 1)[:, None]
     leaves = np.flatnonzero(_inside(first, line))
     enters = np.flatnonzero(_inside(second, line))
-    # A middle may lie beside its blob, and so may the whole line.
+    # A center, and even the whole line, may lie outside its blob.
     last, next_ = int(leaves[-1]) if leaves.size else 0, int(enters[0]) if enters.size else steps
     return length * max(next_ - last, 0) / steps
 
@@ -53,15 +54,15 @@ def blob_gap(first: Blob, second: Blob) -> float:
 def _inside(blob: Blob, points: Floats) -> NDArray[np.bool_]:
     """Return which points `(N, 2)` lie in a blob, `(N,)`."""
     columns, rows = np.floor(points - blob.box[:2]).astype(np.int64).T
-    high, wide = blob.mask.shape
-    within = (columns >= 0) & (columns < wide) & (rows >= 0) & (rows < high)
-    found = np.zeros(len(points), dtype=np.bool_)
-    found[within] = blob.mask[rows[within], columns[within]] > 0
-    return found
+    height, width = blob.mask.shape
+    within = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    inside = np.zeros(len(points), dtype=np.bool_)
+    inside[within] = blob.mask[rows[within], columns[within]] > 0
+    return inside
 
 
 def distance_cost(share: float) -> float:
-    """Return g(x): x up to 1, the distance walked in the time; beyond, a sigmoid that rises to 51."""
+    """Return g(x): x up to 1, the distance walked in that time; beyond, a sigmoid that rises to 51."""
     if share <= 1.0:
         return share
     return _HEIGHT / (math.exp(-(share - _MIDDLE) / _WIDTH) + 1.0) + 1.0

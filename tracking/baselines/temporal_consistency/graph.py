@@ -1,12 +1,12 @@
 """The graph of a window: every way to match people with blobs, stage by stage (section 2.1).
 
 A node of a stage gives each person a blob; several may be in one. A link between nodes of adjacent stages
-costs, with N people,
+costs, for N people,
 
     c = 1/N (a M + sum over people of f_dist + sum over people of f_color)                            eq. (1)
 
-*a* is how many people are merged less the number of merges. Each person's part of a link depends on their own
-two blobs only, so the graph is kept as one small graph a person; what ties them together is *a*.
+*a* is the number of merged people minus the number of merges. Each person's share of a link depends only on
+that person's two blobs, so the graph is stored as one small graph per person; only *a* couples them.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ class WindowGraph:
     """A window of T stages after the last decided stage, for P people.
 
     Attributes:
-        start: `(P,)`, everybody's blob in the decided stage, an index of the first of `steps`' rows.
+        start: `(P,)`, each person's blob in the decided stage: a row of the first of `distance_costs`.
         distance_costs: T tables `(B', B)` of f_dist between the blobs of a stage and the next one.
         appearance_costs: T tables `(P, B)` of f_color.
-        shared: T rows `(B,)`: whether it costs something to be several there.
+        shared: T rows `(B,)`: whether merging there has a cost.
         merge_cost: M.
-        max_step_cost: steps that cost more are no links (section 4.3); infinite: none is left out.
+        max_step_cost: links with a higher distance cost are pruned (section 4.3); infinite: none.
     """
 
     start: Indices
@@ -54,9 +54,9 @@ class Links:
     """The links of one person between two stages.
 
     Attributes:
-        blobs: `(r,)`, the later stage's blobs that they may be in, ascending.
-        costs: `(r', r)`, from each blob of the stage before that they may be in, f_color included; infinite
-            where there is no link.
+        blobs: `(r,)`, the reachable blobs of the later stage, ascending.
+        costs: `(r', r)`, from each reachable blob of the earlier stage, f_color included; infinite where
+            there is no link.
     """
 
     blobs: Indices
@@ -73,32 +73,32 @@ PersonLinks = tuple[tuple[Links, ...], ...]
 
 
 def prune_links(graph: WindowGraph) -> PersonLinks:
-    """Prune the graph: keep the links that are short enough between reachable blobs.
+    """Prune the graph: keep the short links between reachable blobs.
 
-    A person for whom none is left at a stage keeps all of that stage: they must be somewhere.
+    A person without any short link in a stage keeps all links of that stage.
     """
-    return tuple(_ways_of(graph, person) for person in range(graph.people))
+    return tuple(_links_of(graph, person) for person in range(graph.people))
 
 
-def _ways_of(graph: WindowGraph, person: int) -> tuple[Links, ...]:
-    at: Indices = graph.start[person : person + 1]
-    found = []
-    for step, looks in zip(graph.distance_costs, graph.appearance_costs, strict=True):
-        costs = step[at]
+def _links_of(graph: WindowGraph, person: int) -> tuple[Links, ...]:
+    blobs: Indices = graph.start[person : person + 1]
+    links = []
+    for step, appearance in zip(graph.distance_costs, graph.appearance_costs, strict=True):
+        costs = step[blobs]
         short = np.where(costs <= graph.max_step_cost, costs, np.inf)
         if np.isinf(short).all():
             short = costs
-        at = np.flatnonzero(np.isfinite(short).any(axis=0))
-        found.append(Links(at, short[:, at] + looks[person, at]))
-    return tuple(found)
+        blobs = np.flatnonzero(np.isfinite(short).any(axis=0))
+        links.append(Links(blobs, short[:, blobs] + appearance[person, blobs]))
+    return tuple(links)
 
 
-def count_joint_edges(found: Sequence[Sequence[Links]]) -> list[int]:
+def count_joint_edges(links: Sequence[Sequence[Links]]) -> list[int]:
     """Count the links between joint nodes of adjacent stages, stage by stage.
 
-    A joint link is one of every person's, so their numbers multiply.
+    A joint link combines one link of every person, so the counts multiply.
     """
-    return [prod(links.count for links in stage) for stage in zip(*found, strict=True)]
+    return [prod(step.count for step in stage) for stage in zip(*links, strict=True)]
 
 
 def count_unpruned_edges(graph: WindowGraph) -> list[int]:
@@ -107,29 +107,29 @@ def count_unpruned_edges(graph: WindowGraph) -> list[int]:
 
 
 def merge_costs(
-    blobs: Sequence[Indices], shared: NDArray[np.bool_], taken: NDArray[np.int64], merge: float
+    blobs: Sequence[Indices], shared: NDArray[np.bool_], occupied: NDArray[np.int64], merge: float
 ) -> Floats:
     """Return the merge cost a M of every joint node of a stage.
 
     Args:
-        blobs: for each of k people, the `(r,)` blobs that they may be in.
-        shared: `(B,)`, whether it costs something to be several there.
-        taken: `(B,)`, how many others are there already.
+        blobs: for each of k people, the reachable blobs `(r,)`.
+        shared: `(B,)`, whether merging there has a cost.
+        occupied: `(B,)`, the number of other people already assigned to each blob.
         merge: M.
 
     Returns:
-        `(r_1, ..., r_k)`; what the others cost among themselves is not in it.
+        `(r_1, ..., r_k)`, without the merge costs among the other people.
     """
-    shape = tuple(len(it) for it in blobs)
+    shape = tuple(len(reachable) for reachable in blobs)
     total = np.zeros(shape)
     for blob in np.flatnonzero(shared).tolist():
-        met = [person for person, it in enumerate(blobs) if blob in it]
-        if len(met) + int(taken[blob] > 0) < 2:  # noqa: PLR2004 — nobody to be with
+        candidates = [person for person, reachable in enumerate(blobs) if blob in reachable]
+        if len(candidates) + int(occupied[blob] > 0) < 2:  # noqa: PLR2004 — nobody to merge with
             continue
-        here = np.zeros(shape, dtype=np.int64)
-        for person in met:
+        counts = np.zeros(shape, dtype=np.int64)
+        for person in candidates:
             axis = [1] * len(shape)
             axis[person] = -1
-            here = here + (blobs[person] == blob).astype(np.int64).reshape(axis)
-        total += np.maximum(here - (0 if taken[blob] else 1), 0)
+            counts = counts + (blobs[person] == blob).astype(np.int64).reshape(axis)
+        total += np.maximum(counts - (0 if occupied[blob] else 1), 0)
     return merge * total

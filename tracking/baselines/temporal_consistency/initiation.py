@@ -1,4 +1,4 @@
-"""New and departed people. The report counts people by hand and leaves doors to others (section 2.2)."""
+"""Initiation and departure of people. In the report the number of people is given (section 2.2)."""
 
 from __future__ import annotations
 
@@ -14,39 +14,42 @@ from tracking.baselines.temporal_consistency.window import Stage, StageDecision,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _UnassignedBlob:
-    """A blob without a person, and for how many decided stages in a row."""
+    """A blob without a person, and its consecutive decided stages without one."""
 
     blob: Blob
     stages: int
 
 
 class PersonLifecycle:
-    """Decides which blobs are new people, and who has left."""
+    """Decides which blobs are new people, and which people have left."""
 
     def __init__(self, settings: TemporalSettings, meter: float) -> None:
         self._settings, self._meter = settings, meter
-        self._unclaimed: list[_UnassignedBlob] = []
+        self._unassigned: list[_UnassignedBlob] = []
         self._absent_stages: dict[int, int] = {}
-        """By number: since how many decided stages they have been nowhere."""
+        """By person id: consecutive decided stages of absence."""
 
     def find_new(self, window: TemporalWindow, done: StageDecision) -> list[int]:
         """Return the blobs of a decided stage that are new people, the largest first.
 
-        Such a blob is nobody's, as large as a person, and stays so from stage to stage for `confirm` of them;
-        what the window says of the stages after it counts, too.
+        Such a blob is as large as a person and unassigned in `confirm_stages` consecutive stages; pending
+        stages count too.
         """
-        claimed = set(done.blob_by_id.values())
+        assigned = set(done.blob_by_id.values())
         least = self._settings.min_person_m2 * self._meter**2
-        new, unclaimed = [], []
+        new, unassigned = [], []
         for at, blob in enumerate(done.stage.blobs):
-            if at in claimed or blob.area < least:
+            if at in assigned or blob.area < least:
                 continue
-            before = max((it.stages for it in self._unclaimed if self._reachable(it.blob, blob)), default=0)
+            before = max(
+                (earlier.stages for earlier in self._unassigned if self._reachable(earlier.blob, blob)),
+                default=0,
+            )
             if before + 1 + self._pending_stages(window, blob) >= self._settings.confirm_stages:
                 new.append(at)
             else:
-                unclaimed.append(_UnassignedBlob(blob, before + 1))
-        self._unclaimed = unclaimed
+                unassigned.append(_UnassignedBlob(blob, before + 1))
+        self._unassigned = unassigned
         room = max(self._settings.max_people - len(window.people), 0)
         return sorted(new, key=lambda at: -done.stage.blobs[at].area)[:room]
 
@@ -57,14 +60,14 @@ class PersonLifecycle:
             for number, at in done.blob_by_id.items()
             if at == done.stage.absent
         }
-        gone = {
+        departed = {
             number
             for number, stages in self._absent_stages.items()
             if stages * stage_s >= self._settings.forget_after_s
         }
-        for number in gone:
+        for number in departed:
             del self._absent_stages[number]
-        return gone
+        return departed
 
     def _pending_stages(self, window: TemporalWindow, blob: Blob) -> int:
         """Count the consecutive pending stages with an unassigned blob nearby."""
@@ -72,8 +75,8 @@ class PersonLifecycle:
             return 0
         count = 0
         for stage, chosen in zip(window.pending, window.path.blobs, strict=True):
-            free = np.setdiff1d(np.arange(len(stage.blobs)), chosen)
-            near = [stage.blobs[at] for at in free.tolist() if self._reachable(blob, stage.blobs[at])]
+            unassigned = np.setdiff1d(np.arange(len(stage.blobs)), chosen)
+            near = [stage.blobs[at] for at in unassigned.tolist() if self._reachable(blob, stage.blobs[at])]
             if not near:
                 break
             blob, count = near[0], count + 1
@@ -86,7 +89,7 @@ class PersonLifecycle:
 
 
 def initial_people(stage: Stage, settings: TemporalSettings, meter: float) -> list[tuple[int, int]]:
-    """Return id and blob of the first stage's blobs that are as large as a person."""
+    """Return pairs of new id and blob index for the first stage's blobs that are as large as a person."""
     least = settings.min_person_m2 * meter**2
     large = [at for at, blob in enumerate(stage.blobs) if blob.area >= least]
     return [(number + 1, at) for number, at in enumerate(large[: settings.max_people])]

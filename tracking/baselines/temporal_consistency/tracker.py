@@ -24,26 +24,26 @@ from tracking.window import WindowResult, WindowSettings, WindowTrack
 class TemporalTracker:
     """Person-to-blob matching over a window of samples. A decided sample is final.
 
-    It looks at the pictures alone: a detection only says how the person looks whom it shows.
+    It tracks in the images only; detections only provide appearance histograms.
     """
 
     def __init__(
         self, window: WindowSettings, settings: TemporalSettings | None = None, fps: float = 25.0
     ) -> None:
-        """Set up for results every `stride` frames of a recording at `fps` frames a second."""
+        """Set up for results every `stride` frames of a recording at `fps` frames per second."""
         self._window, self._settings, self._fps = window, settings or TemporalSettings(), fps
         self._every = self._settings.stage_frames(fps)
         self._blobs: BlobDetector | None = None
         self._scale = 1.0
-        """Pixels of the picture in one of the working picture."""
-        self._learned: list[Image] = []
-        self._pictures = 0
-        """Pictures seen while the background is learned."""
-        self._numbers = 0
+        """Pixels of the image per pixel of the working image."""
+        self._bootstrap_images: list[Image] = []
+        self._bootstrap_frames = 0
+        """Frames received while the background is learned."""
+        self._last_id = 0
         self._detections: dict[int, Detections] = {}
         self._bins = 0
         self._first: int | None = None
-        """The first frame that is not final."""
+        """The first frame that is not final yet."""
         self._last: int | None = None
         self._people: TemporalWindow | None = None
         self._lifecycle: PersonLifecycle | None = None
@@ -54,17 +54,16 @@ class TemporalTracker:
         self._next_stage = 0
 
     def prepare(self, images: Iterable[Image]) -> None:
-        """Learn the background from images of a recording before its first frame; without any, online."""
+        """Learn the background from images of a recording before its first frame; without any, live."""
         small = [self._blobs_of(image).resize(image) for image in images]
         if small and self._blobs is not None:
             self._blobs.prepare(small)
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take a frame; return a result where one or more windows end.
+        """Add a frame; return a result if one or more windows end.
 
-        A frame without a picture is one of which nothing is known; the sample is taken from the next one.
-        After a gap longer than `forget_after` of the window everybody is forgotten, and the frames of the gap
-        are in no result.
+        A frame without an image has no data; the sample is taken from the next one. After a gap longer than
+        `forget_after` of the window all people are dropped, and the frames of the gap are in no result.
 
         Raises:
             ValueError: the frame number is not larger than the last one.
@@ -90,7 +89,7 @@ class TemporalTracker:
         return self._result() if (frame + 1) // stride > (before + 1) // stride else None
 
     def flush(self) -> WindowResult | None:
-        """End the recording: all frames become final. `None` where they were already."""
+        """End the recording: all frames become final. Return `None` if they were final already."""
         if self._first is None or self._last is None or self._last < self._first:
             return None
         while (done := None if self._people is None else self._people.commit()) is not None:
@@ -99,7 +98,7 @@ class TemporalTracker:
         return self._result()
 
     def _forget(self) -> None:
-        """Forget all people, but keep the background."""
+        """Drop all people, but keep the background."""
         self._people, self._lifecycle = None, None
         self._blob_history, self._samples = BlobBoxHistory(), {}
         self._final, self._next_stage = None, 0
@@ -116,12 +115,12 @@ class TemporalTracker:
         boxes = np.array([blob.box for blob in found]).reshape(-1, 4) * self._scale
         self._blob_history.add(frame, boxes)
         if not is_due or (self._settings.closed_world and not found):
-            return  # nobody can be nowhere: the sample is taken later
+            return  # everyone must be in a blob: the sample is taken later
         self._next_stage = (frame // self._every + 1) * self._every
         self._sample(Stage(frame, found), blobs)
 
     def _decide_overdue(self, frame: int) -> None:
-        """Decide overdue stages where images have been missing for long."""
+        """Decide overdue stages if images have been missing for long."""
         oldest = frame - self._settings.lag(self._fps)
         while self._people is not None and self._final is not None and self._final < oldest:
             done = self._people.commit()
@@ -132,24 +131,26 @@ class TemporalTracker:
 
     def _bootstrap(self, blobs: BlobDetector, small: Image) -> None:
         settings = self._settings.blobs
-        taken = (self._pictures + 1) * settings.samples // settings.bootstrap_frames
-        if taken > self._pictures * settings.samples // settings.bootstrap_frames:
-            self._learned.append(small)
-        self._pictures += 1
-        if self._pictures >= settings.bootstrap_frames:
-            blobs.prepare(self._learned)
-            self._learned = []
+        used = (self._bootstrap_frames + 1) * settings.samples // settings.bootstrap_frames
+        if used > self._bootstrap_frames * settings.samples // settings.bootstrap_frames:
+            self._bootstrap_images.append(small)
+        self._bootstrap_frames += 1
+        if self._bootstrap_frames >= settings.bootstrap_frames:
+            blobs.prepare(self._bootstrap_images)
+            self._bootstrap_images = []
 
     def _sample(self, stage: Stage, blobs: BlobDetector) -> None:
         if self._people is None or self._lifecycle is None:
             first = initial_people(stage, self._settings, blobs.pixels_per_meter)
             if self._settings.closed_world and not first:
-                return  # who is there is only counted once
+                return  # people are only counted once
             self._people = TemporalWindow(self._settings, blobs.size, blobs.pixels_per_meter, 1.0 / self._fps)
             self._lifecycle = PersonLifecycle(self._settings, blobs.pixels_per_meter)
-            self._people.begin(stage, [(self._numbers + number, at) for number, at in first])
-            self._numbers += len(first)
-            self._apply_decision(StageDecision(stage, {it.id: it.blob for it in self._people.people}))
+            self._people.begin(stage, [(self._last_id + number, at) for number, at in first])
+            self._last_id += len(first)
+            self._apply_decision(
+                StageDecision(stage, {person.id: person.blob for person in self._people.people})
+            )
         elif (done := self._people.push(stage)) is not None:
             self._apply_decision(done)
 
@@ -162,24 +163,24 @@ class TemporalTracker:
             return
         self._people.remove(self._lifecycle.find_departed(done, self._settings.stage_s))
         for at in self._lifecycle.find_new(self._people, done):
-            self._numbers += 1
-            self._people.add(self._numbers, at)
-            self._samples[self._numbers] = [(done.stage.frame, self._box(done.stage, at))]
+            self._last_id += 1
+            self._people.add(self._last_id, at)
+            self._samples[self._last_id] = [(done.stage.frame, self._box(done.stage, at))]
 
     def _box(self, stage: Stage, at: int) -> Floats | None:
         """Return a blob's box in pixels of the camera's image; `None` for absence."""
         return None if at == stage.absent else stage.blobs[at].box * self._scale
 
     def _result(self) -> WindowResult:
-        """Return the result for all frames not published as final before."""
+        """Return the result for all frames that were not published as final."""
         assert self._first is not None  # noqa: S101 — there was a frame
         assert self._last is not None  # noqa: S101
         first, last = self._first, self._last
         frames = range(first, last + 1)
-        # Where nobody is followed yet, nothing that comes changes what was not seen.
+        # Without any decision, all frames are final: later ones cannot change them.
         final = last if self._final is None else max(min(self._final, last), first - 1)
-        seen = [self._detections.get(frame, Detections.empty(self._bins)) for frame in frames]
-        tracks = build_window_tracks(self._all_samples(), self._blob_history, seen, first, final)
+        detections = [self._detections.get(frame, Detections.empty(self._bins)) for frame in frames]
+        tracks = build_window_tracks(self._all_samples(), self._blob_history, detections, first, final)
         result = WindowResult(first, last, final, tracks, self._report())
         self._drop_final(final)
         return result
@@ -188,19 +189,21 @@ class TemporalTracker:
         """Return everyone's boxes at samples: the decided ones, then the current best path."""
         if self._people is None or self._people.path is None:
             return self._samples
-        stops = {number: list(it) for number, it in self._samples.items()}
+        samples = {number: list(boxes) for number, boxes in self._samples.items()}
         for stage, chosen in zip(self._people.pending, self._people.path.blobs.tolist(), strict=True):
             for person, at in zip(self._people.people, chosen, strict=True):
-                stops.setdefault(person.id, []).append((stage.frame, self._box(stage, at)))
-        return stops
+                samples.setdefault(person.id, []).append((stage.frame, self._box(stage, at)))
+        return samples
 
     def _drop_final(self, final: int) -> None:
         """Drop final frames, except each person's last sample."""
         self._first = final + 1
-        self._detections = {frame: it for frame, it in self._detections.items() if frame > final}
-        self._blob_history.forget_through(final)
-        here = set() if self._people is None else {it.id for it in self._people.people}
-        self._samples = {number: stops[-1:] for number, stops in self._samples.items() if number in here}
+        self._detections = {
+            frame: detections for frame, detections in self._detections.items() if frame > final
+        }
+        self._blob_history.drop_through(final)
+        present = set() if self._people is None else {person.id for person in self._people.people}
+        self._samples = {number: boxes[-1:] for number, boxes in self._samples.items() if number in present}
 
     def _report(self) -> SolveReport:
         path = None if self._people is None else self._people.path
@@ -216,37 +219,46 @@ class TemporalTracker:
         return self._blobs
 
 
-_SAME = 0.3
-"""Overlap (IoU) from which a detection shows whoever a blob is."""
+_MIN_IOU = 0.3
+"""Least overlap (IoU) of a blob and its matched detection."""
 
 
 def build_window_tracks(
-    stops: SampledBoxes, trails: BlobBoxHistory, seen: Sequence[Detections], first: int, final: int
+    samples: SampledBoxes,
+    history: BlobBoxHistory,
+    detections: Sequence[Detections],
+    first: int,
+    final: int,
 ) -> tuple[WindowTrack, ...]:
-    """Return the tracks of the frames from `first` on, by ascending id; `seen` are their detections.
+    """Return the tracks of the frames from `first` on, by ascending id.
 
-    `final` is the last of them that never changes again.
+    `detections` are those of each of these frames; `final` is the last frame that cannot change any more.
     """
     tracks, states = [], []
-    for number, mine in sorted(stops.items()):
-        boxes = trails.trajectory(mine, first, first + len(seen) - 1)
+    for number, boxes_at_samples in sorted(samples.items()):
+        boxes = history.trajectory(boxes_at_samples, first, first + len(detections) - 1)
         if np.isnan(boxes).all():
             continue
-        shown = _matched_detections(boxes, seen)
-        looks = [it.histograms[at] for it, at in zip(seen, shown, strict=True) if at != OCCLUDED]
-        histogram = mean_histogram(np.stack(looks)) if looks else np.empty(seen[0].histograms.shape[1])
-        sure = float(np.mean(~np.isnan(boxes[:, 0])))
-        tracks.append(WindowTrack(number, boxes, boxes, histogram, sure))
-        states.append(shown)
-    return add_appearance_samples(tracks, states, first, seen[: final - first + 1])
+        matched = _matched_detections(boxes, detections)
+        histograms = [
+            found.histograms[index]
+            for found, index in zip(detections, matched, strict=True)
+            if index != OCCLUDED
+        ]
+        bins = detections[0].histograms.shape[1]
+        histogram = mean_histogram(np.stack(histograms)) if histograms else np.empty(bins)
+        score = float(np.mean(~np.isnan(boxes[:, 0])))
+        tracks.append(WindowTrack(number, boxes, boxes, histogram, score))
+        states.append(matched)
+    return add_appearance_samples(tracks, states, first, detections[: final - first + 1])
 
 
-def _matched_detections(boxes: Floats, seen: Sequence[Detections]) -> NDArray[np.int64]:
+def _matched_detections(boxes: Floats, detections: Sequence[Detections]) -> NDArray[np.int64]:
     """Return the detection that matches a track in each frame, `(F,)`, -1 for none."""
-    states = np.full(len(seen), OCCLUDED, dtype=np.int64)
-    for row, found in enumerate(seen):
+    states = np.full(len(detections), OCCLUDED, dtype=np.int64)
+    for row, found in enumerate(detections):
         if len(found) and not np.isnan(boxes[row, 0]):
             overlaps = iou(boxes[row][None], found.boxes)
             best = int(overlaps.argmax())
-            states[row] = best if overlaps[best] >= _SAME else OCCLUDED
+            states[row] = best if overlaps[best] >= _MIN_IOU else OCCLUDED
     return states

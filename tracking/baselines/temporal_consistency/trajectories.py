@@ -1,4 +1,4 @@
-"""Boxes in every frame: the blobs at samples, and interpolated along blobs in between."""
+"""Boxes in every frame: a person's blobs at samples, and interpolated along blobs between them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats, iou
 
-_SAME = 0.2
-"""Overlap (IoU) from which a blob of a frame between two samples is the one that is followed."""
+_MIN_IOU = 0.2
+"""Least overlap (IoU) of a blob between two samples with the interpolated box."""
 
 
 SampledBoxes = dict[int, list[tuple[int, Floats | None]]]
-"""By number: frames of samples, and the box `(4,)` there; None: nowhere."""
+"""By person id: frames of samples, and the box `(4,)` there; None: absent."""
 
 
 class BlobBoxHistory:
-    """Blob boxes of every frame that is not final yet."""
+    """Blob boxes of the frames that are not final yet."""
 
     def __init__(self) -> None:
         self._boxes: dict[int, Floats] = {}
@@ -26,32 +26,32 @@ class BlobBoxHistory:
         """Store the boxes `(B, 4)` of a frame."""
         self._boxes[frame] = boxes
 
-    def forget_through(self, frame: int) -> None:
+    def drop_through(self, frame: int) -> None:
         """Drop all frames up to this one."""
-        self._boxes = {it: boxes for it, boxes in self._boxes.items() if it > frame}
+        self._boxes = {stored: boxes for stored, boxes in self._boxes.items() if stored > frame}
 
     def trajectory(self, samples: list[tuple[int, Floats | None]], first: int, last: int) -> Floats:
         """Return a person's boxes in the frames `first` to `last`, `(F, 4)`, NaN where absent.
 
         Args:
-            samples: frames and their blob's boxes `(4,)` at samples, ascending; None: nowhere.
+            samples: frames and the person's blob box `(4,)`, ascending; None: absent.
             first: the first frame.
             last: the last frame.
         """
         boxes = np.full((last - first + 1, BOX_SIDES), np.nan)
         frames = [frame for frame, _ in samples]
         for row, frame in enumerate(range(first, last + 1)):
-            place = bisect_left(frames, frame)
-            if place < len(samples) and samples[place][0] == frame:
-                box = samples[place][1]
-            elif place == 0:
+            index = bisect_left(frames, frame)
+            if index < len(samples) and samples[index][0] == frame:
+                box = samples[index][1]
+            elif index == 0:
                 continue
-            elif place == len(samples):
-                # After the newest sample: on from frame to frame.
+            elif index == len(samples):
+                # After the newest sample, follow the blobs from frame to frame.
                 before = boxes[row - 1] if row else samples[-1][1]
                 box = None if before is None or np.isnan(before[0]) else self._nearest_blob(frame, before)
             else:
-                box = self._interpolated(frame, samples[place - 1], samples[place])
+                box = self._interpolated(frame, samples[index - 1], samples[index])
             if box is not None:
                 boxes[row] = box
         return boxes
@@ -72,4 +72,4 @@ class BlobBoxHistory:
             return expected
         overlaps = iou(expected[None], boxes)
         best = int(overlaps.argmax())
-        return boxes[best] if overlaps[best] >= _SAME else expected
+        return boxes[best] if overlaps[best] >= _MIN_IOU else expected

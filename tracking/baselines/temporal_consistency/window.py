@@ -1,4 +1,4 @@
-"""The moving window: samples come in, decisions come out as many stages later (sections 2.1 and 2.2)."""
+"""The moving window: each sample is decided `window_stages` samples later (sections 2.1 and 2.2)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from tracking.baselines.temporal_consistency.blobs import Blob
 from tracking.baselines.temporal_consistency.distance import distance_cost, distance_costs
 from tracking.baselines.temporal_consistency.graph import PersonLinks, WindowGraph, prune_links
-from tracking.baselines.temporal_consistency.groups import JointPath, solve_joint_path
+from tracking.baselines.temporal_consistency.joint_path import JointPath, solve_joint_path
 from tracking.baselines.temporal_consistency.regional_appearance import RegionalAppearance
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
 from tracking.boxes import Floats, intersections
@@ -26,7 +26,7 @@ class Stage:
 
     @property
     def absent(self) -> int:
-        """The index that stands for no blob at all."""
+        """The index that means no blob."""
         return len(self.blobs)
 
 
@@ -44,8 +44,8 @@ class StageDecision:
     """The decision of one stage.
 
     Attributes:
-        stage: which one.
-        blob_by_id: by person's number, the index of the blob, or `stage.nowhere`.
+        stage: the decided stage.
+        blob_by_id: by person id, the index of the blob, or `stage.absent`.
     """
 
     stage: Stage
@@ -56,23 +56,23 @@ class TemporalWindow:
     """Decides each stage for a known set of people, `window_stages` samples later.
 
     Attributes:
-        people: who is followed, by ascending number.
+        people: the tracked people, by ascending id.
         decided: the last decided stage.
         pending: the stages after it.
-        path: everybody's best path through these, as it stands; None before the first of them.
+        path: the current best joint path through these; None if there are none.
     """
 
     def __init__(
         self, settings: TemporalSettings, size: tuple[int, int], meter: float, frame_s: float
     ) -> None:
-        """Set up for images of `size` (width, height), `meter` pixels a meter, a frame each `frame_s`."""
+        """Set up for images of `size` (width, height), `meter` pixels per meter, `frame_s` seconds per frame."""
         self._settings, self._size, self._meter, self._frame_s = settings, size, meter, frame_s
         self.people: list[TrackedPerson] = []
         self.decided: Stage | None = None
         self.pending: deque[Stage] = deque()
         self.path: JointPath | None = None
         self.graph: WindowGraph | None = None
-        """The graph that `path` goes through, and what pruning has left of it."""
+        """The graph that `path` goes through; `links` are its links after pruning."""
         self.links: PersonLinks = ()
         self._steps: deque[Floats] = deque()
 
@@ -88,7 +88,7 @@ class TemporalWindow:
         """Add a sample; decide the oldest pending stage once the window is full.
 
         Raises:
-            ValueError: it is not known yet who is where, or the frame is not after the last one.
+            ValueError: `begin` was not called, or the frame is not after the last one.
         """
         before = self.pending[-1] if self.pending else self.decided
         if before is None:
@@ -108,8 +108,8 @@ class TemporalWindow:
         self._steps.popleft()
         for person, at in zip(self.people, chosen.tolist(), strict=True):
             person.blob = at
-        rest = self.path.blobs[1:]
-        self.path = JointPath(rest, self.path.cost, self.path.exact) if self.pending else None
+        remaining = self.path.blobs[1:]
+        self.path = JointPath(remaining, self.path.cost, self.path.exact) if self.pending else None
         self.decided = stage
         self._learn(stage)
         return StageDecision(stage, {person.id: person.blob for person in self.people})
@@ -135,14 +135,14 @@ class TemporalWindow:
         if not self.pending:
             return
         settings = self._settings
-        longest = distance_cost(settings.prune_factor) if settings.prune_factor else np.inf
+        max_cost = distance_cost(settings.prune_factor) if settings.prune_factor else np.inf
         self.graph = WindowGraph(
             np.array([person.blob for person in self.people], dtype=np.int64),
             tuple(self._steps),
             tuple(self._appearance_costs(stage) for stage in self.pending),
             tuple(np.arange(len(stage.blobs) + 1) < stage.absent for stage in self.pending),
             settings.merge_cost,
-            longest,
+            max_cost,
         )
         self.links = prune_links(self.graph)
         self.path = solve_joint_path(self.graph, self.links, settings.max_joint_states)
@@ -151,10 +151,10 @@ class TemporalWindow:
         """Compute f_color of everyone in every blob, and the cost of absence: `(P, B + 1)`."""
         costs = np.full((len(self.people), len(stage.blobs) + 1), self._settings.absence_cost)
         if stage.blobs:
-            middles = np.stack([blob.center for blob in stage.blobs])
+            centers = np.stack([blob.center for blob in stage.blobs])
             colors = np.stack([blob.colors for blob in stage.blobs])
             for row, person in enumerate(self.people):
-                costs[row, :-1] = person.appearance.costs(middles, colors, self._settings.unknown_appearance)
+                costs[row, :-1] = person.appearance.costs(centers, colors, self._settings.unknown_appearance)
         return costs
 
     def _distance_costs(self, before: Stage, after: Stage) -> Floats:
@@ -171,12 +171,12 @@ class TemporalWindow:
     def _exit_cost(self, blob: Blob) -> float:
         """Return the cost of leaving the image from a blob, or of entering there."""
         left, top, right, bottom = blob.box.tolist()
-        room = min(left, top, self._size[0] - right, self._size[1] - bottom)
-        at_edge = room < self._settings.no_overlap_m * self._meter
+        margin = min(left, top, self._size[0] - right, self._size[1] - bottom)
+        at_edge = margin < self._settings.no_overlap_m * self._meter
         return self._settings.border_exit_cost if at_edge else self._settings.inner_exit_cost
 
     def _learn(self, stage: Stage) -> None:
-        """Update the appearance of everyone isolated in a decided stage (section 2.2)."""
+        """Update the appearance of all isolated people in a decided stage (section 2.2)."""
         for person in self.people:
             if person.blob < stage.absent:
                 self._learn_person(person)
@@ -185,10 +185,10 @@ class TemporalWindow:
         stage = self.decided
         if stage is None or person.blob >= stage.absent:
             return
-        others = [it.blob for it in self.people if it is not person and it.blob < stage.absent]
+        others = [other.blob for other in self.people if other is not person and other.blob < stage.absent]
         if person.blob in others:
             return
         blob, reach = stage.blobs[person.blob], self._settings.isolated_m * self._meter
         around = blob.box + reach * np.array([-1.0, -1.0, 1.0, 1.0])
-        if not any(float(intersections(around, stage.blobs[it].box)) > 0.0 for it in others):
+        if not any(float(intersections(around, stage.blobs[other].box)) > 0.0 for other in others):
             person.appearance.learn(blob.center, blob.colors)
