@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tracking.types import Detections
 
 Image: TypeAlias = npt.NDArray[np.uint8]
-"""A picture, `(H, W, 3)`, blue green red."""
+"""An image, `(H, W, 3)`, BGR."""
 Mask: TypeAlias = npt.NDArray[np.uint8]
 """A mask, `(H, W)`, 0 or 255: what OpenCV calls a binary image."""
 Plane: TypeAlias = npt.NDArray[np.float32]
@@ -21,16 +21,16 @@ _CHANNELS = 3
 class Detector(Protocol):
     """Detects candidate boxes in the frames of one camera.
 
-    A detector may remember what it saw (a background, the height of people), so one instance
-    belongs to one camera. It has no clock and no randomness: the same frames in the same order give the
-    same detections to the byte.
+    A detector may keep state (a background, the height of people), so one instance belongs to one
+    camera. It uses no clock and no random numbers: the same frames in the same order give the same
+    detections, byte for byte.
     """
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Return the detections of the next frame.
 
         Args:
-            image: `(H, W, 3)` uint8, blue green red, the same size in every call.
+            image: `(H, W, 3)` uint8, BGR, the same size in every call.
             frame: the frame number; `None` means the frame after the last one.
 
         Raises:
@@ -40,7 +40,7 @@ class Detector(Protocol):
 
 
 def validate_image(image: Image) -> Image:
-    """Return the image, after checking it.
+    """Check an image and return it.
 
     Raises:
         ValueError: it is not `(H, W, 3)` uint8.
@@ -54,7 +54,7 @@ def require_at_least_one(settings: object, *names: str) -> None:
     """Check counts among a detector's settings.
 
     Raises:
-        ValueError: one of them is below 1; the text names it.
+        ValueError: one of them is below 1; the message names it.
     """
     for name in names:
         value = getattr(settings, name)

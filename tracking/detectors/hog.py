@@ -19,7 +19,7 @@ _PERSON_ROWS = 96
 _MARGIN = 0.125
 _STRIDE = (8, 8)
 _PADDING = (16, 16)
-# Of a person's height: the window is much wider than most people are.
+# Width over height of a person's box: the window is much wider than most people.
 _ASPECT = 0.38
 
 
@@ -31,11 +31,13 @@ class HogSettings:
         ValueError: a setting is out of range.
     """
 
-    min_height: float = 0.14  # smallest person, in image heights: the smaller the slower
+    min_height: float = 0.14  # smallest person, in image heights; smaller is slower
     scale_step: float = 1.08  # factor between two sizes of the scan
-    min_margin: float = 0.0  # least distance from the SVM's boundary; below 0 finds more, also false ones
-    nms_iou: float = 0.5  # of two boxes that overlap (IoU) more, the one of lower score is dropped
-    max_detections: int = 40  # boxes per frame at most
+    min_margin: float = (
+        0.0  # least distance from the SVM's boundary; below 0 detects more people and more false positives
+    )
+    nms_iou: float = 0.5  # overlap (IoU) above which the box of lower score is dropped
+    max_detections: int = 40  # most boxes per frame
 
     def __post_init__(self) -> None:
         if not 0.0 < self.min_height <= 1.0:
@@ -70,18 +72,18 @@ class HogDetector:
         """Return the people detected in a frame, best first.
 
         Raises:
-            ValueError: not an `(H, W, 3)` uint8 picture.
+            ValueError: not an `(H, W, 3)` uint8 image.
         """
         validate_image(image)
         boxes, scores = self._positive_windows(image)
-        seen = self._ignore_filter.keep(image.shape, boxes)
-        boxes, scores = boxes[seen], scores[seen]
+        visible = self._ignore_filter.keep(image.shape, boxes)
+        boxes, scores = boxes[visible], scores[visible]
         kept = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
         boxes = boxes[kept]
         return Detections(boxes, scores[kept], self._appearance.histograms(image, boxes))
 
     def _positive_windows(self, image: Image) -> tuple[Floats, Floats]:
-        """Return the SVM's positive windows cut to the person: boxes and scores."""
+        """Return the boxes of people in the SVM's positive windows, and their scores."""
         height, width = image.shape[:2]
         factor = _PERSON_ROWS / (self.settings.min_height * height)
         size = (max(round(width * factor), 64), max(round(height * factor), 128))
@@ -97,10 +99,10 @@ class HogDetector:
         sides = np.asarray(windows, dtype=np.float64).reshape(-1, 4)
         per_pixel = np.array([width / size[0], height / size[1]])
         corner, extent = sides[:, :2] * per_pixel, sides[:, 2:] * per_pixel
-        tall = (1.0 - 2.0 * _MARGIN) * extent[:, 1]
+        person_height = (1.0 - 2.0 * _MARGIN) * extent[:, 1]
         top = corner[:, 1] + _MARGIN * extent[:, 1]
-        middle, half = corner[:, 0] + extent[:, 0] / 2.0, _ASPECT * tall / 2.0
-        boxes = np.stack([middle - half, top, middle + half, top + tall], axis=1)
+        center, half = corner[:, 0] + extent[:, 0] / 2.0, _ASPECT * person_height / 2.0
+        boxes = np.stack([center - half, top, center + half, top + person_height], axis=1)
         limits = np.array([width, height] * 2, dtype=np.float64)
         scores = 1.0 / (1.0 + np.exp(-np.asarray(margins, dtype=np.float64).ravel()))
         return np.clip(boxes, 0.0, limits), scores

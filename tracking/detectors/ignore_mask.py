@@ -13,9 +13,9 @@ from tracking.boxes import Floats
 from tracking.detectors.base import Mask
 
 Polygon: TypeAlias = Sequence[tuple[float, float]]
-"""Corners `(x, y)` in pixels of the camera's picture, in order; at least three."""
+"""Corners `(x, y)` in pixels of the camera's image, in order; at least three."""
 Polygons: TypeAlias = Sequence[Polygon]
-"""What to ignore."""
+"""The ignored areas of an image."""
 
 
 def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: float = 1.0) -> Mask:
@@ -24,8 +24,8 @@ def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: fl
     Args:
         height: rows of the mask.
         width: columns of the mask.
-        polygons: what to ignore; corners are multiplied by `scale` first.
-        scale: pixels of the mask per pixel of the camera's picture.
+        polygons: the ignored areas; corners are multiplied by `scale` first.
+        scale: pixels of the mask per pixel of the camera's image.
 
     Raises:
         ValueError: a polygon has fewer than three corners.
@@ -51,14 +51,14 @@ class IgnoreFilter:
         if not self._polygons:
             return np.ones(len(boxes), dtype=np.bool_)
         if self._sums is None or self._sums.shape != (shape[0] + 1, shape[1] + 1):
-            visible = visible_mask(shape[0], shape[1], self._polygons) > 0
-            self._sums = np.pad(visible.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0))).astype(np.float64)
+            mask = visible_mask(shape[0], shape[1], self._polygons) > 0
+            self._sums = np.pad(mask.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0))).astype(np.float64)
         limits = np.array([shape[1], shape[0]] * 2, dtype=np.float64)
         left, top, right, bottom = np.rint(np.clip(boxes, 0.0, limits)).astype(np.int64).T
-        seen = self._sums[bottom, right] - self._sums[top, right]
-        seen += self._sums[top, left] - self._sums[bottom, left]
-        return np.asarray(seen >= _LEAST_SEEN * np.maximum((right - left) * (bottom - top), 1))
+        visible = self._sums[bottom, right] - self._sums[top, right]
+        visible += self._sums[top, left] - self._sums[bottom, left]
+        return np.asarray(visible >= _MIN_VISIBLE * np.maximum((right - left) * (bottom - top), 1))
 
 
 # Least share of a box that is not ignored.
-_LEAST_SEEN = 0.45
+_MIN_VISIBLE = 0.45

@@ -18,25 +18,24 @@ from tracking.types import Detections
 
 @dataclass(frozen=True, slots=True)
 class MotFileSettings:
-    """Reading public detections."""
+    """Settings of detections from a file."""
 
-    bins: int = 64  # bins of the gray histograms, where there is a picture
-    min_score: float = 0.0  # detections below this score (0..1, see `MotFileDetector`) are left out
-    nms_iou: float = 0.7  # of two detections that overlap (IoU) by more, the one of lower score is left out
+    bins: int = 64  # bins of the gray histograms, if there is an image
+    min_score: float = 0.0  # detections below this score (0..1, see `MotFileDetector`) are dropped
+    nms_iou: float = 0.7  # overlap (IoU) above which the detection of lower score is dropped
     first_frame: int = 0  # frame number (pulse) of the file's frame 1
 
 
-_SURE = 0.9
-"""Quantile of confidences in an unknown unit that counts as sure."""
+_FULL_SCORE_QUANTILE = 0.9
+"""Quantile of confidences in an unknown unit that becomes score 1."""
 
 
 class MotFileDetector:
-    """Reads detections from a file frame by frame; histograms come from the image where there is one.
+    """Reads detections from a file frame by frame; histograms are computed from the image.
 
-    Confidences become scores in [0, 1]: as they are if all lie there, else stretched from the smallest
-    of the file to what a tenth of them exceeds (detectors write what they like, the files do not say the
-    unit, and a few may be far above all others). Without
-    pictures (`image` of no pixels) histograms have no bins.
+    Confidences become scores in [0, 1]. If any lies outside, all are rescaled linearly, from the smallest in
+    the file to 0 and from the 0.9 quantile to 1: the unit is not stated, and a few may be far above the
+    others. Without pixels (an empty `image`) histograms have no bins.
 
     Raises:
         ValueError: the file is no MOTChallenge text.
@@ -54,14 +53,14 @@ class MotFileDetector:
         return self.settings.first_frame + max(self._frames, default=0) - 1
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
-        """Return the detections of the frame; none where the file has none."""
+        """Return the detections of the frame; none if the file has none."""
         number = self._next if frame is None else frame
         self._next = number + 1
         bins = self.settings.bins if image.size else 0
         rows = self._frames.get(number - self.settings.first_frame + 1)
         if rows is None:
             return Detections.empty(bins)
-        keep = _kept(rows, self.settings)
+        keep = _select_rows(rows, self.settings)
         boxes, scores = rows[keep, :BOX_SIDES], rows[keep, BOX_SIDES]
         if not bins:
             return Detections(boxes, scores, np.empty((len(boxes), 0)))
@@ -72,13 +71,13 @@ class MotFileDetector:
 def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
     """Return the rows `left, top, right, bottom, score` of each frame, best first."""
     confidences = [row.confidence for row in rows]
-    least, most = 0.0, 1.0
+    low, high = 0.0, 1.0
     if confidences and not (min(confidences) >= 0.0 and max(confidences) <= 1.0):
-        least, most = min(confidences), float(np.quantile(confidences, _SURE, method="higher"))
-    spread = most - least
+        low, high = min(confidences), float(np.quantile(confidences, _FULL_SCORE_QUANTILE, method="higher"))
+    spread = high - low
     frames: dict[int, list[tuple[float, ...]]] = {}
     for row in rows:
-        score = min((row.confidence - least) / spread, 1.0) if spread > 0.0 else 1.0
+        score = min((row.confidence - low) / spread, 1.0) if spread > 0.0 else 1.0
         frames.setdefault(row.frame, []).append((*row.box, score))
     return {
         number: np.array(sorted(found, key=lambda row: (-row[-1], *row)), dtype=np.float64)
@@ -86,7 +85,9 @@ def _by_frame(rows: Sequence[MotRow]) -> dict[int, np.ndarray[tuple[int, int], n
     }
 
 
-def _kept(rows: np.ndarray[tuple[int, int], np.dtype[np.float64]], settings: MotFileSettings) -> list[int]:
+def _select_rows(
+    rows: np.ndarray[tuple[int, int], np.dtype[np.float64]], settings: MotFileSettings
+) -> list[int]:
     kept: list[int] = []
     for index, row in enumerate(rows):
         if row[BOX_SIDES] < settings.min_score:

@@ -1,9 +1,9 @@
 """Template matching detector: local peaks of the correlation (paper IV.A.1).
 
-Sub-images are its appearance, in the form of histograms: a pixel of value v in [0, 1] becomes the two numbers
-v and 1 - v; those of all pixels, divided by the number of pixels, sum to 1. The intersection distance of two
-such rows is the mean absolute difference of the sub-images, and the Bhattacharyya distance the Hellinger
-distance of their pixels.
+Sub-images serve as appearance, in the form of histograms: a pixel of value v in [0, 1] becomes the two
+numbers v and 1 - v; those of all pixels, divided by the number of pixels, sum to 1. The intersection distance
+of two such rows is the mean absolute difference of the sub-images, and the Bhattacharyya distance the
+Hellinger distance of their pixels.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
 from tracking.types import Detections
 
-_LEAST_SIDE = 4
-"""Pixels: a smaller template matches everywhere."""
+_MIN_SIDE = 4
+"""Least side of a template in pixels: smaller ones match everywhere."""
 _CHANNELS = 3
 _WHITE = 255.0
 
@@ -34,7 +34,7 @@ class SubimageSettings:
         ValueError: a side has no pixel.
     """
 
-    columns: int = 12  # pixels across, whatever the box's width
+    columns: int = 12  # pixels across
     rows: int = 12  # pixels down
     color: bool = True  # false: gray
 
@@ -53,7 +53,7 @@ def subimage_histograms(image: Image, boxes: Floats, settings: SubimageSettings)
 
     Args:
         image: `(H, W, 3)`.
-        boxes: `(K, 4)` in pixels, cut at the picture's borders; where nothing is left the row is gray.
+        boxes: `(K, 4)` in pixels, clipped to the image; the row of an empty box is uniform.
         settings: the sub-images' size.
     """
     rows = np.full((len(boxes), settings.length), 1.0 / settings.length)
@@ -66,8 +66,8 @@ def subimage_histograms(image: Image, boxes: Floats, settings: SubimageSettings)
         small = cv2.resize(image[top:bottom, left:right], size, interpolation=cv2.INTER_AREA)
         if not settings.color:
             small = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY)
-        light = small.ravel() / _WHITE
-        rows[k] = np.concatenate([light, 1.0 - light]) / light.size
+        values = small.ravel() / _WHITE
+        rows[k] = np.concatenate([values, 1.0 - values]) / values.size
     return rows
 
 
@@ -79,12 +79,14 @@ class TemplateSettings:
         ValueError: a setting is out of range.
     """
 
-    max_peaks: int = 80  # K: peaks handed on at most, best first
+    max_peaks: int = 80  # K: most peaks, best first
     min_score: float = 0.0  # least correlation of a peak, 0 to 1
     peak_distance: float = 0.06  # no other peak within this share of the template's width and height
-    appearance: Literal["subimage", "gray", "color"] = "subimage"  # what an observation looks like
-    bins: int = 64  # looks gray: bins of the histogram
-    color_bins: int = 16  # looks color: bins of each of the six histograms
+    appearance: Literal["subimage", "gray", "color"] = (
+        "subimage"  # the appearance histogram of an observation
+    )
+    bins: int = 64  # appearance gray: bins of the histogram
+    color_bins: int = 16  # appearance color: bins of each of the six histograms
     subimage: SubimageSettings = field(default_factory=SubimageSettings)
 
     def __post_init__(self) -> None:
@@ -99,8 +101,8 @@ class TemplateSettings:
 class TemplateDetector:
     """Detects one object by normalized cross-correlation with a template image.
 
-    Each object has observations of its own, as many as there are peaks: `build_network_per_object` takes
-    them, `TemplateTracker` does it all. Nothing is remembered from one frame to the next.
+    The peaks are observations of that object only: see `build_network_per_object` and `TemplateTracker`. The
+    detector is stateless.
 
     Raises:
         ValueError: the template is not `(h, w, 3)` uint8, or smaller than 4 pixels on a side.
@@ -110,14 +112,14 @@ class TemplateDetector:
         self.settings = settings or TemplateSettings()
         self._template = validate_image(template)
         height, width = template.shape[:2]
-        if min(height, width) < _LEAST_SIDE:
-            raise ValueError(f"a template has at least {_LEAST_SIDE} pixels a side, not {width}x{height}")
+        if min(height, width) < _MIN_SIDE:
+            raise ValueError(f"a template has at least {_MIN_SIDE} pixels a side, not {width}x{height}")
         self._size = (width, height)
-        # Odd, so that a peak is in the middle of what it is compared with.
-        reach = [2 * max(1, round(self.settings.peak_distance * side)) + 1 for side in (height, width)]
-        self._around = np.ones(reach, dtype=np.uint8)
+        # Odd, so that a peak is in the center of its neighborhood.
+        sides = [2 * max(1, round(self.settings.peak_distance * side)) + 1 for side in (height, width)]
+        self._neighborhood = np.ones(sides, dtype=np.uint8)
         self.histogram: Floats = self._histograms(self._template, np.array([[0.0, 0.0, width, height]]))[0]
-        """`(B,)`, what the template itself looks like, in the terms of the observations."""
+        """`(B,)`, the template's appearance histogram, of the same kind as those of the observations."""
 
     @property
     def bins(self) -> int:
@@ -128,13 +130,13 @@ class TemplateDetector:
         """Return the peaks of a frame, best first; boxes have the template's size, scores are correlations.
 
         Raises:
-            ValueError: not an `(H, W, 3)` uint8 picture, or smaller than the template.
+            ValueError: not an `(H, W, 3)` uint8 image, or smaller than the template.
         """
         validate_image(image)
         width, height = self._size
         if image.shape[0] < height or image.shape[1] < width:
             raise ValueError(
-                f"a {width}x{height} template does not fit into a picture of {image.shape[:2][::-1]}"
+                f"a {width}x{height} template does not fit into an image of {image.shape[:2][::-1]}"
             )
         lefts, tops, scores = self._peaks(image)
         boxes = np.stack([lefts, tops, lefts + width, tops + height], axis=1).astype(np.float64)
@@ -143,13 +145,13 @@ class TemplateDetector:
     def _peaks(self, image: Image) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Floats]:
         """Return left, top and score of the local maxima, best first."""
         match = cv2.matchTemplate(image, self._template, cv2.TM_CCOEFF_NORMED)
-        # Where the picture is of one color the correlation is not defined: nothing is there.
+        # The correlation is undefined where the image has a single color.
         match = np.where(np.isfinite(match), np.clip(match, 0.0, 1.0), 0.0).astype(np.float32)
-        highest = cv2.dilate(match, self._around, borderType=cv2.BORDER_CONSTANT, borderValue=0.0)
+        highest = cv2.dilate(match, self._neighborhood, borderType=cv2.BORDER_CONSTANT, borderValue=0.0)
         peak = (match >= highest) & (match > 0.0) & (match >= self.settings.min_score)
         tops, lefts = np.nonzero(peak)
         scores = match[tops, lefts].astype(np.float64)
-        # Best first; equal ones by place, so that the order never depends on the sort.
+        # Best first, then by position, so that the order is well defined.
         order = np.lexsort((tops, lefts, -scores))[: self.settings.max_peaks]
         return lefts[order], tops[order], scores[order]
 

@@ -1,9 +1,8 @@
-"""Column generation over arcs: for the layout term, and for windows in which many objects meet.
+"""Column generation over arcs: for the layout term, and for windows in which many objects conflict.
 
-The program starts with the arcs of a few paths. Its duals, of the conflict rows it breaks and of the
-layout, are prices on nodes; a forward and a backward Viterbi pass over the priced network give every arc
-the cost of the best path through it, and those that better the program enter. When there are none, the
-passes prove the optimum.
+The program starts with the arcs of a few paths. The duals of violated conflict rows and of the layout are
+prices on nodes. A forward and a backward Viterbi pass over the priced network give the cost of the best path
+through each arc; arcs that improve the program are added. If there are none, the passes prove the optimum.
 """
 
 from __future__ import annotations
@@ -24,15 +23,15 @@ from tracking.solvers.relaxation import OPTIMALITY_TOLERANCE, RelaxedSolution, a
 from tracking.solvers.viterbi import MinMarginals, PathPricer, Trellis, forward
 
 _ARCS_WITH_LAYOUT, _ARCS = 300, 100
-"""Arcs per object and round: about those of some paths; more only swell the program."""
+"""Most arcs added per object and round, about those of a few paths; more only enlarge the program."""
 
 _STATES_WITH_LAYOUT, _STATES = 12, 6
-"""States of a frame and object whose arcs are looked at first, the best: most rounds need no more."""
+"""Cheapest states per frame and object whose arcs are tried first: most rounds need no others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PricedTrellis:
-    """The trellis at the prices of a point, the forward pass over it, and the bound that they prove."""
+    """The trellis with prices, the forward pass over it, and the bound that it proves."""
 
     trellis: Trellis
     forward: Floats
@@ -41,7 +40,7 @@ class _PricedTrellis:
 
 
 class ArcGeneration:
-    """One search from `starts` arcs and `rows` already found; `run` it once. There is an object at least."""
+    """One search from the arcs `starts` and known conflict `rows`, for at least one object; `run` it once."""
 
     def __init__(
         self, network: Network, starts: ArcSet, rows: Sequence[ConflictRow], finder: ConflictSeparator
@@ -50,9 +49,9 @@ class ArcGeneration:
         self._trellis = Trellis.of(network)
         self._finder = finder
         self._master = self._new_master()
-        # Occluded all along, an object keeps every row: the program always has a solution.
-        hidden = np.full((network.objects, network.frames), network.places)
-        self._master.add_arcs(path_arcs(np.arange(network.objects), hidden))
+        # An object that is always occluded violates no row, so the program is feasible.
+        occluded = np.full((network.objects, network.frames), network.places)
+        self._master.add_arcs(path_arcs(np.arange(network.objects), occluded))
         self._master.add_arcs(starts)
         self._master.add_rows(rows)
 
@@ -60,24 +59,26 @@ class ArcGeneration:
         return ArcMaster(self._network)
 
     def enter_guess(self, guess: DualGuess) -> None:
-        """Bind the program by the rows of a guess at the duals; let in the arcs that it finds good."""
+        """Add the conflict rows of a dual guess, and the arcs that improve the program at its prices."""
         self._master.add_rows(guess.rows)
         owners = np.tile(np.arange(self._network.objects), len(guess.paths))
         self._master.add_arcs(path_arcs(owners, np.concatenate(guess.paths)))
-        anything = np.full(self._network.objects, np.inf)
-        self._enter_better_arcs(
-            self._priced_by(ArcMasterSolution(0.0, guess.prices, guess.layout_prices, anything, 0.0))
+        no_limits = np.full(self._network.objects, np.inf)
+        self._add_improving_arcs(
+            self._price(ArcMasterSolution(0.0, guess.prices, guess.layout_prices, no_limits, 0.0))
         )
 
     def run(self) -> RelaxedSolution:
         """Find the optimum of the relaxation."""
         rounds = 0
         while True:
-            point = self._settled()
+            point = self._solve_with_violated_rows()
             rounds += 1
-            priced = self._priced_by(point)
-            close = point.objective - priced.bound <= OPTIMALITY_TOLERANCE * max(1.0, abs(point.objective))
-            if close or not self._enter_better_arcs(priced):
+            priced = self._price(point)
+            is_optimal = point.objective - priced.bound <= OPTIMALITY_TOLERANCE * max(
+                1.0, abs(point.objective)
+            )
+            if is_optimal or not self._add_improving_arcs(priced):
                 return self._relaxed(point, priced, rounds)
 
     def _relaxed(self, point: ArcMasterSolution, priced: _PricedTrellis, rounds: int) -> RelaxedSolution:
@@ -94,22 +95,22 @@ class ArcGeneration:
             charges=charges,
         )
 
-    def _settled(self) -> ArcMasterSolution:
-        """Solve the program with all conflict rows that its solution breaks."""
+    def _solve_with_violated_rows(self) -> ArcMasterSolution:
+        """Solve the program with all conflict rows that its solution violates."""
         point = self._master.solve()
         while rows := self._finder.find_violated(self._master.usage()):
             self._master.add_rows(rows)
             point = self._master.solve()
         return point
 
-    def _priced_by(self, point: ArcMasterSolution) -> _PricedTrellis:
-        """Price all arcs."""
-        trellis = self._trellis.with_node(self._priced(point))
+    def _price(self, point: ArcMasterSolution) -> _PricedTrellis:
+        """Price all nodes at a point's duals, and compute the bound."""
+        trellis = self._trellis.with_node(self._priced_nodes(point))
         ahead = forward(trellis)
-        least = (ahead[-1] + trellis.sink).min(axis=1)
-        return _PricedTrellis(trellis, ahead, point.reduced_cost_limits, float(least.sum()) - point.charge)
+        costs = (ahead[-1] + trellis.sink).min(axis=1)
+        return _PricedTrellis(trellis, ahead, point.reduced_cost_limits, float(costs.sum()) - point.charge)
 
-    def _enter_better_arcs(self, priced: _PricedTrellis) -> bool:
+    def _add_improving_arcs(self, priced: _PricedTrellis) -> bool:
         """Add arcs whose best path improves the program; return whether there are any."""
         layout, objects = self._network.layout, self._network.objects
         passes = MinMarginals.of(priced.trellis, priced.forward)
@@ -120,8 +121,8 @@ class ArcGeneration:
                 return True
         return False
 
-    def _priced(self, point: ArcMasterSolution) -> Floats:
-        """Return the node costs with the prices of conflict rows and what moves earn."""
+    def _priced_nodes(self, point: ArcMasterSolution) -> Floats:
+        """Return the node costs with the prices of conflict rows and of the layout."""
         network = self._network
         node = add_conflict_prices(network, self._master.rows, point.prices)
         if not network.layout:
@@ -130,17 +131,17 @@ class ArcGeneration:
 
 
 def start_arc_generation(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> ArcGeneration:
-    """Return a search that starts from a guess at the duals; the finder is a new one."""
+    """Return a search that starts from a guess at the duals; the finder must be unused."""
     search = ArcGeneration(network, path_arcs(np.arange(network.objects), pricing.alone.nodes), [], finder)
     search.enter_guess(guess_duals(network, pricing, finder))
     return search
 
 
-def _cheapest_arcs(owner: Ints, costs: Floats, objects: int, most: int) -> Bools:
+def _cheapest_arcs(owner: Ints, costs: Floats, objects: int, limit: int) -> Bools:
     """Return which arcs are among the cheapest of their object; arcs of equal cost stay together."""
     kept = np.ones(len(owner), dtype=np.bool_)
     for n in range(objects):
         own = owner == n
-        if own.sum() > most:
-            kept[own] = costs[own] <= np.partition(costs[own], most)[most] + 1e-12
+        if own.sum() > limit:
+            kept[own] = costs[own] <= np.partition(costs[own], limit)[limit] + 1e-12
     return kept

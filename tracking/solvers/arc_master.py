@@ -1,4 +1,4 @@
-"""The relaxation over arcs as columns, restricted to the arcs met so far: paths recombine by themselves."""
+"""The relaxation with arcs as columns, restricted to the arcs added so far, in any combination."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _NO_ROW = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArcSet:
-    """ArcSet into `target` of `frame` from `origin` of the frame before (from the source in frame 0).
+    """Arcs to state `target` of `frame` from state `origin` of the frame before, in frame 0 the source.
 
     Attributes:
         owner: (A,) the object.
         frame: (A,) the frame of the target.
-        origin: (A,) the state left; 0 where that is the source.
-        target: (A,) the state entered.
+        origin: (A,) the state it leaves; 0 for the source.
+        target: (A,) the state it enters.
     """
 
     owner: Ints
@@ -43,7 +43,7 @@ class ArcSet:
         return ArcSet(self.owner[chosen], self.frame[chosen], self.origin[chosen], self.target[chosen])
 
     def concatenate(self, more: ArcSet) -> ArcSet:
-        """Return these arcs and more."""
+        """Return the union with more arcs."""
         return ArcSet(
             np.concatenate([self.owner, more.owner]),
             np.concatenate([self.frame, more.frame]),
@@ -53,7 +53,7 @@ class ArcSet:
 
 
 def path_arcs(owners: Ints, nodes: Ints) -> ArcSet:
-    """Return the arcs on paths, `nodes` (P, M), of the objects `owners` (P,), each arc once."""
+    """Return the distinct arcs of paths `nodes` (P, M) of the objects `owners` (P,)."""
     path, frame = (index.ravel() for index in np.indices(nodes.shape))
     before = np.zeros_like(nodes)
     before[:, 1:] = nodes[:, :-1]
@@ -67,10 +67,10 @@ class ArcMasterSolution:
 
     Attributes:
         objective: its cost.
-        prices: (R,) what going through each conflict row costs, not negative.
-        layout_prices: (n, M - 1, 4) what a move by a pixel earns, by the layout term.
-        reduced_cost_limits: (n,) the cost below which a path of an object would better the program.
-        charge: what the prices and the layout term take off the bound.
+        prices: (R,) the price of each conflict row, not negative.
+        layout_prices: (n, M - 1, 4) the gain per pixel of movement by the layout term.
+        reduced_cost_limits: (n,) the cost below which a path of an object improves the program.
+        charge: the amount by which prices and layout term reduce the bound.
     """
 
     objective: float
@@ -81,9 +81,9 @@ class ArcMasterSolution:
 
 
 class ArcMaster:
-    """Sends one unit of flow through the arcs of each object, as cheaply as the rows allow.
+    """Minimum-cost flow of one unit per object through its arcs, subject to the conflict rows.
 
-    With `squared`, the layout term is that of the L2 norm.
+    With `squared`, the layout term uses the squared L2 norm.
     """
 
     def __init__(self, network: Network, *, squared: bool = False) -> None:
@@ -111,9 +111,9 @@ class ArcMaster:
         return np.arange(first, first + len(lower))
 
     def add_arcs(self, arcs: ArcSet) -> int:
-        """Add the arcs that are new; return their numbers."""
-        fresh = ~self._known[arcs.frame, arcs.owner, arcs.origin, arcs.target]
-        arcs = arcs.select(fresh)
+        """Add the arcs that are new; return how many."""
+        new = ~self._known[arcs.frame, arcs.owner, arcs.origin, arcs.target]
+        arcs = arcs.select(new)
         if not len(arcs):
             return 0
         self._known[arcs.frame, arcs.owner, arcs.origin, arcs.target] = True
@@ -121,13 +121,13 @@ class ArcMaster:
         column, row, value = self._entries(arcs)
         order = np.argsort(column, kind="stable")
         starts = np.searchsorted(column[order], np.arange(len(arcs))).astype(np.int32)
-        zeros, endless = np.zeros(len(arcs)), np.full(len(arcs), np.inf)
+        zeros, unbounded = np.zeros(len(arcs)), np.full(len(arcs), np.inf)
         first = self._highs.getNumCol()
         self._highs.addCols(
             len(arcs),
             self._costs(arcs),
             zeros,
-            endless,
+            unbounded,
             len(row),
             starts,
             row[order].astype(np.int32),
@@ -138,7 +138,7 @@ class ArcMaster:
         return len(arcs)
 
     def _costs(self, arcs: ArcSet) -> Floats:
-        """Return the costs of arcs; the sink's is on the arcs into the last frame."""
+        """Return the costs of arcs; the arcs into the last frame include the sink's."""
         network = self._network
         n, m, i, j = arcs.owner, arcs.frame, arcs.origin, arcs.target
         costs = network.node[n, m, j]
@@ -150,7 +150,7 @@ class ArcMaster:
         return costs
 
     def _add_node_rows(self, arcs: ArcSet) -> None:
-        """Conserve the flow in all nodes that arcs touch, but those of the last frame, its end."""
+        """Add flow conservation for the nodes that arcs touch, except those of the last frame."""
         touched = np.zeros(self._node_rows.shape, dtype=np.bool_)
         touched[arcs.owner, arcs.frame, arcs.target] = True
         inner = arcs.frame > 0
@@ -164,26 +164,30 @@ class ArcMaster:
     def _entries(self, arcs: ArcSet) -> tuple[Ints, Ints, Floats]:
         """Return columns (counted from the first of these arcs), rows and values."""
         n, m, i, j = arcs.owner, arcs.frame, arcs.origin, arcs.target
-        every = np.arange(len(arcs))
-        first, inner, going = m == 0, m > 0, m < self._network.frames - 1
-        columns = [every[first], every[inner], every[going]]
-        rows = [n[first], self._node_rows[n[inner], m[inner] - 1, i[inner]], self._node_rows[n, m, j][going]]
-        values = [np.ones(int(first.sum())), np.full(int(inner.sum()), -1.0), np.ones(int(going.sum()))]
+        index = np.arange(len(arcs))
+        first, inner, outgoing = m == 0, m > 0, m < self._network.frames - 1
+        columns = [index[first], index[inner], index[outgoing]]
+        rows = [
+            n[first],
+            self._node_rows[n[inner], m[inner] - 1, i[inner]],
+            self._node_rows[n, m, j][outgoing],
+        ]
+        values = [np.ones(int(first.sum())), np.full(int(inner.sum()), -1.0), np.ones(int(outgoing.sum()))]
         for number, row in zip(self._conflict_rows, self.rows, strict=True):
             through = np.flatnonzero((m == row.frame) & row.members[n, j])
             columns.append(through)
             rows.append(np.full(len(through), number))
             values.append(np.ones(len(through)))
         if self._layout is not None:
-            moved = every[inner]
-            at, values_of_moves = self._layout.entries(n[inner], m[inner] - 1, i[inner], j[inner])
-            columns.append(np.repeat(moved, at.shape[1]))
-            rows.append(at.ravel())
-            values.append(values_of_moves.ravel())
+            moved = index[inner]
+            layout_rows, layout_values = self._layout.entries(n[inner], m[inner] - 1, i[inner], j[inner])
+            columns.append(np.repeat(moved, layout_rows.shape[1]))
+            rows.append(layout_rows.ravel())
+            values.append(layout_values.ravel())
         return np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
 
     def add_rows(self, rows: Sequence[ConflictRow]) -> None:
-        """Bind the program by more conflict rows."""
+        """Add conflict rows."""
         for row in rows:
             arcs = self._arcs
             through = np.flatnonzero((arcs.frame == row.frame) & row.members[arcs.owner, arcs.target])
@@ -193,19 +197,20 @@ class ArcMaster:
             self._highs.addRow(-np.inf, 1.0, len(index), index, np.ones(len(index)))
 
     def solve(self) -> ArcMasterSolution:
-        """Choose anew."""
+        """Solve the restricted program."""
         found = run_highs(self._highs)
         self._values = found.values[self._columns]
         objects, frames = self._network.objects, self._network.frames
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
-        pulls, charge = np.zeros((objects, frames - 1, BOX_SIDES)), float(prices.sum())
+        layout_prices, charge = np.zeros((objects, frames - 1, BOX_SIDES)), float(prices.sum())
         if self._layout is not None:
             forces = self._layout.forces(found.duals)
-            pulls, charge = self._layout.layout_prices(forces), charge + self._layout.slack(forces)
-        return ArcMasterSolution(found.objective, prices, pulls, found.duals[:objects], charge)
+            layout_prices = self._layout.layout_prices(forces)
+            charge += self._layout.slack(forces)
+        return ArcMasterSolution(found.objective, prices, layout_prices, found.duals[:objects], charge)
 
     def usage(self) -> Floats:
-        """Return y (n, M, S)."""
+        """Return y (n, M, S), the flow through each node."""
         usage = np.zeros(self._network.node.shape)
         arcs = self._arcs
         np.add.at(usage, (arcs.owner, arcs.frame, arcs.target), self._values)
@@ -213,16 +218,16 @@ class ArcMaster:
 
 
 def find_improving_arcs(
-    trellis: Trellis, passes: MinMarginals, worths: Floats, most: int
+    trellis: Trellis, passes: MinMarginals, limits: Floats, max_states: int
 ) -> tuple[ArcSet, Floats]:
-    """Return the arcs (A,) whose best path costs less than `worths` (n,) of its object, and that cost (A,).
+    """Return the arcs (A,) whose best path costs less than its object's limit (n,), and that cost (A,).
 
-    Only arcs between the `most` cheapest states of each frame and object are looked at.
+    Only arcs between the `max_states` cheapest states of each frame and object are considered.
     """
     through = passes.through
-    width = int((through < worths[:, None, None]).sum(axis=2).max(initial=0))
-    packed = PrunedStates.cheapest(through, max(min(width, most), 1))
-    n, j = np.nonzero(packed.states(through, np.inf)[:, 0] < worths[:, None])
+    width = int((through < limits[:, None, None]).sum(axis=2).max(initial=0))
+    packed = PrunedStates.cheapest(through, max(min(width, max_states), 1))
+    n, j = np.nonzero(packed.states(through, np.inf)[:, 0] < limits[:, None])
     zero = np.zeros(len(n), dtype=np.int64)
     begin = ArcSet(n, zero, zero, packed.index[n, 0, j])
     begin_costs = through[n, 0, begin.target]
@@ -231,6 +236,6 @@ def find_improving_arcs(
     costs = packed.pairs(trellis.pair)
     costs += packed.states(ahead, np.inf)[:, :-1, :, None]
     costs += packed.states(behind + trellis.node, np.inf)[:, 1:, None, :]
-    n, m, i, j = np.nonzero(costs < worths[:, None, None, None])
+    n, m, i, j = np.nonzero(costs < limits[:, None, None, None])
     between = ArcSet(n, m + 1, packed.index[n, m, i], packed.index[n, m + 1, j])
     return begin.concatenate(between), np.concatenate([begin_costs, costs[n, m, i, j]])

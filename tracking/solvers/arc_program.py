@@ -22,13 +22,13 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArcProgram:
-    """The program, and where its variables are.
+    """The program and the indices of its variables.
 
     Attributes:
         program: the linear program.
         nodes: (n, M, S) the column of each y, -1 where there is no such node.
-        defining: (y,) the rows that define the y, in the order of their columns: y = sum of arcs.
-        arcs: how many columns are arcs; they come first.
+        defining: (y,) the rows that define the y as sums of arcs, in the order of their columns.
+        arcs: the number of arc columns, which come first.
         moves: (pairs, M - 1, 4, 2) the columns p+ and p- of the layout term; empty when μ is 0.
     """
 
@@ -40,13 +40,13 @@ class ArcProgram:
 
 
 def build_arc_program(network: Network, allowed: NDArray[np.bool_] | None = None) -> ArcProgram:
-    """Write down the program of a network with at least one object.
+    """Build the program of a network with at least one object.
 
-    `allowed` (n, M - 1, S, S), where given, leaves only its arcs between frames in.
+    `allowed` (n, M - 1, S, S) restricts the arcs between frames.
     """
     build = LinearProgramBuilder()
     exists = np.isfinite(network.node)
-    # Arcs are the first columns, nodes the next: the flow rows join them.
+    # Arcs are the first columns, then nodes; the flow rows connect them.
     pair = network.pair[network.pair_sets] + network.node[:, 1:, None, :]
     usable = np.isfinite(pair) & exists[:, :-1, :, None]
     if allowed is not None:
@@ -92,17 +92,19 @@ def _add_conflicts(build: LinearProgramBuilder, network: Network, nodes: Ints) -
 
 
 def _add_layout(build: LinearProgramBuilder, network: Network, nodes: Ints) -> Ints:
-    """Add p, tied to y, and p+ - p- = the change of the vector between two objects, for all pairs."""
+    """Add p, defined by y, and p+ - p- = the change of the vector between two objects, for all pairs."""
     pairs = list(combinations(range(network.objects), 2))
     steps = network.frames - 1
     if not network.layout or not pairs or not steps:
         return np.empty((len(pairs), steps, BOX_SIDES, 0), dtype=np.int64)
     shape = (network.objects, network.frames, BOX_SIDES)
     location = build.add_columns(np.zeros(int(np.prod(shape))), lower=-np.inf).reshape(shape)
-    tie = build.add_rows(location.size, 0.0, 0.0).reshape(shape)
-    build.add_entries(tie, location, 1.0)
+    location_rows = build.add_rows(location.size, 0.0, 0.0).reshape(shape)
+    build.add_entries(location_rows, location, 1.0)
     n, m, state = np.nonzero(nodes >= 0)
-    build.add_entries(tie[n, m], nodes[n, m, state][:, None], -network.locations[network.sets[n], m, state])
+    build.add_entries(
+        location_rows[n, m], nodes[n, m, state][:, None], -network.locations[network.sets[n], m, state]
+    )
 
     first, second = np.array(pairs).T
     moves = build.add_columns(np.full(len(pairs) * steps * BOX_SIDES * 2, network.layout))
@@ -118,12 +120,12 @@ def _add_layout(build: LinearProgramBuilder, network: Network, nodes: Ints) -> I
 
 
 class ArcProgramSolver(TimedSolver):
-    """All arcs of the window in one program; slow, and simple enough to trust."""
+    """Solves all arcs of the window in one program: slow, but simple."""
 
     name = "arcs"
 
     def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
-        """Solve the relaxation and round it where it is not whole."""
+        """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
         return solution_from_relaxation(self.name, network, solve_arc_relaxation(network))
@@ -132,20 +134,20 @@ class ArcProgramSolver(TimedSolver):
 def solve_arc_relaxation(network: Network) -> RelaxedSolution:
     """Return the optimum of the full relaxation of a network with at least one object; no prices.
 
-    The program is that of II.D with y replaced by the sums of arcs that define it: half the simplex
-    iterations, the fastest way that is known to solve all arcs at once.
+    The program is that of II.D with y replaced by the sums of arcs that define it, which halves the simplex
+    iterations.
     """
     built = build_arc_program(network)
-    short = eliminate_nodes(built)
-    found = solve_program(short.program)
+    reduced = eliminate_nodes(built)
+    found = solve_program(reduced.program)
     usage = np.zeros(network.node.shape)
-    usage[built.nodes >= 0] = short.sums @ found.values
+    usage[built.nodes >= 0] = reduced.sums @ found.values
     return RelaxedSolution(usage, found.objective, network.node, rounds=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedProgram:
-    """The program without y: `sums` (y, columns) times its columns gives them back."""
+    """The program without y; y is `sums` (y, columns) times its variables."""
 
     program: LinearProgram
     sums: sparse.csr_array
@@ -155,19 +157,19 @@ def eliminate_nodes(built: ArcProgram) -> ReducedProgram:
     """Replace each y by the sum of arcs that its row sets it equal to."""
     program = built.program
     nodes = built.nodes[built.nodes >= 0]
-    others = np.ones(len(program.costs), dtype=np.bool_)
-    others[nodes] = False
-    kept = np.ones(len(program.row_lower), dtype=np.bool_)
-    kept[built.defining] = False
+    is_kept = np.ones(len(program.costs), dtype=np.bool_)
+    is_kept[nodes] = False
+    kept_rows = np.ones(len(program.row_lower), dtype=np.bool_)
+    kept_rows[built.defining] = False
     rows = sparse.csr_array(program.matrix)
-    sums = rows[built.defining][:, others]
-    matrix = rows[kept][:, others] + rows[kept][:, nodes] @ sums
-    short = LinearProgram(
-        costs=program.costs[others],
-        lower=program.lower[others],
-        upper=program.upper[others],
+    sums = rows[built.defining][:, is_kept]
+    matrix = rows[kept_rows][:, is_kept] + rows[kept_rows][:, nodes] @ sums
+    reduced = LinearProgram(
+        costs=program.costs[is_kept],
+        lower=program.lower[is_kept],
+        upper=program.upper[is_kept],
         matrix=sparse.csc_array(matrix),
-        row_lower=program.row_lower[kept],
-        row_upper=program.row_upper[kept],
+        row_lower=program.row_lower[kept_rows],
+        row_upper=program.row_upper[kept_rows],
     )
-    return ReducedProgram(short, sums)
+    return ReducedProgram(reduced, sums)

@@ -1,4 +1,4 @@
-"""What all solvers share: the answer, its proof, and how a solver is found by name."""
+"""Solver protocol, solutions with their proof, and the registry of solvers by name."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tracking.model.network import Network
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 OCCLUDED = -1
-"""The state of an object that is on no observation of a frame."""
+"""The state of an object that has no observation in a frame."""
 
-# Modules are imported when asked for: a tracker with a dynamic program need not load the LP solver.
+# Imported on demand: a tracker with a dynamic program does not load the LP solver.
 _SOLVERS = {
     "arcs": ("tracking.solvers.arc_program", "ArcProgramSolver"),
     "columns": ("tracking.solvers.column_generation", "ColumnGenerationSolver"),
@@ -33,19 +33,19 @@ DEFAULT_SOLVER = "columns"
 
 @dataclass(frozen=True, slots=True)
 class SolveReport:
-    """What is proven about an answer.
+    """What is proven about a solution.
 
     Attributes:
         solver: the name of the solver.
         objective: cost of the integer states returned (II.C).
         bound: proven lower bound of the cost of any states without conflicts.
-        integral: the relaxation gave whole paths by itself: nothing was rounded, and the answer is the
-            global optimum.
-        conflicts: pairs of objects and frames of the answer that conflict; only `separate-dp`, which
-            does not look at conflicts, leaves any.
-        rounds: how often the linear program (or a dynamic program over all objects) was solved; 0 where
-            the answer was proven without.
-        seconds: how long it took; equal answers are equal however long they took.
+        integral: whether the relaxation was integral: nothing was rounded, and the solution is the global
+            optimum.
+        conflicts: number of conflicting pairs of objects over all frames; only `separate-dp`, which ignores
+            conflicts, leaves any.
+        rounds: how often the linear program (or a dynamic program over all objects) was solved; 0 if the
+            solution was proven without.
+        seconds: elapsed time; not part of comparisons.
     """
 
     solver: str
@@ -58,18 +58,18 @@ class SolveReport:
 
     @property
     def gap(self) -> float:
-        """How far the answer may be from the optimum, relative to max(1, |objective|); never negative."""
+        """Largest distance from the optimum, relative to max(1, |objective|); never negative."""
         return max(0.0, self.objective - self.bound) / max(1.0, abs(self.objective))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """Where each object is in each frame of a window.
+    """The observation of each object in each frame of a window.
 
     Attributes:
         states: (n, M) int64, the index of the observation in its frame, or -1: occluded.
         report: what is proven about it.
-        prices: the conflict rows that bind, where the solver can tell.
+        prices: the binding conflict rows, if the solver knows them.
     """
 
     states: NDArray[np.int64]
@@ -78,7 +78,7 @@ class Solution:
 
     @property
     def warm_start(self) -> WarmStart:
-        """What this answer tells about a window with the same frames; see `WarmStart.later`."""
+        """This solution as a warm start for a window that shares frames; see `WarmStart.shift`."""
         return WarmStart(self.prices, self.states)
 
 
@@ -90,7 +90,7 @@ class Solver(Protocol):
         """The name in the registry."""
 
     def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
-        """Return the states of all objects in all frames; the same input gives the same answer.
+        """Return the states of all objects in all frames; the same input gives the same result.
 
         A warm start (`Solution.warm_start.shift(...)` of the previous window) only makes it faster.
         """
@@ -105,7 +105,7 @@ def create_solver(name: str) -> Solver:
     """Return the solver of that name.
 
     Raises:
-        ValueError: there is none; the message lists the names.
+        ValueError: no solver has that name; the message lists the names.
     """
     if name not in _SOLVERS:
         raise ValueError(f"no solver is called {name!r}; there are {', '.join(solver_names())}")
@@ -114,12 +114,12 @@ def create_solver(name: str) -> Solver:
 
 
 class TimedSolver(ABC):
-    """Puts the time of the solve into its report."""
+    """Base class that reports the elapsed time of each solve."""
 
     name: ClassVar[str]
 
     def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
-        """Return the states of all objects in all frames; a hint only makes it quicker."""
+        """Return the states of all objects in all frames; a warm start only makes it faster."""
         start = time.perf_counter()
         solution = self._solve(network, warm_start)
         seconds = time.perf_counter() - start
@@ -127,4 +127,4 @@ class TimedSolver(ABC):
 
     @abstractmethod
     def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
-        """Solve the network, which may be one without objects."""
+        """Solve the network, which may have no objects."""

@@ -1,10 +1,9 @@
 """Column generation over whole paths, for windows without layout term.
 
-Every object starts on its cheapest path. Where these conflict, the objects concerned, and no others,
-enter a small program that mixes their paths so that the rows they broke hold. Its duals price the places
-of the rows; a Viterbi pass over the priced network finds each object's best path or proves that there is
-no better one. Objects that never meet never share a row, so the program falls into independent groups
-of objects, and a group whose prices stand still is not priced again; most objects of most windows never
+Every object starts on its cheapest path. Objects whose paths conflict enter a small program that combines
+their paths so that the violated rows hold. Its duals are prices on the places of the rows; a Viterbi pass
+over the priced network finds each object's best path or proves that there is no better one. Objects that
+never conflict share no row, so the program splits into independent groups. Most objects of most windows never
 enter it.
 """
 
@@ -35,18 +34,18 @@ from tracking.solvers.viterbi import PathPricer, Paths, Trellis
 from tracking.solvers.warm_start import WarmStart
 
 _MAX_PATH_GROUP = 12
-"""Up to so many objects in conflict, paths settle sooner than arcs do."""
+"""Largest group of conflicting objects for which columns of paths converge faster than arcs."""
 
 _SUBGRADIENT_STEPS, _STEP_FACTOR = 8, 1.2
-"""Steps of prices in each round, and how much longer than Polyak's they are: into the optimum, not onto
-its edge.
+"""Subgradient steps per round, and their length relative to Polyak's.
 """
 
-_PATIENCE, _MIN_PROGRESS = 2, 0.8
-"""After so many steps, those that leave more than this share of what is missing, each, are given up."""
+_MIN_STEPS, _MAX_GAP_RATIO = 2, 0.8
+"""Steps before the round may stop early, and the gap per step, relative to the one before, at which it
+does."""
 
 _MAX_ROUNDS_SMALL_GROUP, _MAX_ROUNDS_LARGE_GROUP = 50, 4
-"""Rounds of paths before arcs take over."""
+"""Rounds with paths as columns before switching to arcs."""
 
 
 class PathGeneration:
@@ -60,7 +59,7 @@ class PathGeneration:
         self._priced = network.node
         self._prices = np.empty(0)
         self._point = PathMasterSolution(0.0, np.empty(0), np.empty(0))
-        self._meets = np.zeros((network.objects, network.objects), dtype=np.bool_)
+        self._linked = np.zeros((network.objects, network.objects), dtype=np.bool_)
         self._active = np.zeros(network.objects, dtype=np.bool_)
         self._usage = np.zeros(network.node.shape)
         each, frames = np.indices(self._alone.nodes.shape)
@@ -70,33 +69,33 @@ class PathGeneration:
         """Find the optimum of the relaxation."""
         if not conflict_count(self._network, self._alone.nodes):
             return RelaxedSolution(self._usage, float(self._alone.costs.sum()), self._priced, 0)
-        return self._of_those_who_meet(warm_start)
+        return self._resolve_conflicts(warm_start)
 
-    def _of_those_who_meet(self, warm_start: WarmStart | None) -> RelaxedSolution:
+    def _resolve_conflicts(self, warm_start: WarmStart | None) -> RelaxedSolution:
         rows = self._finder.find_violated(self._usage)
-        told = try_warm_start(self._network, self._pricing, self._finder, warm_start) if warm_start else None
-        if told is not None and told.proven is not None:
-            return told.proven
-        self._meet(rows)
+        warm = try_warm_start(self._network, self._pricing, self._finder, warm_start) if warm_start else None
+        if warm is not None and warm.proven is not None:
+            return warm.proven
+        self._link_objects(rows)
         if self._largest_group() > _MAX_PATH_GROUP:
             return start_arc_generation(self._network, self._pricing, ConflictSeparator(self._network)).run()
-        self._bind([*rows, *self._finder.drop_known(told.rows)] if told else rows)
-        for paths in told.paths if told else ():
+        self._add_rows([*rows, *self._finder.drop_known(warm.rows)] if warm else rows)
+        for paths in warm.paths if warm else ():
             active = np.flatnonzero(self._active)
             self._master.add_paths(active, paths.select(active))
         self._solve()
-        self._keep_rows()
+        self._add_violated_rows()
         rounds = 0
         while rounds < (
             _MAX_ROUNDS_SMALL_GROUP if self._largest_group() <= _MAX_PATH_GROUP else _MAX_ROUNDS_LARGE_GROUP
         ):
             rounds += 1
-            if not self._enter_better_paths():
+            if not self._add_improving_paths():
                 prices = conflict_prices(self._network, self._master.rows, self._prices)
                 return RelaxedSolution(self._usage, self._bound, self._priced, rounds, prices)
             self._solve()
-            self._keep_rows()
-        return self._by_arcs(rounds)
+            self._add_violated_rows()
+        return self._switch_to_arcs(rounds)
 
     @cached_property
     def _finder(self) -> ConflictSeparator:
@@ -106,11 +105,13 @@ class PathGeneration:
     def _master(self) -> PathMaster:
         return PathMaster(self._network)
 
-    def _by_arcs(self, rounds: int) -> RelaxedSolution:
-        """Go on from the arcs of the paths in use: many objects that meet want parts of paths combined."""
+    def _switch_to_arcs(self, rounds: int) -> RelaxedSolution:
+        """Continue with arcs, from those of the paths in use: large groups need parts of paths combined."""
         owners, nodes = self._master.used_paths()
-        calm = np.flatnonzero(~self._active)
-        starts = path_arcs(np.concatenate([owners, calm]), np.concatenate([nodes, self._alone.nodes[calm]]))
+        inactive = np.flatnonzero(~self._active)
+        starts = path_arcs(
+            np.concatenate([owners, inactive]), np.concatenate([nodes, self._alone.nodes[inactive]])
+        )
         found = ArcGeneration(self._network, starts, self._master.rows, self._finder).run()
         return RelaxedSolution(found.usage, found.bound, found.priced, found.rounds + rounds)
 
@@ -118,91 +119,91 @@ class PathGeneration:
         self._point = self._master.solve()
         self._master.write_usage(self._usage)
 
-    def _keep_rows(self) -> None:
-        """Bind the program by the rows it breaks until it breaks none."""
+    def _add_violated_rows(self) -> None:
+        """Add violated rows and solve until none is violated."""
         while rows := self._finder.find_violated(self._usage):
-            self._bind(rows)
+            self._add_rows(rows)
             self._solve()
 
-    def _meet(self, rows: list[ConflictRow]) -> Bools:
-        """Note who meets whom on the rows; say which objects are on any, (n,)."""
+    def _link_objects(self, rows: list[ConflictRow]) -> Bools:
+        """Link the objects that share a row; return which objects are on any row, (n,)."""
         concerned = np.zeros(self._network.objects, dtype=np.bool_)
         for row in rows:
-            there = np.asarray((self._usage[:, row.frame] * row.members).any(axis=1))
-            self._meets |= np.outer(there, there)
-            concerned |= there
+            members = np.asarray((self._usage[:, row.frame] * row.members).any(axis=1))
+            self._linked |= np.outer(members, members)
+            concerned |= members
         return concerned
 
     def _largest_group(self) -> int:
-        """Return the size of the largest group of objects that meet, directly or through others."""
-        return int(np.bincount(group_objects(self._meets)).max())
+        """Return the size of the largest group of objects linked directly or through others."""
+        return int(np.bincount(group_objects(self._linked)).max())
 
-    def _bind(self, rows: list[ConflictRow]) -> None:
+    def _add_rows(self, rows: list[ConflictRow]) -> None:
         """Add the objects that violate rows, and paths that avoid all rows, to the program."""
-        concerned = self._meet(rows)
+        concerned = self._link_objects(rows)
         new = np.flatnonzero(concerned & ~self._active)
         self._active[new] = True
         if len(new):
             self._master.add_objects(new.tolist())
         self._master.add_rows(rows)
-        # Occluded all along, an object keeps every row: the program always has a solution.
-        hidden = np.full((self._network.objects, self._network.frames), self._network.places)
-        self._master.add_paths(new, Paths(hidden, path_costs(self._network, hidden)).select(new))
+        # An object that is always occluded violates no row, so the program is feasible.
+        occluded = np.full((self._network.objects, self._network.frames), self._network.places)
+        self._master.add_paths(new, Paths(occluded, path_costs(self._network, occluded)).select(new))
         self._master.add_paths(new, self._alone.select(new))
-        self._enter_detours(np.flatnonzero(concerned))
+        self._add_detours(np.flatnonzero(concerned))
 
-    def _enter_detours(self, objects: Ints) -> None:
+    def _add_detours(self, objects: Ints) -> None:
         """Add for each of the objects the best path that avoids all rows."""
         node = self._network.node.copy()
         for row in self._master.rows:
             node[:, row.frame][row.members] = np.inf
         self._master.add_paths(objects, self._pricing.best_paths(node, objects))
 
-    def _enter_better_paths(self) -> bool:
-        """Price all paths; let the better ones in; say whether there are any. Keeps the bound.
+    def _add_improving_paths(self) -> bool:
+        """Price all paths and add the improving ones; return whether there are any. Updates the bound.
 
-        Where objects meet for some frames on end, the program's duals charge for one of the frames, and
-        a round would go by for each of the others. So prices take some steps of their own from there,
-        up to the cost that the program has attained: Polyak's subgradient steps.
+        If objects conflict in several consecutive frames, the program's duals put a price on only one of
+        them, and each of the others would take a round. So the prices take a few of Polyak's subgradient
+        steps from there, with the program's cost as the target.
         """
         active, prices = np.flatnonzero(self._active), self._point.prices
-        others = float(self._alone.costs[~self._active].sum())
-        cost = others + self._point.objective
-        met: list[Ints] = []
-        missing: list[float] = []
+        inactive_cost = float(self._alone.costs[~self._active].sum())
+        cost = inactive_cost + self._point.objective
+        found: list[Ints] = []
+        gaps: list[float] = []
         for step in range(_SUBGRADIENT_STEPS):
             self._priced = add_conflict_prices(self._network, self._master.rows, prices)
             self._prices = prices
             paths = self._pricing.best_paths(self._priced, active)
-            self._bound = others + float(paths.costs.sum() - prices.sum())
-            missing.append(cost - self._bound)
-            if missing[-1] <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost)):
+            self._bound = inactive_cost + float(paths.costs.sum() - prices.sum())
+            gaps.append(cost - self._bound)
+            if gaps[-1] <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost)):
                 return False
-            met.append(paths.nodes)
-            if step >= _PATIENCE and missing[-1] > _MIN_PROGRESS**step * missing[0]:
+            found.append(paths.nodes)
+            if step >= _MIN_STEPS and gaps[-1] > _MAX_GAP_RATIO**step * gaps[0]:
                 break
             loads = [row.members[active, paths.nodes[:, row.frame]].sum() for row in self._master.rows]
             slope = np.array(loads) - 1.0
             slope[(slope < 0.0) & (prices == 0.0)] = 0.0
             if not slope.any():
                 break
-            prices = np.maximum(0.0, prices + _STEP_FACTOR * missing[-1] / float(slope @ slope) * slope)
-        return sum([self._enter(active, nodes) for nodes in met]) > 0
+            prices = np.maximum(0.0, prices + _STEP_FACTOR * gaps[-1] / float(slope @ slope) * slope)
+        return sum([self._add_paths(active, nodes) for nodes in found]) > 0
 
-    def _enter(self, objects: Ints, nodes: Ints) -> int:
+    def _add_paths(self, objects: Ints, nodes: Ints) -> int:
         """Add paths of objects; return how many are new."""
-        every = self._alone.nodes.copy()
-        every[objects] = nodes
-        return self._master.add_paths(objects, Paths(nodes, path_costs(self._network, every)[objects]))
+        all_nodes = self._alone.nodes.copy()
+        all_nodes[objects] = nodes
+        return self._master.add_paths(objects, Paths(nodes, path_costs(self._network, all_nodes)[objects]))
 
 
 class ColumnGenerationSolver(TimedSolver):
-    """The optimum of the relaxation from a few of its columns; equal to `arcs`, and many times faster."""
+    """Column generation: the same optimum as `arcs`, many times faster."""
 
     name = "columns"
 
     def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
-        """Solve the relaxation and round it where it is not whole."""
+        """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
         return solution_from_relaxation(self.name, network, solve_relaxation(network, warm_start))
@@ -211,8 +212,8 @@ class ColumnGenerationSolver(TimedSolver):
 def solve_relaxation(network: Network, warm_start: WarmStart | None = None) -> RelaxedSolution:
     """Return the optimum of the relaxation of a network with at least one object.
 
-    Paths are the columns where only conflicts couple the objects; under the layout term, which whole
-    paths fit badly, arcs are.
+    The columns are paths if only conflicts couple the objects, and arcs under the layout term, for which
+    whole paths are unsuitable.
     """
     if not network.layout:
         return PathGeneration(network).run(warm_start)
@@ -223,15 +224,15 @@ _SQUARED_POWER = 2
 
 
 class SquaredLayoutSolver(TimedSolver):
-    """As `columns`, but a change of layout by d pixels costs μ d²: many small changes rather than a jump.
+    """Like `columns`, but a layout change of d pixels costs μ d², which favors small changes over jumps.
 
-    Without layout term or a second object it is `columns`.
+    Without layout term or with a single object it equals `columns`.
     """
 
     name = "l2"
 
     def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
-        """Solve the relaxation and round it where it is not whole."""
+        """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
         if not network.layout:

@@ -1,4 +1,4 @@
-"""Conflict rows, found when a point of the relaxation breaks them: few of them ever bind."""
+"""Conflict rows, added when a point of the relaxation violates them: few of them are ever binding."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tracking.solvers.objective import Ints
 from tracking.solvers.warm_start import ConflictPrice
 
 _TOLERANCE = 1e-9
-"""Rows are broken beyond the feasibility tolerance of the LP solver only."""
+"""Rows count as violated beyond the feasibility tolerance of the LP solver."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConflictRow:
-    """At most one path goes through `members` (n, S) of `frame`; the occlusion is never a member."""
+    """At most one path passes through `members` (n, S) of `frame`; the occlusion is never a member."""
 
     frame: int
     members: Bools
@@ -27,10 +27,10 @@ class ConflictRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ConflictComponent:
-    """The rows of places of one frame that conflict with each other, directly or through others.
+    """The rows of a connected component of conflicting places in one frame.
 
     Attributes:
-        rows: (R, P K), or (R, n K) where the rows are stars: the entries of each row.
+        rows: (R, P K), or (R, n K) for stars: the entries of each row.
     """
 
     rows: Floats
@@ -39,7 +39,7 @@ class _ConflictComponent:
 def conflict_prices(
     network: Network, rows: Sequence[ConflictRow], prices: Floats
 ) -> tuple[ConflictPrice, ...]:
-    """Return the rows with a price, if all objects share them."""
+    """Return the rows with a positive price, if all objects share the observations."""
     if not network.shared or network.conflict_rows == "star":
         return ()
     return tuple(
@@ -50,34 +50,34 @@ def conflict_prices(
 
 
 class ConflictSeparator:
-    """Finds the rows of a network that a point breaks; the rows are those of `Network.rows`."""
+    """Finds the rows of `Network.rows` that a point violates."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
         self._stars = network.conflict_rows == "star"
         self._relation = network.conflicts.astype(np.float64)
-        self._parts: dict[tuple[int, int], _ConflictComponent] = {}
-        self._given: set[tuple[int, bytes]] = set()
+        self._components: dict[tuple[int, int], _ConflictComponent] = {}
+        self._returned: set[tuple[int, bytes]] = set()
 
     def find_violated(self, usage: Floats) -> list[ConflictRow]:
-        """Return the rows that y = `usage` (n, M, S) breaks and that were not given before."""
+        """Return the rows that y = `usage` (n, M, S) violates and that were not returned before."""
         found = []
         visits = self._visits(usage)
         around = (self._relation @ visits[:, :, None])[:, :, 0]
-        # More than one path in all that a place conflicts with; without such a place no row is broken.
+        # Places whose conflicting places carry more than one path; without any, no row is violated.
         suspects = around > 1.0 + _TOLERANCE
         for frame in np.flatnonzero(suspects.any(axis=1)).tolist():
-            there = usage[:, frame, :-1].ravel() if self._stars else visits[frame]
-            for part in self._parts_at(frame, np.flatnonzero(suspects[frame])):
-                for row in part.rows[part.rows @ there > 1.0 + _TOLERANCE]:
+            flow = usage[:, frame, :-1].ravel() if self._stars else visits[frame]
+            for component in self._components_at(frame, np.flatnonzero(suspects[frame])):
+                for row in component.rows[component.rows @ flow > 1.0 + _TOLERANCE]:
                     key = (frame, row.tobytes())
-                    if key not in self._given:
-                        self._given.add(key)
+                    if key not in self._returned:
+                        self._returned.add(key)
                         found.append(self._row(frame, row))
         return found
 
     def match_prices(self, rows: Sequence[ConflictPrice]) -> tuple[list[ConflictRow], list[float]]:
-        """Return those rows, and their prices, that are rows of this network, given before or not."""
+        """Return those of the rows, with their prices, that are rows of this network."""
         found: list[ConflictRow] = []
         prices: list[float] = []
         if not self._network.shared or self._stars:
@@ -86,22 +86,22 @@ class ConflictSeparator:
             member = np.zeros(self._network.places)
             if row.frame >= self._network.frames:
                 continue
-            there = np.flatnonzero(self._network.present[0, row.frame])
-            known = [place for place in row.places if place in there]
+            present = np.flatnonzero(self._network.present[0, row.frame])
+            known = [place for place in row.places if place in present]
             if not known:
                 continue
             member[known] = 1.0
-            for part in self._parts_at(row.frame, np.array(known[:1])):
-                if (part.rows == member).all(axis=1).any():
+            for component in self._components_at(row.frame, np.array(known[:1])):
+                if (component.rows == member).all(axis=1).any():
                     found.append(self._row(row.frame, member))
                     prices.append(row.price)
         return found, prices
 
     def drop_known(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
-        """Return those of the rows that were not given before; from now on they were."""
+        """Return those of the rows that were not returned before, and mark them as returned."""
         keys = [(row.frame, self._entries(row).tobytes()) for row in rows]
-        found = {key: row for key, row in zip(keys, rows, strict=True) if key not in self._given}
-        self._given.update(found)
+        found = {key: row for key, row in zip(keys, rows, strict=True) if key not in self._returned}
+        self._returned.update(found)
         return list(found.values())
 
     def _entries(self, row: ConflictRow) -> Floats:
@@ -109,7 +109,7 @@ class ConflictSeparator:
         return np.asarray(members, dtype=np.float64).ravel()
 
     def _visits(self, usage: Floats) -> Floats:
-        """Return how much goes through each place, (M, P K)."""
+        """Return the flow through each place, (M, P K)."""
         if self._network.shared:
             return np.asarray(usage[:, :, :-1].sum(axis=0))
         return np.swapaxes(usage[:, :, :-1], 0, 1).reshape(self._network.frames, -1)
@@ -120,36 +120,38 @@ class ConflictSeparator:
         members[:, :-1] = row.reshape(-1, network.places) > 0.0
         return ConflictRow(frame, members)
 
-    def _parts_at(self, frame: int, places: Ints) -> list[_ConflictComponent]:
-        """Return the parts that places of a frame are in, each once."""
+    def _components_at(self, frame: int, places: Ints) -> list[_ConflictComponent]:
+        """Return the distinct components of places of a frame."""
         if self._stars:
-            if (frame, 0) not in self._parts:
+            if (frame, 0) not in self._components:
                 rows = self._network.rows(frame)
-                self._parts[frame, 0] = _ConflictComponent(rows.reshape(len(rows), -1).astype(np.float64))
-            return [self._parts[frame, 0]]
-        parts = {}
+                self._components[frame, 0] = _ConflictComponent(
+                    rows.reshape(len(rows), -1).astype(np.float64)
+                )
+            return [self._components[frame, 0]]
+        components = {}
         for place in places.tolist():
-            if (frame, place) not in self._parts:
+            if (frame, place) not in self._components:
                 self._cover(frame, place)
-            part = self._parts[frame, place]
-            parts[id(part)] = part
-        return list(parts.values())
+            component = self._components[frame, place]
+            components[id(component)] = component
+        return list(components.values())
 
     def _cover(self, frame: int, place: int) -> None:
-        """Compute the rows of the part that a place is in."""
+        """Compute the rows of a place's component."""
         relation, owners = self._network.conflicts[frame], self._network.owners
         inside = connected_places(relation, place)
         cliques = clique_rows(relation[np.ix_(inside, inside)], None if owners is None else owners[inside])
         rows = np.zeros((len(cliques), len(relation)))
         rows[:, inside] = cliques
-        part = _ConflictComponent(rows)
+        component = _ConflictComponent(rows)
         for member in inside.tolist():
-            self._parts[frame, member] = part
+            self._components[frame, member] = component
 
 
-def group_objects(meets: Bools) -> Ints:
-    """Return the lowest object of the group of each, (n,); `meets` (n, n) is symmetric."""
-    reached = meets | np.eye(len(meets), dtype=np.bool_)
+def group_objects(linked: Bools) -> Ints:
+    """Return the lowest object of each object's group, (n,); `linked` (n, n) is symmetric."""
+    reached = linked | np.eye(len(linked), dtype=np.bool_)
     while True:
         further = reached @ reached
         if (further == reached).all():

@@ -1,4 +1,4 @@
-"""Steps uphill along slopes that jump about: each number by steps of its own size, as Adam takes them."""
+"""Approximate dual ascent with Adam steps: a starting point for column generation over arcs."""
 
 from __future__ import annotations
 
@@ -15,80 +15,84 @@ from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, best_paths
 
 _MOMENTUM, _SECOND_MOMENT_DECAY = 0.6, 0.9
-"""Shares of the former direction, and of the former typical size of a slope, in the next one."""
+"""Decay of the first and of the second moment of the slopes."""
 
 _EPSILON = 1e-3
-"""Slopes far below this are no reason to move."""
+"""Added to the typical slope: much smaller slopes cause no step."""
 
 
 class AdamSteps:
-    """Remembers slopes; numbers may join at the end of the first axis."""
+    """Adam steps (Kingma, Ba 2015); variables may be appended along the first axis."""
 
     def __init__(self) -> None:
-        self._way = self._size = np.empty(0)
-        self._weight = self._weight_of_size = 0.0
+        self._moment = self._second_moment = np.empty(0)
+        self._weight = self._second_weight = 0.0
 
     def step(self, slope: Floats) -> Floats:
-        """Return the next step, about 1 where the slopes agree with each other and near 0 where not."""
-        if len(self._way) < len(slope):
-            joined = np.zeros((len(slope) - len(self._way), *slope.shape[1:]))
-            self._way = np.concatenate([self._way.reshape(-1, *slope.shape[1:]), joined])
-            self._size = np.concatenate([self._size.reshape(-1, *slope.shape[1:]), joined])
-        self._way = _MOMENTUM * self._way + (1.0 - _MOMENTUM) * slope
-        self._size = _SECOND_MOMENT_DECAY * self._size + (1.0 - _SECOND_MOMENT_DECAY) * slope**2
+        """Return the next step: about 1 where the slopes keep their sign, and near 0 elsewhere."""
+        if len(self._moment) < len(slope):
+            appended = np.zeros((len(slope) - len(self._moment), *slope.shape[1:]))
+            self._moment = np.concatenate([self._moment.reshape(-1, *slope.shape[1:]), appended])
+            self._second_moment = np.concatenate(
+                [self._second_moment.reshape(-1, *slope.shape[1:]), appended]
+            )
+        self._moment = _MOMENTUM * self._moment + (1.0 - _MOMENTUM) * slope
+        self._second_moment = (
+            _SECOND_MOMENT_DECAY * self._second_moment + (1.0 - _SECOND_MOMENT_DECAY) * slope**2
+        )
         self._weight = _MOMENTUM * self._weight + (1.0 - _MOMENTUM)
-        self._weight_of_size = _SECOND_MOMENT_DECAY * self._weight_of_size + (1.0 - _SECOND_MOMENT_DECAY)
-        typical = np.sqrt(self._size / self._weight_of_size)
-        return np.asarray(self._way / self._weight / (typical + _EPSILON))
+        self._second_weight = _SECOND_MOMENT_DECAY * self._second_weight + (1.0 - _SECOND_MOMENT_DECAY)
+        typical = np.sqrt(self._second_moment / self._second_weight)
+        return np.asarray(self._moment / self._weight / (typical + _EPSILON))
 
 
-def add_layout_prices(node: Floats, where: Floats, pulls: Floats) -> Floats:
-    """Return the costs of nodes `node` (n, M, S) at `where` (n, M, S, 4) with what moves earn.
+def add_layout_prices(node: Floats, locations: Floats, layout_prices: Floats) -> Floats:
+    """Return node costs `node` (n, M, S) at `locations` (n, M, S, 4) with the layout prices.
 
-    `pulls` (n, M - 1, 4) is what a move by a pixel earns.
+    `layout_prices` (n, M - 1, 4) is the gain per pixel of movement.
     """
-    inward = np.zeros((*node.shape[:2], BOX_SIDES))
-    inward[:, 1:] -= pulls
-    inward[:, :-1] += pulls
-    return np.asarray(node + (where @ inward[:, :, :, None])[:, :, :, 0])
+    prices = np.zeros((*node.shape[:2], BOX_SIDES))
+    prices[:, 1:] -= layout_prices
+    prices[:, :-1] += layout_prices
+    return np.asarray(node + (locations @ prices[:, :, :, None])[:, :, :, 0])
 
 
 class LayoutDuals:
-    """Forces within [-μ, μ] on the difference of two objects' moves, climbing; 0 at first."""
+    """Duals in [-μ, μ] of the difference of two objects' movements, initially 0."""
 
     def __init__(self, network: Network) -> None:
         count = network.objects if network.layout else 0
         self._objects = network.objects
         self._pairs = np.array(list(combinations(range(count), 2)), dtype=np.int64).reshape(-1, 2)
         self._forces = np.zeros((len(self._pairs), network.frames - 1, BOX_SIDES))
-        self._most = network.layout
+        self._limit = network.layout
         self._steps = AdamSteps()
 
     def layout_prices(self) -> Floats:
-        """Return what a move by a pixel earns each object, (n, M - 1, 4)."""
-        pulls = np.zeros((self._objects, *self._forces.shape[1:]))
-        np.add.at(pulls, self._pairs[:, 0], self._forces)
-        np.add.at(pulls, self._pairs[:, 1], -self._forces)
-        return pulls
+        """Return each object's gain per pixel of movement, (n, M - 1, 4)."""
+        prices = np.zeros((self._objects, *self._forces.shape[1:]))
+        np.add.at(prices, self._pairs[:, 0], self._forces)
+        np.add.at(prices, self._pairs[:, 1], -self._forces)
+        return prices
 
-    def ascend(self, where: Floats, length: float) -> bool:
-        """Step by `length` of the largest force, for objects at `where` (n, M, 4); False: all in step."""
-        slope = self._slope(where)
+    def ascend(self, locations: Floats, length: float) -> bool:
+        """Step by `length` of the largest dual, for objects at `locations` (n, M, 4); False: zero slope."""
+        slope = self._slope(locations)
         if not slope.any():
             return False
-        self._forces += length * self._most * self._steps.step(slope)
-        np.clip(self._forces, -self._most, self._most, out=self._forces)
+        self._forces += length * self._limit * self._steps.step(slope)
+        np.clip(self._forces, -self._limit, self._limit, out=self._forces)
         return True
 
-    def _slope(self, where: Floats) -> Floats:
-        """Return how much less the first of a pair moves than the second."""
-        moves: Floats = np.diff(where, axis=1)
+    def _slope(self, locations: Floats) -> Floats:
+        """Return the movement of the second object of each pair minus that of the first."""
+        moves: Floats = np.diff(locations, axis=1)
         first, second = self._pairs.T
         return np.asarray(moves[second] - moves[first])
 
 
 class ConflictDuals:
-    """Prices, never negative, of conflict rows on a packed trellis, climbing; rows join at price 0."""
+    """Prices of conflict rows on a pruned trellis, not negative; new rows start at 0."""
 
     def __init__(self, packed: PrunedStates) -> None:
         self._packed = packed
@@ -111,15 +115,15 @@ class ConflictDuals:
         self.rows.extend(rows)
 
     def add_to(self, node: Floats) -> Floats:
-        """Return the costs of nodes, `node` (n, M, W), with the prices."""
+        """Return node costs `node` (n, M, W) with the prices."""
         if not len(self.prices):
             return node
-        at = (self._frame == np.arange(self._frames)[:, None]) * self.prices
-        added = at @ self._members.reshape(len(self.prices), -1)
+        frame_prices = (self._frame == np.arange(self._frames)[:, None]) * self.prices
+        added = frame_prices @ self._members.reshape(len(self.prices), -1)
         return np.asarray(node + np.swapaxes(added.reshape(self._frames, *self._members.shape[1:]), 0, 1))
 
     def ascend(self, slots: Ints, length: float) -> bool:
-        """Step by `length` for objects in `slots` (n, M); False: no row is broken and none costs."""
+        """Step by `length` for objects in `slots` (n, M); False: no row is violated or has a price."""
         if not len(self.prices):
             return False
         rows, each = np.arange(len(self.prices))[:, None], np.arange(len(slots))
@@ -133,44 +137,44 @@ class ConflictDuals:
 
 @dataclass(frozen=True, slots=True)
 class _AscentSchedule:
-    """How an ascent goes.
+    """Step schedule of an ascent.
 
     Attributes:
-        steps: how many it takes.
-        shorter: the length of each as a share of the one before.
-        states: how many states of a frame and object it looks at, the cheapest without prices.
-        price: length of the first step of prices, as a share of a typical one.
+        steps: number of steps.
+        decay: length of each step over the one before.
+        states: number of states per frame and object, the cheapest without prices.
+        price: length of the first price step, as a share of a typical price.
     """
 
     steps: int
-    shorter: float
+    decay: float
     states: int
     price: float
 
 
-_WITH_LAYOUT = _AscentSchedule(steps=30, shorter=0.94, states=40, price=1.0)
-_BY_CONFLICTS = _AscentSchedule(steps=25, shorter=0.92, states=10, price=0.2)
-"""The layout term leads further off the cheapest paths than conflicts do."""
+_WITH_LAYOUT = _AscentSchedule(steps=30, decay=0.94, states=40, price=1.0)
+_CONFLICTS_ONLY = _AscentSchedule(steps=25, decay=0.92, states=10, price=0.2)
+"""The layout term moves the optimum further from the cheapest paths than conflicts do."""
 
 _FIRST_FORCE_STEP = 0.2
-"""Length of the first step of forces, as a share of the largest."""
+"""Length of the first step of layout duals, as a share of the largest."""
 
 _KEPT_PATHS = 8
-"""Of the last paths met: they are near those of the optimum."""
+"""Number of the last paths that are kept: they are near those of the optimum."""
 
 _EARLY_STEPS, _SEPARATION_INTERVAL = 10, 3
-"""Broken rows are looked for in each of the first steps, later in some: few are still to be found."""
+"""Violated rows are searched in each of the first steps, then in every few steps: later there are few."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DualGuess:
-    """What the ascent came to.
+    """Result of the ascent.
 
     Attributes:
-        rows: the conflict rows that cost, or that paths broke.
-        prices: (R,) what going through them costs.
-        layout_prices: (n, M - 1, 4) what a move by a pixel earns.
-        paths: (G, n, M) the last paths met, of all objects at a time.
+        rows: the conflict rows that were violated.
+        prices: (R,) their prices.
+        layout_prices: (n, M - 1, 4) the gain per pixel of movement.
+        paths: (G, n, M) the last paths of all objects.
     """
 
     rows: list[ConflictRow]
@@ -180,43 +184,47 @@ class DualGuess:
 
 
 def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> DualGuess:
-    """Guess the duals of a network."""
+    """Approximate the optimal duals of a network."""
     passes = MinMarginals.of(pricing.trellis, pricing.forward)
-    pace = _WITH_LAYOUT if network.layout else _BY_CONFLICTS
-    packed = PrunedStates.cheapest(passes.through, pace.states)
+    schedule = _WITH_LAYOUT if network.layout else _CONFLICTS_ONLY
+    packed = PrunedStates.cheapest(passes.through, schedule.states)
     trellis = packed.trellis(pricing.trellis)
     forces, prices = LayoutDuals(network), ConflictDuals(packed)
-    where = packed.states(network.locations[network.sets], 0.0) if network.layout else None
+    locations = packed.states(network.locations[network.sets], 0.0) if network.layout else None
     typical = _typical_price(packed.states(passes.through, np.inf), passes.least)
     each, frames = np.indices((network.objects, network.frames))
-    best, best_prices, best_pulls = -np.inf, prices.prices, forces.layout_prices()
-    met: list[Ints] = []
-    for step in range(pace.steps):
-        node, pulls = prices.add_to(trellis.node), forces.layout_prices()
+    best, best_prices, best_layout_prices = -np.inf, prices.prices, forces.layout_prices()
+    last_paths: list[Ints] = []
+    for step in range(schedule.steps):
+        node, layout_prices = prices.add_to(trellis.node), forces.layout_prices()
         paths = best_paths(
-            trellis.with_node(node if where is None else add_layout_prices(node, where, pulls))
+            trellis.with_node(
+                node if locations is None else add_layout_prices(node, locations, layout_prices)
+            )
         )
-        met = [*met, packed.original_states(paths.nodes)][-_KEPT_PATHS:]
+        last_paths = [*last_paths, packed.original_states(paths.nodes)][-_KEPT_PATHS:]
         bound = float(paths.costs.sum() - prices.prices.sum())
         if bound > best:
-            best, best_prices, best_pulls = bound, prices.prices, pulls
+            best, best_prices, best_layout_prices = bound, prices.prices, layout_prices
         if step < _EARLY_STEPS or step % _SEPARATION_INTERVAL == 0:
             usage = np.zeros(network.node.shape)
-            usage[each, frames, met[-1]] = 1.0
+            usage[each, frames, last_paths[-1]] = 1.0
             prices.add_rows(finder.find_violated(usage))
-        length = pace.shorter**step
-        moved = prices.ascend(paths.nodes, length * pace.price * typical)
-        if where is not None:
-            moved |= forces.ascend(where[each, frames, paths.nodes], length * _FIRST_FORCE_STEP)
+        length = schedule.decay**step
+        moved = prices.ascend(paths.nodes, length * schedule.price * typical)
+        if locations is not None:
+            moved |= forces.ascend(locations[each, frames, paths.nodes], length * _FIRST_FORCE_STEP)
         if not moved:
             break
-    late = np.zeros(len(prices.prices) - len(best_prices))
-    return DualGuess(prices.rows, np.concatenate([best_prices, late]), best_pulls, np.array(met))
+    new = np.zeros(len(prices.prices) - len(best_prices))
+    return DualGuess(
+        prices.rows, np.concatenate([best_prices, new]), best_layout_prices, np.array(last_paths)
+    )
 
 
 def _typical_price(through: Floats, least: Floats) -> float:
-    """Return what it costs on average to be in the second best state of a frame; (n, M, W) and (n,)."""
+    """Return the mean excess cost of the second best state per frame, from costs (n, M, W) and (n,)."""
     if through.shape[2] == 1:
         return 0.0
-    regret = np.partition(through, 1, axis=2)[:, :, 1] - least[:, None]
-    return float(regret[np.isfinite(regret)].mean()) if np.isfinite(regret).any() else 0.0
+    excess = np.partition(through, 1, axis=2)[:, :, 1] - least[:, None]
+    return float(excess[np.isfinite(excess)].mean()) if np.isfinite(excess).any() else 0.0

@@ -1,4 +1,4 @@
-"""`separate-dp`: every object on its own, conflicts and layout ignored (paper IV.A.3, Fig. 16)."""
+"""Baselines by dynamic programming: `separate-dp` (paper IV.A.3, Fig. 16) and `greedy-dp`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tracking.solvers.warm_start import WarmStart
 
 
 class SeparateDpSolver(TimedSolver):
-    """The cheapest path of each object; two objects may take one place. A baseline, and a bound."""
+    """The cheapest path of each object; conflicts and layout are ignored. A baseline and a lower bound."""
 
     name = "separate-dp"
 
@@ -44,40 +44,39 @@ class SeparateDpSolver(TimedSolver):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GreedyPaths:
-    """The paths of best track first, (n, M) nodes, and the bound that the first pass proves."""
+    """Greedy paths, (n, M) nodes, and the bound that the first pass proves."""
 
     nodes: Ints
     bound: float
 
 
 def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
-    """Fix the cheapest path, bar its places to the others, and go on; the layout term is ignored.
+    """Fix the cheapest path, block its places for the other objects, and repeat; the layout term is ignored.
 
-    Of equal paths the one of the lowest object is fixed first. `alone`, where known, are the cheapest
-    paths of all. An object that may not be occluded somewhere, and to which nothing is left there, is in
-    conflict.
+    Of equal paths the one of the lowest object is fixed first. `alone`: the cheapest path of each object, if
+    known. An object that cannot be occluded in a frame and has no free place there stays in conflict.
     """
     exclusions = network.exclusions()
     trellis = Trellis(network.source, network.node.copy(), network.pair, network.sink)
     each, frames = np.indices((network.objects, network.frames))
     alone = best_paths(trellis) if alone is None else alone
     nodes, costs, bound = alone.nodes.copy(), alone.costs.copy(), float(alone.costs.sum())
-    left = np.ones(network.objects, dtype=np.bool_)
-    while left.any():
-        rest = np.flatnonzero(left)
-        owner = int(rest[costs[rest].argmin()])
-        left[owner] = False
+    open_objects = np.ones(network.objects, dtype=np.bool_)
+    while open_objects.any():
+        candidates = np.flatnonzero(open_objects)
+        owner = int(candidates[costs[candidates].argmin()])
+        open_objects[owner] = False
         block_conflicting_nodes(network, exclusions, trellis.node, (owner, nodes[owner]))
-        # A cheapest path of which nothing is barred is still the cheapest.
-        cut = np.flatnonzero(left & np.isinf(trellis.node[each, frames, nodes]).any(axis=1))
-        if len(cut):
-            again = best_paths(trellis.select(cut))
-            nodes[cut], costs[cut] = again.nodes, again.costs
+        # A cheapest path without a blocked node is still the cheapest.
+        blocked = np.flatnonzero(open_objects & np.isinf(trellis.node[each, frames, nodes]).any(axis=1))
+        if len(blocked):
+            rerouted = best_paths(trellis.select(blocked))
+            nodes[blocked], costs[blocked] = rerouted.nodes, rerouted.costs
     return GreedyPaths(nodes, bound)
 
 
 class GreedyDpSolver(TimedSolver):
-    """Best track first: quick, never in conflict, not always right. A baseline."""
+    """Greedy assignment, cheapest path first: fast and without conflicts, but not optimal. A baseline."""
 
     name = "greedy-dp"
 
@@ -85,12 +84,12 @@ class GreedyDpSolver(TimedSolver):
         """Return the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
         cost, conflicts = total_cost(network, paths.nodes), conflict_count(network, paths.nodes)
-        attained = math.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost))
+        is_optimal = math.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost))
         report = SolveReport(
             solver=self.name,
             objective=cost,
             bound=paths.bound,
-            integral=not conflicts and attained,
+            integral=not conflicts and is_optimal,
             conflicts=conflicts,
             rounds=network.objects,
         )

@@ -1,8 +1,7 @@
-"""Dynamic programming over the joint states that a proof leaves: the layout term's integer optimum.
+"""Integer optimum: dynamic programming over the joint states that bounds do not exclude, or branch and bound.
 
-The extended dynamic program (I.A) has S^n joint states a frame. The duals of the relaxation say what
-the rest of the window costs at least from each of them, and most joint states cost more with that than an
-answer already known.
+The extended dynamic program (I.A) has S^n joint states per frame. The duals of the relaxation give a lower
+bound on the cost from each of them to the end of the window; most joint states exceed a known solution by it.
 """
 
 from __future__ import annotations
@@ -28,25 +27,25 @@ from tracking.solvers.viterbi import MinMarginals, Trellis, backward, forward
 from tracking.solvers.warm_start import WarmStart
 
 _MAX_JOINT_STATES = 150_000
-"""Joint states of a frame."""
+"""Most joint states of a frame."""
 
 _MAX_TRANSITIONS = 2_000_000_000
-"""Pairs of joint states of two frames, over the whole window: about half a minute."""
+"""Most pairs of joint states of successive frames over the window: about half a minute."""
 
 _BLOCK_SIZE = 2_000_000
-"""Numbers held at once, 16 MB."""
+"""Numbers in memory at once: 16 MB."""
 
 _TOLERANCE = 1e-9
-"""Relative: bounds are sums of some tens of costs, each with its rounding error."""
+"""Relative tolerance of bounds, for the rounding errors of sums of costs."""
 
 
 class TooManyStatesError(Exception):
-    """The proof leaves more than can be tried."""
+    """Too many joint states remain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Frontier:
-    """Joint states of a frame: `nodes` (J, n), the `costs` (J,) to get there, and from which, `origin`."""
+    """Joint states of a frame: `nodes` (J, n), `costs` (J,) from the source, predecessors `origin` (J,)."""
 
     nodes: Ints
     costs: Floats
@@ -54,7 +53,7 @@ class _Frontier:
 
 
 class JointStateSearch:
-    """Searches a network with layout term whose relaxation is solved, its duals known."""
+    """Dynamic program over joint states of a network with layout term, pruned by its solved relaxation."""
 
     def __init__(self, network: Network, found: RelaxedSolution) -> None:
         self._network = network
@@ -62,90 +61,92 @@ class JointStateSearch:
         self._exclusions = network.exclusions()
         passes = MinMarginals.of(Trellis.of(network).with_node(found.priced))
         self._excess = passes.through - passes.least[:, None, None]
-        self._where = network.locations[network.sets]
-        # What the way from a state on costs at least: the part of a pull that acts at the cut is undone.
-        self._rest = np.swapaxes(passes.backward, 0, 1).copy()
-        self._rest[:, :-1] += np.einsum("nml,nmsl->nms", found.layout_prices, self._where[:, :-1])
+        self._locations = network.locations[network.sets]
+        # Lower bound of the cost from each state on, without the layout price that acts at that frame.
+        self._bound_ahead = np.swapaxes(passes.backward, 0, 1).copy()
+        self._bound_ahead[:, :-1] += np.einsum("nml,nmsl->nms", found.layout_prices, self._locations[:, :-1])
         self._charges = np.append(np.cumsum(found.charges[::-1])[::-1][1:], 0.0)
 
     def cheaper_than(self, cost: float) -> Ints | None:
-        """Return the cheapest nodes (n, M) if they cost less than `cost`; None: nothing does.
+        """Return the cheapest nodes (n, M) if they cost less than `cost`, else None.
 
         Raises:
-            TooManyStatesError: finding out would take too long.
+            TooManyStatesError: the search would take too long.
         """
         limit = cost + _TOLERANCE * max(1.0, abs(cost))
         network = self._network
         nodes = self._candidates(0, limit)
         costs = (network.source + network.node[:, 0])[np.arange(network.objects), nodes].sum(axis=1)
-        frontiers = [self._hopeful(0, _Frontier(nodes, costs, np.zeros(len(nodes), np.int64)), limit)]
+        frontiers = [self._prune(0, _Frontier(nodes, costs, np.zeros(len(nodes), np.int64)), limit)]
         steps = 0
         for m in range(1, network.frames):
             nodes = self._candidates(m, limit)
             steps += len(nodes) * len(frontiers[-1].nodes)
             if steps > _MAX_TRANSITIONS:
                 raise TooManyStatesError
-            frontiers.append(self._hopeful(m, self._arrived(m, frontiers[-1], nodes), limit))
-        return self._traced(frontiers, cost)
+            frontiers.append(self._prune(m, self._advance(m, frontiers[-1], nodes), limit))
+        return self._trace_back(frontiers, cost)
 
     def _candidates(self, frame: int, limit: float) -> Ints:
-        """Return the joint states (J, n) without conflicts that the bound leaves possible."""
+        """Return the joint states (J, n) without conflicts that the bound allows."""
         network = self._network
         joint, excess = np.empty((1, 0), dtype=np.int64), np.zeros(1)
         for n in range(network.objects):
             own = np.flatnonzero(self._excess[n, frame] <= limit - self._bound)
             total = excess[:, None] + self._excess[n, frame, own]
-            fits = total <= limit - self._bound
+            allowed = total <= limit - self._bound
             for other in range(n):
-                fits &= ~self._barred(frame, (other, n))[np.ix_(joint[:, other], own)]
-            first, second = np.nonzero(fits)
+                allowed &= ~self._excluded(frame, (other, n))[np.ix_(joint[:, other], own)]
+            first, second = np.nonzero(allowed)
             if len(first) > _MAX_JOINT_STATES:
                 raise TooManyStatesError
             joint = np.column_stack([joint[first], own[second]])
             excess = total[first, second]
         return joint
 
-    def _barred(self, frame: int, pair: tuple[int, int]) -> Bools:
+    def _excluded(self, frame: int, pair: tuple[int, int]) -> Bools:
         """Return which states of two objects conflict, (S, S)."""
         places, sets = self._network.places, self._network.sets
-        barred = np.zeros((places + 1, places + 1), dtype=np.bool_)
+        excluded = np.zeros((places + 1, places + 1), dtype=np.bool_)
         first, second = (slice(sets[n] * places, (sets[n] + 1) * places) for n in pair)
-        barred[:places, :places] = self._exclusions[frame, first, second]
-        return barred
+        excluded[:places, :places] = self._exclusions[frame, first, second]
+        return excluded
 
-    def _hopeful(self, frame: int, frontier: _Frontier, limit: float) -> _Frontier:
-        """Leave out joint states from which no answer is as cheap as the limit."""
+    def _prune(self, frame: int, frontier: _Frontier, limit: float) -> _Frontier:
+        """Drop the joint states whose bound exceeds the limit."""
         each = np.arange(self._network.objects)
-        rest = self._rest[each, frame, frontier.nodes].sum(axis=1) - self._charges[frame]
-        kept = frontier.costs + rest <= limit
+        ahead = self._bound_ahead[each, frame, frontier.nodes].sum(axis=1) - self._charges[frame]
+        kept = frontier.costs + ahead <= limit
         return _Frontier(frontier.nodes[kept], frontier.costs[kept], frontier.origin[kept])
 
-    def _arrived(self, frame: int, before: _Frontier, nodes: Ints) -> _Frontier:
-        """Return the cheapest way into each of the joint states `nodes` (J, n) of a frame."""
+    def _advance(self, frame: int, before: _Frontier, nodes: Ints) -> _Frontier:
+        """Return the joint states `nodes` (J, n) of a frame with the cheapest predecessor of each."""
         network = self._network
         best, origin = np.full(len(nodes), np.inf), np.zeros(len(nodes), dtype=np.int64)
-        leaving, entering = self._apart(frame - 1, before.nodes), self._apart(frame, nodes)
+        leaving, entering = self._pair_offsets(frame - 1, before.nodes), self._pair_offsets(frame, nodes)
         size = max(1, _BLOCK_SIZE // max(1, len(nodes)))
         for first in range(0, len(before.nodes), size):
             part = slice(first, first + size)
-            ways = network.layout * cdist(leaving[part], entering, "cityblock")
-            ways += before.costs[part, None]
+            totals = network.layout * cdist(leaving[part], entering, "cityblock")
+            totals += before.costs[part, None]
             for n, p in enumerate(network.pair_sets):
-                ways += network.pair[p, frame - 1][before.nodes[part, n][:, None], nodes[:, n]]
-            least = ways.argmin(axis=0)
-            costs = ways[least, np.arange(len(nodes))]
+                totals += network.pair[p, frame - 1][before.nodes[part, n][:, None], nodes[:, n]]
+            least = totals.argmin(axis=0)
+            costs = totals[least, np.arange(len(nodes))]
             better = costs < best
             best[better], origin[better] = costs[better], least[better] + first
         own = network.node[np.arange(network.objects), frame, nodes].sum(axis=1)
         return _Frontier(nodes, best + own, origin)
 
-    def _apart(self, frame: int, nodes: Ints) -> Floats:
+    def _pair_offsets(self, frame: int, nodes: Ints) -> Floats:
         """Return the differences of the locations of all pairs of objects, (J, pairs * 4)."""
-        where = self._where[np.arange(self._network.objects), frame, nodes]
+        locations = self._locations[np.arange(self._network.objects), frame, nodes]
         first, second = np.triu_indices(self._network.objects, 1)
-        return np.asarray((where[:, first] - where[:, second]).reshape(len(nodes), len(first) * BOX_SIDES))
+        return np.asarray(
+            (locations[:, first] - locations[:, second]).reshape(len(nodes), len(first) * BOX_SIDES)
+        )
 
-    def _traced(self, frontiers: list[_Frontier], cost: float) -> Ints | None:
+    def _trace_back(self, frontiers: list[_Frontier], cost: float) -> Ints | None:
         last = frontiers[-1]
         ends = last.costs + self._network.sink[np.arange(self._network.objects), last.nodes].sum(axis=1)
         if not len(ends) or not ends.min() < cost:
@@ -158,16 +159,13 @@ class JointStateSearch:
         return np.array(columns[::-1]).T
 
 
-"""Relative: excesses are sums of some tens of costs, each with its rounding error."""
-
-
 class ExactSolver(TimedSolver):
-    """Fixes what the relaxation proves needless, and tries the little that is left.
+    """Integer optimum from the relaxation and a search over what its bound does not exclude.
 
-    Under the layout term, joint states that the duals leave possible are tried by dynamic programming.
-    Without, or where they are too many, HiGHS branches and bounds over the arcs left: one whose best
-    path, at the prices that prove the bound, costs more above its object's best than the gap between the
-    best states known and the bound is in no better states.
+    With the layout term, the remaining joint states are searched by dynamic programming. Without it, or if
+    they are too many, HiGHS branches and bounds over the remaining arcs: an arc is excluded if its best path,
+    at the prices that prove the bound, exceeds its object's best path by more than the gap between the best
+    known states and the bound.
     """
 
     name = "exact"
@@ -187,7 +185,7 @@ class ExactSolver(TimedSolver):
 
 
 def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
-    """Return the cheapest states; `nodes` are some without conflicts."""
+    """Return the cheapest states; `nodes` are states without conflicts."""
     if network.layout:
         with suppress(TooManyStatesError):
             better = JointStateSearch(network, found).cheaper_than(total_cost(network, nodes))
@@ -196,7 +194,7 @@ def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints) -> I
 
 
 def branch_and_bound(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
-    """Return the cheapest states by branch and bound, first among the arcs that are tight, then the rest."""
+    """Return the cheapest states by branch and bound, first over tight arcs, then over all remaining ones."""
     excess = arc_excess(network, found)
     tight = _TOLERANCE * max(1.0, abs(total_cost(network, nodes)))
     nodes = _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= tight))
@@ -205,7 +203,7 @@ def branch_and_bound(network: Network, found: RelaxedSolution, nodes: Ints) -> I
 
 
 def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
-    """Return how much the best path through each arc costs above its object's best path, priced.
+    """Return the excess cost of the best path through each arc over its object's best path, at the prices.
 
     Shape (n, M - 1, S, S); infinite where there is no arc.
     """
@@ -215,21 +213,21 @@ def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
     objects, frames, states = network.node.shape
     excess = np.empty((objects, frames - 1, states, states))
     for m in range(1, frames):
-        rest = (trellis.node[:, m] + behind[m])[:, None]
-        excess[:, m - 1] = ahead[m - 1][:, :, None] + trellis.pair[:, m - 1] + rest
+        after = (trellis.node[:, m] + behind[m])[:, None]
+        excess[:, m - 1] = ahead[m - 1][:, :, None] + trellis.pair[:, m - 1] + after
     excess -= least[:, None, None, None]
     return excess
 
 
 def _solve_restricted(network: Network, nodes: Ints, allowed: Bools) -> Ints:
-    """Return the cheapest states on the arcs allowed and those of `nodes`."""
+    """Return the cheapest states on the allowed arcs and those of `nodes`."""
     each, steps = np.indices(nodes[:, 1:].shape)
     allowed = allowed.copy()
     allowed[each, steps, nodes[:, :-1], nodes[:, 1:]] = True
     built = build_arc_program(network, allowed)
-    whole = np.zeros(len(built.program.costs), dtype=np.bool_)
-    whole[built.nodes[built.nodes >= 0]] = True
-    values = solve_program(built.program, whole).values
+    integer = np.zeros(len(built.program.costs), dtype=np.bool_)
+    integer[built.nodes[built.nodes >= 0]] = True
+    values = solve_program(built.program, integer).values
     usage = np.where(built.nodes >= 0, values[built.nodes], 0.0)
     return np.asarray(usage.argmax(axis=2))
 

@@ -13,14 +13,14 @@ from tracking.solvers.solution_builder import Certificate, build_solution, empty
 from tracking.solvers.warm_start import WarmStart
 
 _MAX_NUMBERS = 30_000_000
-"""Numbers held at once, 240 MB: three objects with 70 places, say."""
+"""Numbers in memory at once: 240 MB, for example three objects with 70 places."""
 
 
 class ExtendedDpSolver(TimedSolver):
-    """The integer optimum by trying all joint states; an oracle for up to three objects or so.
+    """The integer optimum over all joint states: a reference for up to about three objects.
 
-    Without the layout term the step from one frame to the next separates by object, and a window costs
-    O(M n S^(n+1)); with it, O(M S^(2n)).
+    Without the layout term a step between frames separates by object, and a window takes O(M n S^(n+1)); with
+    it, O(M S^(2n)).
     """
 
     name = "extended-dp"
@@ -29,7 +29,7 @@ class ExtendedDpSolver(TimedSolver):
         """Return the cheapest states without conflicts; the bound is their cost.
 
         Raises:
-            ValueError: the joint states of the objects are too many to hold.
+            ValueError: the objects have too many joint states.
         """
         if not network.objects:
             return empty_solution(self.name, network)
@@ -44,19 +44,19 @@ class ExtendedDpSolver(TimedSolver):
 
 
 class _JointStates:
-    """Joint states are arrays of n axes of S states each."""
+    """Dynamic program over joint states, which are arrays with n axes of S states."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
         self._exclusions = network.exclusions()
 
     def best(self) -> Ints:
-        """Go forward over all frames, and trace back the cheapest."""
+        """Compute the costs forward over all frames, and trace back the cheapest."""
         network = self._network
-        costs = [self._sum(network.source + network.node[:, 0]) + self._bars(0)]
+        costs = [self._sum(network.source + network.node[:, 0]) + self._exclusion_costs(0)]
         for m in range(1, network.frames):
             step = self._step_with_layout if network.layout else self._step
-            costs.append(step(costs[-1], m - 1) + self._sum(network.node[:, m]) + self._bars(m))
+            costs.append(step(costs[-1], m - 1) + self._sum(network.node[:, m]) + self._exclusion_costs(m))
         nodes = np.empty((network.objects, network.frames), dtype=np.int64)
         last = costs[-1] + self._sum(network.sink)
         nodes[:, -1] = np.unravel_index(int(last.argmin()), last.shape)
@@ -73,29 +73,29 @@ class _JointStates:
             total = total + single[n].reshape([-1 if axis == n else 1 for axis in range(objects)])
         return total
 
-    def _bars(self, frame: int) -> Floats:
-        """Return infinity for joint states in conflict, else 0."""
+    def _exclusion_costs(self, frame: int) -> Floats:
+        """Return infinity for conflicting joint states, else 0."""
         network = self._network
         objects, places = network.objects, network.places
-        bars = np.zeros((places + 1,) * objects)
+        costs = np.zeros((places + 1,) * objects)
         for a in range(objects):
             for b in range(a + 1, objects):
-                barred = self._pair_bars(frame, a, b)
+                excluded = self._pair_exclusions(frame, a, b)
                 axes = [axis for axis in range(objects) if axis not in {a, b}]
-                bars = bars + np.where(np.expand_dims(barred, axes), np.inf, 0.0)
-        return bars
+                costs = costs + np.where(np.expand_dims(excluded, axes), np.inf, 0.0)
+        return costs
 
-    def _pair_bars(self, frame: int, first: int, second: int) -> Bools:
+    def _pair_exclusions(self, frame: int, first: int, second: int) -> Bools:
         network = self._network
         places, sets = network.places, network.sets
-        barred = np.zeros((places + 1, places + 1), dtype=np.bool_)
+        excluded = np.zeros((places + 1, places + 1), dtype=np.bool_)
         rows = slice(sets[first] * places, (sets[first] + 1) * places)
         columns = slice(sets[second] * places, (sets[second] + 1) * places)
-        barred[:places, :places] = self._exclusions[frame, rows, columns]
-        return barred
+        excluded[:places, :places] = self._exclusions[frame, rows, columns]
+        return excluded
 
     def _step(self, costs: Floats, step: int) -> Floats:
-        """Take the arcs of one object after the other."""
+        """Advance one frame, one object after another."""
         network = self._network
         for n in range(network.objects):
             pair = network.pair[network.pair_sets[n], step]
@@ -104,7 +104,7 @@ class _JointStates:
         return costs
 
     def _step_with_layout(self, costs: Floats, step: int) -> Floats:
-        """Take the arcs of all objects together."""
+        """Advance one frame for all objects together."""
         arriving = np.empty(costs.shape)
         for target in np.ndindex(costs.shape):
             arriving[target] = (costs + self._into(step, np.array(target))).min()
@@ -121,7 +121,7 @@ class _JointStates:
         objects = network.objects
         for a in range(objects):
             for b in range(a + 1, objects):
-                apart = np.abs(moves[a][:, None] - moves[b][None]).sum(axis=2)
+                change = np.abs(moves[a][:, None] - moves[b][None]).sum(axis=2)
                 axes = [axis for axis in range(objects) if axis not in {a, b}]
-                total = total + network.layout * np.expand_dims(apart, axes)
+                total = total + network.layout * np.expand_dims(change, axes)
         return total

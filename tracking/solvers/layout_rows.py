@@ -1,4 +1,4 @@
-"""The layout term in a program of arcs: moves δ of the objects, and what pairs of moves differ by."""
+"""The layout term in a program of arcs: movements δ of the objects, and differences of pairs of movements."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tracking.solvers.objective import Ints
 
 
 class LayoutConstraints:
-    """Columns δ, p+ and p- and their rows; the network has two frames or more.
+    """Columns δ, p+ and p- and their rows; the network has at least two frames.
 
-    A row per object, step and side says that δ is the move of the flow; a row per pair of objects, step
-    and side says that p+ - p- is the difference of two moves. The duals of the pair rows are within
-    [-μ, μ], and those of the moves are sums of them: a potential on the nodes, so that Viterbi prices it.
+    A row per object, step and side defines δ as the movement of the flow; a row per pair of objects, step and
+    side defines p+ - p- as the difference of two movements. The duals of the pair rows are in [-μ, μ], and
+    those of the movements are sums of them: a potential on the nodes, so that Viterbi can price it.
 
-    With `squared`, the term is μ times the square of the difference, which p+ alone, then free, stands
-    for; its duals have no limits.
+    With `squared`, the term is μ times the squared difference; then p+ alone, unbounded, is the difference,
+    and its duals have no limits.
     """
 
     def __init__(self, network: Network, highs: highspy.Highs, *, squared: bool) -> None:
@@ -41,7 +41,7 @@ class LayoutConstraints:
         self._add_columns(highs)
 
     def _add_columns(self, highs: highspy.Highs) -> None:
-        """Add δ, free, and p+ and p-, each at the cost μ."""
+        """Add δ, unbounded and without cost, and p+ and p- at the cost μ."""
         moves, differences, first_row = self._moves, self._differences, int(self._moves.flat[0])
         count = moves.size + 2 * differences.size
         delta = np.arange(moves.size).reshape(moves.shape)
@@ -85,25 +85,25 @@ class LayoutConstraints:
         hessian.index_ = squared.astype(np.int32)
         hessian.value_ = np.full(len(squared), 2.0 * self._network.layout)
         if highs.passHessian(hessian) != highspy.HighsStatus.kOk:
-            raise RuntimeError("the solver does not take the squares of the layout term")
+            raise RuntimeError("the solver rejects the quadratic layout term")
 
     def entries(self, owner: Ints, step: Ints, origin: Ints, target: Ints) -> tuple[Ints, Floats]:
         """Return the rows and values, both (A, 4), of arcs from frame `step` to the next."""
-        where, sets = self._network.locations, self._network.sets[owner]
-        return self._moves[owner, step], where[sets, step + 1, target] - where[sets, step, origin]
+        locations, sets = self._network.locations, self._network.sets[owner]
+        return self._moves[owner, step], locations[sets, step + 1, target] - locations[sets, step, origin]
 
     def forces(self, duals: Floats) -> Floats:
-        """Return what a pixel of difference costs each pair, (pairs, M - 1, 4), exactly feasible duals."""
+        """Return each pair's duals per pixel of difference, (pairs, M - 1, 4), clipped to be feasible."""
         forces = duals[self._differences]
         return forces if self._squared else np.clip(forces, -self._network.layout, self._network.layout)
 
     def layout_prices(self, forces: Floats) -> Floats:
-        """Return what a move by a pixel earns each object, (n, M - 1, 4)."""
-        pulls = np.zeros(self._moves.shape)
-        np.add.at(pulls, self._pairs[:, 0], forces)
-        np.add.at(pulls, self._pairs[:, 1], -forces)
-        return pulls
+        """Return each object's gain per pixel of movement, (n, M - 1, 4)."""
+        prices = np.zeros(self._moves.shape)
+        np.add.at(prices, self._pairs[:, 0], forces)
+        np.add.at(prices, self._pairs[:, 1], -forces)
+        return prices
 
     def slack(self, forces: Floats) -> float:
-        """Return what the bound loses to the forces: the conjugate of the square, nothing for the L1 norm."""
+        """Return the reduction of the bound by the duals: the conjugate of the square; 0 for the L1 norm."""
         return float((forces**2).sum() / (4.0 * self._network.layout)) if self._squared else 0.0

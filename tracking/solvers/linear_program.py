@@ -1,4 +1,4 @@
-"""The LP solver, called in one way everywhere: one thread, dual simplex, no presolve, no clock."""
+"""The LP solver HiGHS with fixed options, for deterministic results: one thread, simplex, no time limit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tracking.boxes import Floats
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearProgram:
-    """Minimise `costs x` with `row_lower <= matrix x <= row_upper` and `lower <= x <= upper`."""
+    """Minimize `costs x` with `row_lower <= matrix x <= row_upper` and `lower <= x <= upper`."""
 
     costs: Floats
     lower: Floats
@@ -35,17 +35,16 @@ class LinearSolution:
 
 
 _DEVEX = 1
-"""Edge weights that need no start-up: a growing program is started from many bases."""
+"""Edge weights without initialization cost: a growing program is solved from many bases."""
 
 _DUAL, _CHOOSE = 1, 0
-"""Simplex strategies: dual, best from nothing; or primal after new columns and dual after new rows."""
+"""Simplex strategies: dual, best without a basis; or primal after new columns and dual after new rows."""
 
 
 def create_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Highs:
-    """Return a solver that is deterministic and says nothing; `growing`: for a program that gets columns.
+    """Return a deterministic solver without output; `growing`: columns will be added.
 
-    With `presolve` the program is made smaller before it is solved for the first time; after that it
-    goes on from its last basis.
+    With `presolve` the program is reduced before the first solve; later solves continue from the last basis.
     """
     solver: highspy.Highs = highspy.Highs()  # type: ignore[no-untyped-call]
     options: dict[str, bool | int | float | str] = {
@@ -63,12 +62,12 @@ def create_highs(*, growing: bool = False, presolve: bool = False) -> highspy.Hi
         options["simplex_dual_edge_weight_strategy"] = _DEVEX
     for name, value in options.items():
         if solver.setOptionValue(name, value) != highspy.HighsStatus.kOk:
-            raise RuntimeError(f"the LP solver does not take {name} = {value}")
+            raise RuntimeError(f"the LP solver rejects {name} = {value}")
     return solver
 
 
 def to_highs_model(program: LinearProgram) -> highspy.HighsLp:
-    """Put a program into the solver's own form."""
+    """Convert a program to a HiGHS model."""
     model = highspy.HighsLp()
     rows, columns = program.matrix.shape
     model.num_col_ = columns
@@ -86,16 +85,16 @@ def to_highs_model(program: LinearProgram) -> highspy.HighsLp:
 
 
 _FALLBACKS: tuple[tuple[str, str | float], ...] = (("presolve", "off"), ("qp_regularization_value", 0.0))
-"""What to try anew with, from no basis, where there is no optimum: a basis kept from before columns and rows
-came may be too ill-conditioned to go on from; presolve has called whole-number programs infeasible that
-had answers; and squares with a little added to be regular have ended in an error of the solver's own."""
+"""Options of further attempts, without a basis, if no optimum is found: a basis from before columns and rows
+were added may be ill-conditioned; presolve has reported feasible integer programs as infeasible; and
+regularized quadratic programs have ended in solver errors."""
 
 
 def run_highs(solver: highspy.Highs) -> LinearSolution:
-    """Run the solver and give what it found.
+    """Run the solver and return its solution.
 
     Raises:
-        RuntimeError: the program has no optimum, which no network gives rise to.
+        RuntimeError: the solver finds no optimum; every network has one.
     """
     solver.run()
     status = solver.getModelStatus()
@@ -121,12 +120,12 @@ def run_highs(solver: highspy.Highs) -> LinearSolution:
 
 
 def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = None) -> LinearSolution:
-    """Solve one program from nothing; columns where `integer` is true are whole."""
+    """Solve one program; columns where `integer` is true take integer values."""
     solver = create_highs()
     model = to_highs_model(program)
     if integer is not None:
         kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
-        model.integrality_ = [kinds[int(whole)] for whole in integer]
+        model.integrality_ = [kinds[int(is_integer)] for is_integer in integer]
         for name in ("mip_rel_gap", "mip_abs_gap"):
             solver.setOptionValue(name, 0.0)
         solver.setOptionValue("presolve", "on")
@@ -136,7 +135,7 @@ def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = No
 
 
 class LinearProgramBuilder:
-    """Collects the columns and rows of a program; entries of one place add up."""
+    """Collects the columns and rows of a program; entries at the same position add up."""
 
     def __init__(self) -> None:
         self._costs: list[Floats] = []
@@ -148,32 +147,32 @@ class LinearProgramBuilder:
         self._rows = 0
 
     def add_columns(self, costs: Floats, lower: float = 0.0) -> NDArray[np.int64]:
-        """Add columns without upper bound; return their numbers."""
+        """Add columns without upper bound; return their indices."""
         first, self._columns = self._columns, self._columns + len(costs)
         self._costs.append(costs)
         self._lower.append(np.full(len(costs), lower))
         return np.arange(first, self._columns)
 
     def add_rows(self, count: int, lower: float, upper: float) -> NDArray[np.int64]:
-        """Add `count` empty rows; return their numbers."""
+        """Add `count` empty rows; return their indices."""
         first, self._rows = self._rows, self._rows + count
         self._row_lower.append(np.full(count, lower))
         self._row_upper.append(np.full(count, upper))
         return np.arange(first, self._rows)
 
     def add_entries(self, rows: ArrayLike, columns: ArrayLike, values: ArrayLike) -> None:
-        """Put values into the matrix; the three broadcast."""
-        at_row, at_column, value = np.broadcast_arrays(rows, columns, values)
+        """Add values to the matrix; the three arguments broadcast."""
+        row, column, value = np.broadcast_arrays(rows, columns, values)
         self._entries.append(
             (
-                at_row.ravel().astype(np.int64),
-                at_column.ravel().astype(np.int64),
+                row.ravel().astype(np.int64),
+                column.ravel().astype(np.int64),
                 value.ravel().astype(np.float64),
             )
         )
 
     def program(self) -> LinearProgram:
-        """Return the program as collected."""
+        """Return the collected program."""
         rows, columns, values = (np.concatenate(part) for part in zip(*self._entries, strict=True))
         matrix = sparse.csc_array(
             sparse.coo_array((values, (rows, columns)), shape=(self._rows, self._columns))

@@ -1,4 +1,4 @@
-"""What states cost and whether they conflict: the discrete problem of paper II.C."""
+"""Costs and conflicts of states: the discrete problem of paper II.C."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
     `power` 1: the L1 norm, pixels; 2: the square of the L2 norm, square pixels.
     """
     moves = np.diff(locations_at(network, nodes), axis=1)
-    apart = (np.abs(moves[:, None] - moves[None]) ** power).sum(axis=(2, 3))
-    return float(np.triu(apart, 1).sum())
+    changes = (np.abs(moves[:, None] - moves[None]) ** power).sum(axis=(2, 3))
+    return float(np.triu(changes, 1).sum())
 
 
 def locations_at(network: Network, nodes: Ints) -> Floats:
@@ -72,21 +72,21 @@ def conflict_count(network: Network, nodes: Ints) -> int:
     if not exclusions.size or not len(first):
         return 0
     frames = np.arange(network.frames)
-    barred = exclusions[frames, places[first], places[second]]
-    return int((barred & visible[first] & visible[second]).sum())
+    excluded = exclusions[frames, places[first], places[second]]
+    return int((excluded & visible[first] & visible[second]).sum())
 
 
 def block_conflicting_nodes(
-    network: Network, exclusions: NDArray[np.bool_], node: Floats, taken: tuple[int, Ints]
+    network: Network, exclusions: NDArray[np.bool_], node: Floats, fixed: tuple[int, Ints]
 ) -> None:
-    """Make infinite in `node` (n, M, S) what others cannot take once `taken`, object and path, is fixed."""
-    owner, path = taken
+    """Set the costs `node` (n, M, S) to infinity where others conflict with a `fixed` object and its path."""
+    owner, path = fixed
     if not exclusions.size:
         return
     places, frames = network.places, np.arange(network.frames)
     visible = path < places
-    at = np.where(visible, network.sets[owner] * places + path, 0)
-    barred = (exclusions[frames, at] & visible[:, None]).reshape(network.frames, -1, places)
-    barred = np.broadcast_to(np.swapaxes(barred, 0, 1), (network.objects, network.frames, places)).copy()
-    barred[owner] = False
-    node[:, :, :places][barred] = np.inf
+    index = np.where(visible, network.sets[owner] * places + path, 0)
+    blocked = (exclusions[frames, index] & visible[:, None]).reshape(network.frames, -1, places)
+    blocked = np.broadcast_to(np.swapaxes(blocked, 0, 1), (network.objects, network.frames, places)).copy()
+    blocked[owner] = False
+    node[:, :, :places][blocked] = np.inf

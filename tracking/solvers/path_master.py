@@ -1,4 +1,4 @@
-"""The relaxation over whole paths as columns (Dantzig-Wolfe), restricted to the paths met so far."""
+"""The relaxation with whole paths as columns (Dantzig-Wolfe), restricted to the paths added so far."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class PathMasterSolution:
 
     Attributes:
         objective: its cost.
-        prices: (R,) what going through each conflict row costs, not negative.
-        reduced_cost_limits: (n,) the cost below which a path of an object would better the program.
+        prices: (R,) the price of each conflict row, not negative.
+        reduced_cost_limits: (n,) the cost below which a path of an object improves the program.
     """
 
     objective: float
@@ -32,7 +32,7 @@ class PathMasterSolution:
 
 
 class PathMaster:
-    """Chooses, for the objects added to it, the cheapest mixture of their paths that keeps the rows."""
+    """Finds the cheapest convex combination of paths of its objects that satisfies the conflict rows."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -56,7 +56,7 @@ class PathMaster:
         )
 
     def add_paths(self, owners: Ints, paths: Paths) -> int:
-        """Add the paths that are new; return their numbers."""
+        """Add the paths that are new; return how many."""
         new = []
         for k, (owner, nodes) in enumerate(zip(owners.tolist(), paths.nodes, strict=True)):
             key = (owner, nodes.tobytes())
@@ -70,9 +70,9 @@ class PathMaster:
         column, row = np.nonzero(entries)
         starts = np.searchsorted(column, np.arange(len(new))).astype(np.int32)
         index = np.concatenate([self._row_numbers(), self._conflict_rows]).astype(np.int32)[row]
-        zeros, endless = np.zeros(len(new)), np.full(len(new), np.inf)
+        zeros, unbounded = np.zeros(len(new)), np.full(len(new), np.inf)
         self._highs.addCols(
-            len(new), paths.costs[new], zeros, endless, len(row), starts, index, np.ones(len(row))
+            len(new), paths.costs[new], zeros, unbounded, len(row), starts, index, np.ones(len(row))
         )
         self._owners = np.concatenate([self._owners, owners])
         self._paths = np.concatenate([self._paths, nodes])
@@ -82,13 +82,13 @@ class PathMaster:
         return np.array(list(self._object_rows.values()), dtype=np.int64)
 
     def _entries(self, owners: Ints, nodes: Ints) -> Bools:
-        """Return which paths are in which rows, (paths, object rows and then conflict rows)."""
+        """Return which rows each path is in, (paths, object rows then conflict rows)."""
         own = owners[:, None] == np.array(list(self._object_rows), dtype=np.int64)
         through = [row.members[owners, nodes[:, row.frame]] for row in self.rows]
         return np.column_stack([own, *through])
 
     def add_rows(self, rows: Sequence[ConflictRow]) -> None:
-        """Bind the program by more conflict rows."""
+        """Add conflict rows."""
         for row in rows:
             through = np.flatnonzero(row.members[self._owners, self._paths[:, row.frame]])
             self._conflict_rows.append(len(self._object_rows) + len(self.rows))
@@ -96,13 +96,13 @@ class PathMaster:
             self._highs.addRow(-np.inf, 1.0, len(through), through.astype(np.int32), np.ones(len(through)))
 
     def solve(self) -> PathMasterSolution:
-        """Choose anew."""
+        """Solve the restricted program."""
         found = run_highs(self._highs)
         self._values = found.values
-        worths = np.full(self._network.objects, np.inf)
-        worths[list(self._object_rows)] = found.duals[self._row_numbers()]
+        limits = np.full(self._network.objects, np.inf)
+        limits[list(self._object_rows)] = found.duals[self._row_numbers()]
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
-        return PathMasterSolution(found.objective, prices, worths)
+        return PathMasterSolution(found.objective, prices, limits)
 
     def used_paths(self) -> tuple[Ints, Ints]:
         """Return the paths in use: their objects (P,) and nodes (P, M)."""
@@ -110,7 +110,7 @@ class PathMaster:
         return self._owners[used], self._paths[used]
 
     def write_usage(self, usage: Floats) -> None:
-        """Write y of the objects added into `usage` (n, M, S)."""
+        """Write y of the program's objects into `usage` (n, M, S)."""
         usage[list(self._object_rows)] = 0.0
         frames = np.arange(self._network.frames)
         used = np.flatnonzero(self._values > 0.0)

@@ -1,4 +1,4 @@
-"""The optimum of the relaxation, however it was found."""
+"""The optimum of the relaxation, and its shortcut by a warm start."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tracking.solvers.viterbi import PathPricer, Paths, best_paths
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 OPTIMALITY_TOLERANCE = 1e-11
-"""Relative distance of cost and bound at which the optimum is proven; far below the 1e-9 promised."""
+"""Relative distance of cost and bound at which the optimum is proven; far below the documented 1e-9."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,14 +22,16 @@ class RelaxedSolution:
     """The optimum of the relaxation.
 
     Attributes:
-        usage: y (n, M, S), how much of each object goes through each node.
-        bound: its cost, as the prices prove it.
-        priced: (n, M, S) the costs of nodes with the prices of conflicts and of the layout on them, at
-            which the cheapest paths prove the bound.
+        usage: y (n, M, S), the flow of each object through each node.
+        bound: its cost, as proven by the prices.
+        priced: (n, M, S) node costs with the prices of conflicts and of the layout, at which the cheapest
+        paths
+            prove the bound.
         rounds: how often paths or arcs were priced.
-        prices: the conflict rows that bind, where all objects share them.
-        layout_prices: (n, M - 1, 4) what moves earn by the layout term; none without.
-        charges: (M,) what the prices of a frame's rows take off the bound; none without layout term.
+        prices: the binding conflict rows, if all objects share the observations.
+        layout_prices: (n, M - 1, 4) the gain per pixel of movement; empty without layout term.
+        charges: (M,) the reduction of the bound by the prices of each frame's rows; empty without layout
+        term.
     """
 
     usage: Floats
@@ -43,12 +45,12 @@ class RelaxedSolution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WarmStartResult:
-    """What a warm_start is worth in a network.
+    """Result of a warm start in a network.
 
     Attributes:
-        rows: the conflict rows of the hint that the network has.
-        paths: paths to start from, each of all objects.
-        proven: the optimum, if one of them was proven to be it.
+        rows: the conflict rows of the warm start that the network has.
+        paths: paths of all objects to start from.
+        proven: the optimum, if one of the paths was proven optimal.
     """
 
     rows: list[ConflictRow]
@@ -59,7 +61,7 @@ class WarmStartResult:
 def try_warm_start(
     network: Network, pricing: PathPricer, finder: ConflictSeparator, warm_start: WarmStart
 ) -> WarmStartResult:
-    """Try a hint; of a network without layout term."""
+    """Evaluate a warm start in a network without layout term."""
     rows, costs = finder.match_prices(warm_start.rows)
     prices = np.array(costs)
     node = add_conflict_prices(network, rows, prices)
@@ -80,7 +82,7 @@ def try_warm_start(
 
 
 def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Floats) -> Floats:
-    """Return the costs of nodes (n, M, S) with the prices of conflict rows."""
+    """Return node costs (n, M, S) with the prices of conflict rows."""
     node = network.node.copy()
     for price, row in zip(prices, rows, strict=True):
         if price > 0.0:
@@ -91,22 +93,22 @@ def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Float
 def _follow_warm_start(
     network: Network, pricing: PathPricer, node: Floats, warm_start: WarmStart, nodes: Ints
 ) -> Ints:
-    """Return `nodes` (n, M), but for objects that the hint has elsewhere the best paths that follow it."""
+    """Return `nodes` (n, M), replaced by the best paths that follow the warm start where it differs."""
     if len(warm_start.states) != network.objects:
         return nodes
     known = warm_start.states[:, : network.frames]
     frames = known.shape[1]
     hinted = np.where(known == -1, network.places, known)
     usable = (hinted >= 0) & (hinted <= network.places)
-    elsewhere = np.flatnonzero((usable & (hinted != nodes[:, :frames])).any(axis=1))
-    if not len(elsewhere):
+    differing = np.flatnonzero((usable & (hinted != nodes[:, :frames])).any(axis=1))
+    if not len(differing):
         return nodes
-    bound = node[elsewhere].copy()
-    off = np.arange(network.places + 1) != hinted[elsewhere, :, None]
-    bound[:, :frames][off & usable[elsewhere, :, None]] = np.inf
-    found = best_paths(pricing.trellis.with_node(node).select(elsewhere).with_node(bound))
-    # Where the hint asks for arcs that do not exist, it is no help.
-    there = np.isfinite(found.costs)
-    answer = nodes.copy()
-    answer[elsewhere[there]] = found.nodes[there]
-    return answer
+    restricted = node[differing].copy()
+    off = np.arange(network.places + 1) != hinted[differing, :, None]
+    restricted[:, :frames][off & usable[differing, :, None]] = np.inf
+    found = best_paths(pricing.trellis.with_node(node).select(differing).with_node(restricted))
+    # Ignore the warm start where it requires missing arcs.
+    feasible = np.isfinite(found.costs)
+    followed = nodes.copy()
+    followed[differing[feasible]] = found.nodes[feasible]
+    return followed

@@ -1,4 +1,4 @@
-"""From the relaxation to whole states: the rounding of paper II.D."""
+"""Rounding of the relaxation to integer states (paper II.D), and local search."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tracking.solvers.objective import Ints, locations_at, path_cost, total_cost
 from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis, best_paths, trace_back
 
 _ZERO_TOLERANCE = 1e-9
-"""A node with less than this on it is not on any path."""
+"""Flow below which a node is on no path."""
 
 INTEGRALITY_TOLERANCE = 1e-6
-"""Nodes within this of 0 or 1 are whole: well above the solver's feasibility tolerance."""
+"""Distance from 0 or 1 up to which y is integral: well above the solver's feasibility tolerance."""
 
 
 def is_integral(usage: Floats) -> bool:
@@ -26,14 +26,14 @@ def round_relaxation(network: Network, usage: Floats) -> Ints:
     """Round y = `usage` (n, M, S) to nodes (n, M) without conflicts.
 
     In each frame the largest y becomes 1, its conflicting nodes and the other nodes of its object 0;
-    then the next largest. Of equal ones the lowest object and state come first. An object that keeps
-    nothing is occluded.
+    then the next largest. Ties go to the lowest object and state. An object without a node is
+    occluded.
     """
     exclusions = network.exclusions()
     nodes = np.full((network.objects, network.frames), network.places, dtype=np.int64)
-    whole = usage.max(axis=2, initial=0.0) >= 1.0 - INTEGRALITY_TOLERANCE
+    integral = usage.max(axis=2, initial=0.0) >= 1.0 - INTEGRALITY_TOLERANCE
     for m in range(network.frames):
-        if whole[:, m].all():
+        if integral[:, m].all():
             nodes[:, m] = usage[:, m].argmax(axis=1)
         else:
             nodes[:, m] = _round_frame(network, usage[:, m].copy(), exclusions[m])
@@ -49,24 +49,24 @@ def _round_frame(network: Network, usage: Floats, exclusions: Bools) -> Ints:
             break
         nodes[owner] = state
         if state < places:
-            barred = exclusions[sets[owner] * places + state].reshape(-1, places)
-            usage[:, :places][np.broadcast_to(barred, (len(usage), places))] = 0.0
+            excluded = exclusions[sets[owner] * places + state].reshape(-1, places)
+            usage[:, :places][np.broadcast_to(excluded, (len(usage), places))] = 0.0
         usage[owner] = 0.0
     return nodes
 
 
 _MAX_ROUNDS = 20
-"""Far above what it takes to settle; bounds the time whatever the window."""
+"""Limit of the rounds, far above what convergence takes."""
 
 _MIN_IMPROVEMENT = 1e-12
-"""Relative: what is cheaper by less is no cheaper."""
+"""Relative improvement below which costs count as equal."""
 
 
 class LocalSearch:
-    """Improves states of one network; `power` is that of its layout term.
+    """Coordinate descent over the objects of one network; `power` is that of its layout term.
 
     Attributes:
-        alone: the cheapest path of each object, the others ignored.
+        alone: the cheapest path of each object without regard to the others.
     """
 
     def __init__(self, network: Network, power: int = 1) -> None:
@@ -79,22 +79,22 @@ class LocalSearch:
     def improve(self, nodes: Ints) -> Ints:
         """Return nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
 
-        Repairs what the rounding of II.D may leave, since it looks at each frame by itself: arcs that do
-        not exist where arcs are gated, and jumps where the relaxation was split.
+        Repairs the effects of rounding each frame separately (II.D): missing arcs if arcs are gated, and
+        jumps where the relaxation was fractional.
         """
-        turns = _CoordinateDescent(self._network, self._trellis, self._passes, self._power)
-        turns.nodes = nodes.copy()
+        descent = _CoordinateDescent(self._network, self._trellis, self._passes, self._power)
+        descent.nodes = nodes.copy()
         cost = total_cost(self._network, nodes, self._power)
         for _ in range(_MAX_ROUNDS):
-            changed = [turns.reroute(owner) for owner in range(self._network.objects)]
-            before, cost = cost, total_cost(self._network, turns.nodes, self._power)
+            changed = [descent.reroute(owner) for owner in range(self._network.objects)]
+            before, cost = cost, total_cost(self._network, descent.nodes, self._power)
             if not any(changed) or not cost < before - _MIN_IMPROVEMENT * max(1.0, abs(cost)):
                 break
-        return turns.nodes
+        return descent.nodes
 
 
 class _CoordinateDescent:
-    """Lets one object after the other choose; an object whose others have not moved has nothing to do."""
+    """Reroutes one object after another; an object is skipped if no other has moved since its last turn."""
 
     def __init__(self, network: Network, trellis: Trellis, passes: MinMarginals, power: int) -> None:
         self._network = network
@@ -132,14 +132,13 @@ class _CoordinateDescent:
         return cost
 
     def _rerouted(self, owner: int, cost: float) -> Ints:
-        """Return the best path of one object while the others stay where they are; it has one at `cost`.
+        """Return the best path of one object with the others fixed; its current path costs `cost`.
 
-        The layout term takes nothing off a path, so states through which every path costs more than that
-        can be left out before it is computed.
+        The layout term is not negative, so states whose best path already costs more are left out.
         """
         network = self._network
         node = network.node[owner].copy()
-        node[:, :-1][self._barred(owner)] = np.inf
+        node[:, :-1][self._excluded(owner)] = np.inf
         limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
         packed = PrunedStates.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
         trellis = packed.trellis(self._trellis.select(np.array([owner])).with_node(node[None]))
@@ -147,28 +146,28 @@ class _CoordinateDescent:
             trellis.pair[0] += network.layout * self._layout_of_arcs(owner, packed)
         return np.asarray(packed.original_states(best_paths(trellis).nodes)[0])
 
-    def _barred(self, owner: int) -> Bools:
-        """Return which places of one object the others bar, (M, K)."""
+    def _excluded(self, owner: int) -> Bools:
+        """Return the places of one object that the others exclude, (M, K)."""
         network = self._network
         places, sets = network.places, network.sets
         others = np.delete(np.arange(network.objects), owner)
-        taken = self.nodes[others]
-        visible = taken < places
-        at = np.where(visible, sets[others, None] * places + taken, 0)
+        occupied = self.nodes[others]
+        visible = occupied < places
+        index = np.where(visible, sets[others, None] * places + occupied, 0)
         own = slice(sets[owner] * places, (sets[owner] + 1) * places)
         if not self._exclusions.size:
             return np.zeros((network.frames, places), dtype=np.bool_)
-        barred = self._exclusions[np.arange(network.frames), at, own] & visible[:, :, None]
-        return np.asarray(barred.any(axis=0))
+        excluded = self._exclusions[np.arange(network.frames), index, own] & visible[:, :, None]
+        return np.asarray(excluded.any(axis=0))
 
     def _layout_of_arcs(self, owner: int, packed: PrunedStates) -> Floats:
-        """Return what each arc between states kept adds to the layout term without μ, (M - 1, W, W)."""
+        """Return the layout term, without μ, of each arc between the kept states, (M - 1, W, W)."""
         network = self._network
-        where = packed.states(network.locations[network.sets[[owner]]], 0.0)[0]
+        locations = packed.states(network.locations[network.sets[[owner]]], 0.0)[0]
         others = np.diff(np.delete(locations_at(network, self.nodes), owner, axis=0), axis=1)
-        apart = np.zeros((network.frames - 1, where.shape[1], where.shape[1]))
-        for side in range(where.shape[2]):
-            moves = where[1:, None, :, side] - where[:-1, :, None, side]
+        changes = np.zeros((network.frames - 1, locations.shape[1], locations.shape[1]))
+        for side in range(locations.shape[2]):
+            moves = locations[1:, None, :, side] - locations[:-1, :, None, side]
             for other in others[:, :, side]:
-                apart += np.abs(moves - other[:, None, None]) ** self._power
-        return apart
+                changes += np.abs(moves - other[:, None, None]) ** self._power
+        return changes

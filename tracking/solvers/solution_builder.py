@@ -1,4 +1,4 @@
-"""From the optimum of the relaxation to the answer and its report."""
+"""Builds the solution and its report from the optimum of the relaxation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tracking.solvers.warm_start import ConflictPrice
 def solution_from_relaxation(
     solver: str, network: Network, found: RelaxedSolution, power: int = 1
 ) -> Solution:
-    """Return the answer for the optimum of the relaxation; `power` is that of the layout term."""
+    """Return the solution for the optimum of the relaxation; `power` is that of the layout term."""
     nodes = integer_nodes(network, found.usage, power)
     integral = is_integral(found.usage)
     proof = Certificate(solver, found.bound, integral, found.rounds, found.prices)
@@ -29,8 +29,8 @@ def solution_from_relaxation(
 def integer_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
     """Return nodes (n, M) without conflicts for y = `usage` (n, M, S).
 
-    Where y is whole they are its paths. Where not, it is rounded (II.D) and improved, and so are the
-    greedy paths; the cheaper are taken, the rounded ones where equal.
+    If y is integral, they are its paths. Otherwise y is rounded (II.D) and improved by local search, and so
+    are the greedy paths; the cheaper ones are returned, the rounded ones if equal.
     """
     nodes = round_relaxation(network, usage)
     if is_integral(usage):
@@ -45,7 +45,7 @@ def integer_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What a solver knows of its answer: see `SolveReport` and `Solution`."""
+    """What a solver has proven: see `SolveReport` and `Solution`."""
 
     solver: str
     bound: float
@@ -55,9 +55,9 @@ class Certificate:
 
 
 def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int = 1) -> Solution:
-    """Return nodes (n, M) as the answer, with the report on it.
+    """Return the solution of nodes (n, M), with its report.
 
-    The bound is no better than the cost of an answer that attains it: rounding errors are cut off.
+    The bound is limited to the cost, which removes rounding errors.
     """
     cost = total_cost(network, nodes, power)
     report = SolveReport(
@@ -72,6 +72,6 @@ def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int
 
 
 def empty_solution(solver: str, network: Network) -> Solution:
-    """Return the answer for a network without objects."""
+    """Return the solution of a network without objects."""
     nodes = np.empty((0, network.frames), dtype=np.int64)
     return build_solution(network, nodes, Certificate(solver, 0.0, integral=True, rounds=0))

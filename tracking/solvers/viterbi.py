@@ -1,4 +1,4 @@
-"""Shortest paths of all objects at once, each on its own: the Viterbi algorithm over a window."""
+"""Independent shortest paths of all objects: the Viterbi algorithm over a window."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tracking.solvers.objective import Ints
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trellis:
-    """The arcs of n objects that are priced together; `node` may carry duals or blocked places.
+    """Costs of the arcs of n objects; `node` may include duals or blocked places.
 
     Attributes:
         source, node, pair, sink: as in `Network`; `node` is (n, M, S), `pair` (P, M - 1, S, S).
@@ -28,7 +28,7 @@ class Trellis:
 
     @classmethod
     def of(cls, network: Network) -> Trellis:
-        """Return the trellis of a network as it is."""
+        """Return the trellis of a network without prices."""
         return cls(network.source, network.node, network.pair, network.sink)
 
     def select(self, chosen: NDArray[np.int64]) -> Trellis:
@@ -37,7 +37,7 @@ class Trellis:
         return Trellis(self.source[chosen], self.node[chosen], pair, self.sink[chosen])
 
     def with_node(self, node: Floats) -> Trellis:
-        """Return the trellis with other costs of being in a state."""
+        """Return the trellis with other node costs."""
         return Trellis(self.source, node, self.pair, self.sink)
 
 
@@ -46,7 +46,7 @@ class Paths:
     """One path for each object.
 
     Attributes:
-        nodes: (n, M) int64, the state in each frame, S - 1 where occluded.
+        nodes: (n, M) int64, the state in each frame, S - 1 if occluded.
         costs: (n,) the costs of the paths, source to sink.
     """
 
@@ -59,9 +59,9 @@ class Paths:
 
 
 def forward(trellis: Trellis, known: Floats | None = None) -> Floats:
-    """Return the cost of the best way from the source into each state, the state counted, (M, n, S).
+    """Return the cost of the best path from the source to each state, its node included, (M, n, S).
 
-    `known` (F, n, S), where given, is the answer for the first F frames.
+    `known` (F, n, S): the result for the first F frames, if known.
     """
     objects, frames, states = trellis.node.shape
     best = np.empty((frames, objects, states))
@@ -70,29 +70,29 @@ def forward(trellis: Trellis, known: Floats | None = None) -> Floats:
         best[: len(known)], first = known, len(known)
     else:
         best[0] = trellis.source + trellis.node[:, 0]
-    ways = np.empty((objects, states, states))
+    costs = np.empty((objects, states, states))
     for m in range(first, frames):
-        np.add(best[m - 1][:, :, None], trellis.pair[:, m - 1], out=ways)
-        np.minimum.reduce(ways, axis=1, out=best[m])
+        np.add(best[m - 1][:, :, None], trellis.pair[:, m - 1], out=costs)
+        np.minimum.reduce(costs, axis=1, out=best[m])
         best[m] += trellis.node[:, m]
     return best
 
 
 def backward(trellis: Trellis) -> Floats:
-    """Return the cost of the best way from each state to the sink, the state not counted, (M, n, S)."""
+    """Return the cost of the best path from each state to the sink, its node excluded, (M, n, S)."""
     objects, frames, states = trellis.node.shape
     best = np.empty((frames, objects, states))
     best[-1] = trellis.sink
-    ways = np.empty((objects, states, states))
+    costs = np.empty((objects, states, states))
     for m in range(frames - 2, -1, -1):
         ahead = best[m + 1] + trellis.node[:, m + 1]
-        np.add(trellis.pair[:, m], ahead[:, None], out=ways)
-        np.minimum.reduce(ways, axis=2, out=best[m])
+        np.add(trellis.pair[:, m], ahead[:, None], out=costs)
+        np.minimum.reduce(costs, axis=2, out=best[m])
     return best
 
 
 def trace_back(trellis: Trellis, best: Floats) -> Paths:
-    """Follow `forward` back from the sink; of equal ways the one through the lowest state is taken."""
+    """Trace the result of `forward` back from the sink; ties go to the lowest state."""
     objects, frames, _ = trellis.node.shape
     each = np.arange(objects)
     sets = each if len(trellis.pair) == objects else np.zeros(objects, dtype=np.int64)
@@ -106,11 +106,11 @@ def trace_back(trellis: Trellis, best: Floats) -> Paths:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MinMarginals:
-    """Both passes over a trellis: what the best ways into and out of each state cost.
+    """Forward and backward pass over a trellis: costs of the best paths to and from each state.
 
     Attributes:
-        forward: (M, n, S) from the source into each state, the state counted.
-        backward: (M, n, S) from each state to the sink, the state not counted.
+        forward: (M, n, S) from the source to each state, its node included.
+        backward: (M, n, S) from each state to the sink, its node excluded.
         least: (n,) the costs of the cheapest paths.
     """
 
@@ -120,7 +120,7 @@ class MinMarginals:
 
     @classmethod
     def of(cls, trellis: Trellis, ahead: Floats | None = None) -> MinMarginals:
-        """Go over the trellis forward and backward; `ahead`, where given, is the forward pass."""
+        """Run both passes; `ahead` is the forward pass, if known."""
         ahead = forward(trellis) if ahead is None else ahead
         return cls(ahead, backward(trellis), (ahead[-1] + trellis.sink).min(axis=1))
 
@@ -131,17 +131,17 @@ class MinMarginals:
 
 
 def best_paths(trellis: Trellis) -> Paths:
-    """Return the cheapest path of each object on its own."""
+    """Return the cheapest path of each object independently."""
     return trace_back(trellis, forward(trellis))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrunedStates:
-    """W slots for each object and frame, in the order of their states; empty slots are the last.
+    """The kept states in W slots per object and frame, in ascending order; empty slots are last.
 
     Attributes:
-        index: (n, M, W) the state in each slot; any in an empty one.
-        filled: (n, M, W) False where a slot is empty.
+        index: (n, M, W) the state in each slot; arbitrary in an empty one.
+        filled: (n, M, W) False in empty slots.
     """
 
     index: Ints
@@ -156,10 +156,10 @@ class PrunedStates:
         return cls(index, np.arange(width) < counts[:, :, None])
 
     @classmethod
-    def cheapest(cls, costs: Floats, most: int) -> PrunedStates:
-        """Keep the `most` states of an object and frame that cost least by `costs` (n, M, S)."""
-        if most < costs.shape[2]:
-            index = np.sort(np.argpartition(costs, most - 1, axis=2)[:, :, :most], axis=2)
+    def cheapest(cls, costs: Floats, count: int) -> PrunedStates:
+        """Keep the `count` cheapest states per object and frame by `costs` (n, M, S)."""
+        if count < costs.shape[2]:
+            index = np.sort(np.argpartition(costs, count - 1, axis=2)[:, :, :count], axis=2)
         else:
             index = np.broadcast_to(np.arange(costs.shape[2]), costs.shape)
         return cls(index, np.ones(index.shape, dtype=np.bool_))
@@ -180,7 +180,7 @@ class PrunedStates:
         return np.asarray(values[sets[:, None, None, None], step, origin, target])
 
     def trellis(self, trellis: Trellis) -> Trellis:
-        """Return the trellis of the states kept."""
+        """Return the trellis of the kept states."""
         each = np.arange(len(self.index))[:, None]
         return Trellis(
             trellis.source[each, self.index[:, 0]],
@@ -195,7 +195,7 @@ class PrunedStates:
 
 
 class PathPricer:
-    """Answers for one trellis under many node costs.
+    """Cheapest paths of one trellis for changing node costs, computed only where costs changed.
 
     Attributes:
         trellis: the trellis without prices.
@@ -216,7 +216,7 @@ class PathPricer:
         if len(touched):
             self._node[touched] = node[touched]
             trellis = self.trellis.with_node(node).select(touched)
-            # Up to the first frame with a price the ways are those without prices.
+            # Before the first frame with a price the forward pass is that without prices.
             priced = (trellis.node != self.trellis.node[touched]).any(axis=(0, 2))
             first = int(priced.argmax()) if priced.any() else len(priced)
             paths = trace_back(trellis, forward(trellis, self.forward[:first, touched]))

@@ -1,4 +1,4 @@
-"""What the answer of one window tells about the next one, most of whose frames are the same."""
+"""Warm start: the solution of one window as a guess for the next one, which shares most of its frames."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 UNKNOWN_STATE = -2
-"""The state of an object of which the hint does not know where it is."""
+"""The state of an object that the warm start does not know."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConflictPrice:
-    """A conflict row that binds: at most one object in `places` of `frame`, and what that costs."""
+    """A binding conflict row: at most one object in `places` of `frame`, and its price."""
 
     frame: int
     places: tuple[int, ...]
@@ -23,39 +23,39 @@ class ConflictPrice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WarmStart:
-    """A guess at an answer, right or wrong: a solver that is told reaches the same optimum, only sooner.
+    """A guess at a solution. Right or wrong, the solver finds the same optimum; a good guess makes it faster.
 
     Attributes:
-        rows: conflict rows thought to bind.
-        states: (n, F) where each object is thought to be in the first F frames: the index of its
-            observation, -1 where occluded, `UNKNOWN_STATE`.
+        rows: conflict rows expected to bind.
+        states: (n, F) expected states in the first F frames: the index of the observation, -1 if occluded, or
+            `UNKNOWN_STATE`.
     """
 
     rows: tuple[ConflictPrice, ...]
     states: NDArray[np.int64]
 
     def shift(self, frames: int, objects: Sequence[int | None]) -> WarmStart:
-        """Return the hint for a window that begins `frames` later.
+        """Return the warm start for a window that begins `frames` later.
 
-        `objects` says for each object of that window which it was in this one; None: it was not.
-        Observations must be numbered as they were.
+        `objects` maps each object of that window to its index in this one, None if it is new. The order of
+        the observations must be the same.
         """
         states = np.full((len(objects), max(self.states.shape[1] - frames, 0)), UNKNOWN_STATE, dtype=np.int64)
-        for n, was in enumerate(objects):
-            if was is not None:
-                states[n] = self.states[was, frames:]
+        for n, index in enumerate(objects):
+            if index is not None:
+                states[n] = self.states[index, frames:]
         rows = (replace(row, frame=row.frame - frames) for row in self.rows if row.frame >= frames)
         return WarmStart(tuple(rows), states)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindowWarmStart:
-    """The answer of a window.
+    """A window's solution as a warm start, with its frame and object ids.
 
     Attributes:
         first: the window's first frame.
-        ids: the numbers of its objects, in the order of the warm_start.
-        warm_start: the answer.
+        ids: the ids of its objects, in the order of the warm start.
+        warm_start: the warm start.
     """
 
     first: int
@@ -63,6 +63,6 @@ class WindowWarmStart:
     warm_start: WarmStart
 
     def for_window(self, first: int, ids: Sequence[int]) -> WarmStart:
-        """Return the hint for a window of the objects `ids` that begins with the frame `first`."""
+        """Return the warm start for a window of the objects `ids` that begins with the frame `first`."""
         rows = {number: n for n, number in enumerate(self.ids)}
         return self.warm_start.shift(first - self.first, [rows.get(number) for number in ids])

@@ -65,7 +65,7 @@ class TemporalWindow:
     def __init__(
         self, settings: TemporalSettings, size: tuple[int, int], meter: float, frame_s: float
     ) -> None:
-        """Set up for images of `size` (width, height), `meter` pixels per meter, `frame_s` seconds per frame."""
+        """Set up for images of `size` (width, height), with `meter` in pixels and frames of `frame_s`."""
         self._settings, self._size, self._meter, self._frame_s = settings, size, meter, frame_s
         self.people: list[TrackedPerson] = []
         self.decided: Stage | None = None

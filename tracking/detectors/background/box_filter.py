@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.background.height_model import HeightModel
-from tracking.detectors.background.scan_plan import STEPS_A_HEIGHT, HeightPlan, plan_height
+from tracking.detectors.background.scan_plan import STEPS_PER_HEIGHT, HeightPlan, plan_height
 from tracking.detectors.background.silhouette import (
     BODY_PARTS,
     Body,
@@ -22,15 +22,15 @@ from tracking.detectors.base import Plane
 
 @dataclass(frozen=True, slots=True)
 class BoxFilterSettings:
-    """The scan for standing people."""
+    """Settings of the scan for standing people."""
 
-    body: Body = "person"  # person: head, trunk and legs inside the box; box: all of it (the paper)
+    body: Body = "person"  # person: head, trunk and legs inside the box; box: the whole box (the paper)
     aspect_ratio: float = 0.38  # width of a person's box over its height
     min_height: float = 0.14  # smallest person, in image heights; see also height_model
     max_height: float = 0.95  # tallest person, in image heights
-    height_step: float = 1.08  # each height of the scan is this factor above the one before
-    background_cost: float = 0.35  # what a background pixel inside the body costs, a foreground one brings 1
-    min_gain: float = 0.3  # least gain of a box, in areas of its body
+    height_step: float = 1.08  # factor between successive heights of the scan
+    background_cost: float = 0.35  # cost of a background pixel inside the body; a foreground pixel gains 1
+    min_gain: float = 0.3  # least gain of a box, as a share of its body's area
     min_visible: float = 0.45  # least share of a box that is inside the image and not ignored
     max_peaks: int = 240  # local maxima kept for the foreground fit, best first
 
@@ -41,9 +41,9 @@ class ScanPeaks:
 
     Attributes:
         boxes: `(P, 4)` in cells.
-        gains: `(P,)`, what the cells of the body add up to.
-        areas: `(P,)`, how many cells of the body count, at least 1.
-        priors: `(P,)`, the factor by which the height lessens a gain, 1 where it is the expected one.
+        gains: `(P,)`, the sum over the cells of the body.
+        areas: `(P,)`, the number of visible cells of the body, at least 1.
+        priors: `(P,)`, the factor on the gain for the height, 1 at the expected height.
         parts: the bodies' parts.
     """
 
@@ -59,37 +59,37 @@ class HeightRange:
     """Range of possible heights around the height model, in cells."""
 
     model: HeightModel
-    tolerance: float  # share by which a height may differ from the line
-    tolerance_std: float  # standard deviations of the line by which it may differ besides
-    min_height: float  # smallest person, in picture heights
+    tolerance: float  # share by which a height may differ from the model
+    tolerance_std: float  # standard deviations of the model allowed in addition
+    min_height: float  # smallest person, in image heights
 
     def priors(self, feet: Floats, height: float | Floats) -> Floats:
         """Return the factor on the gain at each foot row: 1 at the expected height, 0 where impossible.
 
-        A height at the edge of what is possible counts for `1 - _EDGE` of one on the line.
+        It falls to `1 - _EDGE` at the edge of the possible range.
         """
         expected = self.model.expected_height(feet)
         allowed = np.maximum(
             self.tolerance * expected + self.tolerance_std * self.model.standard_deviation(feet), 1.0
         )
-        away = np.abs(height - expected) / allowed
-        return np.where((away <= 1.0) & (expected > 0.0), 1.0 - _EDGE * away**2, 0.0)
+        deviation = np.abs(height - expected) / allowed
+        return np.where((deviation <= 1.0) & (expected > 0.0), 1.0 - _EDGE * deviation**2, 0.0)
 
 
-# Share of its gain that a height at the edge of the range loses.
+# Share of the gain lost at the edge of the height range.
 _EDGE = 0.3
-# Where a box is looked for around a place of the scan, in steps; first where it is.
+# Offsets tried around a scan position, in steps; the first is the position itself.
 _OFFSETS = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtype=np.float64)
 
 
 class BoxFilter:
     """Scans planes of one size for the positions and heights of bodies with the largest gain.
 
-    A cell in a body adds its gain; the sum is lessened by the prior of the body's height at its foot.
+    The gain of a body is the sum over its cells, times the prior of its height at its foot row.
     """
 
     def __init__(self, weight: Plane, rows: int, settings: BoxFilterSettings) -> None:
-        """Prepare for planes like `weight` `(H, W)`, 1 where the picture counts, itself `rows` cells high."""
+        """Prepare for planes like `weight` `(H, W)`, 1 in visible cells; the image has `rows` rows."""
         self._settings = settings
         self._parts = BODY_PARTS[settings.body]
         self._weights = integral_image(weight)
@@ -102,14 +102,14 @@ class BoxFilter:
         """Scan all positions and heights; return the local maxima, best first.
 
         Args:
-            gain: `(H, W)`, what each cell adds to a body that covers it.
+            gain: `(H, W)`, the gain of each cell of a covering body.
             height_range: the possible heights by foot row; None: all.
         """
         if self._plans is None or height_range is not self._range:
             self._range, self._plans = height_range, self._plan_heights(height_range)
         sums = integral_image(gain)
         found = [plan.peaks(sums) for plan in self._plans]
-        boxes = np.concatenate([np.empty((0, 4)), *(places for places, _ in found)])
+        boxes = np.concatenate([np.empty((0, 4)), *(positions for positions, _ in found)])
         gains = np.concatenate([np.empty(0), *(values for _, values in found)])
         order = _best_first(boxes, gains)[: self._settings.max_peaks]
         return self._refine(boxes[order], sums)
@@ -117,10 +117,10 @@ class BoxFilter:
     def _plan_heights(self, height_range: HeightRange | None) -> list[HeightPlan]:
         feet = np.arange(self._shape[0] + 1, dtype=np.float64)
         plans: list[HeightPlan] = []
-        least = self._settings.min_height * self._rows
+        smallest = self._settings.min_height * self._rows
         if height_range is not None:
-            least = min(least, max(height_range.min_height * self._rows, height_range.model.min_height))
-        for height in scan_heights(self._rows, least, self._settings).astype(np.int64).tolist():
+            smallest = min(smallest, max(height_range.min_height * self._rows, height_range.model.min_height))
+        for height in scan_heights(self._rows, smallest, self._settings).astype(np.int64).tolist():
             size = max(round(self._settings.aspect_ratio * height), 2), height
             priors = np.ones(len(feet)) if height_range is None else height_range.priors(feet, float(height))
             plan = plan_height(self._shape, size, self._parts, priors, self._settings.min_gain)
@@ -129,18 +129,18 @@ class BoxFilter:
         return plans
 
     def _refine(self, boxes: Floats, sums: Floats) -> ScanPeaks:
-        """Move each box to the best place between those of the scan, by half a step and half again."""
-        step = np.maximum((boxes[:, 3] - boxes[:, 1]) // STEPS_A_HEIGHT, 1.0)
+        """Move each box to the best position between the scan's, halving the step each time."""
+        step = np.maximum((boxes[:, 3] - boxes[:, 1]) // STEPS_PER_HEIGHT, 1.0)
         while (step := step // 2).any():
             moved = boxes[:, None] + step[:, None, None] * _OFFSETS
             gains, priors, _ = self._measure(moved.reshape(-1, 4), sums)
             best = np.argmax((gains * priors).reshape(len(boxes), len(_OFFSETS)), axis=1)
             boxes = moved[np.arange(len(boxes)), best]
         gains, priors, corners = self._measure(boxes, sums)
-        whole = part_rectangles(boxes, BODY_PARTS["box"], self._shape).sums(self._weights)
+        visible = part_rectangles(boxes, BODY_PARTS["box"], self._shape).sums(self._weights)
         extent = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
         order = _best_first(boxes, gains * priors)
-        order = order[(whole >= self._settings.min_visible * extent)[order]]
+        order = order[(visible >= self._settings.min_visible * extent)[order]]
         sizes = np.maximum(corners.sums(self._weights), 1.0)
         return ScanPeaks(boxes[order], gains[order], sizes[order], priors[order], corners.select(order))
 
@@ -154,12 +154,12 @@ class BoxFilter:
 
 
 def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:
-    """Order by gain; equal ones by place, so that the order never depends on the sort."""
+    """Order by gain, then by position, so that the order is well defined."""
     return np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))
 
 
-def scan_heights(rows: int, least: float, settings: BoxFilterSettings) -> Floats:
-    """Return the heights to scan, in cells, `(S,)`, ascending, from `least` on."""
-    most = settings.max_height * rows
-    steps = int(np.floor(np.log(most / least) / np.log(settings.height_step))) + 1
-    return np.unique(np.rint(least * settings.height_step ** np.arange(steps)))
+def scan_heights(rows: int, smallest: float, settings: BoxFilterSettings) -> Floats:
+    """Return the heights to scan, in cells, `(S,)`, ascending, from `smallest` on."""
+    largest = settings.max_height * rows
+    steps = int(np.floor(np.log(largest / smallest) / np.log(settings.height_step))) + 1
+    return np.unique(np.rint(smallest * settings.height_step ** np.arange(steps)))

@@ -13,12 +13,12 @@ from tracking.detectors.ignore_mask import Polygon, visible_mask
 
 
 class CellGrid:
-    """Sizes and conversions of one camera's pictures.
+    """Sizes and coordinate conversions of one camera's images.
 
     Attributes:
-        margin: cells added on every side, so that boxes may reach out of the picture.
-        visible: `(h, w)` of the working picture, 0 where it is ignored.
-        weight: `(H, W)` of cells with margin, 1 where the picture counts.
+        margin: cells added on every side, so that boxes may extend beyond the image.
+        visible: `(h, w)` of the working image, 0 where it is ignored.
+        weight: `(H, W)` in cells with margin, 1 where the image is visible.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class CellGrid:
         return np.pad(shares, self.margin)
 
     def cells_to_work(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Turn boxes in cells into boxes in pixels of the working picture, cut at its borders."""
+        """Convert boxes from cells to pixels of the working image, clipped to it."""
         height, width = self._work
         per_cell = np.array([width / (width // self._cell), height / (height // self._cell)] * 2)
         limits = np.array([width, height, width, height], dtype=np.float64)
@@ -55,15 +55,15 @@ class CellGrid:
 
     @property
     def rows(self) -> int:
-        """The height of the working picture."""
+        """The height of the working image."""
         return self._work[0]
 
     @property
     def scale(self) -> float:
-        """How many times as large as the camera's the working picture is."""
+        """Size of the working image over that of the camera's image."""
         return self._work[0] / self._size[0]
 
     def work_to_image(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Turn boxes in pixels of the working picture into boxes in pixels of the camera's picture."""
+        """Convert boxes from pixels of the working image to pixels of the camera's image."""
         per_pixel = np.array([self._size[1] / self._work[1], self._size[0] / self._work[0]] * 2)
         return np.asarray(boxes * per_pixel)

@@ -8,26 +8,26 @@ import numpy.typing as npt
 
 from tracking.detectors.base import Image
 
-# Every eighth row and column is plenty for a median and costs a fiftieth of a millisecond.
+# Every eighth row and column is enough for a median.
 _STEP = 8
-# Dark pixels give noisy ratios and bright ones may be clipped.
-_DARKEST = 24
-_BRIGHTEST = 240
-_LEAST_PIXELS = 30
+# The ratios of dark pixels are noisy, and bright pixels may be clipped.
+_MIN_LEVEL = 24
+_MAX_LEVEL = 240
+_MIN_PIXELS = 30
 
 
 def channel_gains(image: Image, reference: Image) -> npt.NDArray[np.float64]:
     """Return the gain of the image over the reference per channel, `(3,)`.
 
-    The median over the picture of the ratio: people who cover less than half of it do not move it.
+    The median over the image of the ratio, which is robust to people who cover less than half of it.
     """
     gains = np.ones(3)
     for channel in range(3):
         new = image[::_STEP, ::_STEP, channel].ravel()
         old = reference[::_STEP, ::_STEP, channel].ravel()
-        fit = (old >= _DARKEST) & (old <= _BRIGHTEST) & (new >= _DARKEST // 2) & (new <= _BRIGHTEST)
-        if np.count_nonzero(fit) >= _LEAST_PIXELS:
-            gains[channel] = np.median(new[fit].astype(np.float64) / old[fit])
+        usable = (old >= _MIN_LEVEL) & (old <= _MAX_LEVEL) & (new >= _MIN_LEVEL // 2) & (new <= _MAX_LEVEL)
+        if np.count_nonzero(usable) >= _MIN_PIXELS:
+            gains[channel] = np.median(new[usable].astype(np.float64) / old[usable])
     return gains
 
 

@@ -33,7 +33,7 @@ from tracking.detectors.base import Image, Mask, require_at_least_one, validate_
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
 from tracking.types import Detections
 
-# Pixels of the working picture per cell of the box filter, on each axis.
+# Pixels of the working image per cell of the box filter, on each axis.
 CELL = 2
 
 
@@ -42,16 +42,14 @@ class BackgroundSettings:
     """The background-subtraction detector of paper IV.A.2.
 
     Raises:
-        ValueError: nothing to look at ahead, no picture to work on, or so many bins do not fit.
+        ValueError: a setting is out of range.
     """
 
     model: Literal["median", "mog2"] = "median"  # how the background is learned
-    work_width: int = 360  # pixels; wider pictures are made smaller first
+    work_width: int = 360  # pixels; wider images are resized first
     gray_bins: int = 64  # bins of the gray histograms, 1 to 256
-    prescan_frames: int = (
-        500  # frames of a recording scanned before the first is searched; 0: none, as if live
-    )
-    prescan_every: int = 20  # of these, one in so many is used
+    prescan_frames: int = 500  # frames of a recording scanned before the first is searched; 0: none
+    prescan_every: int = 20  # every n-th of these frames is used
     ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
     border_margin: float = 0.25  # share of the image height by which people may extend beyond the image
     appearance: AppearanceSettings = field(default_factory=AppearanceSettings)
@@ -74,7 +72,7 @@ class BackgroundSettings:
 def paper_settings(settings: BackgroundSettings) -> BackgroundSettings:
     """Return the settings of the paper's detector (IV.A.2): all extensions off.
 
-    What is left are full boxes over place and height, each by itself, and gray histograms.
+    This leaves independent full boxes over position and height, and gray histograms.
     """
     return replace(
         settings,
@@ -87,7 +85,7 @@ def paper_settings(settings: BackgroundSettings) -> BackgroundSettings:
 
 
 _SPAN = 0.5
-"""Of a person's height, about what they are wide and deep from above."""
+"""Extent of a person seen from above, as a share of their height."""
 
 
 S = TypeVar("S", bound=BackgroundSettings)
@@ -96,7 +94,7 @@ S = TypeVar("S", bound=BackgroundSettings)
 def overhead_settings(settings: S) -> S:
     """Return the settings for a camera that looks straight down: square boxes and no height model.
 
-    Their least size is half of what they are tall where they stand upright.
+    The smallest box has half of the height of an upright person.
     """
     boxes = replace(
         settings.box_filter, body="box", aspect_ratio=1.0, min_height=_SPAN * settings.box_filter.min_height
@@ -105,7 +103,7 @@ def overhead_settings(settings: S) -> S:
 
 
 PAPER_DETECTOR = paper_settings(BackgroundSettings())
-"""The paper's box filters, as `PAPER_COSTS` are its costs."""
+"""The paper's box filters, like `PAPER_COSTS` its costs."""
 
 
 class _Background(Protocol):
@@ -120,7 +118,7 @@ class BackgroundDetector:
     def __init__(
         self, settings: BackgroundSettings | None = None, floor: FloorGeometry | None = None
     ) -> None:
-        """Start without a background; `floor` is the calibrated floor geometry, where known."""
+        """Start without a background; `floor` is the calibrated floor geometry, if known."""
         self.settings = settings or BackgroundSettings()
         self._appearance = AppearanceExtractor(self.settings.appearance, self.settings.gray_bins)
         self._floor = floor
@@ -136,17 +134,17 @@ class BackgroundDetector:
         self._height_model: HeightModel | None = None
         self._height_range: HeightRange | None = None
         self.warming_up = True
-        """Whether the last frame could not be searched, since the background was not known."""
+        """Whether the last frame could not be searched because the background was unknown."""
 
     def prepare(self, images: Iterable[Image], every: int) -> None:
         """Learn the background and the height model from a recording before its first frame.
 
         Args:
-            images: people may come and go in them; they are taken one by one, and kept small.
-            every: how many frames each of them stands for.
+            images: images of the recording, people included; they are consumed one by one.
+            every: frames of the recording per image.
 
         Raises:
-            ValueError: not `(H, W, 3)` uint8 pictures of one size.
+            ValueError: not `(H, W, 3)` uint8 images of one size.
         """
         background = self._background
         if not isinstance(background, MedianBackground):
@@ -154,27 +152,27 @@ class BackgroundDetector:
         small = [self._grid_for(image).resize(image) for image in images]
         background.prepare(small)
         for image in small:
-            split = background.segment_still(image)
-            if split is not None and self._grid is not None:
+            segmentation = background.segment_still(image)
+            if segmentation is not None and self._grid is not None:
                 self._height_estimator.observe(
-                    _clean_mask(split.foreground & self._grid.visible), self._grid.visible, every
+                    _clean_mask(segmentation.foreground & self._grid.visible), self._grid.visible, every
                 )
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
-        """Return the detections of the next frame; none while the background is not known yet.
+        """Return the detections of the next frame; none while the background is unknown.
 
         Raises:
-            ValueError: not an `(H, W, 3)` uint8 picture, or another size than before.
+            ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
         grid = self._grid_for(image)
         small = grid.resize(image)
-        split = self._background.segment(small)
-        self.warming_up = split is None
-        if split is None:
+        segmentation = self._background.segment(small)
+        self.warming_up = segmentation is None
+        if segmentation is None:
             return Detections.empty(self.bins)
-        mask = _clean_mask(split.foreground & grid.visible)
+        mask = _clean_mask(segmentation.foreground & grid.visible)
         self._height_estimator.observe(mask, grid.visible)
-        found = self._fit(mask, split.shadow & grid.visible & ~mask, grid)
+        found = self._fit(mask, segmentation.shadow & grid.visible & ~mask, grid)
         boxes = grid.cells_to_work(found.boxes)
         self._background.learn(mask, _occupied_mask(boxes[: found.people], mask.shape))
         return Detections(
@@ -188,7 +186,7 @@ class BackgroundDetector:
 
     @property
     def height_model(self) -> HeightModel | None:
-        """How tall people are where, in pixels of the working picture; None: not known yet."""
+        """Expected box height by foot row, in pixels of the working image; None: not known yet."""
         return self._height_estimator.model
 
     def _fit(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
@@ -201,8 +199,8 @@ class BackgroundDetector:
         peaks = self._filter.peaks(foreground - cost, self._heights(grid))
         fit_settings = settings.foreground_fit
         if not self._height_estimator.is_reliable:
-            fewer = min(fit_settings.max_people, fit_settings.max_people_uncalibrated)
-            fit_settings = replace(fit_settings, max_people=fewer)
+            limit = min(fit_settings.max_people, fit_settings.max_people_uncalibrated)
+            fit_settings = replace(fit_settings, max_people=limit)
         found = fit_foreground(peaks, foreground, cost, grid.weight, fit_settings)
         return ForegroundFit(
             shrink_to_foreground(found.boxes, foreground, grid.weight), found.scores, found.people
@@ -210,16 +208,16 @@ class BackgroundDetector:
 
     def _heights(self, grid: CellGrid) -> HeightRange | None:
         """Return the possible heights in cells; the same object while the model is unchanged."""
-        line, heights = self._height_estimator.model, self.settings.height_model
-        if line is not self._height_model:
-            self._height_model = line
+        model, settings = self._height_estimator.model, self.settings.height_model
+        if model is not self._height_model:
+            self._height_model = model
             self._height_range = None
-            if line is not None:
+            if model is not None:
                 self._height_range = HeightRange(
-                    line.in_cells(CELL, grid.margin),
-                    heights.tolerance,
-                    heights.tolerance_std,
-                    heights.min_height,
+                    model.in_cells(CELL, grid.margin),
+                    settings.tolerance,
+                    settings.tolerance_std,
+                    settings.min_height,
                 )
         return self._height_range
 
@@ -244,10 +242,10 @@ class BackgroundDetector:
         return self._grid
 
 
-# Closing joins a head to its shoulders where the hair looks like the wall behind.
+# Closing connects a head to its shoulders if the hair has the background's color.
 _CLOSE = np.ones((5, 3), dtype=np.uint8)
-# Around a person nothing is learned either: shadows of feet, hands, and the box may be a little off.
-_AROUND = 0.15
+# Margin around a box, in its sides, where the background is not updated: shadows, hands, inexact boxes.
+_OCCUPIED_MARGIN = 0.15
 
 
 def _clean_mask(mask: Mask) -> Mask:
@@ -256,10 +254,10 @@ def _clean_mask(mask: Mask) -> Mask:
 
 
 def _occupied_mask(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
-    """Return a mask of `shape` that is 255 inside the boxes."""
+    """Return a mask of `shape` that is 255 in and around the boxes."""
     occupied = np.zeros(shape, dtype=np.uint8)
     for left, top, right, bottom in boxes:
-        x, y = _AROUND * (right - left), _AROUND * (bottom - top)
+        x, y = _OCCUPIED_MARGIN * (right - left), _OCCUPIED_MARGIN * (bottom - top)
         rows = slice(max(int(top - y), 0), int(bottom + y) + 1)
         occupied[rows, max(int(left - x), 0) : int(right + x) + 1] = 255
     return occupied

@@ -17,12 +17,12 @@ from tracking.detectors.base import Plane
 class ForegroundFitSettings:
     """Which hypotheses of a frame become detections."""
 
-    enabled: bool = True  # false: all boxes of the scan, each by itself (the paper)
-    max_people: int = 40  # people selected per frame at most
-    max_people_uncalibrated: int = 10  # the same while the height model is unreliable
-    min_gain: float = 0.3  # least gain of a further person, in visible body areas
-    max_hypotheses: int = 16  # K: detections per frame, people and alternatives, where people are few
-    max_alternatives: int = 8  # alternatives beside the people, however many these are
+    enabled: bool = True  # false: all boxes of the scan, independently (the paper)
+    max_people: int = 40  # most people selected per frame
+    max_people_uncalibrated: int = 10  # the same while the height model is not reliable
+    min_gain: float = 0.3  # least gain of a person, as a share of the visible body area
+    max_hypotheses: int = 16  # K: detections per frame, people and alternatives, if people are few
+    max_alternatives: int = 8  # most alternatives if people are many
     max_iou: float = 0.55  # largest overlap (IoU) of an alternative with another detection
 
 
@@ -30,7 +30,7 @@ class ForegroundFitSettings:
 class ForegroundFit:
     """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `people` explain the foreground.
 
-    Where nothing was explained, all of them may be people, and `people` is at least as many as there are.
+    Without a fit any of them may be a person, and `people` is at least K.
     """
 
     boxes: npt.NDArray[np.float64]
@@ -43,17 +43,17 @@ def fit_foreground(
 ) -> ForegroundFit:
     """Select people whose bodies explain the foreground, refine each, then add alternatives.
 
-    The gain of a body is the foreground inside that nobody explains yet, less the background inside (a
-    linear form of the log-likelihood `P(foreground) = 1 - (1 - e) prod (1 - t_k)`). The score of a
-    person is that gain, beside all the others, over the part of the body that none of them covers; of a
-    runner-up, what the people leave to it, so that a second box on the same person scores near 0.
+    The gain of a body is the foreground inside that no selected body covers, minus the background inside (a
+    linear form of the log-likelihood `P(foreground) = 1 - (1 - e) prod (1 - t_k)`). The score of a person is
+    this gain given all others, divided by the area of the body that they do not cover. The score of an
+    alternative is its gain given the selected people, so that a second box on a person scores near 0.
 
     Args:
         peaks: candidates, in cells.
         foreground: share of foreground per cell, `(H, W)`.
-        cost: what each cell costs a body that covers it for the background in it, `(H, W)`.
-        weight: 1 where the picture counts, `(H, W)`.
-        settings: how many.
+        cost: cost of the background in each cell to a covering body, `(H, W)`.
+        weight: 1 in visible cells, `(H, W)`.
+        settings: limits and thresholds.
     """
     search = GreedySearch(peaks, foreground, cost, weight, settings)
     chosen = search.select_people() if settings.enabled else []
@@ -70,11 +70,11 @@ def fit_foreground(
     return ForegroundFit(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), people)
 
 
-# How often each person is looked for again, given the others: the first choice was made without them.
+# Rounds in which each person is selected again given all others.
 _REFINEMENTS = 2
 
 
-# A body of which less is visible than this share counts as if so much were: a hand proves nobody.
+# Least visible share of a body used in its score: a visible hand is no evidence of a person.
 _MIN_VISIBLE = 0.6
 
 
@@ -82,8 +82,8 @@ class GreedySearch:
     """Greedy selection, then refinement of each selected candidate.
 
     Attributes:
-        gains: `(P,)`, what each candidate gains beside the chosen.
-        visible: `(P,)`, cells of it that none of them covers.
+        gains: `(P,)`, the gain of each candidate given the selected ones.
+        visible: `(P,)`, the cells of each that no selected one covers.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class GreedySearch:
         self._settings = settings
         self.gains = peaks.gains.copy()
         self.visible = peaks.areas.copy()
-        # What a covered cell no longer adds to the gain of the others, and to what is visible of them.
+        # What a cell adds to the gain and to the visible area of a body until another one covers it.
         self._cell_values = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
         self._cover_counts = np.zeros(weight.shape, dtype=np.int32)
         self._extent = peaks.parts.extent
@@ -112,8 +112,8 @@ class GreedySearch:
             for index in before:
                 self.remove(index)
                 best = self._best([other for other in chosen if other != index])
-                place = chosen.index(index)
-                chosen[place : place + 1] = [] if best is None else [best]
+                position = chosen.index(index)
+                chosen[position : position + 1] = [] if best is None else [best]
                 if best is not None:
                     self.add(best)
             if chosen == before:
@@ -121,34 +121,34 @@ class GreedySearch:
         return chosen
 
     def gain_per_area(self) -> npt.NDArray[np.float64]:
-        """Return each candidate's gain per visible body area beside the selected, `(P,)`."""
+        """Return each candidate's gain per visible body area given the selected, `(P,)`."""
         least = _MIN_VISIBLE * self._peaks.areas
         return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
 
     def add(self, index: int) -> None:
         """Add a candidate to the selected: it covers its cells."""
-        place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
-        self._update(place, inside & (self._cover_counts[place] == 0), -1.0)
-        self._cover_counts[place] += inside
+        bounds, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
+        self._update(bounds, inside & (self._cover_counts[bounds] == 0), -1.0)
+        self._cover_counts[bounds] += inside
 
     def remove(self, index: int) -> None:
         """Remove a candidate from the selected."""
-        place, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
-        self._cover_counts[place] -= inside
-        self._update(place, inside & (self._cover_counts[place] == 0), 1.0)
+        bounds, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
+        self._cover_counts[bounds] -= inside
+        self._update(bounds, inside & (self._cover_counts[bounds] == 0), 1.0)
 
-    def _update(self, place: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
+    def _update(self, bounds: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
         """Update gains and visible areas of the bodies that overlap the changed cells."""
-        lost = integral_image(self._cell_values[place] * cells[..., None].astype(np.float32))
-        (top, bottom), (left, right) = ((it.start, it.stop) for it in place)
+        changed = integral_image(self._cell_values[bounds] * cells[..., None].astype(np.float32))
+        (top, bottom), (left, right) = ((span.start, span.stop) for span in bounds)
         lefts, tops, rights, bottoms = self._extent
         near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
-        change = self._peaks.parts.select(near).clip_to(place).sums(lost)
+        change = self._peaks.parts.select(near).clip_to(bounds).sums(changed)
         self.gains[near] += sign * change[:, 0]
         self.visible[near] += sign * change[:, 1]
 
     def _best(self, chosen: list[int]) -> int | None:
-        """Return the candidate with the largest gain beside the selected; `None` where none gains enough."""
+        """Return the candidate with the largest gain given the selected, or `None` if none gains enough."""
         if not len(self.gains):
             return None
         shares = self.gain_per_area()
@@ -167,24 +167,23 @@ def _alternatives(
     overlaps = iou(boxes[:, None], boxes[None])
     nearest = overlaps[chosen].max(axis=0, initial=0.0)
     nearest[chosen] = np.inf
-    extra: list[int] = []
-    most = settings.max_hypotheses
+    alternatives: list[int] = []
+    limit = settings.max_hypotheses
     if settings.enabled:
-        most = max(most, len(chosen) + settings.max_alternatives)
+        limit = max(limit, len(chosen) + settings.max_alternatives)
     for index in range(len(boxes)):
-        if len(chosen) + len(extra) >= most:
+        if len(chosen) + len(alternatives) >= limit:
             break
         if nearest[index] < settings.max_iou:
-            extra.append(index)
+            alternatives.append(index)
             nearest = np.maximum(nearest, overlaps[index])
-    return extra
+    return alternatives
 
 
-# A box loses at most this share of its width or height on each side: in a group there is always
-# somebody's foreground at the border, and alone the scan is never that far off.
-_MOST_TRIM = 0.12
+# Largest share of its width or height that a box loses on each side: the scan is more accurate than that.
+_MAX_TRIM = 0.12
 # A row or column with less than this share of foreground is outside.
-_LEAST_FILL = 0.04
+_MIN_FILL = 0.04
 
 
 def shrink_to_foreground(
@@ -192,7 +191,7 @@ def shrink_to_foreground(
 ) -> npt.NDArray[np.float64]:
     """Move each side of each box `(K, 4)` in cells inwards to where the foreground begins.
 
-    Sides that lie in ignored cells (`weight` 0) stay.
+    Sides in ignored cells (`weight` 0) are not moved.
     """
     fitted = boxes.copy()
     filled = np.where(weight > 0, foreground, 1.0)
@@ -208,6 +207,6 @@ def shrink_to_foreground(
 
 def _trim(profile: npt.NDArray[np.float32]) -> int:
     """Return how many cells can be trimmed at the start of a profile."""
-    most = int(_MOST_TRIM * len(profile))
-    full = np.flatnonzero(profile[: most + 1] >= _LEAST_FILL)
-    return int(full[0]) if full.size else 0
+    limit = int(_MAX_TRIM * len(profile))
+    filled = np.flatnonzero(profile[: limit + 1] >= _MIN_FILL)
+    return int(filled[0]) if filled.size else 0

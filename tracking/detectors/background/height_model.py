@@ -1,10 +1,10 @@
 """Height model: on a flat floor a person's box height is linear in the foot's row.
 
 A pinhole camera `c` above a flat floor sees a person of height `p` as `h = p / c (y - horizon)` rows
-tall: one slope for the whole picture. So the slope is about known before anybody is seen (people are
-some 1.7 m, cameras hang at 1.5 to 6 m), and a few people who stand alone fix the rest. Where the floor was
-measured in meters there is a line before anybody is seen, and people in a crowd, of whom the foreground
-shows pieces and pairs, hardly lead it astray.
+tall: one slope for the whole image. The slope is roughly known in advance (people are about 1.7 m tall,
+cameras hang at 1.5 to 6 m), and a few isolated people determine the line. A floor calibrated in meters gives
+the line in advance; this prior is strong enough that fragments and pairs of people in a crowd barely change
+it.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ class HeightModelSettings:
     max_samples: int = 1000  # newest samples kept
     sample_every: int = 1  # frames between two samples
     prior_slope: float = 0.65  # person height over camera height: the slope without samples
-    prior_slope_std: float = 0.18  # standard deviation of that
-    min_height: float = 0.08  # smallest person, in image heights, once people as small were seen isolated
+    prior_slope_std: float = 0.18  # standard deviation of this slope
+    min_height: float = (
+        0.08  # smallest person, in image heights, once isolated people of that size were detected
+    )
     tolerance: float = 0.15  # share by which a box may be taller or smaller than the model
-    tolerance_std: float = 1.0  # standard deviations of the model allowed besides
+    tolerance_std: float = 1.0  # standard deviations of the model allowed in addition
     max_scatter: float = 0.13  # median deviation, in heights, above which there is no model (stairs)
 
 
@@ -40,9 +42,8 @@ class FloorGeometry:
     """What the floor calibration implies about people's heights.
 
     Attributes:
-        horizon: the row of the picture in which the floor ends: people there would be without height.
-        slope: rows of a person's height for each row that their feet are below; None: it was not measured in
-            meters.
+        horizon: the image row of the horizon, where the expected height is 0.
+        slope: rows of a person's height per row between foot and horizon; None: the floor is not metric.
     """
 
     horizon: float
@@ -57,8 +58,8 @@ class FloorGeometry:
 class HeightModel:
     """The expected box height `slope * y + offset` of a person whose foot is at row y.
 
-    Its standard deviation is `sqrt(spread^2 + (slope_spread (y - center))^2)`: the line is known best
-    where people were seen.
+    Its standard deviation is `sqrt(level_std^2 + (slope_std (y - center))^2)`, smallest where samples were
+    taken.
     """
 
     slope: float
@@ -67,7 +68,7 @@ class HeightModel:
     level_std: float = 0.0
     slope_std: float = 0.0
     min_height: float = 0.0
-    """Nobody much smaller was seen: far beyond the people seen, the line says nothing."""
+    """Smallest person expected: the model does not extrapolate far below the samples."""
 
     def expected_height(self, foot: Floats) -> Floats:
         """Return the expected heights at foot rows, in the unit of `foot`."""
@@ -92,7 +93,7 @@ class HeightModel:
 class HeightModelEstimator:
     """Estimates the height model online from isolated standing people.
 
-    Where people's heights follow from the floor there is a line from the beginning.
+    With a metric floor there is a model from the beginning.
     """
 
     def __init__(
@@ -114,60 +115,60 @@ class HeightModelEstimator:
     @property
     def is_reliable(self) -> bool:
         """Return whether the model is reliable: from a metric floor, or from enough samples."""
-        line = self.model
-        if line is None or self._prior.model is not None:
-            return line is not None
-        return line.level_std <= _RELIABLE * (line.slope * line.center + line.offset)
+        model = self.model
+        if model is None or self._prior.model is not None:
+            return model is not None
+        return model.level_std <= _RELIABLE * (model.slope * model.center + model.offset)
 
     def observe(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
         """Add the isolated people of one frame's foreground `(H, W)`; `visible` is 0 in ignored areas.
 
-        It stands for so many `frames` in a row.
+        `frames`: the number of consecutive frames that it represents.
         """
         self._frames += 1
         if not self._settings.enabled or self._frames % self._settings.sample_every:
             return
         people = find_isolated_people(foreground, visible)
         self._max_people = max(self._max_people, len(people))
-        worth = max(round(frames / _FRAMES), 1)
+        weight = max(round(frames / _FRAMES), 1)
         for person in self._novelty_filter.new_samples(people, frames * self._settings.sample_every):
-            self._samples.extend([(person.foot, person.height)] * worth)
-            self._sample_count += worth
-        # Refit when the samples have grown by a tenth: early often, later seldom.
+            self._samples.extend([(person.foot, person.height)] * weight)
+            self._sample_count += weight
+        # Refit when the number of samples has grown by a tenth.
         if len(self._samples) >= self._settings.min_samples and self._sample_count >= 1.1 * self._fitted_on:
             self._fitted_on = self._sample_count
             samples = np.asarray(self._samples, dtype=np.float64)
             self.model = fit_height_model(samples, self._settings, self._prior, self._max_people)
 
 
-# Who walks gives a sample in so many frames, and so many samples are worth one independent one.
+# Frames per sample of a walking person, and correlated samples that count as one independent sample.
 _FRAMES = 4
 _CORRELATED_SAMPLES = 6.0
-# Standard deviation of a sample, in heights: strides, what is missing of the outline.
+# Standard deviation of a sample, in heights: strides, missing parts of the outline.
 _NOISE = 0.06
-# Standard deviation of a person's own height, in heights: it is the same in all samples of theirs.
+# Standard deviation of people's stature, in heights: common to all samples of a person.
 _STATURE = 0.04
-# Deviation, in heights, from which a sample counts as no whole person, or two.
+# Deviation, in heights, of an outlier: part of a person, or two people.
 _OUTLIER = 0.16
 _ROUNDS = 5
-# People may be this much smaller than the low quantile of those that were seen alone.
+# The smallest person expected is this share of the low quantile of the samples.
 _MIN_HEIGHT_SHARE, _LOW_QUANTILE = 0.8, 0.05
 _SLOPES = np.linspace(-2.0, 2.0, 17)
-_SAMPLES_A_SLOPE = 40
-# Standard deviation of a measured line at the horizon, in picture heights: heights are no straight line
-# where a camera looks steeply down, and homographies not exact.
-_HORIZON = 0.02
-# Standard deviation of a line, in heights, up to which it is sure.
+_SAMPLES_PER_SLOPE = 40
+# Standard deviation of a calibrated model at the horizon, in image heights: heights are not linear if the
+# camera looks down steeply, and homographies are not exact.
+_HORIZON_ERROR = 0.02
+# Largest standard deviation of a reliable model, in heights.
 _RELIABLE = 0.06
-# Standard deviation of a measured slope, in slopes.
-_MEASURED = 0.06
+# Standard deviation of a calibrated slope, as a share of the slope.
+_SLOPE_ERROR = 0.06
 
 
 @dataclass(frozen=True, slots=True)
 class HeightPrior:
     """Prior knowledge of the height model.
 
-    The slope is `N(slope, slope_spread^2)`, and the line `N(0, spread^2)` at the horizon where there is one.
+    The slope is `N(slope, slope_std^2)`; at the horizon, if known, the height is `N(0, horizon_std^2)`.
     """
 
     slope: float
@@ -175,7 +176,7 @@ class HeightPrior:
     horizon: float | None = None
     horizon_std: float = 0.0
     model: HeightModel | None = None
-    """The line to go by while samples tell none."""
+    """The model used until samples determine one."""
 
 
 def height_prior(
@@ -184,60 +185,67 @@ def height_prior(
     """Return the prior of the height model in an image of `rows` rows."""
     if floor is None:
         return HeightPrior(settings.prior_slope, settings.prior_slope_std)
-    off = _HORIZON * rows
+    horizon_std = _HORIZON_ERROR * rows
     if floor.slope is None:
-        return HeightPrior(settings.prior_slope, settings.prior_slope_std, floor.horizon, off)
-    spread = _MEASURED * floor.slope
-    line = HeightModel(floor.slope, -floor.slope * floor.horizon, floor.horizon, off, spread)
-    return HeightPrior(floor.slope, spread, floor.horizon, off, line)
+        return HeightPrior(settings.prior_slope, settings.prior_slope_std, floor.horizon, horizon_std)
+    slope_std = _SLOPE_ERROR * floor.slope
+    model = HeightModel(floor.slope, -floor.slope * floor.horizon, floor.horizon, horizon_std, slope_std)
+    return HeightPrior(floor.slope, slope_std, floor.horizon, horizon_std, model)
 
 
 def fit_height_model(
     samples: Floats, settings: HeightModelSettings, prior: HeightPrior | None = None, people: int = 1
 ) -> HeightModel | None:
-    """Fit the model to samples `(N, 2)` of foot row and height; the prior's model where no line fits.
+    """Fit the model to samples `(N, 2)` of foot row and height; return the prior's model if no line fits.
 
-    They are of at least so many different `people`: all of them may be tall by a share that is found along
-    with the line, and leaves it the more in doubt the fewer they are.
+    The samples are of at least `people` different people, whose common deviation from the average stature is
+    estimated too: the fewer people, the larger the uncertainty of the line.
 
-    The most likely line under Tukey's biweight and the prior: the best of a grid of slopes first, so that
-    no share of wild samples below a half leads astray, then a few rounds of reweighted least squares.
+    The fit maximizes the posterior under Tukey's biweight: first over a grid of slopes, which is robust to
+    almost half of the samples being outliers, then by a few rounds of reweighted least squares.
     """
     prior = prior or height_prior(settings)
     foot, height = samples.T
     slope, offset = _best_of_grid(foot, height, prior)
     precision = np.diag([1e-9, prior.slope_std**-2, people / _STATURE**2])
-    center, taller = float(foot.mean()), 0.0
+    center, stature = float(foot.mean()), 0.0
     for _ in range(_ROUNDS):
         expected = slope * foot + offset
-        deviation = (height - (1.0 + taller) * expected) / height
+        deviation = (height - (1.0 + stature) * expected) / height
         weight = np.maximum(1.0 - (deviation / _OUTLIER) ** 2, 0.0) ** 2
         if not weight.any():
             return prior.model
         center = float(np.average(foot, weights=weight))
         weight = weight / (_CORRELATED_SAMPLES * (_NOISE * height) ** 2)
         terms = np.stack([np.ones_like(foot), foot - center, expected])
-        evidence = (terms * weight) @ terms.T + precision
-        pull = (terms * weight) @ height + precision @ [0.0, prior.slope, 0.0]
+        information = (terms * weight) @ terms.T + precision
+        moment = (terms * weight) @ height + precision @ [0.0, prior.slope, 0.0]
         if prior.horizon is not None:
-            there = np.array([1.0, prior.horizon - center, 0.0])
-            evidence += np.outer(there, there) / prior.horizon_std**2
-        level, slope, taller = (float(value) for value in np.linalg.solve(evidence, pull))
+            horizon_terms = np.array([1.0, prior.horizon - center, 0.0])
+            information += np.outer(horizon_terms, horizon_terms) / prior.horizon_std**2
+        level, slope, stature = (float(value) for value in np.linalg.solve(information, moment))
         offset = level - slope * center
-    seen = (1.0 + taller) * (slope * foot + offset)
-    scatter = _median(np.abs(height - seen) / height, _sample_weights(height))
-    # Upright cameras see people grow towards the bottom of the picture; anything else is a misfit.
+    fitted = (1.0 + stature) * (slope * foot + offset)
+    scatter = _median(np.abs(height - fitted) / height, _sample_weights(height))
+    # In an upright image people are taller towards the bottom; anything else is a misfit.
     if slope <= 0.0 or scatter > settings.max_scatter:
         return prior.model
-    (level, mixed), (_, steep) = np.linalg.inv(evidence)[:2, :2]
+    (level_variance, covariance), (_, slope_variance) = np.linalg.inv(information)[:2, :2]
     smallest = _MIN_HEIGHT_SHARE * float(np.quantile(height[weight > 0.0], _LOW_QUANTILE))
-    # Level and slope are uncorrelated, and the line known best, a little off the mean of the feet.
-    spread = float(np.sqrt(max(level - mixed**2 / steep, 0.0)))
-    return HeightModel(slope, offset, center - float(mixed / steep), spread, float(np.sqrt(steep)), smallest)
+    # Move the center to where level and slope are uncorrelated.
+    level_std = float(np.sqrt(max(level_variance - covariance**2 / slope_variance, 0.0)))
+    return HeightModel(
+        slope,
+        offset,
+        center - float(covariance / slope_variance),
+        level_std,
+        float(np.sqrt(slope_variance)),
+        smallest,
+    )
 
 
 def _sample_weights(height: Floats) -> Floats:
-    """Return the weight of each sample, 1 on average: tall ones more, since parts of people are small."""
+    """Return the weight of each sample, 1 on average: more for tall ones, since fragments are short."""
     return np.asarray(height / height.mean())
 
 
@@ -251,7 +259,7 @@ def _median(values: Floats, weights: Floats) -> float:
 def _best_of_grid(foot: Floats, height: Floats, prior: HeightPrior) -> tuple[float, float]:
     """Return slope and offset of the grid's best line through a sample or the horizon."""
     slopes = prior.slope + prior.slope_std * _SLOPES
-    through = np.linspace(0, len(foot) - 1, min(len(foot), _SAMPLES_A_SLOPE)).astype(np.int64)
+    through = np.linspace(0, len(foot) - 1, min(len(foot), _SAMPLES_PER_SLOPE)).astype(np.int64)
     offsets = height[through] - slopes[:, None] * foot[through]
     if prior.horizon is not None:
         offsets = np.concatenate([offsets, -slopes[:, None] * prior.horizon], axis=1)

@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from tracking.detectors.base import Mask
 
-# What an isolated person's blob looks like: width over height, filled share of its box, least height
-# in picture heights, and the margin in pixels to the border and to what is ignored.
-_THINNEST, _WIDEST = 0.2, 0.55
-_LEAST_FILL = 0.4
-_LEAST_HEIGHT = 0.08
+# An isolated person's blob: width over height, filled share of its box, least height in image heights, and
+# the margin in pixels to the border and to ignored areas.
+_MIN_ASPECT, _MAX_ASPECT = 0.2, 0.55
+_MIN_FILL = 0.4
+_MIN_HEIGHT = 0.08
 _MARGIN = 3
 _MERGED_AREA = 0.05
 
@@ -25,7 +25,7 @@ _MERGED_AREA = 0.05
 class IsolatedPerson:
     """An isolated standing person, in pixels: center column, foot row and height."""
 
-    middle: float
+    center: float
     foot: float
     height: float
 
@@ -33,15 +33,15 @@ class IsolatedPerson:
 def find_isolated_people(foreground: Mask, visible: Mask) -> list[IsolatedPerson]:
     """Return every foreground blob that looks like one whole isolated standing person."""
     rows, columns = foreground.shape
-    # Outlines instead of labeled pixels: a twentieth of the time.
+    # Outlines are much faster than labeled pixels.
     outlines, _ = cv2.findContours(foreground, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     blobs = np.array([_blob(np.asarray(outline)) for outline in outlines], dtype=np.int64).reshape(-1, 5)
     found: list[IsolatedPerson] = []
     for label, (left, top, width, height, area) in enumerate(blobs.tolist()):
-        upright = _THINNEST * height <= width <= _WIDEST * height and area >= _LEAST_FILL * width * height
+        upright = _MIN_ASPECT * height <= width <= _MAX_ASPECT * height and area >= _MIN_FILL * width * height
         inside = left >= _MARGIN and left + width <= columns - _MARGIN
         inside = inside and top >= _MARGIN and top + height <= rows - _MARGIN
-        if not (upright and inside and height >= _LEAST_HEIGHT * rows):
+        if not (upright and inside and height >= _MIN_HEIGHT * rows):
             continue
         around = visible[top - _MARGIN : top + height + _MARGIN, left - _MARGIN : left + width + _MARGIN]
         if around.all() and not _has_neighbor(blobs, label):
@@ -51,7 +51,7 @@ def find_isolated_people(foreground: Mask, visible: Mask) -> list[IsolatedPerson
 
 def _blob(outline: npt.NDArray[Any]) -> tuple[int, ...]:
     """Return left, top, width, height and area of an outline, holes included."""
-    around = cv2.arcLength(outline, True) / 2.0  # noqa: FBT003 — closed; half a pixel all around
+    around = cv2.arcLength(outline, True) / 2.0  # noqa: FBT003 — closed; adds half a pixel around the outline
     return (*cv2.boundingRect(outline), round(cv2.contourArea(outline) + around) + 1)
 
 
@@ -66,32 +66,32 @@ def _has_neighbor(blobs: npt.NDArray[np.int64], label: int) -> bool:
     return bool((~(beside | apart)).any())
 
 
-# Shares of a person's height by which middle, foot or head must have moved to count once more.
+# Movement of center, foot or head, in person heights, after which a person counts as a new sample.
 _STEP = 0.1
-# Frames after which it is forgotten that somebody was seen in a place where nobody is.
-_FORGET = 50
+# Frames after which a position without a person is dropped.
+_MAX_AGE = 50
 
 
 class SampleNoveltyFilter:
-    """Drops samples of people who stand where a sample was just taken."""
+    """Drops samples of people who stand where a sample was taken recently."""
 
     def __init__(self) -> None:
         self._positions = np.empty((0, 3))
         self._ages = np.empty(0)
-        """Frames since somebody was there."""
+        """Frames since a person was detected there."""
 
     def new_samples(self, people: Sequence[IsolatedPerson], frames: int = 1) -> list[IsolatedPerson]:
-        """Return the people who count as new samples; the previous frame was `frames` ago."""
+        """Return the people who count as new samples; `frames` have passed since the previous call."""
         self._ages += frames
         new: list[IsolatedPerson] = []
         for person in people:
-            place = np.array([person.middle, person.foot, person.foot - person.height])
-            same = np.abs(self._positions - place).max(axis=1, initial=0.0) <= _STEP * person.height
+            position = np.array([person.center, person.foot, person.foot - person.height])
+            same = np.abs(self._positions - position).max(axis=1, initial=0.0) <= _STEP * person.height
             self._ages[same] = 0.0
             if not same.any():
                 new.append(person)
-                self._positions = np.concatenate([self._positions, place[None]])
+                self._positions = np.concatenate([self._positions, position[None]])
                 self._ages = np.append(self._ages, 0.0)
-        kept = self._ages <= _FORGET
+        kept = self._ages <= _MAX_AGE
         self._positions, self._ages = self._positions[kept], self._ages[kept]
         return new

@@ -1,4 +1,4 @@
-"""Median background model: absorbs neither people nor their ghosts."""
+"""Median background model, which absorbs neither people nor their ghosts."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ class MedianSettings:
     """The gain-compensated median background.
 
     Raises:
-        ValueError: no frames to learn from, or in no steps.
+        ValueError: a setting is out of range.
     """
 
     bootstrap_frames: int = 50  # frames whose median is the first background (2 s at 25 frames/s)
-    samples: int = 15  # how many of the bootstrap frames enter the median; odd
-    threshold: float = 24.0  # gray levels by which the most different channel of a pixel must differ
+    samples: int = 15  # bootstrap frames that enter the median; odd
+    threshold: float = (
+        24.0  # largest difference over the channels, in gray levels, above which a pixel is foreground
+    )
     learn_every: int = 5  # frames between two updates of the background
-    learn_rate: float = 0.02  # share of the new frame in each update, where nobody is
-    relearn_share: float = 0.6  # share of the picture in the foreground that means: the light changed
-    relearn_frames: int = 15  # frames that it must last before the background is learned anew
+    learn_rate: float = 0.02  # share of the new frame in each update, where no person is
+    relearn_share: float = 0.6  # foreground share of the image that indicates a change of light
+    relearn_frames: int = 15  # consecutive such frames before the background is learned again
 
     def __post_init__(self) -> None:
         require_at_least_one(self, "bootstrap_frames", "samples", "learn_every")
@@ -38,7 +40,7 @@ class MedianSettings:
 class MedianBackground:
     """Background model of one camera: the median of the first frames, updated where no people are.
 
-    Usable after half of the bootstrap; the median is taken again at its end.
+    It is usable after half of the bootstrap; the median is computed again at its end.
     """
 
     def __init__(
@@ -53,10 +55,10 @@ class MedianBackground:
         self._exact: npt.NDArray[np.float32] | None = None
         self._rounded: Image | None = None
         self._last: tuple[Image, npt.NDArray[np.float64]] | None = None
-        """The frame last seen, and its gains."""
+        """The last frame and its gains."""
 
     def prepare(self, images: Sequence[Image]) -> None:
-        """Learn the background from images before the first frame; without any, learn it online."""
+        """Learn the background from images before the first frame; without any, learn it live."""
         for image in images:
             self._sample(image)
         if self._samples:
@@ -68,36 +70,36 @@ class MedianBackground:
         return None if self._rounded is None else self._compare(image, self._rounded)[0]
 
     def segment(self, image: Image) -> Segmentation | None:
-        """Segment the next frame; `None` while the background is not known yet."""
+        """Segment the next frame; `None` while the background is unknown."""
         self._bootstrap(image)
         self._frames += 1
         if self._rounded is None:
             return None
-        split, gains = self._compare(image, self._rounded)
+        segmentation, gains = self._compare(image, self._rounded)
         self._last = image, gains
-        self._relearn_on_light_change(split.foreground | split.shadow)
-        return split
+        self._relearn_on_light_change(segmentation.foreground | segmentation.shadow)
+        return segmentation
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Update the background with the last frame, except where people are.
 
         Args:
             foreground: `(H, W)`, the cleaned foreground of that frame.
-            occupied: `(H, W)`, 255 where somebody is.
+            occupied: `(H, W)`, 255 where a person is.
         """
         if self._exact is None or self._rounded is None or self._last is None:
             return
         checks_static, updates = self._static_filter.is_due(), self._frames % self._settings.learn_every == 0
         if not (checks_static or updates):
             return
-        # The frame as it would look at the background's gain.
-        level = apply_gains(self._last[0], 1.0 / self._last[1])
-        static = self._static_filter.find(level, self._rounded, foreground) if checks_static else None
+        # The frame at the background's gain.
+        leveled = apply_gains(self._last[0], 1.0 / self._last[1])
+        static = self._static_filter.find(leveled, self._rounded, foreground) if checks_static else None
         if static is not None:
-            self._exact[static > 0] = level[static > 0]
+            self._exact[static > 0] = leveled[static > 0]
         if updates:
-            free = cv2.bitwise_not(occupied)
-            cv2.accumulateWeighted(level, self._exact, self._settings.learn_rate, mask=free)
+            unoccupied = cv2.bitwise_not(occupied)
+            cv2.accumulateWeighted(leveled, self._exact, self._settings.learn_rate, mask=unoccupied)
         elif static is None:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)
@@ -118,8 +120,8 @@ class MedianBackground:
         if self._frames >= settings.bootstrap_frames:
             return
         # Spread the samples evenly, the last one on the last frame.
-        taken = (self._frames + 1) * settings.samples // settings.bootstrap_frames
-        if taken > self._frames * settings.samples // settings.bootstrap_frames:
+        used = (self._frames + 1) * settings.samples // settings.bootstrap_frames
+        if used > self._frames * settings.samples // settings.bootstrap_frames:
             self._sample(image)
         done = self._frames + 1
         if done in {(settings.bootstrap_frames + 1) // 2, settings.bootstrap_frames} and self._samples:

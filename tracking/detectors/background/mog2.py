@@ -19,12 +19,12 @@ class Mog2Settings:
 
     history_frames: int = 500  # frames over which the background is learned
     variance_threshold: float = 25.0  # squared standard deviations that count as foreground
-    detect_shadows: bool = True  # tell shadows from the foreground
-    warm_up_frames: int = 25  # frames before the first foreground is given
+    detect_shadows: bool = True  # separate shadows from the foreground
+    warm_up_frames: int = 25  # frames before the first segmentation
 
 
 class Mog2Background:
-    """MOG2 behind the interface of the median background."""
+    """MOG2 with the interface of the median background."""
 
     def __init__(self, settings: Mog2Settings) -> None:
         self._settings = settings
@@ -34,7 +34,7 @@ class Mog2Background:
         )
 
     def segment(self, image: Image) -> Segmentation | None:
-        """Segment the next frame; `None` while the background is not known yet."""
+        """Segment the next frame; `None` during the warm-up."""
         mask = self._model.apply(image)
         self._frames += 1
         if self._frames <= self._settings.warm_up_frames:
@@ -43,4 +43,4 @@ class Mog2Background:
         return Segmentation(np.where(mask > _SHADOW, full, none), np.where(mask == _SHADOW, full, none))
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
-        """Do nothing: the mixture has learned already."""
+        """Do nothing: `segment` has updated the mixture."""

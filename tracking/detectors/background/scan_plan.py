@@ -12,12 +12,12 @@ import numpy.typing as npt
 from tracking.boxes import Floats
 from tracking.detectors.background.silhouette import BodyPart
 
-# Steps of the scan in a box's height: what a coarse grid misses, the moves of `find_peaks` find.
-STEPS_A_HEIGHT = 16
-# Nothing else may be better within these shares of a box's height and width.
+# Scan steps per box height; `BoxFilter` refines the positions between them.
+STEPS_PER_HEIGHT = 16
+# Neighborhood of a peak, in shares of the box's height and width.
 _PEAK_ROWS, _PEAK_COLUMNS = 0.1, 0.25
 
-_Read: TypeAlias = tuple[slice, slice]
+_GridSlice: TypeAlias = tuple[slice, slice]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +29,8 @@ class HeightPlan:
         tops: `(R,)` rows of the top left corners.
         lefts: `(C,)` their columns.
         priors: `(R, 1)`, the factor on the gain in each row.
-        min_gain: gain from which a place counts.
-        neighborhood: a peak is the best of its surroundings of this size, `(rows, columns)` of places.
+        min_gain: least gain of a peak.
+        neighborhood: a peak is the maximum of this neighborhood, `(rows, columns)` of positions.
         corner_slices: for each part, slices of the integral image at its bottom right, top right, bottom
             left and top left corner, over all positions.
     """
@@ -41,7 +41,7 @@ class HeightPlan:
     priors: Floats
     min_gain: float
     neighborhood: npt.NDArray[np.uint8]
-    corner_slices: tuple[tuple[_Read, _Read, _Read, _Read], ...]
+    corner_slices: tuple[tuple[_GridSlice, _GridSlice, _GridSlice, _GridSlice], ...]
 
     def peaks(self, sums: Floats) -> tuple[Floats, Floats]:
         """Return the local maxima of the gain with integral image `sums`: boxes `(P, 4)` and gains `(P,)`."""
@@ -70,31 +70,31 @@ def plan_height(
     size: tuple[int, int],
     parts: tuple[BodyPart, ...],
     priors: Floats,
-    least_gain: float,
+    min_gain: float,
 ) -> HeightPlan | None:
-    """Plan the scan of one height; `None` where no such body is possible.
+    """Plan the scan of one height; `None` if no such body is possible.
 
     Args:
-        shape: of the plane, in cells.
+        shape: rows and columns of the plane, in cells.
         size: width and height of the boxes, in cells.
-        parts: what of a box is body.
+        parts: the body parts, in shares of the box.
         priors: `(H,)` the factor on the gain for each row of the feet, 0 where this height is impossible.
-        least_gain: gain from which a place counts, in areas of the body.
+        min_gain: least gain of a peak, as a share of the body's area.
     """
     width, height = size
-    step = max(1, height // STEPS_A_HEIGHT)
+    step = max(1, height // STEPS_PER_HEIGHT)
     tops, lefts = np.arange(0, shape[0] - height, step), np.arange(0, shape[1] - width, step)
     possible = np.flatnonzero(priors[tops + height])
     if not (possible.size and lefts.size):
         return None
     tops = tops[possible[0] : possible[-1] + 1]
     area = sum((part.right - part.left) * (part.bottom - part.top) for part in parts) * width * height
-    around = (
+    neighborhood = (
         2 * max(int(_PEAK_ROWS * height / step), 1) + 1,
         2 * max(int(_PEAK_COLUMNS * width / step), 1) + 1,
     )
 
-    def read(along: float, down: float) -> _Read:
+    def grid_slice(along: float, down: float) -> _GridSlice:
         x, y = round(along * width), round(down * height)
         rows = slice(int(tops[0]) + y, int(tops[-1]) + y + 1, step)
         return rows, slice(int(lefts[0]) + x, int(lefts[-1]) + x + 1, step)
@@ -104,14 +104,14 @@ def plan_height(
         tops=tops,
         lefts=lefts,
         priors=priors[tops + height][:, None],
-        min_gain=least_gain * area,
-        neighborhood=np.ones(around, dtype=np.uint8),
+        min_gain=min_gain * area,
+        neighborhood=np.ones(neighborhood, dtype=np.uint8),
         corner_slices=tuple(
             (
-                read(part.right, part.bottom),
-                read(part.right, part.top),
-                read(part.left, part.bottom),
-                read(part.left, part.top),
+                grid_slice(part.right, part.bottom),
+                grid_slice(part.right, part.top),
+                grid_slice(part.left, part.bottom),
+                grid_slice(part.left, part.top),
             )
             for part in parts
         ),

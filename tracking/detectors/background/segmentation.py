@@ -1,6 +1,7 @@
 """Foreground and shadow masks. A shadow is darker than the floor, but of the floor's color.
 
-Gray trousers look the same, so what looks like a shadow counts neither for a person nor against one.
+Gray clothing has the same appearance, so pixels that look like a shadow count neither for a person nor
+against.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from tracking.detectors.base import Image, Mask
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segmentation:
-    """Pixels by kind, each `(H, W)`, 0 or 255; what is in neither is background.
+    """Pixels by kind, each `(H, W)`, 0 or 255; the other pixels are background.
 
     Attributes:
-        foreground: what surely is not background.
-        shadow: what looks like a shadow, and may be somebody dressed like one.
+        foreground: pixels that differ clearly from the background.
+        shadow: pixels that look like a shadow: shadows, or gray clothing.
     """
 
     foreground: Mask
@@ -27,7 +28,7 @@ class Segmentation:
 
 @dataclass(frozen=True, slots=True)
 class ShadowSettings:
-    """What looks like a shadow, by the ratio of the frame to the background in each channel."""
+    """Thresholds for shadows on the ratio of frame to background in each channel."""
 
     enabled: bool = True
     min_ratio: float = 0.6  # least mean ratio: darker is clothing
@@ -44,16 +45,16 @@ def shadow_mask(image: Image, background: Image, foreground: Mask, settings: Sha
         foreground: `(H, W)`, 255 where the two differ.
         settings: the thresholds.
     """
-    found = np.zeros_like(foreground)
+    shadow = np.zeros_like(foreground)
     where = np.flatnonzero(foreground)
     if not settings.enabled or not where.size:
-        return found
+        return shadow
     new = image.reshape(-1, 3)[where].astype(np.float32) + 1.0
     old = background.reshape(-1, 3)[where].astype(np.float32) + 1.0
     ratio = new / old
-    blue, green, red = ratio.T  # one by one: a sum over so short an axis takes three times as long
+    blue, green, red = ratio.T  # separately: three times as fast as sums over the short axis
     mean = (blue + green + red) / np.float32(3.0)
     spread = np.maximum(np.maximum(blue, green), red) - np.minimum(np.minimum(blue, green), red)
     darker = (mean >= settings.min_ratio) & (mean <= settings.max_ratio)
-    found.ravel()[where[darker & (spread <= settings.max_chroma_spread * mean)]] = 255
-    return found
+    shadow.ravel()[where[darker & (spread <= settings.max_chroma_spread * mean)]] = 255
+    return shadow

@@ -22,7 +22,7 @@ class BodyPart:
     bottom: float
 
 
-# Where more than half of the people who stand alone are, on the mean over several recordings.
+# Covered by more than half of the isolated people, averaged over several recordings.
 PERSON_PARTS = (
     BodyPart(0.36, 0.0, 0.66, 0.1),  # head
     BodyPart(0.30, 0.1, 0.72, 0.2),  # neck and shoulders
@@ -66,23 +66,23 @@ class PartRectangles:
     bottom: npt.NDArray[np.int64]
 
     def sums(self, integrals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Sum a plane, given by its integral, over each body: `(K,)`, or `(K, C)` for `C` planes in one."""
+        """Sum a plane, given its integral image, over each body: `(K,)`, or `(K, C)` for `C` planes."""
         upper = integrals[self.top, self.right] - integrals[self.top, self.left]
         lower = integrals[self.bottom, self.right] - integrals[self.bottom, self.left]
         return np.asarray((lower - upper).sum(axis=1))
 
     @property
     def extent(self) -> tuple[npt.NDArray[np.int64], ...]:
-        """Left, top, right and bottom of the bodies as wholes, each `(K,)`."""
+        """Left, top, right and bottom of the whole bodies, each `(K,)`."""
         return self.left.min(axis=1), self.top.min(axis=1), self.right.max(axis=1), self.bottom.max(axis=1)
 
     def select(self, chosen: npt.NDArray[np.int64]) -> PartRectangles:
         """Return the parts of the chosen bodies."""
         return PartRectangles(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])
 
-    def clip_to(self, place: tuple[slice, slice]) -> PartRectangles:
+    def clip_to(self, region: tuple[slice, slice]) -> PartRectangles:
         """Return the parts relative to a region of the plane, clipped to it."""
-        rows, columns = place
+        rows, columns = region
         width, height = columns.stop - columns.start, rows.stop - rows.start
         return PartRectangles(
             np.clip(self.left - columns.start, 0, width),

@@ -12,10 +12,10 @@ from tracking.detectors.base import Image, Mask, Plane, require_at_least_one
 
 _RING = np.ones((5, 5), dtype=np.uint8)
 _SMALL = np.ones((3, 3), dtype=np.uint8)
-# Pixels around a part that its outline may lie in.
-_REACH = 6
-# Pixels (width, height) around a pixel of the outline over which the colors of its sides are compared.
-_AROUND = (9, 9)
+# Margin around a region in which its outline lies, pixels.
+_OUTLINE_MARGIN = 6
+# Window (width, height) around a pixel of the outline in which the colors of its sides are compared.
+_CONTRAST_WINDOW = (9, 9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,17 +23,17 @@ class StaticForegroundSettings:
     """When foreground that never moves is absorbed into the background.
 
     Raises:
-        ValueError: it is looked at in no steps.
+        ValueError: `check_every` is below 1.
     """
 
-    check_every: int = 5  # frames between two checks of what has not moved
-    still_checks: int = 6  # checks in a row without motion before a region is judged
-    settled_after_checks: int = 20  # checks that agree with the background after which a pixel is settled
-    settled_still_checks: int = 50  # checks without motion needed at settled pixels: furniture, not ghosts
+    check_every: int = 5  # frames between two checks for motion
+    still_checks: int = 6  # consecutive checks without motion before a region is examined
+    settled_after_checks: int = 20  # checks as background after which a pixel counts as settled
+    settled_still_checks: int = 50  # checks without motion at settled pixels: moved furniture, not ghosts
     motion_threshold: float = 14.0  # gray levels between two checks that count as motion
-    min_outline_share: float = 0.3  # least share of a region's outline that borders on the background
-    min_edge_ratio: float = 1.3  # how much sharper an outline is in the background than in the frame
-    min_sharper_share: float = 0.65  # least share of the outline that is sharper in the background
+    min_outline_share: float = 0.3  # least share of a region's outline that is next to background
+    min_edge_ratio: float = 1.3  # contrast of a ghost's outline in the background over that in the frame
+    min_sharper_share: float = 0.65  # least share of the outline with that ratio
     min_area: int = 40  # square pixels of the working image; smaller regions are noise
 
     def __post_init__(self) -> None:
@@ -43,10 +43,10 @@ class StaticForegroundSettings:
 class StaticForegroundFilter:
     """Distinguishes static foreground (ghosts) from people who stand still, by their outline.
 
-    A person's outline is an edge in the frame and not in the background; a ghost's is one in the
-    background and not in the frame. Only the outline towards the background says anything: inside the
-    foreground a part ends where somebody walks before it, or where a sleeve does. Ghosts are as old as
-    the background, so that where it was seen for a while what stands still has to do so for longer.
+    A person's outline is an edge in the frame but not in the background; a ghost's outline is an edge in the
+    background but not in the frame. Only the outline towards the background is informative: inside the
+    foreground a region may end at another person or at a sleeve. Ghosts exist since the background was
+    learned, so at pixels where the background was visible static foreground has to persist longer.
     """
 
     def __init__(self, settings: StaticForegroundSettings) -> None:
@@ -57,7 +57,7 @@ class StaticForegroundFilter:
         self._background_checks: Mask = np.zeros((1, 1), dtype=np.uint8)
 
     def is_due(self) -> bool:
-        """Count a frame; return whether it is one to check."""
+        """Count a frame; return whether it is to be checked."""
         self._frames += 1
         return self._frames % self._settings.check_every == 0
 
@@ -74,62 +74,62 @@ class StaticForegroundFilter:
         self._background_checks = np.minimum(self._background_checks, np.uint8(200)) + (
             foreground == 0
         ).astype(np.uint8)
-        sure = self._background_checks >= self._settings.settled_after_checks
-        waited = np.asarray(
-            still >= np.where(sure, self._settings.settled_still_checks, self._settings.still_checks)
+        settled = self._background_checks >= self._settings.settled_after_checks
+        static = np.asarray(
+            still >= np.where(settled, self._settings.settled_still_checks, self._settings.still_checks)
         )
-        if not waited.any():
+        if not static.any():
             return None
-        return self._check_regions(image, background, foreground, waited)
+        return self._check_regions(image, background, foreground, static)
 
     def _count_still(self, gray: Mask, foreground: Mask) -> Mask:
         if self._last is None or self._still is None:
             self._still = np.zeros_like(gray)
         else:
             motionless = (cv2.absdiff(gray, self._last) < self._settings.motion_threshold) & (foreground > 0)
-            grown = np.minimum(self._still, np.uint8(200)) + np.uint8(1)
-            self._still = np.where(motionless, grown, np.uint8(0)).astype(np.uint8)
+            counted = np.minimum(self._still, np.uint8(200)) + np.uint8(1)
+            self._still = np.where(motionless, counted, np.uint8(0)).astype(np.uint8)
         self._last = gray
         return self._still
 
     def _check_regions(
-        self, image: Image, background: Image, foreground: Mask, waited: npt.NDArray[np.bool_]
+        self, image: Image, background: Image, foreground: Mask, static: npt.NDArray[np.bool_]
     ) -> Mask | None:
-        """Check the motionless regions one by one."""
-        parts = cv2.morphologyEx(waited.astype(np.uint8), cv2.MORPH_OPEN, _SMALL)
-        count, labels, stats, _ = cv2.connectedComponentsWithStats(parts)
+        """Return the mask of the motionless regions whose outline is that of a ghost."""
+        regions = cv2.morphologyEx(static.astype(np.uint8), cv2.MORPH_OPEN, _SMALL)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(regions)
         border = cv2.morphologyEx(foreground, cv2.MORPH_GRADIENT, _RING) > 0
         found = np.zeros_like(foreground)
         for label in range(1, count):
             left, top, width, height, area = (int(value) for value in stats[label])
             if area < self._settings.min_area:
                 continue
-            rows = slice(max(top - _REACH, 0), top + height + _REACH)
-            columns = slice(max(left - _REACH, 0), left + width + _REACH)
-            part = (labels[rows, columns] == label).astype(np.uint8)
-            grown = cv2.dilate(part, _RING)
-            outline = (grown - cv2.erode(part, _RING)) > 0
-            free = outline & border[rows, columns]
-            if np.count_nonzero(free) < self._settings.min_outline_share * np.count_nonzero(outline):
+            rows = slice(max(top - _OUTLINE_MARGIN, 0), top + height + _OUTLINE_MARGIN)
+            columns = slice(max(left - _OUTLINE_MARGIN, 0), left + width + _OUTLINE_MARGIN)
+            region = (labels[rows, columns] == label).astype(np.uint8)
+            grown = cv2.dilate(region, _RING)
+            outline = (grown - cv2.erode(region, _RING)) > 0
+            exposed = outline & border[rows, columns]
+            if np.count_nonzero(exposed) < self._settings.min_outline_share * np.count_nonzero(outline):
                 continue
             outside = (foreground[rows, columns] == 0).astype(np.float32)
-            now = _contrast(image[rows, columns], part, outside)[free]
-            then = _contrast(background[rows, columns], part, outside)[free]
-            sharper = np.count_nonzero(then > self._settings.min_edge_ratio * now)
-            if sharper > self._settings.min_sharper_share * now.size:
+            frame_contrast = _contrast(image[rows, columns], region, outside)[exposed]
+            background_contrast = _contrast(background[rows, columns], region, outside)[exposed]
+            sharper = np.count_nonzero(background_contrast > self._settings.min_edge_ratio * frame_contrast)
+            if sharper > self._settings.min_sharper_share * frame_contrast.size:
                 found[rows, columns][grown > 0] = 255
         return found if found.any() else None
 
 
 def _contrast(image: Image, inside: Mask, outside: Plane) -> Plane:
-    """Return the color contrast across an outline around each pixel, `(h, w)`."""
+    """Return the color contrast between both sides of an outline around each pixel, `(h, w)`."""
     sides = []
     for side in (inside.astype(np.float32), outside):
-        weight = cv2.boxFilter(side, -1, _AROUND, normalize=False, borderType=cv2.BORDER_CONSTANT)
+        weight = cv2.boxFilter(side, -1, _CONTRAST_WINDOW, normalize=False, borderType=cv2.BORDER_CONSTANT)
         colors = cv2.boxFilter(
             image.astype(np.float32) * side[..., None],
             -1,
-            _AROUND,
+            _CONTRAST_WINDOW,
             normalize=False,
             borderType=cv2.BORDER_CONSTANT,
         )

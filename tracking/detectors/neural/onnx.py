@@ -20,8 +20,8 @@ from tracking.types import Detections
 
 _INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _DIMENSIONS = 4
-# Gray of the bars beside the picture, as in YOLO's training.
-_BARS = 114
+# Gray level of the letterbox bars, as in YOLO's training.
+_BAR_LEVEL = 114
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +32,14 @@ class OnnxSettings:
         ValueError: a setting is out of range.
     """
 
-    model: Path | None = None  # the file
+    model: Path | None = None  # path of the file
     output_layout: Layout = "auto"  # layout of the output: yolov5, yolov8, end2end; auto: by its shape
     classes: tuple[int, ...] = (0,)  # class numbers of people: 0 in COCO
     min_score: float = 0.25  # boxes below this score are dropped
-    nms_iou: float = 0.7  # of two boxes that overlap (IoU) more, the one of lower score is dropped
-    input_size: int = 640  # side of the input in pixels, where the file leaves it open
+    nms_iou: float = 0.7  # overlap (IoU) above which the box of lower score is dropped
+    input_size: int = 640  # side of the input in pixels, if the file leaves it open
     threads: int = 1  # threads of the network; each camera has its own process
-    max_detections: int = 100  # boxes per frame at most
+    max_detections: int = 100  # most boxes per frame
 
     def __post_init__(self) -> None:
         if not self.classes or min(self.classes) < 0:
@@ -54,7 +54,7 @@ class OnnxDetector:
     """Detects people with an ONNX network, without memory.
 
     Raises:
-        ValueError: no file is named, or it is no network that takes a picture and gives boxes as YOLO's do.
+        ValueError: no file is given, or it is not a network with an image input and YOLO's output.
         OSError: the file cannot be read.
         ImportError: onnxruntime is not installed.
     """
@@ -68,10 +68,10 @@ class OnnxDetector:
         self._appearance = appearance or AppearanceExtractor()
         self._ignore_filter = IgnoreFilter(ignore)
         if settings.model is None:
-            raise ValueError("no model is named: the path of an ONNX file")
-        self._session = _opened(settings.model, settings.threads)
+            raise ValueError("no model is given: the path of an ONNX file")
+        self._session = _open_session(settings.model, settings.threads)
         self._name, self._size, self._type = _input_of(self._session, settings)
-        # A blank picture now, so that a network that does not fit is found out before the first frame.
+        # Run a blank image, to detect an unusable network before the first frame.
         try:
             self.detect(np.zeros((*self._size, 3), dtype=np.uint8))
         except ValueError as error:
@@ -86,13 +86,13 @@ class OnnxDetector:
         """Return the people detected in a frame, best first.
 
         Raises:
-            ValueError: not an `(H, W, 3)` uint8 picture, or the network's output is not as YOLO's.
+            ValueError: not an `(H, W, 3)` uint8 image, or the network's output is not a YOLO output.
         """
         validate_image(image)
-        planes, factor, bars = self._letterbox(image)
+        planes, scale, offset = self._letterbox(image)
         found = decode_output(self._run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
-        boxes = np.clip((found.boxes - bars) / factor, 0.0, limits)
+        boxes = np.clip((found.boxes - offset) / scale, 0.0, limits)
         kept = (found.scores >= self.settings.min_score) & self._ignore_filter.keep(image.shape, boxes)
         boxes, scores = boxes[kept], found.scores[kept]
         best = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
@@ -101,26 +101,28 @@ class OnnxDetector:
     def _run(self, planes: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         try:
             return np.asarray(self._session.run(None, {self._name: planes})[0])
-        except Exception as error:  # onnxruntime has no common class of its own
+        except Exception as error:  # onnxruntime has no common exception class
             raise ValueError(f"the network cannot be run: {_first_line(error)}") from error
 
     def _letterbox(self, image: Image) -> tuple[npt.NDArray[np.floating], float, Floats]:
-        """Fit the picture undistorted into the middle of the input `(1, 3, h, w)`, red green blue, 0 to 1.
+        """Letterbox the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1.
 
-        Gives it, its scale, and the bars left and above, `(4,)` as for a box.
+        Returns the input, the scale, and the offset of the image, `(4,)` as for a box.
         """
         height, width = self._size
-        factor = min(height / image.shape[0], width / image.shape[1])
-        wide, tall = round(image.shape[1] * factor), round(image.shape[0] * factor)
-        left, top = (width - wide) // 2, (height - tall) // 2
-        canvas = np.full((height, width, 3), _BARS, dtype=np.uint8)
-        canvas[top : top + tall, left : left + wide] = cv2.resize(image, (wide, tall))
+        scale = min(height / image.shape[0], width / image.shape[1])
+        scaled_width, scaled_height = round(image.shape[1] * scale), round(image.shape[0] * scale)
+        left, top = (width - scaled_width) // 2, (height - scaled_height) // 2
+        canvas = np.full((height, width, 3), _BAR_LEVEL, dtype=np.uint8)
+        canvas[top : top + scaled_height, left : left + scaled_width] = cv2.resize(
+            image, (scaled_width, scaled_height)
+        )
         planes = cv2.dnn.blobFromImage(canvas, scalefactor=1.0 / 255.0, swapRB=True)
-        return planes.astype(self._type, copy=False), factor, np.array([left, top] * 2, dtype=np.float64)
+        return planes.astype(self._type, copy=False), scale, np.array([left, top] * 2, dtype=np.float64)
 
 
-def _opened(model: Path, threads: int) -> Any:
-    """Open the file with onnxruntime, which is imported only here: it is an extra."""
+def _open_session(model: Path, threads: int) -> Any:
+    """Open the file with onnxruntime, which is imported only here since it is an optional dependency."""
     try:
         import onnxruntime  # noqa: PLC0415
     except ImportError as error:
@@ -129,11 +131,11 @@ def _opened(model: Path, threads: int) -> Any:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # errors are raised; nothing is printed besides
+    options.log_severity_level = 4  # errors are raised instead of printed
     try:
         return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime has no common class of its own
-        raise ValueError(f"{model}: is not a usable ONNX file: {_first_line(error)}") from error
+    except Exception as error:  # onnxruntime has no common exception class
+        raise ValueError(f"{model}: not a usable ONNX file: {_first_line(error)}") from error
 
 
 def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int], type[np.floating]]:
@@ -143,14 +145,14 @@ def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int
     fits = len(inputs) == 1 and len(shape) == _DIMENSIONS and shape[0] in {1, None} | _names(shape[:1])
     if not (fits and shape[1] in {3, None} | _names(shape[1:2]) and inputs[0].type in _INPUTS):
         raise ValueError(
-            f"{settings.model}: takes {inputs[0].type} {shape}, not a picture of floats (1, 3, height, width)"
+            f"{settings.model}: the input is {inputs[0].type} {shape}, not floats (1, 3, height, width)"
         )
     height, width = (side if isinstance(side, int) else settings.input_size for side in shape[2:])
     return str(inputs[0].name), (height, width), _INPUTS[inputs[0].type]
 
 
 def _names(sides: list[Any]) -> set[Any]:
-    """Return the dimensions that the file leaves open: they have a name instead of a number."""
+    """Return the dimensions that the file leaves open, which have a name instead of a number."""
     return {side for side in sides if isinstance(side, str)}
 
 

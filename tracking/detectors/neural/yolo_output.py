@@ -15,8 +15,9 @@ Layout = Literal["auto", "yolov5", "yolov8", "end2end"]
 
 _BOX = 4
 _END_TO_END = 6
-_MOST_END_TO_END = 1000
-"""End-to-end networks give some 100 to 300 boxes; one-class YOLOv5 networks, as wide, thousands."""
+_MAX_END_TO_END = 1000
+"""End-to-end networks return 100 to 300 boxes; one-class YOLOv5 outputs have as many columns, but thousands
+of rows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,18 +29,18 @@ class DecodedBoxes:
 
 
 def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Sequence[int]) -> DecodedBoxes:
-    """Decode the output of a YOLO network; a box scores its likeliest requested class.
+    """Decode the output of a YOLO network; a box's score is that of its most likely requested class.
 
     | layout | shape | a row |
     | --- | --- | --- |
-    | `yolov5` (v5, v7) | (1, N, 5 + C) | middle x, y, width, height, objectness, C classes |
-    | `yolov8` (v8, v9, v11, v12) | (1, 4 + C, N) | middle x, y, width, height, C classes, as columns |
+    | `yolov5` (v5, v7) | (1, N, 5 + C) | center x, y, width, height, objectness, C classes |
+    | `yolov8` (v8, v9, v11, v12) | (1, 4 + C, N) | center x, y, width, height, C classes, as columns |
     | `end2end` (v10, v26, exports with NMS) | (1, N, 6) | left, top, right, bottom, score, class |
 
-    `auto` goes by the shape.
+    `auto` selects the layout by the shape.
 
     Raises:
-        ValueError: the output has none of these shapes, or not so many classes.
+        ValueError: the output has none of these shapes, or too few classes.
     """
     if output.ndim != 3 or output.shape[0] != 1:  # noqa: PLR2004 — batch, rows, columns
         raise ValueError(_unfit(output.shape))
@@ -50,23 +51,23 @@ def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Seq
     if kind == "end2end":
         if table.shape[1] != _END_TO_END:
             raise ValueError(_unfit(output.shape))
-        wanted = np.isin(table[:, 5].astype(np.int64), list(classes))
-        return DecodedBoxes(table[wanted, :_BOX], np.clip(table[wanted, _BOX], 0.0, 1.0))
+        selected = np.isin(table[:, 5].astype(np.int64), list(classes))
+        return DecodedBoxes(table[selected, :_BOX], np.clip(table[selected, _BOX], 0.0, 1.0))
     first = _BOX if kind == "yolov8" else _BOX + 1
     if table.shape[1] <= first:
         raise ValueError(_unfit(output.shape))
     if max(classes) >= table.shape[1] - first:
-        raise ValueError(f"it knows {table.shape[1] - first} classes, and has no class {max(classes)}")
+        raise ValueError(f"it has {table.shape[1] - first} classes, and no class {max(classes)}")
     scores = table[:, [first + number for number in classes]].max(axis=1)
     if kind == "yolov5":
         scores = scores * table[:, _BOX]
-    middle, half = table[:, :2], table[:, 2:_BOX] / 2.0
-    return DecodedBoxes(np.concatenate([middle - half, middle + half], axis=1), np.clip(scores, 0.0, 1.0))
+    center, half = table[:, :2], table[:, 2:_BOX] / 2.0
+    return DecodedBoxes(np.concatenate([center - half, center + half], axis=1), np.clip(scores, 0.0, 1.0))
 
 
 def _layout_of(shape: tuple[int, ...]) -> Layout:
     rows, columns = shape
-    if columns == _END_TO_END and rows <= _MOST_END_TO_END:
+    if columns == _END_TO_END and rows <= _MAX_END_TO_END:
         return "end2end"
     return "yolov8" if rows < columns else "yolov5"
 
