@@ -35,7 +35,7 @@ SEEDS = range(4)
 def test_a_mixture_finds_the_two_colours_that_pixels_were_drawn_from() -> None:
     rng = np.random.default_rng(3)
     drawn = np.concatenate([rng.normal([200, 40, 60], 6, (900, 3)), rng.normal([30, 90, 180], 12, (300, 3))])
-    found = fit_mixture(np.clip(drawn, 0, 255).astype(np.uint8), parts=2)
+    found = fit_mixture(np.clip(drawn, 0, 255).astype(np.uint8), components=2)
     order = np.argsort(-found.weights)
     assert found.weights[order] == pytest.approx([0.75, 0.25], abs=0.01)
     assert found.means[order] == pytest.approx(np.array([[200, 40, 60], [30, 90, 180]]), abs=2.5)
@@ -43,7 +43,7 @@ def test_a_mixture_finds_the_two_colours_that_pixels_were_drawn_from() -> None:
 
 def test_densities_are_the_formula() -> None:
     rng = np.random.default_rng(4)
-    found = fit_mixture(rng.integers(0, 256, (400, 3)).astype(np.uint8), parts=3)
+    found = fit_mixture(rng.integers(0, 256, (400, 3)).astype(np.uint8), components=3)
     colours = rng.uniform(0, 255, (20, 3))
     for colour, density in zip(colours, found.densities(colours), strict=True):
         expected = 0.0
@@ -57,7 +57,7 @@ def test_densities_are_the_formula() -> None:
 @pytest.mark.parametrize("pixels", [1, 5, 40])
 def test_few_pixels_or_one_colour_make_a_mixture_too(pixels: int) -> None:
     one = np.full((pixels, 3), 77, dtype=np.uint8)
-    densities = fit_mixture(one, parts=3).densities(CODE_COLORS)
+    densities = fit_mixture(one, components=3).densities(CODE_COLORS)
     assert np.isfinite(densities).all()
     assert color_codes(one[None])[0, 0] == int(np.argmax(densities))
 

@@ -52,14 +52,14 @@ def test_who_left_is_the_most_probable_of_all_states(seed: int, count: int) -> N
             probability *= exp(-_unlike(group[staying[0]], rest))
         probabilities[leaving] = probability
     best = max(probabilities, key=lambda it: probabilities[it])
-    assert departed_member(group, out, rest, CLOSE, unlike=1.0) == best
+    assert departed_member(group, out, rest, CLOSE, max_distance=1.0) == best
 
 
 def test_who_is_like_nobody_of_a_group_was_never_in_it() -> None:
     place, still = np.zeros(2), np.zeros(2)
     group = [TrackEnd(0, place, still, 80.0, look(kind)) for kind in (0, 1)]
     stranger = TrackEnd(90, place, still, 80.0, look(5))
-    assert departed_member(group, stranger, group[0], CLOSE, unlike=0.5) is None
+    assert departed_member(group, stranger, group[0], CLOSE, max_distance=0.5) is None
 
 
 def _crossing() -> tuple[list[Detections], list[Stroll]]:
