@@ -1,6 +1,6 @@
 """Measures on boxes: `(..., 4)` float64 arrays `left, top, right, bottom` in pixels.
 
-All of them broadcast over the leading axes, so `measure(a[:, None], b[None])` compares all with all.
+All of them broadcast over the leading axes, so `measure(a[:, None], b[None])` compares all pairs.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 BOX_SIDES = 4
-"""Numbers in a box: left, top, right, bottom."""
+"""Number of sides: left, top, right, bottom."""
 
 Floats = NDArray[np.float64]
 
@@ -21,12 +21,12 @@ _CORNERS_PER_SIDE = 2.0
 
 
 def widths(boxes: Floats) -> Floats:
-    """Return the widths in pixels, shape (...); negative extents count as none."""
+    """Return the widths in pixels, shape (...); negative extents count as 0."""
     return np.maximum(boxes[..., 2] - boxes[..., 0], 0.0)
 
 
 def heights(boxes: Floats) -> Floats:
-    """Return the heights in pixels, shape (...); negative extents count as none."""
+    """Return the heights in pixels, shape (...); negative extents count as 0."""
     return np.maximum(boxes[..., 3] - boxes[..., 1], 0.0)
 
 
@@ -59,7 +59,7 @@ def iou(first: Floats, second: Floats) -> Floats:
 def corner_distance(first: Floats, second: Floats) -> Floats:
     """Return the total city-block distance of the 4 corners in pixels, shape (...) (paper II.B, Fig. 5).
 
-    A box moved by `(x, y)` is `4 (|x| + |y|)` away from itself.
+    The distance of a box moved by `(x, y)` is `4 (|x| + |y|)`.
     """
     return _CORNERS_PER_SIDE * _side_distance(first, second)
 
@@ -85,8 +85,8 @@ def normalized_distance(first: Floats, second: Floats) -> Floats:
 
 
 def _side_distance(first: Floats, second: Floats) -> Floats:
-    """Sum the distances of the four sides; side by side, which is faster than a sum over a short axis."""
-    apart = np.abs(first[..., 0] - second[..., 0])
+    """Return the sum of the distances of the four sides; faster than a sum over the short axis."""
+    total = np.abs(first[..., 0] - second[..., 0])
     for side in range(1, BOX_SIDES):
-        apart = apart + np.abs(first[..., side] - second[..., side])
-    return np.asarray(apart)
+        total = total + np.abs(first[..., side] - second[..., side])
+    return np.asarray(total)

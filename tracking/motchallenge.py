@@ -18,11 +18,11 @@ _MAX_FIELDS = 10
 _CONFIDENCE_FIELD = 6
 # Larger frame numbers are probably timestamps.
 _MAX_FRAME = 10_000_000
-# Pixels; beyond, areas lose precision.
+# Pixels; areas lose precision beyond it.
 _MAX_COORDINATE = 1e9
-# Beyond, floats do not represent every integer.
+# Floats represent all integers up to this.
 _MAX_ID = 2**53
-_MAX_UNPACKED_BYTES = 300_000_000  # bytes
+_MAX_UNPACKED_BYTES = 300_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +31,10 @@ class MotRow:
 
     Attributes:
         frame: from 1.
-        id: the object's number; -1 where it is a detection.
+        id: the object's id; -1 for detections.
         left: pixels, like `top`, `width` and `height`.
-        confidence: the detector's, in its own unit; 1 in tracks, 0 in ground truth that does not count.
-        visible: the ninth field of ground truth: the share of the object that is visible; -1 unknown.
+        confidence: the detector's, in the detector's unit; 1 in tracks, 0 in ground truth to be ignored.
+        visible: visible share of the object, the ninth field of ground truth; -1: unknown.
     """
 
     frame: int
@@ -53,7 +53,7 @@ class MotRow:
 
 
 def read_rows(path: Path) -> list[MotRow]:
-    """Read a MOTChallenge file, in the order of the file; one whose name ends in `.gz` is unpacked.
+    """Read a MOTChallenge file, in the order of the file; `.gz` files are unpacked.
 
     Raises:
         ValueError: the file is not MOTChallenge text; the message names file and line.
@@ -65,7 +65,7 @@ def read_rows(path: Path) -> list[MotRow]:
             with gzip.open(path) as file:
                 data = file.read(_MAX_UNPACKED_BYTES + 1)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-            raise ValueError(f"{path}: not a whole gzip file: {error}") from None
+            raise ValueError(f"{path}: not a complete gzip file: {error}") from None
         if len(data) > _MAX_UNPACKED_BYTES:
             raise ValueError(f"{path}: unpacks to more than {_MAX_UNPACKED_BYTES // 10**6} megabytes")
     try:
@@ -76,10 +76,10 @@ def read_rows(path: Path) -> list[MotRow]:
 
 
 def parse_rows(lines: Iterable[str], name: str) -> Iterator[MotRow]:
-    """Read rows one by one; empty lines are skipped, `name` is what errors call the source.
+    """Parse rows one by one, skipping empty lines; errors call the source `name`.
 
     Raises:
-        ValueError: a line is no row; the message is one line, `name:line: what is wrong`.
+        ValueError: a line is malformed; the message is one line, `name:line: error`.
     """
     for number, line in enumerate(lines, start=1):
         if line.strip():
@@ -90,19 +90,19 @@ def parse_rows(lines: Iterable[str], name: str) -> Iterator[MotRow]:
 
 
 def format_row(row: MotRow) -> str:
-    """Return the row as text without the line's end: two decimals, the same bytes for the same row."""
+    """Return the row as text with two decimals, without the line end; equal rows give equal bytes."""
     numbers = (row.left, row.top, row.width, row.height, row.confidence)
     return f"{row.frame},{row.id}," + ",".join(_format_number(number) for number in numbers) + ",-1,-1,-1"
 
 
 def format_rows(rows: Iterable[MotRow]) -> str:
-    """Return the text of a file: sorted by frame and id, each line ended."""
+    """Return the text of a file, sorted by frame and id."""
     ordered = sorted(rows, key=lambda row: (row.frame, row.id, row.left, row.top))
     return "".join(format_row(row) + "\n" for row in ordered)
 
 
 def write_rows(path: Path, rows: Iterable[MotRow]) -> None:
-    """Write a MOTChallenge file, whole or not at all: a reader never sees half of it.
+    """Write a MOTChallenge file atomically.
 
     Raises:
         OSError: the file cannot be written.
@@ -133,7 +133,7 @@ def _parse_row(line: str) -> MotRow:
         for field, name in zip(fields[2:6], ("left", "top", "width", "height"), strict=True)
     )
     if max(map(abs, (left, top, width, height))) > _MAX_COORDINATE:
-        raise ValueError(f"a box is in pixels, none of them beyond {_MAX_COORDINATE:g}")
+        raise ValueError(f"box coordinates are pixels up to {_MAX_COORDINATE:g}")
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"a box needs a positive width and height, not {width:g} x {height:g}")
     confidence = _parse_number(fields[6], "confidence") if len(fields) > _CONFIDENCE_FIELD else 1.0

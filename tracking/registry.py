@@ -17,12 +17,12 @@ from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
 
 DEFAULT_TRACKER = "lp"
-"""Multiple object tracking as one linear program in a moving window: MyView's own."""
+"""Multi-object tracking as one linear program in a moving window: MyView's tracker."""
 
 TEMPORAL_TRACKER = "temporal"
-"""Person-to-blob matching over a window of samples: it has settings of its own."""
+"""Person-to-blob matching over a window of samples, with `TemporalSettings`."""
 
-# Imported when asked for: a camera with the default tracker loads none of them.
+# Imported on demand: a camera with the default tracker loads none of them.
 PREDICTION_METHODS = {
     "kalman": ("tracking.baselines.kalman_prediction", "KalmanPrediction"),
     "klt": ("tracking.baselines.optical_flow", "OpticalFlow"),
@@ -49,7 +49,7 @@ class Tracker(Protocol):
         ...
 
     def flush(self) -> WindowResult | None:
-        """End the recording: all frames become final. `None` where they were already."""
+        """End the recording: all frames become final. Return `None` if they were final already."""
         ...
 
 
@@ -58,7 +58,7 @@ class PrescanTracker(Protocol):
     """A tracker that learns the background from a recording before its first frame."""
 
     def prepare(self, images: Iterable[Image]) -> None:
-        """Learn from some images; without any, learn online."""
+        """Learn the background from some images; without any, learn it live."""
         ...
 
 
@@ -87,10 +87,10 @@ def create_tracker(
     fps: float = 25.0,
     assist: InteractiveSettings | None = None,
 ) -> Tracker:
-    """Create a tracker for a recording at `fps` frames a second.
+    """Create a tracker for `fps` frames per second.
 
-    Only the network program has costs, a solver and an operator's help (where `assist` is enabled it is an
-    `InteractiveTracker`), and only temporal consistency `temporal`.
+    `costs`, `solver` and `assist` apply to the default tracker only, which is an `InteractiveTracker` if
+    `assist` is enabled; `temporal` and `fps` apply to temporal consistency only.
 
     Raises:
         ValueError: no tracker has that name.
@@ -100,12 +100,12 @@ def create_tracker(
             return InteractiveTracker(window, costs, solver(), assist)
         return OnlineTracker(window, costs, solver())
     if name == TEMPORAL_TRACKER:
-        made: Tracker = import_module("tracking.baselines.temporal_consistency.tracker").TemporalTracker(
+        tracker: Tracker = import_module("tracking.baselines.temporal_consistency.tracker").TemporalTracker(
             window, temporal, fps
         )
-        return made
+        return tracker
     if name == _GRAPH:
-        from tracking.baselines.track_graph import TrackGraph  # noqa: PLC0415 — loaded when asked for
+        from tracking.baselines.track_graph import TrackGraph  # noqa: PLC0415 — imported on demand
 
         return TrackGraph(window)
     return StepwiseTracker(_method_of(name)(), window)

@@ -29,7 +29,7 @@ from tracking.window import (
     select_boxes,
 )
 
-# Two boxes that overlap (IoU) by this much hold parts of each other's object.
+# Overlap (IoU) above which two boxes contain parts of each other's object.
 _MAX_OVERLAP = 0.15
 
 
@@ -37,15 +37,15 @@ class OnlineTracker:
     """Tracks the objects of one camera. Deterministic; memory bounded by the window and the object list.
 
     Windows end at frames n where `stride` divides n + 1, so all cameras end theirs at the same frames.
-    The window reaches from the first frame that is not final yet to the newest; the templates are the
-    objects as they were in the last final frame: one frame of overlap.
+    The window extends from the first frame that is not final to the newest; the templates are the objects in
+    the last final frame, which is one frame of overlap.
     """
 
     def __init__(self, window: WindowSettings, costs: CostSettings, solver: Solver) -> None:
         self._window = window
         self._costs = costs
         self._solver = solver
-        # One object alone is a shortest path: dynamic programming is exact.
+        # For a single object dynamic programming is exact.
         self._single = create_solver("separate-dp")
         self._detections: dict[int, Detections] = {}
         self._objects: list[TrackedObject] = []
@@ -58,13 +58,12 @@ class OnlineTracker:
         self,
         frame: int,
         detections: Detections,
-        image: Image | None = None,  # noqa: ARG002 — other trackers look at it
+        image: Image | None = None,  # noqa: ARG002 — other trackers use it
     ) -> WindowResult | None:
-        """Add the detections of a frame; return a result where one or more windows end.
+        """Add the detections of a frame; return a result if one or more windows end.
 
-        A frame number that is left out is a frame without detections. After a gap longer than
-        `forget_after` everything before it is final, all objects are forgotten, and the frames of the
-        gap are in no result.
+        Skipped frame numbers are frames without detections. After a gap longer than `forget_after` all frames
+        before it are final, all objects are dropped, and the frames of the gap are in no result.
 
         Raises:
             ValueError: the frame number is not larger than the last one.
@@ -87,13 +86,13 @@ class OnlineTracker:
         return merge_results(results)
 
     def flush(self) -> WindowResult | None:
-        """End the recording: all frames become final. `None` where they were already."""
+        """End the recording: all frames become final. Return `None` if they were final already."""
         return merge_results(self._flush_windows())
 
     def _restart(self, frame: int, detections: Detections) -> WindowResult | None:
-        """Start again after a long gap, with this frame as the first.
+        """Restart after a long gap, with this frame as the first.
 
-        No window ends at this frame, so that no result has to span the gap.
+        No window ends at this frame, so that no result spans the gap.
         """
         result = self.flush()
         self._objects = []
@@ -123,14 +122,14 @@ class OnlineTracker:
             states, report = self._assign(first, frames)
         boxes = [select_boxes(row, frames) for row in states]
         ended = terminated_ids(self._objects, boxes, self._window.duplicate_overlap)
-        shown = [
+        visible = [
             n
             for n, (item, rows) in enumerate(zip(self._objects, boxes, strict=True))
             if item.id not in ended and not np.isnan(rows).all()
         ]
-        tracks = [self._track(self._objects[n], first, states[n], boxes[n], frames) for n in shown]
+        tracks = [self._track(self._objects[n], first, states[n], boxes[n], frames) for n in visible]
         final = frames[: max(final_to - first + 1, 0)]
-        sampled = add_appearance_samples(tracks, [states[n] for n in shown], first, final)
+        sampled = add_appearance_samples(tracks, [states[n] for n in visible], first, final)
         alive = [n for n, item in enumerate(self._objects) if item.id not in ended]
         self._objects = [self._objects[n] for n in alive]
         self._finish(first, final_to, frames, states[alive])
@@ -140,13 +139,13 @@ class OnlineTracker:
         return self._detections[number] if number in self._detections else Detections.empty(self._bins())
 
     def _bins(self) -> int:
-        return next((seen.histograms.shape[1] for seen in self._detections.values()), 0)
+        return next((detections.histograms.shape[1] for detections in self._detections.values()), 0)
 
     def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
-        """Solve the window for all remembered objects: states `(n, F)`, -1 where hidden."""
+        """Solve the window for all objects; return states `(n, F)`, -1 where occluded."""
         states = np.full((len(self._objects), len(frames)), OCCLUDED, dtype=np.int64)
         allowed = [self._gated_detections(item, first, frames) for item in self._objects]
-        # An object that nothing in the window can be is hidden throughout: it need not enter the program.
+        # An object without any gated detection is occluded throughout and need not enter the program.
         inside = [n for n, places in enumerate(allowed) if any(place.any() for place in places)]
         if not inside:
             report = SolveReport(self._solver.name, 0.0, 0.0, integral=True, conflicts=0, rounds=0)
@@ -167,10 +166,12 @@ class OnlineTracker:
     def _gated_detections(
         self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
-        """Return for each frame which detections the object can be, `(K_m,)` bool; nothing: none in any."""
+        """Return which detections of each frame the object can be, `(K_m,)` bool; empty: none at all."""
         if item.frames_occluded(first - 1) > self._window.reidentify_after:
             return []
-        return [gate_detections(item, first + m, seen, self._window) for m, seen in enumerate(frames)]
+        return [
+            gate_detections(item, first + m, detections, self._window) for m, detections in enumerate(frames)
+        ]
 
     def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
         """Return the network to solve for the objects `ids`; subclasses override it to change costs."""
@@ -185,17 +186,19 @@ class OnlineTracker:
         """Start tracks for new objects; return whether there are any."""
         start = max(len(frames) - self._window.birth_window, 0)
         test = frames[start:]
-        taken = [
-            seen.boxes[[state for state in states[:, start + m] if state != OCCLUDED]]
-            for m, seen in enumerate(test)
+        occupied = [
+            detections.boxes[[state for state in states[:, start + m] if state != OCCLUDED]]
+            for m, detections in enumerate(test)
         ]
         added = False
-        hidden = {it.id for it, row in zip(self._objects, states, strict=True) if (row == OCCLUDED).all()}
-        for birth in find_births(test, taken, self._window, self._costs, self._single):
+        occluded = {
+            item.id for item, row in zip(self._objects, states, strict=True) if (row == OCCLUDED).all()
+        }
+        for birth in find_births(test, occupied, self._window, self._costs, self._single):
             frame = first + start + birth.offset
             if self._reidentify(first, frame, birth):
                 added = True
-            elif self._evict_if_full(first, hidden):
+            elif self._evict_if_full(first, occluded):
                 self._objects.append(
                     TrackedObject(self._assign_id(birth, frame), birth.histogram, birth.box, frame)
                 )
@@ -203,34 +206,34 @@ class OnlineTracker:
         return added
 
     def _reidentify(self, first: int, frame: int, birth: Birth) -> bool:
-        """Re-identify a birth as a long hidden object of the same appearance; return whether one matched."""
-        hidden_objects = [
+        """Re-identify a birth as a long occluded object of the same appearance; return whether it matched."""
+        occluded_objects = [
             item for item in self._objects if item.frames_occluded(first - 1) > self._window.reidentify_after
         ]
-        if not hidden_objects or not birth.histogram.size:
+        if not occluded_objects or not birth.histogram.size:
             return False
-        looks = np.stack([item.histogram for item in hidden_objects])
-        distances = appearance_distance(birth.histogram[None], looks, self._costs.measure)[0]
+        histograms = np.stack([item.histogram for item in occluded_objects])
+        distances = appearance_distance(birth.histogram[None], histograms, self._costs.measure)[0]
         best = int(np.argmin(distances))
         if distances[best] > self._window.reidentify_max_distance:
             return False
-        hidden_objects[best].restart_at(birth.box, frame)
+        occluded_objects[best].restart_at(birth.box, frame)
         return True
 
-    def _evict_if_full(self, frame: int, hidden: Collection[int]) -> bool:
-        """Remove the longest hidden object where the list is full; return whether there is room.
+    def _evict_if_full(self, frame: int, occluded: Collection[int]) -> bool:
+        """Remove the longest occluded object if the list is full; return whether there is room.
 
-        `hidden` has the ids of the objects hidden throughout this window.
+        `occluded` contains the ids of the objects occluded throughout this window.
         """
         if len(self._objects) < self._window.max_objects:
             return True
-        hidden_objects = [
-            item for item in self._objects if item.id in hidden and item.frames_occluded(frame) > 0
+        occluded_objects = [
+            item for item in self._objects if item.id in occluded and item.frames_occluded(frame) > 0
         ]
-        if hidden_objects:
-            # `max` takes the first of equals: the lowest id.
-            self._objects.remove(max(hidden_objects, key=lambda item: item.frames_occluded(frame)))
-        return bool(hidden_objects)
+        if occluded_objects:
+            # `max` returns the first of equal items: the lowest id.
+            self._objects.remove(max(occluded_objects, key=lambda item: item.frames_occluded(frame)))
+        return bool(occluded_objects)
 
     def _track(
         self,
@@ -247,21 +250,22 @@ class OnlineTracker:
     def _finish(
         self, first: int, final_to: int, frames: Sequence[Detections], states: npt.NDArray[np.int64]
     ) -> None:
-        """Make the frames up to `final_to` final: update the objects, and forget long hidden ones."""
+        """Make the frames up to `final_to` final: update the objects, and drop long occluded ones."""
         if final_to < first:
             return
-        for m, seen in enumerate(frames[: final_to - first + 1]):
+        for m, detections in enumerate(frames[: final_to - first + 1]):
             column = states[:, m]
-            shown = seen.boxes[column[column != OCCLUDED]]
+            assigned = detections.boxes[column[column != OCCLUDED]]
             for item, state in zip(self._objects, column, strict=True):
                 item.present = bool(state != OCCLUDED)
                 if item.present:
-                    alone = bool(np.count_nonzero(iou(seen.boxes[state], shown) > _MAX_OVERLAP) <= 1)
-                    look = seen.histograms[state]
+                    overlaps = iou(detections.boxes[state], assigned)
+                    is_isolated = bool(np.count_nonzero(overlaps > _MAX_OVERLAP) <= 1)
+                    box, histogram = detections.boxes[state], detections.histograms[state]
                     item.update(
-                        Sighting(first + m, seen.boxes[state], look, alone), self._window.template_update_rate
+                        Sighting(first + m, box, histogram, is_isolated), self._window.template_update_rate
                     )
         forget_after = self._window.forget_after
         self._objects = [item for item in self._objects if item.frames_occluded(final_to) <= forget_after]
-        self._detections = {number: seen for number, seen in self._detections.items() if number > final_to}
+        self._detections = {n: detections for n, detections in self._detections.items() if n > final_to}
         self._first = final_to + 1

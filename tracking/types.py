@@ -17,8 +17,8 @@ class Detections:
 
     Attributes:
         boxes: (K, 4) float64, `left, top, right, bottom` in pixels.
-        scores: (K,) float64 in [0, 1], how sure the detector is.
-        histograms: (K, B) float64, appearance; rows sum to 1. B = 0: no appearance is known.
+        scores: (K,) float64 in [0, 1], the detector's confidence.
+        histograms: (K, B) float64, appearance; rows sum to 1. B = 0: unknown appearance.
 
     Raises:
         ValueError: the shapes do not fit together.
@@ -48,7 +48,8 @@ class Detections:
 
 RiskReason = Literal["crossing", "id_switch", "track_loss", "optimality_gap"]
 """`crossing`: two similar objects are about to cross; `id_switch`: two may have swapped identities;
-`track_loss`: an object fades or stays hidden; `optimality_gap`: the solution is not proven optimal."""
+`track_loss`: an object's scores decline, or it stays occluded; `optimality_gap`: the solution is not proven
+optimal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +59,13 @@ class RiskEvent:
     Attributes:
         reason: the kind of failure.
         objects: the ids of the one or two tracks concerned; the first is the one to correct.
-        frame: when it is expected. The newest frame or later for what is ahead; within the window for what
-            has been seen to be doubtful (`id_switch`: where the identities would part): pictures are shown
-            later than they are tracked, so that it may still be ahead of who looks at them.
-        margin: certainty of the tracker, as a cost: 0 is undecided.
-        length: frames for which the two overlap, or an object is hidden.
-        risk: probability of the failure without help, in [0, 1]; comparable between reasons.
+        frame: the expected frame of the failure: the newest frame or later if it is predicted, within the
+        window
+            if it is possible already (`id_switch`: where the identities would separate). Images are displayed
+            later than they are tracked, so it may still be ahead of the viewer.
+        margin: the tracker's certainty, as a cost: 0 is undecided.
+        length: frames for which the two overlap, or an object is occluded.
+        risk: probability of the failure without a correction, in [0, 1]; comparable between reasons.
     """
 
     reason: RiskReason

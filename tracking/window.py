@@ -15,39 +15,33 @@ from tracking.types import Detections, RiskEvent
 
 @dataclass(frozen=True, slots=True)
 class WindowSettings:
-    """The moving window, track initiation and termination.
+    """Settings of the moving window, of initiation and of termination.
 
     Raises:
         ValueError: a setting is out of range.
     """
 
-    window: int = 15  # M: frames of a window; a frame is final when this less the stride have followed it
-    stride: int = 5  # s: frames between two windows, which end at the frames n where s divides n + 1
+    window: int = (
+        15  # M: frames of a window; a frame is final once window minus stride frames have followed it
+    )
+    stride: int = 5  # s: frames between two windows, which end at frames n where s divides n + 1
     birth_window: int = 15  # frames over which a new object is tested; at most the window
-    birth_min_visible: float = 0.5  # share of the test's frames in which a new object must be seen
-    birth_max_cost: float = 0.7  # mean cost per frame that its path may have: appearance, motion, confidence
-    birth_min_score: float = 0.3  # least score of the detections that a new object may begin with
-    birth_min_peak_score: float = 0.65  # least score of the best of them: somebody new is seen clearly once
-    birth_max_tests: int = 8  # tests per window at most, best detections first
-    birth_max_iou: float = (
-        0.35  # overlap (IoU) with a known object above which a detection is not somebody new
-    )
-    duplicate_overlap: float = 0.8  # mean overlap of two tracks above which they are one object
-    forget_after: int = 1500  # F: frames hidden after which an object is forgotten and its number retired
-    max_objects: int = 24  # objects remembered at most; the longest hidden is forgotten first
-    template_update_rate: float = (
-        0.05  # share of an object's template renewed by each final frame it is seen in
-    )
-    gate_heights: float = 0.5  # box heights by which an object may jump between two frames
-    gate_growth: float = 0.3  # box heights added to that for each further frame since it was seen
+    birth_min_visible: float = 0.5  # share of these frames in which a new object must be detected
+    birth_max_cost: float = 0.7  # largest mean cost per frame of its path: appearance, motion, confidence
+    birth_min_score: float = 0.3  # least score of the detections of a new object
+    birth_min_peak_score: float = 0.65  # least score of the best of them
+    birth_max_tests: int = 8  # most tests per window, best detections first
+    birth_max_iou: float = 0.35  # overlap (IoU) with a track above which a detection starts no new one
+    duplicate_overlap: float = 0.8  # mean overlap of two tracks above which they are duplicates
+    forget_after: int = 1500  # F: occluded frames after which an object is dropped and its id retired
+    max_objects: int = 24  # most objects kept; the longest occluded one is dropped first
+    template_update_rate: float = 0.05  # weight of a new histogram in an object's template
+    gate_heights: float = 0.5  # box heights by which an object may move between two frames
+    gate_growth: float = 0.3  # box heights added to that for each further frame since its last detection
     max_height_ratio: float = 1.5  # factor by which its height may change meanwhile
-    max_interpolated_gap: int = 20  # frames hidden at most between two sightings for the track to say where
-    reidentify_after: int = (
-        100  # frames hidden after which an object only comes back the way new ones are born
-    )
-    reidentify_max_distance: float = (
-        0.35  # largest appearance distance of somebody new who is one of those, 0..1
-    )
+    max_interpolated_gap: int = 20  # longest occlusion, in frames, that is interpolated
+    reidentify_after: int = 100  # occluded frames after which an object only returns by re-identification
+    reidentify_max_distance: float = 0.35  # largest appearance distance for that, 0 to 1
 
     def __post_init__(self) -> None:
         if not 1 <= self.stride <= self.window:
@@ -63,7 +57,7 @@ class WindowSettings:
 
     @property
     def lag(self) -> int:
-        """Frames that follow a final frame at least before it is final."""
+        """Least number of frames that follow a frame before it is final."""
         return self.window - self.stride
 
 
@@ -87,11 +81,11 @@ class WindowTrack:
     """One object in one window.
 
     Attributes:
-        id: the object's number: from 1 in each tracker, never used again.
-        boxes: `(F, 4)` pixels, one row per frame of the window, NaN where the object is hidden.
+        id: the object's id: from 1 in each tracker, never reused.
+        boxes: `(F, 4)` pixels, one row per frame of the window, NaN where the object is occluded.
         interpolated: `(F, 4)` the same, with gaps of up to `max_interpolated_gap` frames interpolated.
         histogram: `(B,)`, its template.
-        confidence: mean score of its boxes over the window, 0 where hidden; in [0, 1].
+        confidence: mean score of its boxes over the window, 0 where occluded; in [0, 1].
         appearance_samples: mean histograms over unoccluded frames up to `final_to`, in order.
     """
 
@@ -110,10 +104,11 @@ class WindowResult:
     Attributes:
         first: the first frame that was not final before.
         last: the newest frame.
-        final_to: every frame up to this one is final and never changes again; the others are provisional.
-            An object of which no frame is final yet may still vanish.
-        tracks: the objects that are seen in any of the frames, by ascending id.
-        report: what the solver has proven about the last window.
+        final_to: every frame up to this one is final and does not change any more; the others are
+        provisional.
+            An object without a final frame may still be dropped.
+        tracks: the objects detected in any of the frames, by ascending id.
+        report: the solver's report on the last window.
         risk_events: predicted identity failures, the riskiest first; only of an `InteractiveTracker`.
         revised_from: the first final frame changed by an operator's correction: all frames from `first` on
             replace earlier results. None: no final frame has changed.
@@ -129,9 +124,9 @@ class WindowResult:
 
 
 def merge_results(results: list[WindowResult]) -> WindowResult | None:
-    """Return one result for windows that were solved one after the other; `None` for no window.
+    """Merge the results of successive windows into one; `None` for no window.
 
-    Later windows overwrite what was provisional in earlier ones.
+    Later windows overwrite provisional frames of earlier ones.
     """
     if len(results) <= 1:
         return results[0] if results else None
@@ -141,9 +136,9 @@ def merge_results(results: list[WindowResult]) -> WindowResult | None:
         kept = result.last if result is newest else result.final_to
         window = slice(result.first - first, kept - first + 1)
         for track in result.tracks:
-            nowhere = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
+            absent = np.full((newest.last - first + 1, BOX_SIDES), np.nan)
             known = tracks.get(track.id)
-            boxes, interpolated = (known.boxes, known.interpolated) if known else (nowhere, nowhere.copy())
+            boxes, interpolated = (known.boxes, known.interpolated) if known else (absent, absent.copy())
             boxes[window] = track.boxes[: kept - result.first + 1]
             interpolated[window] = track.interpolated[: kept - result.first + 1]
             samples = (
@@ -152,12 +147,12 @@ def merge_results(results: list[WindowResult]) -> WindowResult | None:
             tracks[track.id] = replace(
                 track, boxes=boxes, interpolated=interpolated, appearance_samples=samples
             )
-    seen = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
-    return replace(newest, first=first, tracks=tuple(seen))
+    visible = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
+    return replace(newest, first=first, tracks=tuple(visible))
 
 
 def select_boxes(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> Floats:
-    """Return the boxes of states `(F,)`, `(F, 4)` pixels, NaN where the object is hidden."""
+    """Return the boxes of states `(F,)`, `(F, 4)` pixels, NaN where the object is occluded."""
     boxes = np.full((len(frames), BOX_SIDES), np.nan)
     for m, state in enumerate(states):
         if state != OCCLUDED:
@@ -166,6 +161,6 @@ def select_boxes(states: npt.NDArray[np.int64], frames: Sequence[Detections]) ->
 
 
 def mean_confidence(states: npt.NDArray[np.int64], frames: Sequence[Detections]) -> float:
-    """Return the mean score of the boxes of states `(F,)`, 0 where the object is hidden; in [0, 1]."""
+    """Return the mean score of the boxes of states `(F,)`, 0 where the object is occluded; in [0, 1]."""
     scores = [float(frames[m].scores[state]) for m, state in enumerate(states) if state != OCCLUDED]
     return sum(scores) / len(frames)

@@ -30,20 +30,18 @@ class FrameSimilarity:
     similarity: Floats
 
 
-def align_frames(
-    truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float
-) -> list[FrameSimilarity]:
+def align_frames(truth: Iterable[MotRow], tracks: Iterable[MotRow], min_iou: float) -> list[FrameSimilarity]:
     """Return the overlaps of truth and tracks frame by frame, for frames with any, in order.
 
-    Truth of confidence 0 does not count: such a person need not be detected, and a track matched with them is
-    left out instead of counted as wrong, as in MOTChallenge.
+    Truth of confidence 0 does not count: such a person need not be detected, and a track matched with one is
+    left out instead of counted as a false positive, as in MOTChallenge.
 
     Raises:
-        ValueError: an id is twice in one frame.
+        ValueError: an id occurs twice in one frame.
     """
     truth_rows, track_rows = _by_frame(truth, "ground truth"), _by_frame(tracks, "tracks")
     return [
-        _frame(truth_rows.get(number, []), track_rows.get(number, []), least_iou)
+        _frame(truth_rows.get(number, []), track_rows.get(number, []), min_iou)
         for number in sorted(truth_rows.keys() | track_rows.keys())
     ]
 
@@ -59,12 +57,12 @@ def _by_frame(rows: Iterable[MotRow], what: str) -> dict[int, list[MotRow]]:
     return {number: list(frame.values()) for number, frame in frames.items()}
 
 
-def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], least_iou: float) -> FrameSimilarity:
+def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], min_iou: float) -> FrameSimilarity:
     counts = np.array([row.confidence != 0.0 for row in truth], dtype=bool)
     similarity = iou(_boxes(truth)[:, None], _boxes(tracks)[None])
     kept = np.ones(len(tracks), dtype=bool)
     if not counts.all():
-        people, results = assign_pairs(similarity, least_iou)
+        people, results = assign_pairs(similarity, min_iou)
         kept[results[~counts[people]]] = False
     return FrameSimilarity(_ids(truth)[counts], _ids(tracks)[kept], similarity[np.ix_(counts, kept)])
 
@@ -81,16 +79,16 @@ _KEEP_BONUS = 1000.0
 """Bonus for keeping a match: more than all overlaps of a frame together."""
 
 
-def match_frames(frames: Iterable[FrameSimilarity], least_iou: float) -> Iterator[NDArray[np.bool_]]:
+def match_frames(frames: Iterable[FrameSimilarity], min_iou: float) -> Iterator[NDArray[np.bool_]]:
     """Yield for each frame which person is matched with which track, `(T, R)`."""
     before: dict[int, int] = {}
     for frame in frames:
         pairs = np.zeros(frame.similarity.shape, dtype=bool)
         if pairs.size:
-            # NaN is no track's id.
+            # NaN equals no track id.
             previous = np.array([before.get(person, np.nan) for person in frame.truth.tolist()])
             bonus = _KEEP_BONUS * (previous[:, None] == frame.tracks[None])
-            rows, columns = assign_pairs(frame.similarity, least_iou, bonus)
+            rows, columns = assign_pairs(frame.similarity, min_iou, bonus)
             pairs[rows, columns] = True
             before = dict(zip(frame.truth[rows].tolist(), frame.tracks[columns].tolist(), strict=True))
         yield pairs

@@ -22,12 +22,12 @@ class TruthAndTracks:
 
 @dataclass(frozen=True, slots=True)
 class MultiCameraScores:
-    """Scores by camera, and of all of them as one.
+    """Scores per camera and of all cameras together.
 
     Attributes:
-        cameras: each camera for itself, by name.
-        joint: the frames of all cameras one after the other. An id is one person in all cameras, in the
-            truth and in the tracks, so a person with different ids in two cameras is an error:
+        cameras: the scores of each camera, by name.
+        joint: the scores of the concatenated frames of all cameras. An id means one person in all cameras, in
+            the truth and in the tracks, so a person with different ids in two cameras is an error:
             `joint.idf1` is the joint IDF1.
     """
 
@@ -36,7 +36,7 @@ class MultiCameraScores:
 
     @property
     def mean(self) -> Scores:
-        """Shares are the mean over the cameras, each counting as much; counts are totals."""
+        """Shares are unweighted means over the cameras; counts are totals."""
         return average_scores(list(self.cameras.values()))
 
 
@@ -47,29 +47,29 @@ def average_scores(scores: Sequence[Scores]) -> Scores:
         ValueError: there are no scores.
     """
     if not scores:
-        raise ValueError("the average of no scores")
+        raise ValueError("there are no scores to average")
     columns: dict[str, Any] = {}
     for field in fields(Scores):
-        values = [getattr(it, field.name) for it in scores]
+        values = [getattr(score, field.name) for score in scores]
         columns[field.name] = sum(values) if isinstance(values[0], int) else fmean(values)
     return Scores(**columns)
 
 
 def evaluate_cameras(
-    cameras: Mapping[str, TruthAndTracks], least_iou: float = DEFAULT_MIN_IOU
+    cameras: Mapping[str, TruthAndTracks], min_iou: float = DEFAULT_MIN_IOU
 ) -> MultiCameraScores:
-    """Score the tracks of several cameras, each and together.
+    """Score the tracks of several cameras, separately and together.
 
     Raises:
-        ValueError: an id is twice in one frame of a camera, which the message names.
+        ValueError: an id occurs twice in one frame of a camera; the message names the camera.
     """
     frames: dict[str, list[FrameSimilarity]] = {}
-    for name, it in cameras.items():
+    for name, camera in cameras.items():
         try:
-            frames[name] = align_frames(it.truth, it.tracks, least_iou)
+            frames[name] = align_frames(camera.truth, camera.tracks, min_iou)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
     return MultiCameraScores(
-        cameras={name: score_frames(found, least_iou) for name, found in frames.items()},
-        joint=score_frames([frame for found in frames.values() for frame in found], least_iou),
+        cameras={name: score_frames(found, min_iou) for name, found in frames.items()},
+        joint=score_frames([frame for found in frames.values() for frame in found], min_iou),
     )

@@ -18,7 +18,7 @@ HIDDEN_BELOW = 0.25
 COVERED_ABOVE = 0.5
 """Share of a box covered by a nearer person above which its person is hidden, if visible shares are
 unknown."""
-_LEAST_SEEN = 3
+_MIN_VISIBLE_FRAMES = 3
 """Least visible frames before and after; two occlusions with fewer frames between them are one."""
 
 
@@ -39,12 +39,12 @@ def find_occlusions(truth: Iterable[MotRow], around: int) -> list[Occlusion]:
 
     Args:
         truth: rows of ground truth; those of confidence 0 do not count.
-        around: frames before and after in which the person must be visible for a while.
+        around: frames before and after in which the person must be visible for some frames.
     """
-    seen: dict[int, dict[int, bool]] = {}
+    visible: dict[int, dict[int, bool]] = {}
     for row, hidden in _hidden([row for row in truth if row.confidence != 0.0]):
-        seen.setdefault(row.id, {})[row.frame] = not hidden
-    return [found for person, frames in seen.items() for found in _of(person, frames, around)]
+        visible.setdefault(row.id, {})[row.frame] = not hidden
+    return [found for person, frames in visible.items() for found in _occlusions_of(person, frames, around)]
 
 
 def identities_kept(
@@ -52,7 +52,7 @@ def identities_kept(
     truth: Iterable[MotRow],
     tracks: Iterable[MotRow],
     around: int,
-    least_iou: float = DEFAULT_MIN_IOU,
+    min_iou: float = DEFAULT_MIN_IOU,
 ) -> list[bool]:
     """Return for each occlusion whether the person's track id is the same before and after it.
 
@@ -60,22 +60,23 @@ def identities_kept(
     either side did not keep it.
     """
     truth, tracks = list(truth), list(tracks)
-    lined = align_frames(truth, tracks, least_iou)
-    numbers: dict[int, dict[int, int]] = {}
+    aligned = align_frames(truth, tracks, min_iou)
+    ids: dict[int, dict[int, int]] = {}
     order = sorted({row.frame for row in (*truth, *tracks)})
-    for number, frame, pairs in zip(order, lined, match_frames(lined, least_iou), strict=True):
+    for number, frame, pairs in zip(order, aligned, match_frames(aligned, min_iou), strict=True):
         for person, track in np.argwhere(pairs).tolist():
-            numbers.setdefault(int(frame.truth[person]), {})[number] = int(frame.tracks[track])
-    return [_same(numbers.get(it.person, {}), it, around) for it in found]
+            ids.setdefault(int(frame.truth[person]), {})[number] = int(frame.tracks[track])
+    return [_is_kept(ids.get(occlusion.person, {}), occlusion, around) for occlusion in found]
 
 
-def _same(numbers: dict[int, int], it: Occlusion, around: int) -> bool:
-    before = _most(numbers, range(it.first - around, it.first))
-    return before is not None and before == _most(numbers, range(it.last + 1, it.last + 1 + around))
+def _is_kept(ids: dict[int, int], occlusion: Occlusion, around: int) -> bool:
+    before = _most_frequent(ids, range(occlusion.first - around, occlusion.first))
+    after = _most_frequent(ids, range(occlusion.last + 1, occlusion.last + 1 + around))
+    return before is not None and before == after
 
 
-def _most(numbers: dict[int, int], frames: range) -> int | None:
-    counts = Counter(numbers[frame] for frame in frames if frame in numbers)
+def _most_frequent(ids: dict[int, int], frames: range) -> int | None:
+    counts = Counter(ids[frame] for frame in frames if frame in ids)
     return min(counts, key=lambda number: (-counts[number], number)) if counts else None
 
 
@@ -85,28 +86,32 @@ def _hidden(rows: Sequence[MotRow]) -> Iterable[tuple[MotRow, bool]]:
     frames: dict[int, list[MotRow]] = {}
     for row in rows:
         frames.setdefault(row.frame, []).append(row)
-    for there in frames.values():
-        boxes = np.array([row.box for row in there], dtype=np.float64).reshape(-1, BOX_SIDES)
+    for people in frames.values():
+        boxes = np.array([row.box for row in people], dtype=np.float64).reshape(-1, BOX_SIDES)
         nearer = boxes[None, :, 3] > boxes[:, None, 3]
         shared = np.where(nearer, intersections(boxes[:, None], boxes[None]), 0.0).max(axis=1, initial=0.0)
         shares = shared / np.maximum(areas(boxes), 1e-9)
-        for row, share in zip(there, shares.tolist(), strict=True):
+        for row, share in zip(people, shares.tolist(), strict=True):
             covered = not has_shares and share > COVERED_ABOVE
             yield row, covered or 0.0 <= row.visible < HIDDEN_BELOW
 
 
-def _of(person: int, frames: dict[int, bool], around: int) -> Iterable[Occlusion]:
+def _occlusions_of(person: int, frames: dict[int, bool], around: int) -> Iterable[Occlusion]:
     """Yield one person's occlusions from their visibility by frame."""
-    hidden = sorted(frame for frame, seen in frames.items() if not seen)
+    hidden = sorted(frame for frame, visible in frames.items() if not visible)
     runs: list[list[int]] = []
     for frame in hidden:
-        together = runs and sum(frames.get(it, False) for it in range(runs[-1][1] + 1, frame)) < _LEAST_SEEN
-        if together:
+        continues = (
+            runs
+            and sum(frames.get(between, False) for between in range(runs[-1][1] + 1, frame))
+            < _MIN_VISIBLE_FRAMES
+        )
+        if continues:
             runs[-1][1] = frame
         else:
             runs.append([frame, frame])
     for first, last in runs:
-        before = sum(frames.get(it, False) for it in range(first - around, first))
-        after = sum(frames.get(it, False) for it in range(last + 1, last + 1 + around))
-        if before >= _LEAST_SEEN and after >= _LEAST_SEEN:
+        before = sum(frames.get(frame, False) for frame in range(first - around, first))
+        after = sum(frames.get(frame, False) for frame in range(last + 1, last + 1 + around))
+        if before >= _MIN_VISIBLE_FRAMES and after >= _MIN_VISIBLE_FRAMES:
             yield Occlusion(person, first, last)

@@ -14,20 +14,20 @@ from tracking.motchallenge import MotRow
 
 
 def oracle_association(
-    detections: Iterable[MotRow], truth: Iterable[MotRow], least_iou: float = DEFAULT_MIN_IOU
+    detections: Iterable[MotRow], truth: Iterable[MotRow], min_iou: float = DEFAULT_MIN_IOU
 ) -> list[MotRow]:
-    """Return the detections with the id of the person they match; drop those that match no one.
+    """Return the detections with the id of the person they match; drop the unmatched ones.
 
-    In each frame people and detections are assigned to each other for the largest total overlap, none below
-    `least_iou`. No tracker on these detections scores higher, unless it adds boxes.
+    In each frame people and detections are assigned for the largest total overlap, none below `min_iou`. A
+    tracker on these detections cannot score higher unless it adds boxes.
     """
     people = _by_frame(row for row in truth if row.confidence != 0.0)
     tracks: list[MotRow] = []
     for number, found in _by_frame(detections).items():
-        there = people.get(number, [])
-        similarity = iou(_boxes(there)[:, None], _boxes(found)[None])
-        rows, columns = assign_pairs(similarity, least_iou)
-        tracks += [replace(found[c], id=there[r].id) for r, c in zip(rows, columns, strict=True)]
+        present = people.get(number, [])
+        similarity = iou(_boxes(present)[:, None], _boxes(found)[None])
+        rows, columns = assign_pairs(similarity, min_iou)
+        tracks += [replace(found[c], id=present[r].id) for r, c in zip(rows, columns, strict=True)]
     return tracks
 
 

@@ -23,18 +23,18 @@ class Scores:
             of `deta` and `assa` (Luiten et al., IJCV 2021).
         deta: detection accuracy, the same mean.
         assa: association accuracy, the same mean.
-        mota: 1 less misses, false positives and switches, per person and frame (CLEAR MOT, Bernardin and
+        mota: 1 minus misses, false positives and switches, per person and frame (CLEAR MOT, Bernardin and
             Stiefelhagen, 2008).
-        idf1: share of boxes that are right when each track stands for one person and each person for one
-            track, the best way round for the whole recording (Ristani et al., 2016).
+        idf1: F1 score of the boxes under the best one-to-one assignment of tracks and people over the whole
+            recording (Ristani et al., 2016).
         recall: share of people's boxes that are matched.
         precision: share of tracks' boxes that are matched.
-        switches: times that a person is matched with another track than last.
-        fragments: times that a person is found again after a gap.
+        switches: how often a person is matched with another track than before.
+        fragments: how often a person is matched again after a gap.
         misses: people's boxes that are not matched.
         false_positives: tracks' boxes that are not matched.
-        objects: people in the ground truth.
-        tracks: tracks.
+        objects: number of people in the ground truth.
+        tracks: number of tracks.
     """
 
     hota: float
@@ -52,28 +52,28 @@ class Scores:
     tracks: int
 
 
-def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], least_iou: float = DEFAULT_MIN_IOU) -> Scores:
+def evaluate(truth: Iterable[MotRow], tracks: Iterable[MotRow], min_iou: float = DEFAULT_MIN_IOU) -> Scores:
     """Score the tracks of one camera.
 
     Args:
         truth: rows whose confidence is 0 do not count; see `align_frames`.
         tracks: rows to score.
-        least_iou: overlap from which a box matches a person, for all scores but HOTA.
+        min_iou: overlap from which a box matches a person, for all scores but HOTA.
 
     Raises:
-        ValueError: an id is twice in one frame.
+        ValueError: an id occurs twice in one frame.
     """
-    return score_frames(align_frames(truth, tracks, least_iou), least_iou)
+    return score_frames(align_frames(truth, tracks, min_iou), min_iou)
 
 
-def score_frames(frames: Sequence[FrameSimilarity], least_iou: float) -> Scores:
+def score_frames(frames: Sequence[FrameSimilarity], min_iou: float) -> Scores:
     """Score aligned frames."""
     people = [frame.truth.tolist() for frame in frames]
     found = [frame.tracks.tolist() for frame in frames]
     overlaps = [frame.similarity.tolist() for frame in frames]
-    pairs = [matrix.astype(float).tolist() for matrix in match_frames(frames, least_iou)]
+    pairs = [matrix.astype(float).tolist() for matrix in match_frames(frames, min_iou)]
     hota = motrics.compute_hota_from_similarity(people, found, overlaps)
-    identity = motrics.compute_identity_from_similarity(people, found, overlaps, least_iou)
+    identity = motrics.compute_identity_from_similarity(people, found, overlaps, min_iou)
     clear = motrics.compute_clear_from_similarity(people, found, pairs)
     return Scores(
         hota=hota.hota,
@@ -105,7 +105,7 @@ HEADINGS = {
     "objects": "GT",
     "tracks": "IDs",
 }
-"""MOTChallenge's headings by the scores' names, in the order of a table."""
+"""MOTChallenge's column headings by score name, in table order."""
 
 
 def format_scores(scores: Scores, names: Iterable[str]) -> list[str]:

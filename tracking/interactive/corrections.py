@@ -22,7 +22,7 @@ class PositionCorrection:
         object: the track's id.
         x: pixels from the left.
         y: pixels from the top.
-        tolerance: how far off the correction may be, pixels: where it is usually within.
+        tolerance: typical error of the correction, in pixels.
 
     Raises:
         ValueError: the tolerance is not positive, or a number is not finite.
@@ -45,8 +45,8 @@ def normalized_offset(correction: PositionCorrection, boxes: Floats) -> Floats:
     The squared distance of the point from the center of the box, in units of twice the tolerance, at most
     1. For normally distributed pointing errors it is a log-likelihood, up to a factor.
     """
-    middles = (boxes[..., :2] + boxes[..., 2:]) / 2.0
-    squared = ((middles - [correction.x, correction.y]) ** 2).sum(axis=-1) / (2.0 * correction.tolerance) ** 2
+    centers = (boxes[..., :2] + boxes[..., 2:]) / 2.0
+    squared = ((centers - [correction.x, correction.y]) ** 2).sum(axis=-1) / (2.0 * correction.tolerance) ** 2
     return np.asarray(np.minimum(squared, 1.0))
 
 
@@ -67,9 +67,10 @@ def apply_corrections(
 
     With `far` the `normalized_offset`, being at node v costs the corrected object `correction_weight
     far(v)` more, and being occluded costs it `correction_weight hidden_share` more: an operator who points
-    at a covered object points closer to its true position than to the center of the object in front. Other
-    objects are not charged, since a place holds one object only. The corrected object may reappear anywhere
-    near the point: arcs out of the occlusion node that were gated away get the cost `reappearance_cost`.
+    at an occluded object points closer to its true position than to the center of the object in front. Other
+    objects have no extra cost, since conflicts keep them off the place. The corrected object may reappear
+    anywhere near the point: arcs out of the occlusion node that were gated away get the cost
+    `reappearance_cost`.
 
     Args:
         network: objects `ids`, which share their observations.
@@ -85,13 +86,13 @@ def apply_corrections(
     node, source, pair = network.node.copy(), network.source.copy(), network.pair.copy()
     owners = np.asarray(ids)
     for m in frames:
-        for it in corrections[first + m].values():
-            own = np.flatnonzero(owners == it.object)
+        for correction in corrections[first + m].values():
+            own = np.flatnonzero(owners == correction.object)
             if not len(own):
                 continue
-            far = normalized_offset(it, network.boxes[0, m])
+            far = normalized_offset(correction, network.boxes[0, m])
             node[own, m, :-1] += settings.correction_weight * far
             node[own, m, -1] += settings.correction_weight * settings.hidden_share
-            way = source[own[0]] if m == 0 else pair[network.pair_sets[own[0]], m - 1, -1]
-            way[:-1][(far < 1.0) & np.isinf(way[:-1])] = reappearance_cost
+            arcs = source[own[0]] if m == 0 else pair[network.pair_sets[own[0]], m - 1, -1]
+            arcs[:-1][(far < 1.0) & np.isinf(arcs[:-1])] = reappearance_cost
     return replace(network, node=node, source=source, pair=pair)

@@ -26,8 +26,8 @@ InsertedHypotheses = Mapping[int, Mapping[int, int]]
 
 def box_around(correction: PositionCorrection, size: Floats) -> Floats:
     """Return the box `(4,)` of `size` `(2,)` (width, height) centered at the corrected point."""
-    middle = np.array([correction.x, correction.y])
-    return np.concatenate([middle - size / 2.0, middle + size / 2.0])
+    center = np.array([correction.x, correction.y])
+    return np.concatenate([center - size / 2.0, center + size / 2.0])
 
 
 def has_hypothesis(correction: PositionCorrection, size: Floats, boxes: Floats) -> bool:
@@ -40,48 +40,48 @@ def has_hypothesis(correction: PositionCorrection, size: Floats, boxes: Floats) 
     )
 
 
-def insert_hypothesis(seen: Detections, box: Floats, histogram: Floats) -> Detections:
+def insert_hypothesis(detections: Detections, box: Floats, histogram: Floats) -> Detections:
     """Append a hypothesis for a corrected object, of score 0 so that no new track starts from it."""
     return Detections(
-        np.concatenate([seen.boxes, box[None]]),
-        np.append(seen.scores, 0.0),
-        np.concatenate([seen.histograms, histogram[None, : seen.histograms.shape[1]]]),
+        np.concatenate([detections.boxes, box[None]]),
+        np.append(detections.scores, 0.0),
+        np.concatenate([detections.histograms, histogram[None, : detections.histograms.shape[1]]]),
     )
 
 
 def apply_insertions(
-    network: Network, first: int, ids: Sequence[int], places: InsertedHypotheses, change: float
+    network: Network, first: int, ids: Sequence[int], inserted: InsertedHypotheses, change: float
 ) -> Network:
     """Return the network of a window in which inserted hypotheses belong to their object only.
 
     Other objects cannot use them, and they conflict with nothing. Moving by less than a body to or from one
     costs at most `change`: pointing is less exact than detection.
     """
-    frames = [m for m in range(network.frames) if places.get(first + m)]
+    frames = [m for m in range(network.frames) if inserted.get(first + m)]
     if not frames:
         return network
     node, source, pair = network.node.copy(), network.source.copy(), network.pair.copy()
     conflicts, owners = network.conflicts.copy(), np.asarray(ids)
     for m in frames:
-        for who, k in places[first + m].items():
-            node[owners != who, m, k] = np.inf
+        for number, k in inserted[first + m].items():
+            node[owners != number, m, k] = np.inf
             conflicts[m, k] = conflicts[m, :, k] = False
             conflicts[m, k, k] = True
-            here = network.boxes[0, m, k]
+            box = network.boxes[0, m, k]
             if m == 0:
-                source[owners == who, k] = np.minimum(source[owners == who, k], change)
+                source[owners == number, k] = np.minimum(source[owners == number, k], change)
             else:
-                near = _near(here, network.boxes[0, m - 1])
-                ways = pair[:, m - 1, :-1, k]
-                ways[:, near] = np.minimum(ways[:, near], change)
+                near = _near(box, network.boxes[0, m - 1])
+                arcs = pair[:, m - 1, :-1, k]
+                arcs[:, near] = np.minimum(arcs[:, near], change)
             if m < network.frames - 1:
-                near = _near(here, network.boxes[0, m + 1])
-                ways = pair[:, m, k, :-1]
-                ways[:, near] = np.minimum(ways[:, near], change)
+                near = _near(box, network.boxes[0, m + 1])
+                arcs = pair[:, m, k, :-1]
+                arcs[:, near] = np.minimum(arcs[:, near], change)
     return replace(network, node=node, source=source, pair=pair, conflicts=conflicts)
 
 
 def _near(box: Floats, boxes: Floats) -> NDArray[np.bool_]:
     """Return which boxes `(K, 4)` are within one body size of a box, `(K,)`."""
-    middle, middles = (box[:2] + box[2:]) / 2.0, (boxes[:, :2] + boxes[:, 2:]) / 2.0
-    return np.asarray(((middles - middle) ** 2).sum(axis=1) <= areas(box))
+    center, centers = (box[:2] + box[2:]) / 2.0, (boxes[:, :2] + boxes[:, 2:]) / 2.0
+    return np.asarray(((centers - center) ** 2).sum(axis=1) <= areas(box))

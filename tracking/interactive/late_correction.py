@@ -1,4 +1,4 @@
-"""Late corrections: where an identity was lost, and what follows for the frames since."""
+"""Late corrections: the frame of an identity switch, and the corrections it implies since then."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
 
 _MAX_OFFSET = 0.5
-"""How far (`normalized_offset`) a track may be from the point to be the one that is pointed at."""
+"""Largest `normalized_offset` of the track that the operator pointed at."""
 
 
 def backdate_correction(
@@ -26,37 +26,37 @@ def backdate_correction(
 ) -> list[PositionCorrection]:
     """Return the corrections for earlier frames that a correction implies, back to the frame `since`.
 
-    The operator pointed at object a where the tracker had object b, while a was elsewhere or hidden: a and
-    b swapped identities earlier. The swap is placed at the frame from which exchanging the two tracks costs
-    least (`swap_margins` in a network of the two and their own boxes, without motion). If b began while a
-    was hidden, it is placed where b began. From that frame on, a is corrected to b's boxes and b to a's.
+    The operator pointed at object a where the tracker had object b, while a was elsewhere or occluded: a and
+    b swapped identities earlier. The swap is dated to the frame from which exchanging the two tracks costs
+    least (`swap_margins` in a network of the two and their boxes, without motion), or to the start of b if a
+    was occluded then. From that frame on, a is corrected to b's boxes and b to a's.
 
-    Returns an empty list where a is already at the point, where no other track is, or where a may be
-    occluded by b.
+    Returns an empty list if a is already at the point, if no other track is there, or if a may be occluded by
+    b.
     """
     a, b = correction.object, _track_at_point(correction, memory)
     if b is None:
         return []
     frames = [n for n in sorted(memory.assignments) if since <= n <= correction.frame]
     states = np.array([[memory.assignments[n].get(k, OCCLUDED) for n in frames] for k in (a, b)])
-    if _covered(states != OCCLUDED):
+    if _is_occluded_by_other(states != OCCLUDED):
         return []
-    start = _start(states, [memory.detections.get(n) for n in frames], costs)
+    start = _first_swapped(states, [memory.detections.get(n) for n in frames], costs)
     return [
-        PositionCorrection(n, ours, *_exact_point(memory.detections[n].boxes[state]))
-        for place, n in enumerate(frames)
-        if start <= place < len(frames) - 1
-        for ours, state in ((a, states[1, place]), (b, states[0, place]))
+        PositionCorrection(n, corrected, *_exact_point(memory.detections[n].boxes[state]))
+        for index, n in enumerate(frames)
+        if start <= index < len(frames) - 1
+        for corrected, state in ((a, states[1, index]), (b, states[0, index]))
         if state != OCCLUDED
     ]
 
 
 def _track_at_point(correction: PositionCorrection, memory: WindowMemory) -> int | None:
-    """Return the track at the corrected point, if it is another one than the corrected track."""
-    there = memory.assignments.get(correction.frame, {})
+    """Return the track at the corrected point, if it is not the corrected track."""
+    assigned = memory.assignments.get(correction.frame, {})
     far = {
         number: float(normalized_offset(correction, memory.detections[correction.frame].boxes[state]))
-        for number, state in there.items()
+        for number, state in assigned.items()
     }
     if not far:
         return None
@@ -64,10 +64,10 @@ def _track_at_point(correction: PositionCorrection, memory: WindowMemory) -> int
     return nearest if nearest != correction.object and far[nearest] < _MAX_OFFSET else None
 
 
-def _covered(seen: NDArray[np.bool_]) -> bool:
-    """Return whether a may be occluded by b: a, the first row of `(2, M)`, ends hidden, and b was there."""
-    shown = np.flatnonzero(seen[0])
-    return bool(len(shown) and not seen[0, -1] and seen[1, : shown[-1] + 1].any())
+def _is_occluded_by_other(visible: NDArray[np.bool_]) -> bool:
+    """Return whether b may occlude a: the visibility `(2, M)` of a ends, and b was visible before."""
+    shown = np.flatnonzero(visible[0])
+    return bool(len(shown) and not visible[0, -1] and visible[1, : shown[-1] + 1].any())
 
 
 def _exact_point(box: Floats) -> tuple[float, float, float]:
@@ -76,46 +76,48 @@ def _exact_point(box: Floats) -> tuple[float, float, float]:
     return float(x), float(y), max(float(heights(box)) / 4.0, 1.0)
 
 
-def _start(states: NDArray[np.int64], frames: Sequence[Detections | None], costs: CostSettings) -> int:
+def _first_swapped(
+    states: NDArray[np.int64], frames: Sequence[Detections | None], costs: CostSettings
+) -> int:
     """Return the index of the first frame after two tracks, states `(2, M)`, have swapped."""
-    seen = states != OCCLUDED
-    began = int(seen[1].argmax())
-    if began > 0 and not seen[0, began:].any():
+    visible = states != OCCLUDED
+    began = int(visible[1].argmax())
+    if began > 0 and not visible[0, began:].any():
         return began
     rows = [np.unique(column[column != OCCLUDED]) for column in states.T]
-    bins = next(it.histograms.shape[1] for it in frames if it is not None)
-    few = [_select_rows(it, row, bins) for it, row in zip(frames, rows, strict=True)]
+    bins = next(detections.histograms.shape[1] for detections in frames if detections is not None)
+    selected = [_select_rows(detections, row, bins) for detections, row in zip(frames, rows, strict=True)]
     local = np.array(
         [
             [OCCLUDED if k == OCCLUDED else int(np.searchsorted(row, k)) for k in pair]
             for pair, row in zip(states.T, rows, strict=True)
         ]
     ).T
-    if seen.any(axis=1).all():
-        templates = [_template(n, row, few) for n, row in enumerate(local)]
-        found = swap_margins(build_network(templates, few, costs), local)
+    if visible.any(axis=1).all():
+        templates = [_template(n, row, selected) for n, row in enumerate(local)]
+        found = swap_margins(build_network(templates, selected, costs), local)
         if np.isfinite(found.margins[0, 1]):
             return int(found.frames[0, 1])
-    return _nearest(local, few)
+    return _nearest(local, selected)
 
 
 def _template(number: int, states: NDArray[np.int64], frames: Sequence[Detections]) -> Template:
-    """Return the template of an object as first seen; a box only if that is the first frame."""
+    """Return the template of an object at its first observation; its box only if that is in frame 0."""
     m = int((states != OCCLUDED).argmax())
     found = frames[m]
     return Template(number, found.histograms[states[m]], found.boxes[states[m]] if m == 0 else None)
 
 
-def _select_rows(seen: Detections | None, rows: NDArray[np.int64], bins: int) -> Detections:
-    if seen is None or not len(rows):
+def _select_rows(detections: Detections | None, rows: NDArray[np.int64], bins: int) -> Detections:
+    if detections is None or not len(rows):
         return Detections.empty(bins)
-    return Detections(seen.boxes[rows], seen.scores[rows], seen.histograms[rows])
+    return Detections(detections.boxes[rows], detections.scores[rows], detections.histograms[rows])
 
 
 def _nearest(states: NDArray[np.int64], frames: Sequence[Detections]) -> int:
-    """Return the index of the frame in which two visible tracks were nearest, else b's first frame."""
+    """Return the index of the last frame in which two visible tracks were nearest, or b's first frame."""
     both = np.flatnonzero((states != OCCLUDED).all(axis=0))
     if not len(both):
         return int(np.flatnonzero(states[1] != OCCLUDED)[0]) if (states[1] != OCCLUDED).any() else 0
-    apart = [float(normalized_distance(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
-    return int(both[len(apart) - 1 - int(np.argmin(apart[::-1]))])
+    distances = [float(normalized_distance(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
+    return int(both[len(distances) - 1 - int(np.argmin(distances[::-1]))])

@@ -1,4 +1,4 @@
-"""Risk prediction from a solved window: upcoming and undecided identity failures, and their probability."""
+"""Risk prediction from a solved window: expected and possible identity failures, and their probability."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from tracking.model.settings import CostSettings
 from tracking.types import RiskEvent, RiskReason
 
 _MAX_MARGIN = 10.0
-"""Margins above this count as this."""
+"""Upper limit of margins."""
 _LEAD_SCALE = 10.0
 """Frames per unit of lead time."""
 _MIN_OVERLAP = 0.25
-"""Shared over average area from which one object covers another."""
+"""Overlap (shared over average area) from which one object occludes another."""
 _RECENT = 5
-"""Least sightings to extrapolate a score or a path."""
+"""Least number of detections to extrapolate a score or a path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class RiskFeatures:
     Attributes:
         margin: cost of the alternative solution above the chosen one.
         lead: frames from the newest one to the expected failure; negative: in the past.
-        length: frames for which two objects overlap, or one is hidden.
+        length: frames for which two objects overlap, or one is occluded.
     """
 
     margin: float
@@ -43,7 +43,7 @@ class RiskFeatures:
 
     @property
     def regression_terms(self) -> tuple[float, float, float, float, float]:
-        """Terms of the log odds: a constant, the margin, and those of future and of past failures."""
+        """Terms of the log odds: a constant, the margin, and terms for future and for past failures."""
         ahead = float(self.lead > 0.0)
         begun = math.log1p(self.length) * (1.0 - ahead)
         return 1.0, min(self.margin, _MAX_MARGIN), ahead, ahead * self.lead / _LEAD_SCALE, begun
@@ -55,14 +55,14 @@ WEIGHTS: Mapping[RiskReason, tuple[float, float, float, float, float]] = {
     "track_loss": (-4.71, -0.02, -0.05, -0.12, 1.23),
     "optimality_gap": (-3.00, -1.00, 0.00, 0.00, 0.00),
 }
-"""By reason; learned by `python -m benchmarks.operator_assist.risk_weights`, except for `optimality_gap`:
-the default solver proves its answers, so there are no examples of it. Its weights are a guess: at most
-one in twenty, and less the larger the margin."""
+"""By reason; learned by `python -m benchmarks.operator_assist.risk_weights`, except for `optimality_gap`, of
+which there are no examples since the default solver proves optimality. Its weights are a guess: at most one
+in twenty, decreasing with the margin."""
 
 
-def failure_probability(reason: RiskReason, signs: RiskFeatures) -> float:
+def failure_probability(reason: RiskReason, features: RiskFeatures) -> float:
     """Return the probability of an identity failure, by logistic regression."""
-    odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], signs.regression_terms, strict=True))
+    odds = sum(weight * term for weight, term in zip(WEIGHTS[reason], features.regression_terms, strict=True))
     return 1.0 / (1.0 + math.exp(-odds))
 
 
@@ -79,17 +79,17 @@ class RiskPredictor:
         events = [
             *self._swaps(window, found),
             *self._similar_crossings(window),
-            *self._hidden_objects(window),
+            *self._occluded_objects(window),
             *self._low_confidence(window),
             *self._unproven(window, found.margins),
         ]
-        once: dict[tuple[str, tuple[int, ...]], RiskEvent] = {}
-        for it in sorted(events, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
-            once.setdefault((it.reason, tuple(sorted(it.objects))), it)
-        return tuple(once.values())
+        unique: dict[tuple[str, tuple[int, ...]], RiskEvent] = {}
+        for event in sorted(events, key=lambda it: (-it.risk, it.frame, it.objects, it.reason)):
+            unique.setdefault((event.reason, tuple(sorted(event.objects))), event)
+        return tuple(unique.values())
 
     def _swaps(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
-        """Return the pairs with a small swap margin in a frame that becomes final now."""
+        """Return the pairs with a small swap margin in a frame that becomes final with this window."""
         settled = window.first + found.frames <= window.final_to
         first, second = np.nonzero(np.triu((found.margins < self._settings.swap_margin) & settled, 1))
         return [
@@ -110,60 +110,60 @@ class RiskPredictor:
         return [
             _risk_event(
                 "crossing",
-                tuple(sorted((it.first, it.second))),
+                tuple(sorted((crossing.first, crossing.second))),
                 window,
-                window.last + 1 + it.frame,
-                it.margin,
-                it.length,
+                window.last + 1 + crossing.frame,
+                crossing.margin,
+                crossing.length,
             )
-            for it in found
-            if it.margin < self._settings.crossing_margin
+            for crossing in found
+            if crossing.margin < self._settings.crossing_margin
         ]
 
-    def _hidden_objects(self, window: SolvedWindow) -> list[RiskEvent]:
-        """Return the objects hidden for a while, with the similar object that covers them, if any.
+    def _occluded_objects(self, window: SolvedWindow) -> list[RiskEvent]:
+        """Return the objects occluded for some time, with the similar object that occludes them, if any.
 
-        The margin is the appearance distance of the two over a whole window, above the distance of an
-        object to itself; it is 0 for an object that is hidden without an occluder.
+        The margin is the appearance distance of the two over a whole window, minus the distance of an object
+        to itself; it is 0 for an object without an occluder.
         """
         histograms, found = window.known_histograms, []
         length = window.last - window.first + 1
-        for n, (hidden, way) in predict_paths(window, window.recent_boxes.shape[1]).items():
-            if hidden < self._settings.hidden_frames:
+        for n, (occluded, path) in predict_paths(window, window.recent_boxes.shape[1]).items():
+            if occluded < self._settings.hidden_frames:
                 continue
-            here = window.recent_boxes[:, -hidden:].copy()
-            here[n] = np.nan
-            covers = np.nan_to_num(overlap(here, way[:hidden])).max(axis=1, initial=0.0)
-            b = int(covers.argmax())
-            frame = window.last - hidden + 1
-            differ = float(
+            others = window.recent_boxes[:, -occluded:].copy()
+            others[n] = np.nan
+            overlaps = np.nan_to_num(overlap(others, path[:occluded])).max(axis=1, initial=0.0)
+            b = int(overlaps.argmax())
+            frame = window.last - occluded + 1
+            distance = float(
                 appearance_distance(histograms[n, None], histograms[b, None], self._costs.measure)[0, 0]
             )
-            margin = length * max(differ - self._costs.unknown_appearance, 0.0)
-            if covers[b] > _MIN_OVERLAP and margin < self._settings.crossing_margin:
+            margin = length * max(distance - self._costs.unknown_appearance, 0.0)
+            if overlaps[b] > _MIN_OVERLAP and margin < self._settings.crossing_margin:
                 pair = window.known_ids[n], window.known_ids[b]
-                found.append(_risk_event("crossing", pair, window, frame, margin, hidden))
+                found.append(_risk_event("crossing", pair, window, frame, margin, occluded))
             else:
-                found.append(_risk_event("track_loss", (window.known_ids[n],), window, frame, 0.0, hidden))
+                found.append(_risk_event("track_loss", (window.known_ids[n],), window, frame, 0.0, occluded))
         return found
 
     def _low_confidence(self, window: SolvedWindow) -> list[RiskEvent]:
         """Return the objects whose detection scores are low, or will be within the horizon."""
         found = []
-        scores, faint = window.scores, self._settings.min_confidence
+        scores, threshold = window.scores, self._settings.min_confidence
         for n, number in enumerate(window.ids):
-            seen = np.flatnonzero(~np.isnan(scores[n]))
-            if len(seen) < 2 * _RECENT or seen[-1] < scores.shape[1] - _RECENT:
+            visible = np.flatnonzero(~np.isnan(scores[n]))
+            if len(visible) < 2 * _RECENT or visible[-1] < scores.shape[1] - _RECENT:
                 continue
-            slope, level = np.polyfit(seen - seen[-1], scores[n, seen], 1)
-            left = (level - faint) / -slope if slope < 0.0 else np.inf
-            if level <= faint or left <= self._settings.horizon_frames:
-                frame = window.last + max(int(left), 0) if level > faint else window.last
-                found.append(_risk_event("track_loss", (number,), window, frame, float(level - faint), 0))
+            slope, level = np.polyfit(visible - visible[-1], scores[n, visible], 1)
+            frames_left = (level - threshold) / -slope if slope < 0.0 else np.inf
+            if level <= threshold or frames_left <= self._settings.horizon_frames:
+                frame = window.last + max(int(frames_left), 0) if level > threshold else window.last
+                found.append(_risk_event("track_loss", (number,), window, frame, float(level - threshold), 0))
         return found
 
     def _unproven(self, window: SolvedWindow, margins: Floats) -> list[RiskEvent]:
-        """Return the pair with the smallest swap margin, where the solution is not proven optimal."""
+        """Return the pair with the smallest swap margin, if the solution is not proven optimal."""
         if window.report.gap <= self._settings.max_solver_gap or not np.isfinite(margins).any():
             return []
         a, b = divmod(int(margins.argmin()), margins.shape[1])
@@ -185,15 +185,15 @@ def _risk_event(
 ) -> RiskEvent:
     """Return a risk event with its probability; `length` as in `RiskFeatures`."""
     margin = max(margin, 0.0)
-    likely = failure_probability(reason, RiskFeatures(margin, frame - window.last, length))
-    return RiskEvent(reason, objects, frame, margin, length, likely)
+    probability = failure_probability(reason, RiskFeatures(margin, frame - window.last, length))
+    return RiskEvent(reason, objects, frame, margin, length, probability)
 
 
 def _ambiguous_frames(window: SolvedWindow, a: int, b: int) -> int:
-    """Return in how many recent frames objects a and b overlapped, or one of them was hidden."""
-    one, other = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
-    hidden = np.isnan(one[:, 0]) | np.isnan(other[:, 0])
-    return int(np.count_nonzero(hidden | (np.nan_to_num(overlap(one, other)) > _MIN_OVERLAP)))
+    """Return in how many recent frames objects a and b overlapped, or one of them was occluded."""
+    first, second = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
+    occluded = np.isnan(first[:, 0]) | np.isnan(second[:, 0])
+    return int(np.count_nonzero(occluded | (np.nan_to_num(overlap(first, second)) > _MIN_OVERLAP)))
 
 
 def _pair(window: SolvedWindow, a: int, b: int) -> tuple[int, ...]:

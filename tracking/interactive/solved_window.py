@@ -22,12 +22,12 @@ class SolvedWindow:
         first: its first frame.
         ids: the tracks in the program, in the order of the network's objects.
         network: the solved network.
-        states: `(n, M)`, -1 where hidden.
-        detections: its M frames.
-        report: of the solver.
+        states: `(n, M)`, -1 where occluded.
+        detections: of its M frames.
+        report: the solver's report.
         final_to: the last frame that becomes final with it.
-        known_ids: all remembered tracks, also those without an observation in the window.
-        recent_boxes: `(k, T, 4)` pixels, the known tracks' boxes in the last T frames, NaN where hidden.
+        known_ids: all tracks, including those without an observation in the window.
+        recent_boxes: `(k, T, 4)` pixels, the known tracks' boxes in the last T frames, NaN where occluded.
         known_histograms: `(k, B)`, their templates.
     """
 
@@ -49,9 +49,9 @@ class SolvedWindow:
 
     @property
     def scores(self) -> Floats:
-        """Detection scores of the tracks, `(n, M)`, NaN where hidden."""
-        found = np.full(self.states.shape, np.nan)
-        for m, seen in enumerate(self.detections):
-            there = self.states[:, m] != OCCLUDED
-            found[there, m] = seen.scores[self.states[there, m]]
-        return found
+        """Detection scores of the tracks, `(n, M)`, NaN where occluded."""
+        scores = np.full(self.states.shape, np.nan)
+        for m, detections in enumerate(self.detections):
+            visible = self.states[:, m] != OCCLUDED
+            scores[visible, m] = detections.scores[self.states[visible, m]]
+        return scores

@@ -34,7 +34,7 @@ _RECENT_FRAMES = 75
 
 
 class InteractiveTracker(OnlineTracker):
-    """An `OnlineTracker` that predicts identity failures and takes an operator's corrections.
+    """An `OnlineTracker` that predicts identity failures and applies an operator's corrections.
 
     Without a correction its tracks are those of an `OnlineTracker`. Memory is bounded by `memory_frames`.
     """
@@ -57,17 +57,19 @@ class InteractiveTracker(OnlineTracker):
         self._predicts_risks = True
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
-        """Take the detections of a frame; see `OnlineTracker.push`."""
+        """Add the detections of a frame; see `OnlineTracker.push`."""
         gap = 1 if self._last is None else frame - self._last
         if 0 < gap <= self._window.forget_after:
             self._memory.add_detections(frame, detections)
         result = super().push(frame, detections, image)
         if gap > self._window.forget_after:
-            # Nothing is remembered over such a gap: what was before it cannot be corrected any more.
+            # The memory does not span such a gap: frames before it can no longer be corrected.
             self._memory = WindowMemory(self._settings.memory_frames)
             self._memory.add_detections(frame, detections)
         oldest = frame - self._settings.memory_frames
-        self._corrections = {number: it for number, it in self._corrections.items() if number >= oldest}
+        self._corrections = {
+            corrected: by_object for corrected, by_object in self._corrections.items() if corrected >= oldest
+        }
         return result
 
     def remembers(self, frame: int) -> bool:
@@ -79,22 +81,22 @@ class InteractiveTracker(OnlineTracker):
         return first is not None and frame >= max(first, self._last - self._settings.memory_frames)
 
     def apply_corrections(self, corrections: Sequence[PositionCorrection]) -> WindowResult | None:
-        """Apply an operator's corrections, also to final frames; return what changes.
+        """Apply an operator's corrections, also to final frames; return the changed result.
 
         The windows since the first corrected frame are solved again with the corrections' costs
         (`corrections.apply_corrections`), and so is every later window that contains a corrected frame.
-        Where the operator pointed at a position held by another track, the identities were swapped earlier;
-        the windows are then solved again from that frame on (`backdate_correction`). The result spans all
-        of these windows and replaces what was published for their frames. Tracks keep their ids.
+        If the operator pointed at the position of another track, the identities were swapped earlier; the
+        windows are then solved again from that frame on (`backdate_correction`). The result spans all of
+        these windows and replaces the results published for their frames. Tracks keep their ids.
 
-        Returns `None` where nothing changes: the tracks agree with the corrections already, the windows are
-        still to come, or the frames are no longer remembered (see `remembers`).
+        Returns `None` if nothing changes: the tracks already agree with the corrections, the windows have not
+        been solved yet, or the frames are no longer in memory (see `remembers`).
         """
         frames: list[int] = []
-        for it in sorted(corrections, key=lambda it: (it.frame, it.object)):
-            if self.remembers(it.frame):
-                frames += self._store_correction(it)
-        # Small contradictions wait for others; frames that are forgotten meanwhile are dropped.
+        for correction in sorted(corrections, key=lambda it: (it.frame, it.object)):
+            if self.remembers(correction.frame):
+                frames += self._store_correction(correction)
+        # Small contradictions are accumulated; frames that have left the memory are dropped.
         self._contradicted_frames = [
             frame for frame in (*self._contradicted_frames, *frames) if self.remembers(frame)
         ]
@@ -110,26 +112,26 @@ class InteractiveTracker(OnlineTracker):
     def _store_correction(self, correction: PositionCorrection) -> list[int]:
         """Store a correction; return the frames in which it contradicts the solution."""
         self._corrections.setdefault(correction.frame, {})[correction.object] = correction
-        self._place(correction)
-        doubt = self._memory.disagreement(correction, self._settings)
-        if not doubt:
+        self._insert_hypothesis(correction)
+        disagreement = self._memory.disagreement(correction, self._settings)
+        if not disagreement:
             return []
-        self._total_disagreement += doubt
+        self._total_disagreement += disagreement
         frames = [correction.frame]
         steps = self._memory.windows_since(correction.frame)
-        for it in backdate_correction(
+        for implied in backdate_correction(
             correction, self._memory, self._costs, self._last_agreement(correction)
         ):
-            if it.frame < steps[0].first or len(frames) > 1:
-                self._corrections.setdefault(it.frame, {}).setdefault(it.object, it)
-                frames.append(it.frame)
+            if implied.frame < steps[0].first or len(frames) > 1:
+                self._corrections.setdefault(implied.frame, {}).setdefault(implied.object, implied)
+                frames.append(implied.frame)
         if len(frames) > 1:
             self._total_disagreement += self._settings.correction_weight
         return frames
 
-    def _place(self, correction: PositionCorrection) -> None:
-        """Insert a hypothesis at the corrected point where no detection fits."""
-        histogram = next((it.histogram for it in self._objects if it.id == correction.object), None)
+    def _insert_hypothesis(self, correction: PositionCorrection) -> None:
+        """Insert a hypothesis at the corrected point if no detection fits."""
+        histogram = next((item.histogram for item in self._objects if item.id == correction.object), None)
         if histogram is None or correction.frame not in self._memory.detections:
             return
         self._memory.insert_hypothesis(correction, histogram)
@@ -140,10 +142,10 @@ class InteractiveTracker(OnlineTracker):
         """Return the frame after the object's last correction that the solution agrees with."""
         before = [
             frame + 1
-            for frame, said in self._corrections.items()
+            for frame, by_object in self._corrections.items()
             if frame < correction.frame
-            and correction.object in said
-            and not self._memory.disagreement(said[correction.object], self._settings)
+            and correction.object in by_object
+            and not self._memory.disagreement(by_object[correction.object], self._settings)
         ]
         return max(before, default=self._memory.snapshots[0].first)
 
@@ -159,14 +161,16 @@ class InteractiveTracker(OnlineTracker):
         results = []
         for step in steps:
             first = self._first
-            self._detections = {n: it for n, it in self._memory.detections.items() if first <= n <= step.end}
-            # Risks of earlier windows have been published.
+            self._detections = {
+                n: detections for n, detections in self._memory.detections.items() if first <= n <= step.end
+            }
+            # Risks of earlier windows were published already.
             self._predicts_risks = step is steps[-1]
             results.append(self._solve(step.end, step.final_to))
         first = self._first
-        self._detections = {n: it for n, it in self._memory.detections.items() if n >= first}
+        self._detections = {n: detections for n, detections in self._memory.detections.items() if n >= first}
         result = merge_results(results)
-        changed = [n for n, it in sorted(self._memory.assignments.items()) if it != before.get(n)]
+        changed = [n for n, assigned in sorted(self._memory.assignments.items()) if assigned != before.get(n)]
         if result is None or not changed:
             return None
         return replace(result, revised_from=changed[0] if changed[0] <= final_before else None)
@@ -215,15 +219,15 @@ class InteractiveTracker(OnlineTracker):
         self, item: TrackedObject, first: int, frames: Sequence[Detections]
     ) -> list[npt.NDArray[np.bool_]]:
         allowed = super()._gated_detections(item, first, frames)
-        for m, seen in enumerate(frames):
+        for m, detections in enumerate(frames):
             correction = self._corrections.get(first + m, {}).get(item.id)
             if correction is not None:
-                # The corrected object is at the point, however far that is.
-                allowed = allowed or [np.zeros(len(it), dtype=np.bool_) for it in frames]
-                allowed[m] = allowed[m] | near_correction(correction, seen.boxes)
-            for who, place in self._memory.inserted.get(first + m, {}).items():
-                if allowed and who != item.id:
-                    allowed[m][place] = False
+                # The gate does not apply to the corrected point.
+                allowed = allowed or [np.zeros(len(frame), dtype=np.bool_) for frame in frames]
+                allowed[m] = allowed[m] | near_correction(correction, detections.boxes)
+            for number, index in self._memory.inserted.get(first + m, {}).items():
+                if allowed and number != item.id:
+                    allowed[m][index] = False
         return allowed
 
     def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:

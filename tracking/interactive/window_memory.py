@@ -18,14 +18,14 @@ from tracking.solvers.base import OCCLUDED
 from tracking.solvers.warm_start import WindowWarmStart
 from tracking.types import Detections
 
-_SAME_PLACE = 0.5
-"""Overlap (IoU) from which a new track is the one that started there before the windows were undone."""
+_MIN_SAME_IOU = 0.5
+"""Overlap (IoU) from which a new track is the one that started there before its window was undone."""
 
 _SIZE_FRAMES = 50
-"""Frames before and after over which the size of an object is taken."""
+"""Frames before and after that determine the size of an object."""
 
-_SAME_TIME = 5
-"""Frames by which a track may start earlier or later than before."""
+_MAX_START_SHIFT = 5
+"""Frames by which such a track may start earlier or later."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class WindowSnapshot:
         end: its last frame.
         final_to: the last frame that becomes final.
         objects: the object list before it.
-        warm_start: from the window before it.
+        warm_start: the warm start from the previous window.
     """
 
     first: int
@@ -48,7 +48,7 @@ class WindowSnapshot:
 
     @property
     def order(self) -> tuple[int, int]:
-        """Which window it is: they come in this order."""
+        """Sort key: windows are solved in this order."""
         return self.end, self.final_to
 
 
@@ -63,10 +63,10 @@ class InitiatedTrack:
 
 
 class WindowMemory:
-    """What a tracker needs to re-solve the last `frames` frames. Bounded by them.
+    """The data to re-solve the windows of the last `frames` frames.
 
     Attributes:
-        detections: the detections, by frame; a frame that is not there showed nothing.
+        detections: the detections by frame; missing frames had none.
         assignments: by frame, the index of each track's observation.
         inserted: by frame, the index of the observation inserted for each corrected object.
         snapshots: the windows, oldest first.
@@ -76,7 +76,7 @@ class WindowMemory:
         self._frames = frames
         self._initiated: list[InitiatedTrack] = []
         self._undone: list[InitiatedTrack] = []
-        """Tracks of windows that are solved again: a track that starts there again gets the same id."""
+        """Tracks of undone windows: a track that starts there again gets the same id."""
         self.detections: dict[int, Detections] = {}
         self.assignments: dict[int, Mapping[int, int]] = {}
         self.inserted: dict[int, dict[int, int]] = {}
@@ -86,40 +86,40 @@ class WindowMemory:
         """Add the detections of a frame, and drop frames older than the memory."""
         self.detections[frame] = detections
         oldest = frame - self._frames
-        # Of a window that reaches back beyond the memory, the detections are needed, too.
+        # A window that begins before the memory needs its detections, too.
         while self.snapshots and self.snapshots[0].end < oldest:
             self.snapshots.popleft()
         oldest = min(oldest, self.snapshots[0].first if self.snapshots else frame)
-        self.detections = {number: it for number, it in self.detections.items() if number >= oldest}
-        self.assignments = {number: it for number, it in self.assignments.items() if number >= oldest}
-        self.inserted = {number: it for number, it in self.inserted.items() if number >= oldest}
-        self._initiated = [it for it in self._initiated if it.frame >= oldest - _SAME_TIME]
-        self._undone = [it for it in self._undone if it.frame >= oldest - _SAME_TIME]
+        self.detections = {n: found for n, found in self.detections.items() if n >= oldest}
+        self.assignments = {n: assigned for n, assigned in self.assignments.items() if n >= oldest}
+        self.inserted = {n: indices for n, indices in self.inserted.items() if n >= oldest}
+        self._initiated = [track for track in self._initiated if track.frame >= oldest - _MAX_START_SHIFT]
+        self._undone = [track for track in self._undone if track.frame >= oldest - _MAX_START_SHIFT]
 
     def insert_hypothesis(self, correction: PositionCorrection, histogram: Floats) -> None:
-        """Insert or move the hypothesis of a corrected object where no detection fits."""
-        frame, who = correction.frame, correction.object
-        size, seen = self._size(who, frame), self.detections.get(frame)
-        if size is None or seen is None:
+        """Insert or move the hypothesis of a corrected object if no detection fits."""
+        frame, number = correction.frame, correction.object
+        size, detections = self._size(number, frame), self.detections.get(frame)
+        if size is None or detections is None:
             return
-        made = self.inserted.get(frame, {})
-        real = len(seen) - len(made)
+        inserted = self.inserted.get(frame, {})
+        detected = len(detections) - len(inserted)
         box = box_around(correction, size)
-        if who in made:
-            boxes = seen.boxes.copy()
-            boxes[made[who]] = box
-            self.detections[frame] = Detections(boxes, seen.scores, seen.histograms)
-        elif not has_hypothesis(correction, size, seen.boxes[:real]):
-            self.detections[frame] = insert_hypothesis(seen, box, histogram)
-            self.inserted[frame] = {**made, who: len(seen)}
+        if number in inserted:
+            boxes = detections.boxes.copy()
+            boxes[inserted[number]] = box
+            self.detections[frame] = Detections(boxes, detections.scores, detections.histograms)
+        elif not has_hypothesis(correction, size, detections.boxes[:detected]):
+            self.detections[frame] = insert_hypothesis(detections, box, histogram)
+            self.inserted[frame] = {**inserted, number: len(detections)}
 
-    def _size(self, who: int, frame: int) -> Floats | None:
+    def _size(self, number: int, frame: int) -> Floats | None:
         """Return the median size of an object around a frame, `(2,)` pixels (width, height)."""
         sides = [
-            self.detections[n].boxes[self.assignments[n][who]]
+            self.detections[n].boxes[self.assignments[n][number]]
             for n in range(frame - _SIZE_FRAMES, frame + _SIZE_FRAMES + 1)
-            if who in self.assignments.get(n, {})
-            and who not in self.inserted.get(n, {})
+            if number in self.assignments.get(n, {})
+            and number not in self.inserted.get(n, {})
             and n in self.detections
         ]
         return np.median([box[2:] - box[:2] for box in sides], axis=0) if sides else None
@@ -129,11 +129,11 @@ class WindowMemory:
         while self.snapshots and self.snapshots[-1].order >= step.order:
             self.snapshots.pop()
         self.snapshots.append(step)
-        self._undone += [it for it in self._initiated if it.window >= step.order]
-        self._initiated = [it for it in self._initiated if it.window < step.order]
+        self._undone += [track for track in self._initiated if track.window >= step.order]
+        self._initiated = [track for track in self._initiated if track.window < step.order]
 
     def record_states(self, first: int, ids: Sequence[int], states: npt.NDArray[np.int64]) -> None:
-        """Record a window's solution `(n, M)` from the frame `first` on, -1 where hidden."""
+        """Record a window's solution `(n, M)` from the frame `first` on, -1 where occluded."""
         for m, column in enumerate(states.T.tolist()):
             self.assignments[first + m] = {
                 number: state for number, state in zip(ids, column, strict=True) if state != OCCLUDED
@@ -141,50 +141,52 @@ class WindowMemory:
 
     def keep_only(self, first: int, ids: set[int]) -> None:
         """Drop the assignments of ended tracks (not in `ids`) from the frame `first` on."""
-        for frame in [it for it in self.assignments if it >= first]:
+        for frame in [n for n in self.assignments if n >= first]:
             self.assignments[frame] = {
-                number: it for number, it in self.assignments[frame].items() if number in ids
+                number: state for number, state in self.assignments[frame].items() if number in ids
             }
 
     def boxes_of(self, ids: Sequence[int], last: int, frames: int) -> Floats:
-        """Return objects' boxes in the `frames` frames up to `last`, `(n, frames, 4)`, NaN where hidden."""
+        """Return objects' boxes in the `frames` frames up to `last`, `(n, frames, 4)`, NaN where occluded."""
         boxes = np.full((len(ids), frames, BOX_SIDES), np.nan)
-        for place, frame in enumerate(range(last - frames + 1, last + 1)):
-            there = self.assignments.get(frame, {})
+        for index, frame in enumerate(range(last - frames + 1, last + 1)):
+            assigned = self.assignments.get(frame, {})
             for n, number in enumerate(ids):
-                if number in there:
-                    boxes[n, place] = self.detections[frame].boxes[there[number]]
+                if number in assigned:
+                    boxes[n, index] = self.detections[frame].boxes[assigned[number]]
         return boxes
 
     def windows_since(self, frame: int) -> Sequence[WindowSnapshot]:
-        """Return the windows from the first that contains this frame; empty where it is forgotten."""
+        """Return the windows from the first that contains this frame on; empty if it is not in memory."""
         if not self.snapshots or frame < self.snapshots[0].first:
             return ()
-        return [it for it in self.snapshots if it.end >= frame]
+        return [window for window in self.snapshots if window.end >= frame]
 
     def disagreement(self, correction: PositionCorrection, settings: InteractiveSettings) -> float:
-        """Return the cost by which a correction contradicts the solution; 0 where they agree."""
+        """Return the cost by which a correction contradicts the solution; 0 if they agree."""
         if correction.frame not in self.assignments or correction.frame not in self.detections:
             return 0.0
         far = normalized_offset(correction, self.detections[correction.frame].boxes)
         state = self.assignments[correction.frame].get(correction.object)
-        now = settings.hidden_share if state is None else float(far[state])
-        return settings.correction_weight * (now - min(float(far.min(initial=1.0)), settings.hidden_share))
+        current = settings.hidden_share if state is None else float(far[state])
+        return settings.correction_weight * (
+            current - min(float(far.min(initial=1.0)), settings.hidden_share)
+        )
 
-    def assign_id(self, frame: int, box: Floats, fresh: int) -> int:
-        """Return the id of a new track: `fresh`, or its id before its window was undone.
+    def assign_id(self, frame: int, box: Floats, new_id: int) -> int:
+        """Return the id of a new track: `new_id`, or its id before its window was undone.
 
         Otherwise ids are never reused.
         """
         known = self._undone_track(frame, box)
         if known is not None:
             self._undone.remove(known)
-        number = fresh if known is None else known.id
+        number = new_id if known is None else known.id
         self._initiated.append(InitiatedTrack(frame, box, number, self.snapshots[-1].order))
         return number
 
     def _undone_track(self, frame: int, box: Floats) -> InitiatedTrack | None:
         """Return the track that started there in an undone window."""
-        near = [it for it in self._undone if abs(it.frame - frame) <= _SAME_TIME]
+        near = [track for track in self._undone if abs(track.frame - frame) <= _MAX_START_SHIFT]
         found = max(near, key=lambda it: (float(iou(it.box, box)), -it.id), default=None)
-        return found if found is not None and float(iou(found.box, box)) >= _SAME_PLACE else None
+        return found if found is not None and float(iou(found.box, box)) >= _MIN_SAME_IOU else None

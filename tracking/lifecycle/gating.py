@@ -1,7 +1,7 @@
 """Gating: detections an object cannot have reached are excluded from its network.
 
-Paper II.B allows partially connected networks for exactly this reason. Without it an object that comes
-out of an occlusion node may do so anywhere in the picture.
+Paper II.B allows partially connected networks for this purpose. Without gating an object may reappear
+anywhere in the image after an occlusion.
 """
 
 from __future__ import annotations
@@ -29,19 +29,21 @@ def gate_detections(
 def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
     """Return which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
-    It may have gone (`normalized_distance`) `gate_heights + gate_growth (elapsed - 1)` heights, and the
-    height changed by a factor.
+    It may have moved by `gate_heights + gate_growth (elapsed - 1)` heights (`normalized_distance`), and its
+    height may have changed by `max_height_ratio`.
     """
-    tall, other = float(heights(box)), heights(boxes)
-    far = window.gate_heights + window.gate_growth * max(elapsed - 1, 0)
-    alike = (other <= window.max_height_ratio * max(tall, 1.0)) & (
-        tall <= window.max_height_ratio * np.maximum(other, 1.0)
+    height, other_heights = float(heights(box)), heights(boxes)
+    max_distance = window.gate_heights + window.gate_growth * max(elapsed - 1, 0)
+    similar = (other_heights <= window.max_height_ratio * max(height, 1.0)) & (
+        height <= window.max_height_ratio * np.maximum(other_heights, 1.0)
     )
-    return np.asarray((normalized_distance(box, boxes) <= far) & (alike | (elapsed > window.window)))
+    return np.asarray(
+        (normalized_distance(box, boxes) <= max_distance) & (similar | (elapsed > window.window))
+    )
 
 
 def restrict_network(network: Network, allowed: Sequence[Sequence[npt.NDArray[np.bool_]]]) -> Network:
-    """Return the network without the places out of reach; `allowed[n][m]` is `(K_m,)` bool."""
+    """Return the network without the gated places; `allowed[n][m]` is `(K_m,)` bool."""
     node = network.node.copy()
     for n, frames in enumerate(allowed):
         for m, places in enumerate(frames):

@@ -32,12 +32,11 @@ def conflict_relation(places: ObservationArrays, settings: CostSettings) -> Bool
 
 
 def clique_rows(relation: Bools, owners: NDArray[np.int64] | None) -> Bools:
-    """Cover conflicts of one frame by cliques: (R, V) bool, at most one path through each row.
+    """Cover the conflicts of one frame by cliques: (R, V) bool, at most one path through each row.
 
-    `relation` is (V, V); `owners` (V,) says which object each place belongs to, None: to all of them.
-    Every conflicting pair of places that two objects could take is in some row together. The places of
-    one object join a clique freely, since an object takes one place only. The cover of a connected part
-    does not depend on the rest, so it may be computed by itself.
+    `relation` is (V, V); `owners` (V,) is the object of each place, None if all objects share them. Each
+    conflicting pair of places of two objects is contained in a row. Places of one object can be in a clique
+    together, since an object takes only one place. The covers of connected components are independent.
     """
     joined, uncovered = relation.copy(), relation.copy()
     if owners is not None:
@@ -67,7 +66,7 @@ def connected_places(relation: Bools, place: int) -> NDArray[np.int64]:
 
 
 def _grow_clique(first: int, second: int, joined: Bools, uncovered: Bools) -> Bools:
-    """Grow the clique of two places, by those that cover most that is uncovered first."""
+    """Grow a clique from two places, adding those that cover most uncovered pairs first."""
     row = np.zeros(len(joined), dtype=np.bool_)
     row[[first, second]] = True
     candidates = joined[first] & joined[second] & ~row
@@ -82,9 +81,9 @@ def _grow_clique(first: int, second: int, joined: Bools, uncovered: Bools) -> Bo
 
 
 def star_exclusions(relation: Bools, sets: int, objects: int) -> Bools:
-    """Return which places two objects cannot both take when stars are the rows, (M, P K, P K).
+    """Return which places two objects cannot both take if the rows are stars, (M, P K, P K).
 
-    Under II.D to the letter two places also exclude each other if both conflict with one place of a
+    With the rows exactly as in II.D, two places also exclude each other if both conflict with one place of a
     third object.
     """
     if objects <= 2:  # noqa: PLR2004 — there is no third object

@@ -17,12 +17,12 @@ from tracking.model.settings import CostSettings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionCosts:
-    """Costs of motion on the arcs to each observation; 0 for objects whose motion is unknown.
+    """Motion costs of the arcs to each observation; 0 for objects with unknown motion.
 
     Attributes:
-        moving: (n, M, K) of arcs from another observation.
-        reappearing: (n, M, K) of arcs out of an occlusion; infinite where the observation is too far off
-            the predicted course, or looks too different.
+        moving: (n, M, K) for arcs from another observation.
+        reappearing: (n, M, K) for arcs out of an occlusion; infinite if the observation is too far from the
+            predicted position, or its appearance too different.
     """
 
     moving: Floats
@@ -30,43 +30,46 @@ class MotionCosts:
 
 
 def motion_costs(
-    templates: Sequence[Template], likeness: Floats, places: ObservationArrays, settings: CostSettings
+    templates: Sequence[Template], distances: Floats, places: ObservationArrays, settings: CostSettings
 ) -> MotionCosts | None:
-    """Return the costs of all objects; `likeness` is (n, M, K). `None` where all would be 0."""
+    """Return the motion costs of all objects, or `None` if all are 0.
+
+    `distances` (n, M, K): appearance distances to the templates.
+    """
     known = any(template.motion is not None for template in templates)
     if not known or not (settings.motion or settings.reappearance):
         return None
     boxes = np.broadcast_to(places.boxes, (len(templates), *places.boxes.shape[1:]))
-    charges = MotionCosts(np.zeros(likeness.shape), np.zeros(likeness.shape))
+    costs = MotionCosts(np.zeros(distances.shape), np.zeros(distances.shape))
     for n, template in enumerate(templates):
         if template.motion is not None:
-            charges.moving[n], charges.reappearing[n] = _object_motion_costs(
-                template.motion, boxes[n], likeness[n], settings
+            costs.moving[n], costs.reappearing[n] = _object_motion_costs(
+                template.motion, boxes[n], distances[n], settings
             )
-    return charges
+    return costs
 
 
 def _object_motion_costs(
-    motion: MotionModel, boxes: Floats, likeness: Floats, settings: CostSettings
+    motion: MotionModel, boxes: Floats, distances: Floats, settings: CostSettings
 ) -> tuple[Floats, Floats]:
     """Return the costs `moving` and `reappearing` of one object for boxes (M, K, 4), both (M, K)."""
-    away, moved = motion.deviations(boxes), motion.damped_elapsed(len(boxes))[:, None]
-    share = np.minimum(away / (settings.motion_slack + settings.motion_drift * moved), 1.0)
+    deviations, elapsed = motion.deviations(boxes), motion.damped_elapsed(len(boxes))[:, None]
+    share = np.minimum(deviations / (settings.motion_slack + settings.motion_drift * elapsed), 1.0)
     moving = settings.motion * share
     if not settings.reappearance:
         return moving, moving
-    share = away / (settings.motion_slack + settings.reappearance_drift * moved)
+    share = deviations / (settings.motion_slack + settings.reappearance_drift * elapsed)
     reappearing = moving + settings.reappearance * share**2
-    reappearing[(share > 1.0) | (likeness > settings.reappearance_max_distance)] = np.inf
+    reappearing[(share > 1.0) | (distances > settings.reappearance_max_distance)] = np.inf
     return moving, reappearing
 
 
-def node_costs(likeness: Floats, places: ObservationArrays, settings: CostSettings) -> Floats:
-    """Return what every arc into a state costs, (n, M, S): `likeness` (n, M, K) to it, or the occlusion."""
-    objects, frames, width = likeness.shape
+def node_costs(distances: Floats, places: ObservationArrays, settings: CostSettings) -> Floats:
+    """Return the node costs, (n, M, S), of observations at `distances` (n, M, K) and of the occlusion."""
+    objects, frames, width = distances.shape
     costs = np.empty((objects, frames, width + 1))
-    doubt = settings.confidence * (1.0 - places.scores)
-    costs[:, :, :width] = likeness + doubt
+    score_costs = settings.confidence * (1.0 - places.scores)
+    costs[:, :, :width] = distances + score_costs
     costs[:, :, :width][~np.broadcast_to(places.present, costs[:, :, :width].shape)] = np.inf
     costs[:, :, width] = settings.change + settings.occlusion
     return costs
@@ -74,12 +77,12 @@ def node_costs(likeness: Floats, places: ObservationArrays, settings: CostSettin
 
 def source_costs(
     templates: Sequence[Template],
-    likeness: Floats,
-    charges: MotionCosts | None,
+    distances: Floats,
+    motion: MotionCosts | None,
     places: ObservationArrays,
     settings: CostSettings,
 ) -> Floats:
-    """Return what the arcs from the source cost besides the node, (n, S); `likeness` is (n, M, K)."""
+    """Return the costs of arcs from the source without the node, (n, S); `distances` is (n, M, K)."""
     width = places.present.shape[2]
     costs = np.full((len(templates), width + 1), settings.change)
     costs[:, width] = 0.0
@@ -87,37 +90,37 @@ def source_costs(
     for n, template in enumerate(templates):
         if template.box is not None:
             moved = _displacement_costs(template.box[None], first_boxes[n], settings)[0]
-            costs[n, :width] = settings.appearance * likeness[n, 0] + moved
+            costs[n, :width] = settings.appearance * distances[n, 0] + moved
             costs[n, width] = settings.disappearance
-        if charges is not None:
-            first = charges.reappearing if template.box is None else charges.moving
+        if motion is not None:
+            first = motion.reappearing if template.box is None else motion.moving
             costs[n, :width] += first[n, 0]
     return costs
 
 
-def pair_costs(charges: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
-    """Return what the arcs between two frames cost besides the node, (Q, M - 1, S, S).
+def pair_costs(motion: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
+    """Return the costs of arcs between two frames without the node, (Q, M - 1, S, S).
 
-    Q is the number of sets of observations, or n where the motion of an object is known.
+    Q is the number of sets of observations, or n if the motion of any object is known.
     """
     sets, frames, width = places.present.shape
     costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))
     before, after = places.histograms[:, :-1], places.histograms[:, 1:]
-    seen = costs[:, :, :width, :width]
-    seen += settings.appearance * appearance_distance(before, after, settings.measure)
-    seen += _displacement_costs(places.boxes[:, :-1], places.boxes[:, 1:], settings)
+    between = costs[:, :, :width, :width]
+    between += settings.appearance * appearance_distance(before, after, settings.measure)
+    between += _displacement_costs(places.boxes[:, :-1], places.boxes[:, 1:], settings)
     costs[:, :, width, :width] = settings.change
     costs[:, :, :width, width] = settings.disappearance
-    if charges is None:
+    if motion is None:
         return costs
-    costs = np.broadcast_to(costs, (len(charges.reappearing), *costs.shape[1:])).copy()
-    costs[:, :, :width, :width] += charges.moving[:, 1:, None]
-    costs[:, :, width, :width] += charges.reappearing[:, 1:]
+    costs = np.broadcast_to(costs, (len(motion.reappearing), *costs.shape[1:])).copy()
+    costs[:, :, :width, :width] += motion.moving[:, 1:, None]
+    costs[:, :, width, :width] += motion.reappearing[:, 1:]
     return costs
 
 
 def sink_costs(objects: int, places: ObservationArrays, settings: CostSettings) -> Floats:
-    """Return what the arcs into the sink cost, (n, S): one constant."""
+    """Return the constant costs of arcs to the sink, (n, S)."""
     return np.full((objects, places.present.shape[2] + 1), settings.change + settings.occlusion)
 
 
@@ -137,7 +140,7 @@ def _displacement_costs(before: Floats, after: Floats, settings: CostSettings) -
 def template_distances(
     templates: Sequence[Template], places: ObservationArrays, settings: CostSettings
 ) -> Floats:
-    """Compare each template with each place: g(s_n, v), (n, M, K)."""
+    """Return the appearance distance of each template to each place: g(s_n, v), (n, M, K)."""
     sets, frames, width, bins = places.histograms.shape
     distances = np.full((len(templates), frames, width), settings.unknown_appearance)
     known = [n for n, template in enumerate(templates) if template.histogram.size and bins]
@@ -146,13 +149,13 @@ def template_distances(
     wrong = {templates[n].histogram.size for n in known} - {bins}
     if wrong:
         raise ValueError(f"templates need histograms of {bins} bins like the frames, not {sorted(wrong)}")
-    looks = np.array([templates[n].histogram for n in known])
+    histograms = np.array([templates[n].histogram for n in known])
     if sets == 1:
-        seen = places.histograms.reshape(frames * width, bins)
-        table = appearance_distance(looks, seen, settings.measure)
+        observed = places.histograms.reshape(frames * width, bins)
+        table = appearance_distance(histograms, observed, settings.measure)
         distances[known] = table.reshape(len(known), frames, width)
     else:
         own = places.histograms[known].reshape(len(known), frames * width, bins)
-        table = appearance_distance(looks[:, None], own, settings.measure)
+        table = appearance_distance(histograms[:, None], own, settings.measure)
         distances[known] = table.reshape(len(known), frames, width)
     return distances

@@ -1,4 +1,4 @@
-"""Motion model: an object's predicted position since its last sighting, with damped velocity."""
+"""Motion model: an object's predicted position since its last detection, with damped velocity."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 
 from tracking.boxes import Floats, normalized_distance
 
-# Frames after which the velocity of a hidden object has decayed to a third: people turn and stop.
+# Frames after which the velocity of an occluded object has decayed to 1/e: people turn and stop.
 _VELOCITY_DECAY_FRAMES = 20.0
-# Sum of squared times, frames², at which the sightings count as much as the prior of no motion: that of
-# three sightings in a row, whose boxes jitter by more than a step.
+# Sum of squared times, frames², at which detections weigh as much as the prior of no motion: slightly more
+# than that of three consecutive detections, whose boxes jitter by more than a step.
 _VELOCITY_REGULARIZATION = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionModel:
-    """How an object moved before the window.
+    """An object's motion before the window.
 
     Attributes:
-        box: (4,) pixels, where it was last seen.
-        velocity: (2,) pixels a frame, right and down.
-        elapsed: frames from there to the window's first frame, at least 1.
+        box: (4,) pixels, its last detection.
+        velocity: (2,) pixels per frame, right and down.
+        elapsed: frames from its last detection to the window's first frame, at least 1.
     """
 
     box: Floats
@@ -32,29 +32,29 @@ class MotionModel:
 
     @classmethod
     def of(cls, frames: Sequence[int], boxes: Floats, first: int) -> MotionModel:
-        """Return the motion of an object seen at `boxes` (F, 4) in `frames` (F,), for a window from `first`.
+        """Return the motion of an object with `boxes` (F, 4) in `frames` (F,), for a window from `first` on.
 
-        The velocity is the slope of the least-squares line through the middles, drawn towards zero by
-        V / (V + 3), V the sum of the squared times: a ridge regression.
+        The velocity is the slope of the least-squares line through the centers, shrunk by V / (V + 3), where
+        V is the sum of the squared times: a ridge regression.
         """
         times = np.asarray(frames, dtype=np.float64)
         times -= times.mean()
-        middles = boxes.reshape(-1, 2, 2).mean(axis=1)
-        velocity = times @ middles / (times @ times + _VELOCITY_REGULARIZATION)
+        centers = boxes.reshape(-1, 2, 2).mean(axis=1)
+        velocity = times @ centers / (times @ times + _VELOCITY_REGULARIZATION)
         return cls(boxes[-1], velocity, first - frames[-1])
 
     def damped_elapsed(self, frames: int) -> Floats:
-        """Return for how many frames it has moved on in each of the window's frames, (M,): 20 at most.
+        """Return the effective frames of motion up to each of the window's frames, (M,), at most 20.
 
-        Every frame counts less than the one before, since people turn and stop: 20 (1 - exp(-t / 20)).
+        Each frame counts less than the one before, since people turn and stop: 20 (1 - exp(-t / 20)).
         """
         elapsed = self.elapsed + np.arange(frames, dtype=np.float64)
         return np.asarray(_VELOCITY_DECAY_FRAMES * (1.0 - np.exp(-elapsed / _VELOCITY_DECAY_FRAMES)))
 
     def predict(self, frames: int) -> Floats:
-        """Return where it is expected in each of the window's frames, (M, 4)."""
+        """Return the predicted boxes in the window's frames, (M, 4)."""
         return np.asarray(self.box + self.damped_elapsed(frames)[:, None] * np.tile(self.velocity, 2))
 
     def deviations(self, boxes: Floats) -> Floats:
-        """Return how far boxes (M, K, 4) are from where it is expected, in heights, (M, K)."""
+        """Return the distances of boxes (M, K, 4) from the predicted ones, in heights, (M, K)."""
         return normalized_distance(self.predict(len(boxes))[:, None], boxes)

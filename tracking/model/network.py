@@ -1,7 +1,7 @@
 """The network of one window: the places that each object can be in, and the costs of moving between them.
 
-Paper II.B, Fig. 4. The observations of a frame are padded to K places; the node after them, the last
-one, is the occlusion node, so that index -1 means occluded everywhere.
+Paper II.B, Fig. 4. The observations of a frame are padded to K places; the last node, after them, is the
+occlusion node, so that index -1 always means occluded.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Network:
-    """One window of M frames and n objects; S = K + 1 states a frame, the last one occlusion.
+    """One window of M frames and n objects; S = K + 1 states per frame, the last one occlusion.
 
     The cost of the arc from state i of frame m to state j of frame m + 1 of object n is
-    `pair[q, m, i, j] + node[n, m + 1, j]`, where q is `pair_sets[n]`; infinite: there is no such arc.
+    `pair[q, m, i, j] + node[n, m + 1, j]`, where q is `pair_sets[n]`; infinite if there is no such arc.
 
     Attributes:
         boxes: (P, M, K, 4) pixels, zero on padding. P = 1: all objects share the observations;
-            else P = n and set n belongs to object n.
+            otherwise P = n and set n belongs to object n.
         present: (P, M, K) bool, False on padding.
         source: (n, S) cost of the arc from the source s_n to a state of the first frame, without `node`.
         node: (n, M, S) cost of being in a state, the same for all arcs into it.
         pair: (Q, M - 1, S, S) cost of going from one state to another; Q = 1: the same for all objects,
-            else n.
+            otherwise n.
         sink: (n, S) cost of the arc from a state of the last frame to the sink t_n.
         conflicts: (M, P K, P K) bool, places `p K + i` of a frame that occupy one region.
         conflict_rows: how conflicts become rows of the program.
@@ -91,18 +91,18 @@ class Network:
 
     @property
     def sets(self) -> NDArray[np.int64]:
-        """The set of observations that each object takes its places from, (n,)."""
+        """The index of each object's set of observations, (n,)."""
         return np.zeros(self.objects, dtype=np.int64) if self.shared else np.arange(self.objects)
 
     @property
     def pair_sets(self) -> NDArray[np.int64]:
-        """The row of `pair` that each object's arcs cost, (n,)."""
-        alike = len(self.pair) == 1
-        return np.zeros(self.objects, dtype=np.int64) if alike else np.arange(self.objects)
+        """The index into `pair` of each object, (n,)."""
+        shared = len(self.pair) == 1
+        return np.zeros(self.objects, dtype=np.int64) if shared else np.arange(self.objects)
 
     @property
     def owners(self) -> NDArray[np.int64] | None:
-        """The object that each of the places `p K + i` belongs to, (P K,); None: all share them."""
+        """The object of each place `p K + i`, (P K,); None if all objects share them."""
         return None if self.shared else np.repeat(np.arange(self.objects), self.places)
 
     def exclusions(self) -> Bools:
@@ -112,10 +112,10 @@ class Network:
         return star_exclusions(self.conflicts, len(self.boxes), self.objects)
 
     def rows(self, frame: int) -> Bools:
-        """Return the conflict rows of a frame, (R, n, K): through each, at most one path goes."""
+        """Return the conflict rows of a frame, (R, n, K): at most one path passes through each."""
         relation = self.conflicts[frame]
         places = self.places
-        if self.objects < 2 or not relation.size:  # noqa: PLR2004 — one object conflicts with nobody
+        if self.objects < 2 or not relation.size:  # noqa: PLR2004 — one object has no conflicts
             return np.zeros((0, self.objects, places), dtype=np.bool_)
         if self.conflict_rows == "clique":
             rows = clique_rows(relation, self.owners).reshape(-1, len(self.boxes), places)
@@ -123,7 +123,7 @@ class Network:
         return self._stars(frame)
 
     def _stars(self, frame: int) -> Bools:
-        """Return one row for each place of each object: itself, and what conflicts of the others."""
+        """Return one row per place of each object: the place and the conflicting places of other objects."""
         sets, n, places = self.sets, self.objects, self.places
         relation = self.conflicts[frame].reshape(len(self.boxes), places, len(self.boxes), places)
         rows = relation[sets][:, :, sets].copy()
@@ -167,10 +167,10 @@ def build_network(
 
     `templates` are the n objects in the frame before the window, `frames` the M frames after it.
     `center`, pixels, is where the layout term places an occluded object (II.D: the center of the image);
-    None: the middle of all observations.
+    None: the center of all observations.
 
     Raises:
-        ValueError: there is no frame, or histograms differ in their number of bins.
+        ValueError: there is no frame, or histograms have different numbers of bins.
     """
     return _build(templates, stack_observations([frames]), settings, center)
 
@@ -181,12 +181,13 @@ def build_network_per_object(
     settings: CostSettings,
     center: tuple[float, float] | None = None,
 ) -> Network:
-    """Build the network of a window in which each object has observations of its own (template matching).
+    """Build the network of a window in which each object has separate observations (template matching).
 
-    `frames[n][m]` are the observations of object n in frame m; else as `build_network`.
+    `frames[n][m]` are the observations of object n in frame m; otherwise like `build_network`.
 
     Raises:
-        ValueError: there is no object or no frame, lengths do not fit, or histograms differ in bins.
+        ValueError: there is no object or no frame, lengths differ, or histograms have different numbers of
+        bins.
     """
     if len(templates) != len(frames):
         raise ValueError(f"{len(templates)} templates need as many lists of frames, not {len(frames)}")
@@ -199,14 +200,14 @@ def _build(
     settings: CostSettings,
     center: tuple[float, float] | None,
 ) -> Network:
-    likeness = template_distances(templates, places, settings)
-    charges = motion_costs(templates, likeness, places, settings)
+    distances = template_distances(templates, places, settings)
+    motion = motion_costs(templates, distances, places, settings)
     return Network(
         boxes=places.boxes,
         present=places.present,
-        source=source_costs(templates, likeness, charges, places, settings),
-        node=node_costs(likeness, places, settings),
-        pair=pair_costs(charges, places, settings),
+        source=source_costs(templates, distances, motion, places, settings),
+        node=node_costs(distances, places, settings),
+        pair=pair_costs(motion, places, settings),
         sink=sink_costs(len(templates), places, settings),
         conflicts=conflict_relation(places, settings),
         conflict_rows=settings.conflict_rows,
@@ -219,8 +220,8 @@ def _locations(places: ObservationArrays, center: tuple[float, float] | None) ->
     """Return the location vectors r of II.D, (P, M, S, 4); occlusion is a box without size at `center`."""
     sets, frames, width = places.present.shape
     if center is None:
-        seen = places.boxes[places.present]
-        middle = (seen.min(axis=0) + seen.max(axis=0)) / 2.0 if len(seen) else np.zeros(BOX_SIDES)
+        observed = places.boxes[places.present]
+        middle = (observed.min(axis=0) + observed.max(axis=0)) / 2.0 if len(observed) else np.zeros(BOX_SIDES)
         center = (float(middle[[0, 2]].mean()), float(middle[[1, 3]].mean()))
     locations = np.empty((sets, frames, width + 1, BOX_SIDES))
     locations[:] = (*center, *center)

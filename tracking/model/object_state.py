@@ -13,14 +13,15 @@ from tracking.model.motion import MotionModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """An object's appearance, and its place in the frame before the window (paper II.B, II.E).
+    """An object's appearance, and its box in the frame before the window (paper II.B, II.E).
 
     Attributes:
-        id: the object's number.
-        histogram: (B,) float64, summing to 1; B = 0: no appearance is known.
-        box: (4,) pixels; None: hidden or away in that frame, so that arcs from the source cost what arcs
-            from an occlusion node do.
-        motion: how it moved until it was last seen; None: not known.
+        id: the object's id.
+        histogram: (B,) float64, summing to 1; B = 0: unknown appearance.
+        box: (4,) pixels; None: occluded or absent in that frame, so that arcs from the source cost the same
+        as
+            arcs from an occlusion node.
+        motion: its motion up to its last detection; None: unknown.
 
     Raises:
         ValueError: the box has not 4 numbers, or the histogram is not one row.
@@ -38,19 +39,19 @@ class Template:
             raise ValueError(f"a template's box has shape (4,), not {self.box.shape}")
 
 
-# Sightings that the velocity is taken from.
+# Detections that determine the velocity.
 _HISTORY_LENGTH = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """An object in one final frame.
+    """The detection of an object in one final frame.
 
     Attributes:
         frame: the frame number.
         box: `(4,)` pixels.
         histogram: `(B,)` of that box.
-        is_isolated: no other object is close enough to be in the box.
+        is_isolated: no other object overlaps the box.
     """
 
     frame: int
@@ -63,63 +64,63 @@ class TrackedObject:
     """One entry of the object list.
 
     Attributes:
-        id: its number.
-        histogram: `(B,)`, its template, renewed by every sighting.
-        box: `(4,)`, where it was last seen.
-        frame: the frame in which that was.
-        is_confirmed: it was seen in a final frame; before that it may vanish.
-        present: it was seen in the last final frame.
+        id: its id.
+        histogram: `(B,)`, its template, updated by every isolated detection.
+        box: `(4,)`, its last detection.
+        frame: the frame of its last detection.
+        is_confirmed: it was detected in a final frame; before that it may be dropped.
+        present: it was detected in the last final frame.
     """
 
-    __slots__ = ("_past", "box", "frame", "histogram", "id", "is_confirmed", "present")
+    __slots__ = ("_history", "box", "frame", "histogram", "id", "is_confirmed", "present")
 
     def __init__(self, number: int, histogram: Floats, box: Floats, frame: int) -> None:
         self.id = number
         self.histogram = histogram
         self.box = box
         self.frame = frame
-        self._past: deque[tuple[int, Floats]] = deque(maxlen=_HISTORY_LENGTH)
+        self._history: deque[tuple[int, Floats]] = deque(maxlen=_HISTORY_LENGTH)
         self.is_confirmed = False
         self.present = False
 
     def copy(self) -> TrackedObject:
-        """Return a copy, to go back to."""
+        """Return a copy."""
         other = TrackedObject(self.id, self.histogram, self.box, self.frame)
-        other._past.extend(self._past)
+        other._history.extend(self._history)
         other.is_confirmed, other.present = self.is_confirmed, self.present
         return other
 
     def template(self, first: int) -> Template:
         """Return the source node of a window that begins with the frame `first`.
 
-        It has no place where the object is hidden in the last final frame.
+        It has no box if the object is occluded in the last final frame.
         """
         motion = None
-        if self._past:
-            frames, boxes = zip(*self._past, strict=True)
+        if self._history:
+            frames, boxes = zip(*self._history, strict=True)
             motion = MotionModel.of(frames, np.stack(boxes), first)
         return Template(self.id, self.histogram, self.box if self.present else None, motion)
 
     def update(self, sighting: Sighting, rate: float) -> None:
-        """Take over what one final frame shows; `rate` is the template's share that it renews.
+        """Update the state by a detection in a final frame; `rate` is the template's update rate.
 
-        Where others are close, the box holds some of them: it does not enter the template.
+        The template is only updated if no other object overlaps the box.
         """
         self.box = sighting.box
-        self._past.append((sighting.frame, sighting.box))
+        self._history.append((sighting.frame, sighting.box))
         self.frame = sighting.frame
         self.is_confirmed = True
         if sighting.is_isolated and self.histogram.size:
             self.histogram = (1.0 - rate) * self.histogram + rate * sighting.histogram
 
     def restart_at(self, box: Floats, frame: int) -> None:
-        """Restart at the place where the object was re-identified, without its old motion."""
+        """Restart at the box where the object was re-identified, without its previous motion."""
         self.box = box
         self.frame = frame
-        self._past.clear()
+        self._history.clear()
 
     def frames_occluded(self, frame: int) -> int:
-        """Return for how many frames it has not been seen at `frame`."""
+        """Return the number of frames since its last detection."""
         return max(frame - self.frame, 0)
 
 

@@ -16,7 +16,7 @@ from tracking.types import Detections
 class ObservationArrays:
     """P sets of observations over M frames, padded to the K of the fullest frame.
 
-    P is 1 where all objects share the observations, else the number of objects.
+    P is 1 if all objects share the observations, otherwise the number of objects.
 
     Attributes:
         boxes: (P, M, K, 4) pixels; padding is zero.
@@ -35,34 +35,34 @@ def stack_observations(sets: Sequence[Sequence[Detections]]) -> ObservationArray
     """Pad the sets of frames into arrays.
 
     Raises:
-        ValueError: there is no frame, sets differ in length, or histograms differ in bins.
+        ValueError: there is no frame, sets differ in length, or histograms have different numbers of bins.
     """
     lengths = {len(frames) for frames in sets}
     if lengths == {0} or not sets:
         raise ValueError("a window needs at least one frame")
     if len(lengths) > 1:
-        raise ValueError(f"every object needs as many frames as the others, not {sorted(lengths)}")
+        raise ValueError(f"all objects need the same number of frames, not {sorted(lengths)}")
     shape = (len(sets), lengths.pop())
-    width = max(len(seen) for frames in sets for seen in frames)
+    width = max(len(detections) for frames in sets for detections in frames)
     bins = _common_bin_count(sets)
     boxes = np.zeros((*shape, width, BOX_SIDES))
     scores = np.zeros((*shape, width))
     appearance = np.zeros((*shape, width, bins))
     present = np.zeros((*shape, width), dtype=np.bool_)
     for p, frames in enumerate(sets):
-        for m, seen in enumerate(frames):
-            count = len(seen)
+        for m, detections in enumerate(frames):
+            count = len(detections)
             if count:
-                boxes[p, m, :count] = seen.boxes
-                scores[p, m, :count] = seen.scores
-                appearance[p, m, :count] = seen.histograms
+                boxes[p, m, :count] = detections.boxes
+                scores[p, m, :count] = detections.scores
+                appearance[p, m, :count] = detections.histograms
                 present[p, m, :count] = True
     return ObservationArrays(boxes, scores, appearance, present)
 
 
 def _common_bin_count(sets: Sequence[Sequence[Detections]]) -> int:
     """Return the number of bins that all frames with observations have."""
-    bins = {seen.histograms.shape[1] for frames in sets for seen in frames if len(seen)}
+    bins = {detections.histograms.shape[1] for frames in sets for detections in frames if len(detections)}
     if len(bins) > 1:
         raise ValueError(f"all histograms of a window need the same number of bins, not {sorted(bins)}")
     return bins.pop() if bins else 0

@@ -12,13 +12,13 @@ ConflictRows = Literal["clique", "star"]
 DisplacementUnit = Literal["pixels", "heights"]
 
 
-# Pixels: a smaller gate was meant in heights.
+# Pixels: a smaller gate was probably meant in heights.
 _MIN_GATE_PIXELS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class CostSettings:
-    """What a path through the network costs, and which places exclude each other.
+    """Costs of paths through the network, and rules for conflicting places.
 
     An arc between two observations costs g(template, target) + λ1 g(from, to) + λ2 d(from, to); an arc
     out of an occlusion c_a + g(template, target); an arc into an occlusion or into the sink c_a + c_b.
@@ -31,31 +31,31 @@ class CostSettings:
     appearance: float = 0.25
     # λ2: weight of the displacement between two frames; cost per displacement unit (below).
     displacement: float = 2.0
-    # What displacement (and the gate) count in: pixels of the image, or mean heights of the two boxes.
+    # Unit of displacement and gate: pixels of the image, or mean heights of the two boxes.
     displacement_unit: DisplacementUnit = "heights"
-    # c_a: what a usual change of place and appearance between two frames costs.
+    # c_a: cost of a typical change of position and appearance between two frames.
     change: float = 0.3
     # c_b: above the appearance difference of one object to itself, below that of two objects.
     occlusion: float = 0.8
-    # Added for an observation of score 0, falling to nothing at score 1: a hypothesis that explains
-    # nothing of its own costs nearly as much as being hidden. 0 is the paper.
+    # Cost of an observation of score 0, decreasing to 0 at score 1: a hypothesis without evidence costs
+    # nearly as much as an occlusion. 0 is the paper.
     confidence: float = 0.7
-    # Added to arcs into an occlusion, once for its whole length. 0 is the paper.
+    # Cost of an arc into an occlusion, once per occlusion. 0 is the paper.
     disappearance: float = 1.0
-    # Weight of the distance from an object's predicted position: in full from
-    # `motion_slack + motion_drift * elapsed frames` heights on. 0 is the paper.
+    # Largest cost of the distance from an object's predicted position, reached at
+    # `motion_slack + motion_drift * elapsed frames` heights. 0 is the paper.
     motion: float = 0.2
     motion_drift: float = 0.04
     # Weight of the square of that distance for arcs out of an occlusion, in units of
-    # `motion_slack + reappearance_drift * elapsed frames` heights; farther off there is no arc. 0 is the
-    # paper: anywhere.
+    # `motion_slack + reappearance_drift * elapsed frames` heights; beyond there is no arc. 0 is the
+    # paper: no limit.
     reappearance: float = 1.0
     reappearance_drift: float = 0.03
-    # Largest appearance distance to its template at which an object comes out of an occlusion, 0 to 1.
+    # Largest appearance distance to the template at which an object reappears after an occlusion, 0 to 1.
     reappearance_max_distance: float = 0.5
     # Deviation from the predicted position that is measurement error, heights.
     motion_slack: float = 0.2
-    # g of an unknown appearance: about what one object differs from itself, so that the other costs weigh
+    # g of an unknown appearance: about the distance of an object to itself, so that the other costs weigh
     # the same with and without images.
     unknown_appearance: float = 0.3
     # How histograms are compared: g(.), in [0, 1].
@@ -64,15 +64,15 @@ class CostSettings:
     gate: float | None = 0.6
     # μ: weight of the spatial layout term, cost per pixel of L1 change between two objects; 0 is off.
     layout: float = 0.0
-    # When two boxes occupy one place: by the city-block distance of their corners, or by their overlap.
+    # When two boxes conflict: by the city-block distance of their corners, or by their overlap.
     conflict_rule: ConflictRule = "overlap"
     # Rule "corners": boxes conflict below this total city-block distance of the 4 corners, pixels.
     conflict_distance: float = 60.0
     # Rule "overlap": boxes conflict above this ratio of shared to average area.
     conflict_overlap: float = 0.5
-    # "clique": no two objects hold conflicting boxes. "star" is II.D to the letter: at most one path
-    # goes through the conflict set of every box, even of an unused one; from three objects on that forbids
-    # more.
+    # "clique": no two objects hold conflicting boxes. "star" is exactly II.D: at most one path
+    # passes through the conflict set of every box, even of an unused one; with three or more objects that
+    # excludes more.
     conflict_rows: ConflictRows = "clique"
 
     def __post_init__(self) -> None:
@@ -96,7 +96,7 @@ class CostSettings:
         if self.gate is not None and not self.gate > 0.0:
             raise ValueError(f"gate must be positive, not {self.gate}")
         if self.gate is not None and self.displacement_unit == "pixels" and self.gate < _MIN_GATE_PIXELS:
-            raise ValueError(f"a gate of {self.gate:g} pixels lets no object move: set a larger one, or none")
+            raise ValueError(f"a gate of {self.gate:g} pixels allows no motion: set a larger one, or none")
         if not self.conflict_distance > 0.0:
             raise ValueError(f"conflict_distance must be positive, not {self.conflict_distance}")
         if not self.conflict_overlap > 0.0:
@@ -116,4 +116,4 @@ PAPER_COSTS = CostSettings(
     unknown_appearance=0.0,
     conflict_rule="corners",
 )
-"""The costs as paper II.B has them, in pixels of a CIF picture (the defaults are free of its size)."""
+"""The costs of paper II.B, in pixels of a CIF image (the defaults do not depend on the image size)."""

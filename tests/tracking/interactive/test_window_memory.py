@@ -17,29 +17,29 @@ def _two_begin_in_one_place() -> WindowMemory:
     """One in each of two windows, as where the first one's track ended at once."""
     memory = WindowMemory(100)
     memory.record_window(_window(19))
-    assert memory.assign_id(12, PLACE, fresh=1) == 1
+    assert memory.assign_id(12, PLACE, new_id=1) == 1
     memory.record_window(_window(24))
-    assert memory.assign_id(14, PLACE, fresh=2) == 2, "who begins where somebody else did is somebody else"
+    assert memory.assign_id(14, PLACE, new_id=2) == 2, "who begins where somebody else did is somebody else"
     return memory
 
 
 def test_unless_windows_are_solved_again_nobody_has_a_number_that_was_used() -> None:
     memory = _two_begin_in_one_place()
     memory.record_window(_window(29))
-    assert memory.assign_id(15, PLACE, fresh=3) == 3
+    assert memory.assign_id(15, PLACE, new_id=3) == 3
 
 
 def test_when_windows_are_solved_again_each_number_of_theirs_is_given_once() -> None:
     memory = _two_begin_in_one_place()
     memory.record_window(_window(19))
-    assert memory.assign_id(13, ELSEWHERE, fresh=3) == 3, "nobody began there"
-    assert memory.assign_id(13, PLACE, fresh=4) == 1
-    assert memory.assign_id(13, PLACE, fresh=4) == 2
-    assert memory.assign_id(13, PLACE, fresh=4) == 4
+    assert memory.assign_id(13, ELSEWHERE, new_id=3) == 3, "nobody began there"
+    assert memory.assign_id(13, PLACE, new_id=4) == 1
+    assert memory.assign_id(13, PLACE, new_id=4) == 2
+    assert memory.assign_id(13, PLACE, new_id=4) == 4
 
 
 def test_who_began_in_a_window_that_stands_keeps_their_number_to_themselves() -> None:
     memory = _two_begin_in_one_place()
     memory.record_window(_window(24))
-    assert memory.assign_id(13, PLACE, fresh=3) == 2
-    assert memory.assign_id(13, PLACE, fresh=3) == 3
+    assert memory.assign_id(13, PLACE, new_id=3) == 2
+    assert memory.assign_id(13, PLACE, new_id=3) == 3
