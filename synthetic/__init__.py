@@ -1,4 +1,4 @@
-"""Synthetic scenes with ground truth: a live camera source, and recordings for anyone to measure on."""
+"""Synthetic scenes with ground truth: a live camera source, and recordings for measurements."""
 
 from synthetic.catalog import scene_names
 from synthetic.ground_truth import CameraTruth

@@ -17,7 +17,7 @@ from synthetic.walking.gatherings import Gatherings
 from synthetic.walking.visiting_crowd import VisitingCrowd
 from synthetic.world import SceneParameters, World
 
-_CROWD = 64  # people in a room, at most
+_CROWD = 64  # most people in a room
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,9 @@ class CatalogEntry:
     """One scene: its default and largest numbers of cameras and objects, and how its world is built."""
 
     description: str
-    default_cameras: int  # by default
+    default_cameras: int
     max_cameras: int
-    default_objects: int  # by default
+    default_objects: int
     max_objects: int
     build: Callable[[SceneParameters], World]
 
@@ -41,7 +41,7 @@ def catalog_entry(name: str) -> CatalogEntry:
     """Return the catalog's entry for a scene.
 
     Raises:
-        ValueError: where no scene has that name.
+        ValueError: no scene has that name.
     """
     if name not in _SCENES:
         raise ValueError(f"there is no scene {name!r}; there are: {', '.join(_SCENES)}")
@@ -59,7 +59,7 @@ def _visited(room: Room) -> Callable[[SceneParameters], World]:
 def _overhead(parameters: SceneParameters) -> World:
     outfits = [choose_casual_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
     crowd = ChoreographedCrowd(
-        Gatherings(OVERHEAD_AREA, parameters.objects, parameters.seed), [worn.height for worn in outfits]
+        Gatherings(OVERHEAD_AREA, parameters.objects, parameters.seed), [outfit.height for outfit in outfits]
     )
     return RoomWorld(OVERHEAD, crowd, outfits, parameters)
 
@@ -68,14 +68,14 @@ def _court(parameters: SceneParameters) -> World:
     game = Game(COURT, parameters.objects, parameters.seed)
     outfits = [choose_team_outfit(player, game.team(player)) for player in range(parameters.objects)]
     return RoomWorld(
-        SPORTS_HALL, ChoreographedCrowd(game, [worn.height for worn in outfits]), outfits, parameters
+        SPORTS_HALL, ChoreographedCrowd(game, [outfit.height for outfit in outfits]), outfits, parameters
     )
 
 
 _SCENES = {
     "room": CatalogEntry("people come and go in a room", 3, len(ROOM.viewpoints), 4, _CROWD, _visited(ROOM)),
     "gallery": CatalogEntry(
-        "a long room whose cameras have no floor in common",
+        "a long room whose cameras share no floor area",
         3,
         len(GALLERY.viewpoints),
         4,
@@ -91,5 +91,7 @@ _SCENES = {
         _overhead,
     ),
     "court": CatalogEntry("two teams play on a court", 4, len(SPORTS_HALL.viewpoints), 10, 16, _court),
-    "fish": CatalogEntry("fish that all look the same in a murky tank", 1, len(VIEWPOINTS), 9, 16, TankWorld),
+    "fish": CatalogEntry(
+        "fish of identical appearance in a murky tank", 1, len(VIEWPOINTS), 9, 16, TankWorld
+    ),
 }

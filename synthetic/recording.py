@@ -1,6 +1,6 @@
 """A scene written to disk: one video per camera, ground truth, and the cameras' homographies.
 
-The formats are those of the field's recordings: `c0.mp4` …, `gt/c0.txt` with MOTChallenge rows
+The formats are those of common tracking data sets: `c0.mp4` …, `gt/c0.txt` with MOTChallenge rows
 `frame,id,left,top,width,height,1,class,visible` (frames count from 1), and, where the scene has a floor,
 `ground.json`.
 """
@@ -22,7 +22,7 @@ from synthetic.ground_truth import CameraTruth
 from synthetic.scene import Scene
 
 _PEDESTRIAN = 1  # MOTChallenge's class
-# Macroblock trees are off: with them x264 gives other bytes from one run to the next for the same pictures.
+# Macroblock trees are off: with them the output of x264 differs from run to run.
 _OPTIONS = {"crf": "21", "preset": "veryfast", "mbtree": "0"}
 _TIME_BASE = Fraction(1, 90_000)  # seconds
 
@@ -30,13 +30,13 @@ Progress = Callable[[int, int], None]
 
 
 def write_recording(scene: Scene, out: Path, seconds: float, progress: Progress | None = None) -> None:
-    """Write the first `seconds` of a scene into the folder `out`, which is new or empty.
+    """Write the first `seconds` of a scene into the folder `out`, which must be new or empty.
 
     `progress` is called after each frame with the numbers of frames written and of all frames. After an error
-    the folder holds a part of the recording.
+    the folder contains a partial recording.
 
     Raises:
-        ValueError: `seconds` holds no frame, or the width or height is odd. Nothing is written.
+        ValueError: `seconds` is shorter than a frame, or width or height is odd. Nothing is written.
         FileExistsError: `out` is a file, or a folder that is not empty.
         OSError: the folder or a file cannot be written.
     """
@@ -47,7 +47,7 @@ def write_recording(scene: Scene, out: Path, seconds: float, progress: Progress 
         raise ValueError(f"a video's width and height must be even, not {scene.width} x {scene.height}")
     out.mkdir(parents=True, exist_ok=True)
     if any(out.iterdir()):
-        raise FileExistsError(f"{out}: is not an empty folder")
+        raise FileExistsError(f"{out}: not an empty folder")
     _write(scene, out, frames, progress)
 
 
@@ -79,8 +79,8 @@ def has_ground(scene: Scene) -> bool:
 
 
 def _homographies(scene: Scene) -> dict[str, list[list[float]]]:
-    found = {f"c{camera}": scene.homography(camera) for camera in range(scene.cameras)}
-    return {camera: matrix.tolist() for camera, matrix in found.items() if matrix is not None}
+    matrices = {f"c{camera}": scene.homography(camera) for camera in range(scene.cameras)}
+    return {camera: matrix.tolist() for camera, matrix in matrices.items() if matrix is not None}
 
 
 def _rows(truth: CameraTruth, frame: int) -> list[str]:
@@ -89,23 +89,23 @@ def _rows(truth: CameraTruth, frame: int) -> list[str]:
         truth.ids.tolist(), truth.boxes.tolist(), truth.visibility.tolist(), strict=True
     ):
         left, top, right, bottom = box
-        place = f"{left:g},{top:g},{right - left:g},{bottom - top:g}"
-        rows.append(f"{frame + 1},{number},{place},1,{_PEDESTRIAN},{visible:.3f}\n")
+        box_fields = f"{left:g},{top:g},{right - left:g},{bottom - top:g}"
+        rows.append(f"{frame + 1},{number},{box_fields},1,{_PEDESTRIAN},{visible:.3f}\n")
     return rows
 
 
 class _Video:
-    """One camera's video file; is closed properly even if an error ends the recording."""
+    """One camera's video file, closed properly even after an error."""
 
     def __init__(self, path: Path, scene: Scene) -> None:
         self._container = av.open(str(path), "w")
-        # x264 starves the bitrate if only the time base is set, without the rate.
+        # Without the rate, x264 assumes a wrong one and reduces the bitrate.
         stream = self._container.add_stream("libx264", rate=Fraction(scene.fps).limit_denominator(1001))
         stream.width, stream.height = scene.width, scene.height
         stream.pix_fmt = "yuv420p"
         stream.options = dict(_OPTIONS)
         stream.time_base = stream.codec_context.time_base = _TIME_BASE
-        stream.codec_context.thread_count = 1  # the same bytes on every machine
+        stream.codec_context.thread_count = 1  # for the same bytes on every machine
         self._stream, self._fps = stream, Fraction(scene.fps).limit_denominator(1001)
 
     def __enter__(self) -> Self:
@@ -117,7 +117,7 @@ class _Video:
         self._container.close()
 
     def add(self, image: NDArray[np.uint8], frame: int) -> None:
-        """Encode a picture ``(H, W, 3)``, blue, green, red."""
+        """Encode a BGR image ``(H, W, 3)``."""
         picture = av.VideoFrame.from_ndarray(image, format="bgr24")
         picture.pts, picture.time_base = round(frame / self._fps / _TIME_BASE), _TIME_BASE
         self._container.mux(self._stream.encode(picture))

@@ -1,4 +1,4 @@
-"""A synthetic scene: the pictures of its cameras at any frame, and the ground truth."""
+"""A synthetic scene: the images of its cameras at any frame, and the ground truth."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from synthetic.world import SceneParameters
 
 
 class Scene:
-    """Objects that move before several cameras: a pure function of its arguments, endless in time.
+    """Moving objects in view of several cameras: a pure function of its arguments, unlimited in time.
 
-    Frames may be drawn in any order and in any process, and are equal to the byte. What does not move
-    before a camera is painted when the camera is first used.
+    Frames may be drawn in any order and in any process, and are equal byte for byte. A camera's static
+    background is drawn on first use.
 
     Args:
         name: one of `scene_names()`.
-        cameras: how many cameras look, at most as many as the scene has places for; None: as many as suit it.
-        objects: how many people or fish there are; their ids count from 1; None: the scene's default.
-        seed: of everything random, not negative.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
+        cameras: number of cameras, at most the scene's viewpoints; None: the scene's default.
+        objects: number of people or fish; their ids count from 1; None: the scene's default.
+        seed: seed of all random numbers, not negative.
+        width: of an image, pixels.
+        height: of an image, pixels.
         fps: frames per second.
 
     Raises:
-        ValueError: for an unknown name or a number out of its range, in one line.
+        ValueError: an unknown name, or a number out of range.
     """
 
     def __init__(
@@ -55,14 +55,14 @@ class Scene:
         self.world = entry.build(SceneParameters(cameras, objects, seed, width, height))
 
     def image(self, camera: int, frame: int) -> NDArray[np.uint8]:
-        """Return a camera's picture ``(H, W, 3)``, blue, green, red. Cameras and frames count from 0."""
+        """Return a camera's BGR image ``(H, W, 3)``. Cameras and frames count from 0."""
         seconds = self._seconds(frame)
-        clean = self.world.picture(self._known(camera), seconds)
+        clean = self.world.picture(self._checked(camera), seconds)
         return add_sensor_noise(clean, camera, frame, seconds, self.seed)
 
     def background(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
-        """Return a camera's picture ``(H, W, 3)`` without the objects, noise and drift."""
-        return self.world.background(self._known(camera), self._seconds(frame))
+        """Return a camera's image ``(H, W, 3)`` without objects, noise and drift."""
+        return self.world.background(self._checked(camera), self._seconds(frame))
 
     def truth(self, frame: int) -> tuple[CameraTruth, ...]:
         """Return the ground truth of every camera: ids, boxes and visible shares."""
@@ -70,7 +70,7 @@ class Scene:
         return tuple(self.world.truth(camera, seconds) for camera in range(self.cameras))
 
     def ground_positions(self, frame: int) -> Floats:
-        """Return where all objects are: ``(objects, 2)`` meters; a corridor is off the room's floor."""
+        """Return all objects' positions, ``(objects, 2)`` meters; corridors are outside the room's floor."""
         return self.world.positions(self._seconds(frame))
 
     def inside(self, frame: int) -> NDArray[np.bool_]:
@@ -80,9 +80,9 @@ class Scene:
     def homography(self, camera: int) -> Floats | None:
         """Return the homography ``(3, 3)`` from a camera's pixels (homogeneous) to the floor, in meters.
 
-        None in a scene without a floor to stand on.
+        None in a scene without a floor.
         """
-        return self.world.homography(self._known(camera))
+        return self.world.homography(self._checked(camera))
 
     @property
     def floor(self) -> tuple[float, float]:
@@ -94,7 +94,7 @@ class Scene:
             raise ValueError(f"scene {self.name}: frame {frame} is before the first, 0")
         return frame / self.fps
 
-    def _known(self, camera: int) -> int:
+    def _checked(self, camera: int) -> int:
         if not 0 <= camera < self.cameras:
             raise ValueError(f"scene {self.name}: there is no camera {camera} among {self.cameras}")
         return camera

@@ -1,4 +1,4 @@
-"""The interface of a scene's world, which cameras look at and which knows the ground truth."""
+"""The interface of a scene's world: images and ground truth."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class SceneParameters:
-    """The size of a scene to draw; the numbers are within their ranges."""
+    """Validated parameters of a scene."""
 
     cameras: int
     objects: int
@@ -28,7 +28,7 @@ class SceneParameters:
 class World(Protocol):
     """A pure function of the parameters and of a moment, in seconds; cameras count from 0.
 
-    Pictures are noiseless: the sensor is the scene's, not the world's.
+    Images are noiseless; the scene adds the sensor noise.
     """
 
     @property
@@ -37,11 +37,11 @@ class World(Protocol):
         ...
 
     def picture(self, camera: int, seconds: float) -> Bytes:
-        """Return a camera's picture ``(H, W, 3)``, blue, green, red."""
+        """Return a camera's BGR image ``(H, W, 3)``."""
         ...
 
     def background(self, camera: int, seconds: float) -> Bytes:
-        """Return a camera's picture ``(H, W, 3)`` without any of the objects."""
+        """Return a camera's image ``(H, W, 3)`` without the objects."""
         ...
 
     def truth(self, camera: int, seconds: float) -> CameraTruth:
@@ -49,7 +49,7 @@ class World(Protocol):
         ...
 
     def positions(self, seconds: float) -> Floats:
-        """Return where all objects are, seen from above: ``(objects, 2)`` meters."""
+        """Return the ground positions of all objects: ``(objects, 2)`` meters."""
         ...
 
     def inside(self, seconds: float) -> NDArray[np.bool_]:

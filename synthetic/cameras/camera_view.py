@@ -1,4 +1,4 @@
-"""One camera's view of a room: the empty room and the people who stand in it, furthest first."""
+"""One camera's view of a room: the empty room and the people in it, farthest first."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from synthetic.room.surface_styles import surface_style
 from synthetic.walking.trajectory import Pose
 
 _THRESHOLD = 0.12  # meters behind the wall from which a person is visible through the doorway only
-_GONE = 1.6  # meters to the side of a doorway's middle at which nothing of a person is in it
-_FULL = 1.12  # brings clothes to their own colors in the brightest part of the room
+_OUT_OF_DOOR = 1.6  # meters to the side of a doorway's center from which a person is not visible through it
+_LIGHT_GAIN = 1.12  # clothes have their nominal colors in the brightest part of the room
 
 Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnPerson:
-    """A person as one camera sees them."""
+    """A person in one camera's image."""
 
     walker: int
     joints: Floats  # (J, 3) meters
     figure: Figure
     inside: bool  # in the room, not in a corridor
-    visible_mask: Bytes | None  # (h, w) of the patch within the picture: visible share; None: all of it
+    visible_mask: Bytes | None  # (h, w) of the patch within the image: visible share; None: fully visible
 
 
 class CameraView:
-    """Everything that one camera needs to draw a frame or to measure its ground truth."""
+    """The data to draw one camera's frames and to measure their ground truth."""
 
     def __init__(self, room: Room, view: PinholeCamera) -> None:
         self.room = room
@@ -46,30 +46,30 @@ class CameraView:
         self.backdrop: Backdrop = paint_backdrop(room, view)
 
     def draw_people(self, poses: Sequence[Pose], outfits: Sequence[Outfit]) -> list[DrawnPerson]:
-        """Draw the people whom the camera may see, furthest first."""
-        found = []
+        """Draw the people who may be visible, farthest first."""
+        drawn = []
         for walker, (pose, outfit) in enumerate(zip(poses, outfits, strict=True)):
             beyond = self.room.outside(pose.x, pose.y)
             if beyond > _THRESHOLD and not self._near_door(pose):
                 continue
             skeleton = place_joints(pose, outfit.height)
-            light = _FULL * float(
+            light = _LIGHT_GAIN * float(
                 surface_style(self.room).light(self.room, np.array(pose.x), np.array(pose.y))
             )
             figure = draw_figure(self.view, build_body(outfit), skeleton, light)
             if figure is None or clip_to_image(figure, self.view) is None:
                 continue
-            found.append(
+            drawn.append(
                 DrawnPerson(walker, skeleton, figure, beyond < 0, self._visible_mask(figure, pose, beyond))
             )
         center = self.view.center
         return sorted(
-            found, key=lambda person: -float(np.hypot(*(person.joints[:, :2].mean(axis=0) - center[:2])))
+            drawn, key=lambda person: -float(np.hypot(*(person.joints[:, :2].mean(axis=0) - center[:2])))
         )
 
     def _near_door(self, pose: Pose) -> bool:
         return any(
-            abs((pose.x if door.wall == "north" else pose.y) - door.start - door.width / 2) < _GONE
+            abs((pose.x if door.wall == "north" else pose.y) - door.start - door.width / 2) < _OUT_OF_DOOR
             and ((pose.y > self.room.depth) == (door.wall == "north"))
             for door in self.room.doors
         )
@@ -78,35 +78,35 @@ class CameraView:
         part = clip_to_image(figure, self.view)
         if part is None:
             return None
-        hiding = [
+        masks = [
             mask[part.area]
             for piece, mask in zip(self.room.furniture, self.backdrop.furniture, strict=True)
             if self._hides(piece, pose)
         ]
-        hiding = [mask for mask in hiding if mask.any()]
-        if not hiding and beyond <= _THRESHOLD:
+        masks = [mask for mask in masks if mask.any()]
+        if not masks and beyond <= _THRESHOLD:
             return None
         if beyond > _THRESHOLD:
-            shown = self.backdrop.doors[0 if pose.y > self.room.depth else 1][part.area].copy()
+            visible = self.backdrop.doors[0 if pose.y > self.room.depth else 1][part.area].copy()
         else:
-            shown = np.full(hiding[0].shape, 255, dtype=np.uint8)
-        for mask in hiding:
-            shown = np.asarray(cv2.subtract(shown, mask), dtype=np.uint8)
-        return shown
+            visible = np.full(masks[0].shape, 255, dtype=np.uint8)
+        for mask in masks:
+            visible = np.asarray(cv2.subtract(visible, mask), dtype=np.uint8)
+        return visible
 
     def _hides(self, piece: Furniture, pose: Pose) -> bool:
-        """Return whether furniture can hide a person: not if both are beyond the same side of it.
+        """Return whether furniture can hide a person: not if the camera is beyond the same side of it.
 
-        From straight above, furniture is beside or below a standing person.
+        Seen from straight above, furniture hides no standing person.
         """
         if self.view.looks_down:
             return False
         west, south, east, north = piece.footprint
         x, y = self.view.center[:2].tolist()
-        apart = (
+        same_side = (
             (x <= west and pose.x <= west)
             or (x >= east and pose.x >= east)
             or (y <= south and pose.y <= south)
             or (y >= north and pose.y >= north)
         )
-        return not apart
+        return not same_side

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
 
-_PLUMB = 0.999  # of a direction's length that is vertical: from there on, no horizon says what is level
+_PLUMB = 0.999  # vertical part of a unit direction from which a camera counts as looking straight down
 
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """Where a camera hangs and where it looks, in meters; the world's z axis points up."""
+    """A camera's position and target, in meters; the world's z axis points up."""
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -25,9 +25,9 @@ class Viewpoint:
 
 @dataclass(frozen=True, slots=True)
 class PinholeCamera:
-    """A pinhole camera: projects world points (meters) to picture points (pixels).
+    """A pinhole camera: projects world points (meters) to image points (pixels).
 
-    Picture coordinates are continuous: pixel ``(i, j)`` covers ``[i, i + 1) x [j, j + 1)``.
+    Image coordinates are continuous: pixel ``(i, j)`` covers ``[i, i + 1) x [j, j + 1)``.
     """
 
     center: Floats  # (3,) optical center, meters
@@ -38,7 +38,7 @@ class PinholeCamera:
 
     @classmethod
     def at(cls, view: Viewpoint, width: int, height: int) -> PinholeCamera:
-        """Build the camera at a viewpoint, with a level horizon; looking straight down, north is on top."""
+        """Build the camera at a viewpoint, with a level horizon; looking straight down, north is at the top."""
         center = np.array(view.position, dtype=np.float64)
         forward = np.array(view.target, dtype=np.float64) - center
         forward /= np.linalg.norm(forward)
@@ -76,12 +76,12 @@ class PinholeCamera:
         return unit
 
     def homography(self) -> Floats:
-        """Return the homography ``(3, 3)`` from picture points to the floor (meters); the last entry is 1."""
+        """Return the homography ``(3, 3)`` from image points to the floor (meters); the last entry is 1."""
         intrinsic = np.array(
             [[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]], dtype=np.float64
         )
         shift = -self.axes @ self.center
-        to_picture = intrinsic @ np.column_stack([self.axes[:, 0], self.axes[:, 1], shift])
-        back = np.linalg.inv(to_picture)
-        normalized: Floats = back / back[2, 2]
+        to_image = intrinsic @ np.column_stack([self.axes[:, 0], self.axes[:, 1], shift])
+        inverse = np.linalg.inv(to_image)
+        normalized: Floats = inverse / inverse[2, 2]
         return normalized

@@ -9,25 +9,25 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_BANK = 6  # noise pictures; a frame takes one, shifted by a hash
-_SPARE = 64  # pixels by which a noise picture is larger than a frame
+_BANK = 6  # noise images; each frame uses one, shifted by a hash
+_SPARE = 64  # pixels by which a noise image is larger than a frame
 _GRAIN = 1.7  # standard deviation, gray levels
-_COLOR = 0.8  # standard deviation of each channel by itself, gray levels
+_COLOR = 0.8  # standard deviation of the independent noise of each channel, gray levels
 _MIDDLE = 128
-_DRIFT = 0.018  # of the brightness
+_DRIFT = 0.018  # amplitude of the brightness drift, as a share
 _PERIODS = (97.0, 41.0)  # seconds
 
 
 @lru_cache(maxsize=4)
 def _noise_images(width: int, height: int, seed: int) -> tuple[NDArray[np.uint8], ...]:
-    pictures = []
+    images = []
     for index in range(_BANK):
         rng = np.random.default_rng([seed, 0x0015E, index])
         shape = (height + _SPARE, width + _SPARE)
         grain = rng.standard_normal((*shape, 1), dtype=np.float32) * _GRAIN
         color = rng.standard_normal((*shape, 3), dtype=np.float32) * _COLOR
-        pictures.append(np.rint(grain + color + _MIDDLE).clip(0, 255).astype(np.uint8))
-    return tuple(pictures)
+        images.append(np.rint(grain + color + _MIDDLE).clip(0, 255).astype(np.uint8))
+    return tuple(images)
 
 
 def _hash(camera: int, frame: int, seed: int) -> int:
@@ -39,12 +39,12 @@ def _hash(camera: int, frame: int, seed: int) -> int:
 def add_sensor_noise(
     image: NDArray[np.uint8], camera: int, frame: int, seconds: float, seed: int
 ) -> NDArray[np.uint8]:
-    """Return a picture ``(H, W, 3)`` with the sensor noise and the exposure of one camera's frame."""
+    """Return an image ``(H, W, 3)`` with the sensor noise and exposure of one camera's frame."""
     height, width = image.shape[:2]
-    mixed = _hash(camera, frame, seed)
-    picture = _noise_images(width, height, seed)[mixed % _BANK]
-    x, y = mixed // 64 % _SPARE, mixed // 4096 % _SPARE
+    hashed = _hash(camera, frame, seed)
+    noise = _noise_images(width, height, seed)[hashed % _BANK]
+    x, y = hashed // 64 % _SPARE, hashed // 4096 % _SPARE
     waves = (math.sin(2 * math.pi * (seconds / period + 0.31 * camera)) for period in _PERIODS)
     gain = 1.0 + _DRIFT * sum(waves) / 2
-    noisy = cv2.addWeighted(image, gain, picture[y : y + height, x : x + width], 1.0, -_MIDDLE)
+    noisy = cv2.addWeighted(image, gain, noise[y : y + height, x : x + width], 1.0, -_MIDDLE)
     return np.asarray(noisy, dtype=np.uint8)

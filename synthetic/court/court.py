@@ -1,4 +1,4 @@
-"""The court: a hall for basketball under cameras all around it, and how its floor and walls look.
+"""The sports hall: a basketball court under surrounding cameras.
 
 Colors are red, green, blue in 0..1.
 """
@@ -10,7 +10,7 @@ from synthetic.court.game import Court
 from synthetic.room.room import Block, Color, Furniture, Room
 
 _WIDTH, _DEPTH, _HEIGHT = 24.0, 14.5, 7.6  # meters
-_FIELD = 76.0  # degrees
+_FIELD_OF_VIEW = 76.0  # degrees
 
 COURT = Court((2.0, 2.0, 22.0, 12.5), ((3.2, 7.25), (20.8, 7.25)))
 
@@ -59,10 +59,10 @@ SPORTS_HALL = Room(
     rug=(0.0, 0.0, 0.0, 0.0),
     style="court",
     viewpoints=(
-        Viewpoint((0.4, 0.4, 6.2), (10.2, 7.0, 0.0), _FIELD),
-        Viewpoint((_WIDTH - 0.4, 0.4, 6.2), (13.8, 7.0, 0.0), _FIELD),
-        Viewpoint((_WIDTH - 0.4, _DEPTH - 0.4, 6.2), (13.8, 7.5, 0.0), _FIELD),
-        Viewpoint((0.4, _DEPTH - 0.4, 6.2), (10.2, 7.5, 0.0), _FIELD),
+        Viewpoint((0.4, 0.4, 6.2), (10.2, 7.0, 0.0), _FIELD_OF_VIEW),
+        Viewpoint((_WIDTH - 0.4, 0.4, 6.2), (13.8, 7.0, 0.0), _FIELD_OF_VIEW),
+        Viewpoint((_WIDTH - 0.4, _DEPTH - 0.4, 6.2), (13.8, 7.5, 0.0), _FIELD_OF_VIEW),
+        Viewpoint((0.4, _DEPTH - 0.4, 6.2), (10.2, 7.5, 0.0), _FIELD_OF_VIEW),
         Viewpoint((_WIDTH / 2, 0.3, 6.8), (_WIDTH / 2, 6.6, 0.0), 100.0),
         Viewpoint((_WIDTH / 2, _DEPTH - 0.3, 6.8), (_WIDTH / 2, 7.9, 0.0), 100.0),
     ),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.round_paths import (
+from synthetic.walking.choreographed_crowd import (
     BEFORE,
     ROUND,
     RoundPath,
@@ -19,7 +19,7 @@ from synthetic.walking.round_paths import (
     straight_path,
 )
 
-# Where attackers stand: meters from the basket towards the middle of the court, and to the side.
+# Positions of attackers: meters from the basket towards the center of the court, and to the side.
 _SPOTS = np.array(
     [(6.9, 0.0), (5.9, 3.6), (5.9, -3.6), (1.2, 4.2), (1.2, -4.2), (3.2, 1.5), (3.4, -1.6), (8.4, 1.9)]
 )
@@ -28,18 +28,18 @@ _TURNS = (
     (3.5, 4.6, 4.9, 6.0),
     (6.0, 7.2, 7.4, 8.8),
 )  # earliest, latest start and arrival
-_OFF = 0.35  # meters: how exactly they know their places
-_MARKING = 0.28  # of the way from an attacker to the basket at which the defender stands
-_CLOSE = 0.95  # meters from an attacker, at least
+_OFF = 0.35  # meters: standard deviation of their positions
+_MARKING = 0.28  # position of the defender on the way from the attacker to the basket, as a share
+_CLOSE = 0.95  # least meters from the attacker
 _LATE = 0.25  # seconds by which defenders follow
 _SPRINT = 5.2  # meters per second
-_KEEP = 0.8  # meters between any two, wherever possible
-_MOVERS = 0.6  # of a team that change places in a turn
+_KEEP = 0.8  # meters between any two players, if possible
+_MOVERS = 0.6  # share of a team that changes positions in a turn
 
 
 @dataclass(frozen=True, slots=True)
 class Court:
-    """Where a game is played, in meters."""
+    """A court, in meters."""
 
     bounds: tuple[float, float, float, float]  # west, south, east and north
     baskets: tuple[tuple[float, float], tuple[float, float]]  # the western and the eastern
@@ -71,11 +71,11 @@ class Game:
         return list(avoid_collisions(paths, np.full((self._players, self._players), _KEEP)))
 
     def _basket(self, number: int) -> tuple[float, float]:
-        """Return the basket that a round's attackers go for."""
+        """Return the basket that is attacked in a round."""
         return self._court.baskets[1 - number % 2]
 
     def _turns(self, number: int) -> list[Floats]:
-        """Return where all players stand after each turn of a round: ``(players, 2)`` meters."""
+        """Return all players' positions after each turn of a round: ``(players, 2)`` meters."""
         rng = np.random.default_rng([self._seed, 0x5B07, number + BEFORE])
         attackers = [player for player in range(self._players) if self.team(player) == number % 2]
         defenders = [player for player in range(self._players) if self.team(player) != number % 2]
@@ -96,7 +96,7 @@ class Game:
 
 
 def _marking(rng: np.random.Generator, attackers: Floats, basket: Floats, count: int) -> Floats:
-    """Place defenders ``(count, 2)`` between attackers and the basket; those left over stay near it."""
+    """Place defenders ``(count, 2)`` between attackers and the basket; the remaining ones stay near it."""
     free = basket + rng.normal(0, 1.2, (count, 2))
     marked = min(count, len(attackers))
     line = basket - attackers[:marked]
@@ -107,14 +107,17 @@ def _marking(rng: np.random.Generator, attackers: Floats, basket: Floats, count:
 
 
 def _run(rng: np.random.Generator, spots: Floats, look: Floats, late: float) -> RoundPath:
-    """Run from spot to spot, each in its turn, and look at a point while standing."""
+    """Build a path from spot to spot, one per turn, facing a point while standing."""
     times, places, facing = [0.0], [spots[0]], [heading_to(spots[0], spots[1])]
-    for (soonest, latest, first, last), here, there in zip(_TURNS, spots[:-1], spots[1:], strict=True):
-        leave = max(float(rng.uniform(soonest, latest)) + late, times[-1])
-        reach = max(
-            float(rng.uniform(first, last)) + late, leave + float(np.linalg.norm(there - here)) / _SPRINT
+    for (earliest_start, latest_start, earliest_end, latest_end), here, there in zip(
+        _TURNS, spots[:-1], spots[1:], strict=True
+    ):
+        departure = max(float(rng.uniform(earliest_start, latest_start)) + late, times[-1])
+        arrival = max(
+            float(rng.uniform(earliest_end, latest_end)) + late,
+            departure + float(np.linalg.norm(there - here)) / _SPRINT,
         )
-        times += [leave, min(reach, ROUND - 0.2)]
+        times += [departure, min(arrival, ROUND - 0.2)]
         places += [here, there]
         facing += [heading_to(here, there), heading_to(there, look)]
     return straight_path(

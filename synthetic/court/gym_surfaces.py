@@ -29,7 +29,7 @@ _WINDOW = (5.0, 6.5)  # meters above the floor
 
 
 def light(room: Room, x: Floats, y: Floats) -> Floats:
-    """Return how bright floor points are: rows of lamps, a little less towards the walls."""
+    """Return the brightness of floor points: rows of lamps, slightly darker towards the walls."""
     near = np.minimum(np.minimum(x, room.width - x), np.minimum(y, room.depth - y))
     rows = 0.025 * np.cos(2 * np.pi * x / 6.0) * np.cos(2 * np.pi * y / 7.25)
     bright: Floats = 0.95 + rows - 0.16 * np.exp(-np.maximum(near, 0) / 1.3)
@@ -42,7 +42,7 @@ def floor(room: Room, points: Floats) -> Floats:
     east, north = room.width - _MARGIN, room.depth - _MARGIN
     inside = (x > _MARGIN) & (x < east) & (y > _MARGIN) & (y < north)
     color = np.where(inside[:, None], _MAPLE * _planks(x, y)[:, None], _APRON)
-    # Both halves alike: seen from the nearer end line.
+    # Both halves are equal: coordinates are relative to the nearer end line.
     along, across = np.minimum(x - _MARGIN, east - x), y - room.depth / 2
     length, half = _KEY_SIZE[0], _KEY_SIZE[1] / 2
     key = inside & (along < length) & (np.abs(across) < half)
@@ -60,7 +60,7 @@ def floor(room: Room, points: Floats) -> Floats:
 
 
 def wall(room: Room, points: Floats, axis: int, *, far: bool) -> Floats:
-    """Return the colors of points ``(N, 3)`` of a wall; `axis` is 0 for west and east. All are alike."""
+    """Return the colors of points ``(N, 3)`` of a wall; `axis` is 0 for west and east. All are equal."""
     del far
     along, z = points[:, 1 - axis], points[:, 2]
     length = room.depth if axis == 0 else room.width

@@ -1,4 +1,4 @@
-"""The empty room as one camera sees it: ray-cast once, kept for every frame."""
+"""The empty room in one camera's image: ray-cast once, reused for every frame."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from synthetic.room.room import Block, Door, Room
 from synthetic.room.surface_styles import surface_color, surface_style
 
 _FINE = 2  # rays per pixel and direction
-_BAND = 24  # picture rows cast at a time: bounds the memory
+_BAND = 24  # image rows cast at a time, to limit memory
 _CORRIDOR = 1.5  # meters from a doorway to the wall behind it
 _FLOOR, _DOOR, _PIECE = 1, 2, 16  # labels: the floor, the first door, the first piece of furniture
-_RAISED = 1.0  # meters above the floor from which a piece does not darken it
+_RAISED = 1.0  # meters above the floor from which furniture does not darken it
 _SUN = np.array([-0.55, -0.45, 0.70])  # towards the light
 
 Bytes = NDArray[np.uint8]
@@ -26,12 +26,12 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Backdrop:
-    """The empty room in one camera's picture, with masks. Shares are 0..255."""
+    """The empty room in one camera's image, with masks. Shares are 0..255."""
 
     image: Bytes  # (H, W, 3) blue, green, red
-    floor: Bytes  # (H, W) share of a pixel that is bare floor: where shadows fall
-    doors: tuple[Bytes, ...]  # (H, W) each: share that looks through the doorway
-    furniture: tuple[Bytes, ...]  # (H, W) each: share that the piece covers
+    floor: Bytes  # (H, W) share of a pixel that is bare floor, where shadows fall
+    doors: tuple[Bytes, ...]  # (H, W) each: share that is doorway
+    furniture: tuple[Bytes, ...]  # (H, W) each: share that the furniture covers
 
 
 def paint_backdrop(room: Room, view: PinholeCamera) -> Backdrop:
@@ -63,17 +63,17 @@ def _cast(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np.
         for block in piece.blocks:
             near = np.flatnonzero(may_intersect(block, origin, rays))
             reach, normal = intersect(block, origin, rays[near])
-            seen = reach < distance[near]
-            chosen = near[seen]
-            distance[chosen] = reach[seen]
-            points = origin + rays[chosen] * reach[seen, None]
-            color[chosen] = _lit(room, block, points, normal[seen])
+            nearer = reach < distance[near]
+            chosen = near[nearer]
+            distance[chosen] = reach[nearer]
+            points = origin + rays[chosen] * reach[nearer, None]
+            color[chosen] = _lit(room, block, points, normal[nearer])
             label[chosen] = _PIECE + index
     return color, label
 
 
 def _shell(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np.int32], Floats]:
-    """Intersect rays with the floor, ceiling and walls, and with what lies behind the doorways."""
+    """Intersect rays with the floor, ceiling and walls, and with the corridors behind the doorways."""
     far = np.array([room.width, room.depth, room.height])
     safe = np.where(np.abs(rays) < 1e-9, 1e-9, rays)  # noqa: PLR2004 — a ray along a wall
     planes = np.where(safe > 0, far - origin, -origin) / safe

@@ -1,4 +1,4 @@
-"""The catalog of clothing, by which people look different."""
+"""The catalog of clothing that distinguishes people."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _BLACK, _BRUNETTE, _GINGER, _BLOND, _GRAY = (
 _INK, _SNOW, _LEATHER = _rgb(0x1E2027), _rgb(0xE6E4DF), _rgb(0x4A2E1E)
 
 _SHIRTS = ((_rgb(0xD8342B), _rgb(0xF0EDE6)), (_rgb(0x2450B4), _rgb(0x1B2440)))
-_ALIKE = 0.3  # of the seeds have two people in nearly the same clothes
+_ALIKE = 0.3  # share of the seeds with two people in nearly the same clothes
 
 # The first eight differ in every piece: no two uppers and no two lowers are less than 30 apart in CIE L*a*b*.
 _WARDROBE = (
@@ -66,39 +66,39 @@ def choose_outfit(walker: int, seed: int) -> Outfit:
     if walker < len(_WARDROBE):
         return _WARDROBE[walker]
     rng = np.random.default_rng([seed, 0x0C10, walker])
-    like = _WARDROBE[int(rng.integers(len(_WARDROBE)))]
+    base = _WARDROBE[int(rng.integers(len(_WARDROBE)))]
     return Outfit(
         upper=_dye(rng),
         lower=_dye(rng, vivid=0.45),
-        hair=like.hair,
-        skin=like.skin,
-        shoes=like.shoes,
+        hair=base.hair,
+        skin=base.skin,
+        shoes=base.shoes,
         height=float(rng.uniform(1.58, 1.92)),
         build=float(rng.uniform(0.92, 1.1)),
-        hair_cut=like.hair_cut,
-        sleeves=like.sleeves,
-        legs=like.legs,
+        hair_cut=base.hair_cut,
+        sleeves=base.sleeves,
+        legs=base.legs,
     )
 
 
 def choose_casual_outfit(walker: int, seed: int) -> Outfit:
-    """Return an outfit of the catalog for walker 0, 1, …; with some seeds two people dress alike."""
+    """Return an outfit of the catalog for walker 0, 1, …; with some seeds two people have nearly the same clothes."""
     rng = np.random.default_rng([seed, 0xCA50])
     order = rng.permutation(len(_WARDROBE)).tolist()
     alike = rng.random() < _ALIKE
-    worn = _WARDROBE[order[walker % len(order)]]
+    outfit = _WARDROBE[order[walker % len(order)]]
     if walker == 1 and alike:
         first = _WARDROBE[order[0]]
-        return replace(worn, upper=_faded(first.upper), lower=first.lower, legs=first.legs)
-    return worn
+        return replace(outfit, upper=_faded(first.upper), lower=first.lower, legs=first.legs)
+    return outfit
 
 
 def choose_team_outfit(player: int, team: int) -> Outfit:
-    """Return a player's outfit in the team's colors: only hair, skin and height tell its players apart."""
-    who = _WARDROBE[(player * 5 + team * 3) % len(_WARDROBE)]
+    """Return a player's outfit in the team's colors: its players differ only in hair, skin and height."""
+    base = _WARDROBE[(player * 5 + team * 3) % len(_WARDROBE)]
     upper, lower = _SHIRTS[team]
     return Outfit(
-        upper, lower, who.hair, who.skin, _SNOW, who.height + 0.08, 0.96, "short", "short", "shorts"
+        upper, lower, base.hair, base.skin, _SNOW, base.height + 0.08, 0.96, "short", "short", "shorts"
     )
 
 

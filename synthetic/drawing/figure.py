@@ -1,4 +1,4 @@
-"""Drawn people: shaded capsules, nearest last, antialiased by drawing large and shrinking."""
+"""Drawn people: shaded capsules, nearest last, antialiased by supersampling."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from synthetic.drawing.limbs import CapsuleBody
 
 _ARC = 7  # corners of a capsule's end
 _SHIFT = 4  # fractional bits of cv2's coordinates
-_TALL = 280  # drawn pixels that a figure needs no more than: large figures are drawn at twice their size only
+_TALL = 280  # drawn pixels from which a figure is supersampled by 2 only, instead of 4
 _SUN = np.array([-0.55, -0.45, 0.70])  # towards the light
-# A limb is drawn several times: whole and dim, then ever narrower, brighter and towards the light.
+# A limb is drawn several times: full and dark, then narrower, brighter and shifted towards the light.
 _TONES = np.array([0.72, 0.85, 0.96, 1.04])
 _GIRTHS = np.array([1.0, 0.85, 0.64, 0.38])
 _OFFSETS = np.array([0.0, 0.12, 0.25, 0.40])
@@ -25,7 +25,7 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A drawn object: a patch whose top left corner is the picture's pixel ``(left, top)``."""
+    """A drawn object: a patch whose top left corner is the image's pixel ``(left, top)``."""
 
     left: int
     top: int
@@ -34,17 +34,17 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class ClipRegion:
-    """The part of a figure's patch that lies within the picture."""
+    """The part of a figure's patch within the image."""
 
-    area: tuple[slice, slice]  # of the picture
+    area: tuple[slice, slice]  # of the image
     patch: tuple[slice, slice]  # of the patch
 
 
 def clip_to_image(figure: Figure, view: PinholeCamera) -> ClipRegion | None:
-    """Clip a figure to the picture; return None if nothing of it is left."""
-    high, wide = figure.patch.shape[:2]
+    """Clip a figure to the image; return None if nothing is left."""
+    height, width = figure.patch.shape[:2]
     left, top = max(figure.left, 0), max(figure.top, 0)
-    right, bottom = min(figure.left + wide, view.width), min(figure.top + high, view.height)
+    right, bottom = min(figure.left + width, view.width), min(figure.top + height, view.height)
     if left >= right or top >= bottom:
         return None
     return ClipRegion(
@@ -56,7 +56,7 @@ def clip_to_image(figure: Figure, view: PinholeCamera) -> ClipRegion | None:
 def draw_figure(view: PinholeCamera, body: CapsuleBody, joints: Floats, light: float) -> Figure | None:
     """Draw a body by its joints ``(J, 3)`` in meters; `light` scales its colors.
 
-    The patch reaches beyond the picture's edge where the body does. None where the body is behind the camera.
+    The patch extends beyond the image's edge if the body does. None if the body is behind the camera.
     """
     pixels, depth = view.project(joints)
     if depth.min() < 0.3:  # noqa: PLR2004 — meters: inside the lens
@@ -89,7 +89,7 @@ def draw_figure(view: PinholeCamera, body: CapsuleBody, joints: Floats, light: f
 
 
 def _sunward(view: PinholeCamera) -> Floats:
-    """Return the light's direction in the picture."""
+    """Return the direction to the light in the image."""
     across = view.axes[:2] @ _SUN
     unit: Floats = across / np.linalg.norm(across)
     return unit
@@ -100,7 +100,7 @@ def _outlines(first: Floats, last: Floats, radii: Floats, sunward: Floats) -> ND
     span = last - first
     length = np.hypot(span[:, 0], span[:, 1])
     angle = np.arctan2(span[:, 1], span[:, 0])
-    # Where one end swallows the other the outline is that end's circle.
+    # If one end contains the other, the outline is that end's circle.
     tangent = np.arccos(np.clip((radii[:, 0] - radii[:, 1]) / np.maximum(length, 1e-6), -1, 1))
     turn = np.linspace(0, 1, _ARC)
     back = (angle + tangent)[:, None] + (2 * (np.pi - tangent))[:, None] * turn
@@ -117,7 +117,7 @@ def _outlines(first: Floats, last: Floats, radii: Floats, sunward: Floats) -> ND
 
 
 def paste(image: Bytes, view: PinholeCamera, figure: Figure, visible_mask: Bytes | None = None) -> None:
-    """Blend a figure over a picture ``(H, W, 3)``, in place; the mask is its clipped part's visible share."""
+    """Blend a figure over an image ``(H, W, 3)`` in place; the mask is its clipped part's visible share."""
     part = clip_to_image(figure, view)
     if part is None:
         return

@@ -23,7 +23,7 @@ class Limb:
     radius_start: float
     radius_end: float
     color: Color
-    tones: int = 4  # how many of the figure's tones: fewer leave the highlight to a limb beside
+    tones: int = 4  # number of the figure's tones; with fewer, an adjacent limb has the highlight
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class LimbGroup:
     """Limbs of one color that are drawn together, without seams."""
 
     limbs: tuple[Limb, ...]
-    depth_offset: float = 0.0  # meters nearer for the drawing order, where groups would tie
+    depth_offset: float = 0.0  # meters nearer in the drawing order, to break ties
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class CapsuleBody:
     radii: Floats  # (L, 2) meters
     colors: Floats  # (L, 3) red, green, blue in 0..1
     tones: tuple[int, ...]  # of each limb
-    groups: tuple[NDArray[np.intp], ...]  # the limbs of each member
+    groups: tuple[NDArray[np.intp], ...]  # the limbs of each group
     depth_offset: Floats  # (M,) meters
 
 

@@ -11,11 +11,11 @@ from synthetic.drawing.skeleton import Joint
 
 Bytes = NDArray[np.uint8]
 
-_COARSE = 4  # shadows are soft: they are drawn at a quarter of the size
+_COARSE = 4  # shadows are soft, so they are drawn at a quarter of the size
 _SLANT = np.array([0.42, 0.34])  # meters on the floor per meter of height, away from the windows
-_BODY = 54  # darkness of 255
+_BODY = 54  # darkness, 0..255
 _FEET = 112
-_NEAREST = 0.5  # meters; a nearer shadow would reach under the camera
+_NEAREST = 0.5  # meters; nearer shadows are not drawn
 _SHIFT = 4  # fractional bits of cv2's coordinates
 _PARTS = (
     (Joint.ANKLE_L, Joint.KNEE_L, 0.07),
@@ -28,25 +28,25 @@ _PARTS = (
 
 
 def cast_shadow(image: Bytes, floor: Bytes, view: PinholeCamera, joints: Floats) -> None:
-    """Darken a picture ``(H, W, 3)`` in place where a body's shadow falls on bare floor ``(H, W)``."""
+    """Darken an image ``(H, W, 3)`` in place where a body's shadow falls on bare floor ``(H, W)``."""
     ground = joints.copy()
     ground[:, :2] += joints[:, 2:] * _SLANT
     ground[:, 2] = 0.0
     points, depth = view.project(ground)
     if depth.min() < _NEAREST:
         return
-    reach = view.focal / depth  # pixels per meter
-    margin = 0.5 * float(reach.max())
+    pixels_per_meter = view.focal / depth
+    margin = 0.5 * float(pixels_per_meter.max())
     limits = (view.width, view.height)
     low = np.clip(points.min(axis=0) - margin, 0, limits).astype(int) // _COARSE * _COARSE
     high = np.clip(points.max(axis=0) + margin, 0, limits).astype(int)
     if (high - low).min() < _COARSE:
         return
-    wide, tall = (high - low).tolist()
-    size = ((tall + _COARSE - 1) // _COARSE, (wide + _COARSE - 1) // _COARSE)
-    local, scale = (points - low) / _COARSE, reach / _COARSE
+    width, height = (high - low).tolist()
+    size = ((height + _COARSE - 1) // _COARSE, (width + _COARSE - 1) // _COARSE)
+    local, scale = (points - low) / _COARSE, pixels_per_meter / _COARSE
     dark = np.maximum(_body_shadow(size, local, scale), _contact(size, local, scale, round_=view.looks_down))
-    full = cv2.resize(dark, None, fx=_COARSE, fy=_COARSE, interpolation=cv2.INTER_LINEAR)[:tall, :wide]
+    full = cv2.resize(dark, None, fx=_COARSE, fy=_COARSE, interpolation=cv2.INTER_LINEAR)[:height, :width]
     area = (slice(low[1], high[1]), slice(low[0], high[0]))
     kept = cv2.cvtColor(255 - cv2.multiply(full, floor[area], scale=1 / 255), cv2.COLOR_GRAY2BGR)
     image[area] = cv2.multiply(image[area], kept, scale=1 / 255)
@@ -65,7 +65,7 @@ def _body_shadow(size: tuple[int, int], points: Floats, scale: Floats) -> Bytes:
 def _contact(size: tuple[int, int], points: Floats, scale: Floats, *, round_: bool) -> Bytes:
     """Draw the small dark contact shadows under the feet.
 
-    They are `round_` from straight above, and flat from elsewhere.
+    They are `round_` if seen from straight above, otherwise flat.
     """
     dark = np.zeros(size, dtype=np.uint8)
     spread = float(scale[Joint.ANKLE_L])

@@ -11,7 +11,7 @@ import numpy as np
 from synthetic.cameras.pinhole import Floats
 from synthetic.walking.trajectory import Pose
 
-STRIDE = 0.69  # two steps, of the height
+STRIDE = 0.69  # length of two steps
 _THIGH, _SHIN, _ANKLE = 0.243, 0.243, 0.042
 _HIP, _SHOULDER, _NECK, _HEAD = 0.525, 0.790, 0.815, 0.926
 _HIP_SIDE, _SHOULDER_SIDE = 0.050, 0.104
@@ -72,7 +72,7 @@ def place_joints(pose: Pose, height: float) -> Floats:
 
 
 def _local(pose: Pose, height: float) -> Floats:
-    """Return the joints in the body's own frame: ahead, left, up."""
+    """Return the joints in the body's frame: ahead, left, up."""
     phase = pose.walked / (STRIDE * height) % 1.0
     swing = min(pose.speed / _BRISK, 1.0)
     bob = -0.015 * swing * (1 + math.cos(4 * math.pi * (phase - 0.05)))

@@ -35,7 +35,7 @@ def hash_noise(a: Floats, b: Floats) -> Floats:
 
 
 def light(room: Room, x: Floats, y: Floats) -> Floats:
-    """Return how bright floor points are, about 0.6 .. 1.1: windows in the west and south, soft lamps."""
+    """Return the brightness of floor points, about 0.6 to 1.1: windows in the west and south, soft lamps."""
     lamps = np.exp(-((x - room.width * 0.5) ** 2 + (y - room.depth * 0.55) ** 2) / 9.0)
     windows = 0.20 * np.exp(-np.maximum(x, 0) / 2.6) + 0.17 * np.exp(-np.maximum(y, 0) / 2.2)
     beyond = np.maximum(np.maximum(x - room.width, y - room.depth), 0)

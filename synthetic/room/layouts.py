@@ -11,7 +11,7 @@ ROOM = Room(
     depth=8.0,
     height=3.4,
     doors=(Door("north", 7.75), Door("east", 5.45)),
-    # Along the walls and beneath the cameras, off the walkers' routes; only the pillar stands in the room.
+    # Along the walls and below the cameras, away from the routes; only the pillar is inside the room.
     furniture=(
         pillar(5.6, 6.0, 3.4),
         bench(4.75, 0.45),
@@ -23,7 +23,7 @@ ROOM = Room(
         plant(10.4, 7.4),
     ),
     rug=(3.7, 2.35, 7.3, 4.75),
-    # Corners first: with two or three cameras the doorways are far from all of them, and before two.
+    # Corners first: with two or three cameras the doorways are far from all of them, and visible in two.
     viewpoints=(
         Viewpoint((0.35, 0.35, 3.0), (5.6, 4.75, 0.45)),
         Viewpoint((10.65, 0.35, 3.0), (5.4, 4.75, 0.45)),
@@ -57,15 +57,10 @@ GALLERY = Room(
 )
 
 _OVERHEAD_WIDTH, _OVERHEAD_DEPTH = 7.0, 5.0  # meters
-_OVERHEAD_HEIGHT = 6.0  # meters: from there the floor fills a picture of 16 by 9
+_OVERHEAD_HEIGHT = 6.0  # meters: the floor then fills a 16:9 image
 _OVERHEAD_FIELD = 77.0  # degrees
 
-OVERHEAD_AREA = (
-    1.0,
-    1.0,
-    6.0,
-    4.0,
-)  # west, south, east and north bound of where people go: no furniture stands there
+OVERHEAD_AREA = (1.0, 1.0, 6.0, 4.0)  # west, south, east and north bound of the area without furniture
 
 
 OVERHEAD = Room(

@@ -58,7 +58,7 @@ class Door:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """Everything in a room that does not move. Compared by identity: a fast cache key."""
+    """The static parts of a room. Compared by identity, as a fast cache key."""
 
     width: float  # west to east
     depth: float  # south to north
@@ -70,7 +70,7 @@ class Room:
     style: StyleName = "house"  # of floor, walls and light: surface_styles.py
 
     def beyond(self, door: Door, along: float, out: float) -> Point:
-        """Return the floor point `out` meters beyond a door's wall, `along` from the opening's middle."""
+        """Return the floor point `out` meters beyond a door's wall, `along` from the opening's center."""
         middle = door.start + door.width / 2 + along
         return (middle, self.depth + out) if door.wall == "north" else (self.width + out, middle)
 
@@ -79,7 +79,7 @@ class Room:
         return _footprints(self)
 
     def outside(self, x: float, y: float) -> float:
-        """Return how far beyond the walls a floor point lies; negative inside."""
+        """Return the distance of a floor point beyond the walls; negative inside."""
         return max(-x, -y, x - self.width, y - self.depth)
 
 

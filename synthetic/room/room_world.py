@@ -21,15 +21,15 @@ from synthetic.world import Bytes, SceneParameters
 
 
 class Crowd(Protocol):
-    """The people of a room: everybody's pose at any moment."""
+    """The people of a room: all poses at any moment."""
 
     def poses(self, seconds: float) -> list[Pose]:
-        """Return everybody's pose at a moment of the scene."""
+        """Return all poses at a moment of the scene."""
         ...
 
 
 class RoomWorld:
-    """A crowd in a room under cameras. A camera's empty room is painted when it is first needed."""
+    """A crowd in a room with cameras. A camera's empty room is drawn on first use."""
 
     def __init__(
         self, room: Room, crowd: Crowd, outfits: Sequence[Outfit], parameters: SceneParameters
@@ -39,7 +39,7 @@ class RoomWorld:
         self._outfits = outfits
         self._size = (parameters.width, parameters.height)
         self.camera_view = lru_cache(maxsize=None)(self._create_view)
-        # A recording needs the picture and the ground truth of a frame: people are drawn once for both.
+        # A recording needs the image and the ground truth of a frame: people are drawn once for both.
         self._people = lru_cache(maxsize=parameters.cameras)(self._draw_people)
 
     @property
@@ -48,26 +48,26 @@ class RoomWorld:
         return (self.room.width, self.room.depth)
 
     def picture(self, camera: int, seconds: float) -> Bytes:
-        """Return the picture of the room with all people."""
+        """Return the image of the room with all people."""
         return compose(self.camera_view(camera), self._people(camera, seconds))
 
-    def background(self, camera: int, seconds: float) -> Bytes:  # noqa: ARG002 — nothing in a room moves by itself
-        """Return the picture of the room without people."""
+    def background(self, camera: int, seconds: float) -> Bytes:  # noqa: ARG002 — a room is static
+        """Return the image of the room without people."""
         return self.camera_view(camera).backdrop.image.copy()
 
     def truth(self, camera: int, seconds: float) -> CameraTruth:
-        """Measure the ground truth on the people as they are drawn."""
+        """Measure the ground truth on the drawn people."""
         return measure_truth(self.camera_view(camera), self._people(camera, seconds))
 
     def positions(self, seconds: float) -> Floats:
-        """Return where everybody stands; a corridor is off the room's floor."""
+        """Return all positions; corridors are outside the room's floor."""
         poses = self._crowd.poses(seconds)
         return np.array([(pose.x, pose.y) for pose in poses], dtype=np.float64).reshape(-1, 2)
 
     def inside(self, seconds: float) -> NDArray[np.bool_]:
-        """Return who is in the room, not in a corridor."""
-        where = self.positions(seconds).tolist()
-        return np.array([self.room.outside(x, y) <= 0 for x, y in where], dtype=np.bool_)
+        """Return which people are in the room, not in a corridor."""
+        positions = self.positions(seconds).tolist()
+        return np.array([self.room.outside(x, y) <= 0 for x, y in positions], dtype=np.bool_)
 
     def homography(self, camera: int) -> Floats:
         """Return the homography from a camera's pixels to the floor."""
@@ -85,7 +85,7 @@ class RoomWorld:
 
 
 def compose(camera_view: CameraView, people: Sequence[DrawnPerson]) -> Bytes:
-    """Compose a noiseless picture ``(H, W, 3)``, blue, green, red: empty room, shadows, then people."""
+    """Compose a noiseless BGR image ``(H, W, 3)``: empty room, shadows, then people."""
     image = camera_view.backdrop.image.copy()
     for person in people:
         if person.inside:

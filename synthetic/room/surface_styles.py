@@ -1,4 +1,4 @@
-"""The styles of rooms: which floor, walls and light each has."""
+"""The surface styles of rooms: floor, walls and light."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class SurfaceStyle(Protocol):
     """The surfaces of one style of room; colors are red, green, blue in 0..1."""
 
     def light(self, room: Room, x: Floats, y: Floats, /) -> Floats:
-        """Return how bright floor points are."""
+        """Return the brightness of floor points."""
 
     def floor(self, room: Room, points: Floats, /) -> Floats:
         """Return the colors of points ``(N, 3)`` of the floor."""

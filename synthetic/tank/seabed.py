@@ -1,4 +1,4 @@
-"""Sand, rocks and water as one camera sees them: cast once, under light that moves."""
+"""Sand, rocks and water in one camera's image: ray-cast once, under moving light."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _FINE = 2  # rays per pixel and direction
 _SAND = np.array([0.74, 0.66, 0.49])
 _STONE = (0.34, 0.33, 0.31)
 _SUN = np.array([0.22, -0.30, 0.93])  # towards the light
-_NET_GAIN = 1.9  # how much brighter than in the shade things are where the net of light falls
-_FADING = 6.0  # meters from which lines of the net are too fine to be seen one by one
+_CAUSTIC_GAIN = 1.9  # brightness of caustics relative to the shade
+_FADING = 6.0  # meters from which caustic lines are too fine to be resolved
 
 
 def _rock(x: float, y: float, wide: float, deep: float, high: float) -> Block:
@@ -45,15 +45,15 @@ ROCKS = (
 
 @dataclass(frozen=True, slots=True)
 class RockOutline:
-    """A heap of rocks in the picture, which hides what is behind it."""
+    """A heap of rocks in the image, which hides objects behind it."""
 
     distance: float  # meters from the camera
     area: tuple[slice, slice]
-    share: Bytes  # (h, w) of the area: how much of a pixel it covers
+    share: Bytes  # (h, w) of the area: covered share of each pixel
 
 
 class Seabed:
-    """Everything in a camera's picture that stays in its place."""
+    """The static parts of a camera's image, under moving light."""
 
     def __init__(self, view: PinholeCamera) -> None:
         columns = (np.arange(view.width * _FINE) + 0.5) / _FINE
@@ -67,7 +67,7 @@ class Seabed:
         gain = (
             cast.color
             * transmittance(cast.distance)
-            * (_NET_GAIN / (1 + (cast.distance / _FADING) ** 4))[:, None]
+            * (_CAUSTIC_GAIN / (1 + (cast.distance / _FADING) ** 4))[:, None]
         )
         gain *= cast.level[:, None] * cast.solid[:, None]
         size = (view.width, view.height)
@@ -84,12 +84,12 @@ class Seabed:
         where = caustic_pixels(points).reshape(*shape, 2)[_FINE // 2 :: _FINE, _FINE // 2 :: _FINE][
             self._rows
         ]
-        # Wrapped here, once: that is several times faster than letting remap wrap.
+        # Wrapped once here, which is several times faster than wrapping in remap.
         column, row = np.moveaxis(where % TILE, -1, 0).astype(np.float32)
         self._places, self._between = cv2.convertMaps(column, row, cv2.CV_16SC2)
 
     def lit(self, seconds: float) -> Bytes:
-        """Paint the bed ``(H, W, 3)``, blue, green, red, in the light of a moment."""
+        """Return the seabed's BGR image ``(H, W, 3)`` in the light of a moment."""
         image = np.asarray(cv2.add(self._base, self._shafts.at(seconds)), dtype=np.uint8)
         if self._rows.stop:
             tile = cv2.copyMakeBorder(caustics(seconds), 0, 1, 0, 1, cv2.BORDER_WRAP)
@@ -103,17 +103,17 @@ class Seabed:
 
 @dataclass(frozen=True, slots=True)
 class _Cast:
-    color: Floats  # (R, 3) in the shade, without water before it
-    level: Floats  # (R,) how much of the sun falls there
+    color: Floats  # (R, 3) in the shade, without water in front
+    level: Floats  # (R,) share of the sunlight
     distance: Floats  # (R,) meters
     solid: NDArray[np.bool_]  # (R,)
     label: NDArray[np.int32]  # (R,) 0: sand or water; rocks from 1
 
 
 def _cast(origin: Floats, rays: Floats) -> _Cast:
-    down = rays[:, 2] < -1e-3  # noqa: PLR2004 — level rays meet the sand nowhere
+    down = rays[:, 2] < -1e-3  # noqa: PLR2004 — level rays never hit the sand
     distance = np.where(down, -origin[2] / np.minimum(rays[:, 2], -1e-3), FAR)
-    solid = distance < 60.0  # noqa: PLR2004 — meters of water: nothing is seen through them
+    solid = distance < 60.0  # noqa: PLR2004 — meters of water are opaque
     color = np.zeros_like(rays)
     points = origin + rays * np.where(solid, distance, 0)[:, None]
     color[solid] = _sand(points[solid])
@@ -124,14 +124,14 @@ def _cast(origin: Floats, rays: Floats) -> _Cast:
         for block in heap:
             near = np.flatnonzero(may_intersect(block, origin, rays))
             reach, normal = intersect(block, origin, rays[near])
-            seen = (reach < distance[near]) & (reach < FAR)
-            chosen = near[seen]
-            place = origin + rays[chosen] * reach[seen, None]
-            light = np.clip(normal[seen] @ sun, 0, 1)
+            nearer = (reach < distance[near]) & (reach < FAR)
+            chosen = near[nearer]
+            place = origin + rays[chosen] * reach[nearer, None]
+            light = np.clip(normal[nearer] @ sun, 0, 1)
             color[chosen] = _stone(place) * (0.42 + 0.58 * light)[:, None]
             level[chosen], distance[chosen], solid[chosen], label[chosen] = (
                 light,
-                reach[seen],
+                reach[nearer],
                 True,
                 index + 1,
             )
@@ -174,9 +174,11 @@ def _outline(
     view: PinholeCamera, heap: tuple[Block, ...], mask: NDArray[np.bool_], size: tuple[int, int]
 ) -> RockOutline | None:
     share = np.rint(cv2.resize(mask * np.float32(255), size, interpolation=cv2.INTER_AREA)).astype(np.uint8)
-    x, y, wide, high = cv2.boundingRect(share)
-    if not wide:
+    x, y, width, height = cv2.boundingRect(share)
+    if not width:
         return None
     middle = np.mean([(np.array(block.low) + np.array(block.high)) / 2 for block in heap], axis=0)
     distance = float(np.linalg.norm(middle - view.center))
-    return RockOutline(distance, (slice(y, y + high), slice(x, x + wide)), share[y : y + high, x : x + wide])
+    return RockOutline(
+        distance, (slice(y, y + height), slice(x, x + width)), share[y : y + height, x : x + width]
+    )

@@ -1,7 +1,7 @@
-"""A shoal of fish: places, headings and tail beats at any moment.
+"""A shoal of fish: positions, headings and tail beats at any moment.
 
 Time is cut into rounds that begin and end at waypoints: places and velocities that are a pure function of
-the seed and the round's number. So any moment can be drawn at once, in any process.
+the seed and the round's number. So any moment can be drawn directly, in any process.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from synthetic.tank.steering import CRUISE, HIGH, LOW, RATE, STRAIGHT, Waypoints
 from synthetic.walking.trajectory import whole_strides
 
 ROUND = 32.0  # seconds
-_DRAWS = 60  # places of which a fish takes the one that is furthest from the others'
+_DRAWS = 60  # candidate positions, of which a fish uses the one farthest from the others
 _PASSING = (
     -STRAIGHT,
     -STRAIGHT / 2,
@@ -26,8 +26,8 @@ _PASSING = (
 )  # seconds around a waypoint in which a fish keeps clear of others
 _BEFORE = 10_000  # added to numbers of rounds in seeds, which cannot be negative
 _BEAT = 0.42  # meters swum per beat of the tail
-_APART = 1.4  # meters between two fish that count as far apart
-_RING = 0.95  # meters: all begin on a circle around the first camera's axis, and swims towards it
+_APART = 1.4  # distance between two fish in meters beyond which more has no value
+_RING = 0.95  # meters: all start on a circle around the first camera's axis, swimming towards it
 _TURNING = 0.2  # seconds over which a head follows its path
 _EASE = 0.8  # seconds at a round's ends in which bodies straighten
 
@@ -53,7 +53,7 @@ class _Round:
 
 
 class Shoal:
-    """Fish that swim for ever; fish 0 is object 1."""
+    """Fish that swim endlessly; fish 0 is object 1."""
 
     def __init__(self, count: int, seed: int) -> None:
         self._count = count
@@ -122,7 +122,7 @@ def _ring(count: int) -> Waypoints:
 
 
 def _steady(velocities: Floats, ease: Floats) -> Floats:
-    """Smooth velocities ``(T, P, 3)``: heads turn less suddenly than paths do, except at a round's ends."""
+    """Smooth velocities ``(T, P, 3)``: heads turn more smoothly than paths, except at a round's ends."""
     flat = velocities.reshape(len(velocities), -1)
     soft = cv2.GaussianBlur(flat, (1, 13), sigmaX=1, sigmaY=_TURNING * RATE, borderType=cv2.BORDER_REPLICATE)
     steady: Floats = velocities + ease[:, None, None] * (soft - flat).reshape(velocities.shape)

@@ -11,39 +11,39 @@ from synthetic.cameras.pinhole import Floats
 from synthetic.walking.collision_avoidance import push_paths_apart
 
 RATE = 10  # samples a second
-LOW = np.array([0.55, 0.55, 0.5])  # meters: where fish swim, corner to corner
+LOW = np.array([0.55, 0.55, 0.5])  # meters: corners of the volume in which fish swim
 HIGH = np.array([5.45, 4.45, 2.5])
 CRUISE = 0.55  # meters per second
 _SPEEDS = (0.28, 0.95)  # meters per second
-_STEEP = 0.45  # of the speed ahead is the most that a fish climbs or dives
+_STEEP = 0.45  # largest vertical over horizontal speed
 _WHIM = np.array([0.85, 0.85, 0.22])  # meters per second squared
-_WHIM_SECONDS = 0.7  # that a whim lasts
-_WALL = 0.7  # meters before the end of the water at which a fish turns away
+_WHIM_SECONDS = 0.7  # duration of a random push
+_WALL = 0.7  # meters from a wall at which a fish turns away
 _WALL_PUSH = 3.2  # meters per second squared and meter
 _REACH = 1.35  # meters within which fish avoid each other
-_SHY = 6.0  # meters per second squared, where two would be in one place
-_FORESEE = 0.45  # seconds that they look ahead
+_SHY = 6.0  # meters per second squared between two fish at the same position
+_FORESEE = 0.45  # seconds of lookahead
 _SPURT = 0.6  # meters per second squared
-_TURN = 1.9  # radians per second, at most
-STRAIGHT = 3.0  # seconds before a waypoint that are swum straight towards it
-_KEEN = 2.5  # per second: how fast a fish takes up its wanted velocity
+_TURN = 1.9  # largest turn, radians per second
+STRAIGHT = 3.0  # seconds of straight swimming before a waypoint
+_KEEN = 2.5  # per second: rate at which a fish reaches its desired velocity
 _CLOSING = 0.9  # seconds in which a fish tries to close a gap
 _CLEAR = 0.55  # smallest distance in meters between two fish near the end
-_TRIALS = 4  # to bring all fish near their waypoints
-_NEAR = 0.75  # meters from their waypoints
+_TRIALS = 4  # attempts to bring all fish near their waypoints
+_NEAR = 0.75  # meters from its waypoint at which a fish counts as near
 _LANDING = 4.0  # seconds before the end over which the remaining error is corrected
 
 
 @dataclass(frozen=True, slots=True)
 class Waypoints:
-    """Places and velocities of all fish at a moment that all paths pass through."""
+    """Positions and velocities of all fish at a moment that all paths pass through."""
 
     places: Floats  # (P, 3) meters
     velocities: Floats  # (P, 3) meters per second
 
 
 def swim_between(rng: np.random.Generator, start: Waypoints, end: Waypoints, seconds: float) -> Floats:
-    """Return paths between waypoints: ``(T, P, 3)`` meters, `RATE` samples a second, both ends included."""
+    """Return paths between waypoints: ``(T, P, 3)`` meters, `RATE` samples per second, both ends included."""
     trials = []
     for _ in range(_TRIALS):
         trials.append(_try(rng, start, end, seconds))
@@ -63,7 +63,7 @@ def swim_between(rng: np.random.Generator, start: Waypoints, end: Waypoints, sec
 class _Trial:
     path: Floats  # (T, P, 3) meters
     velocities: Floats  # (P, 3) meters per second, at its end
-    missed: float  # meters: the largest error of a fish's place at the end
+    missed: float  # meters: the largest position error of a fish at the end
 
 
 def _try(rng: np.random.Generator, start: Waypoints, end: Waypoints, seconds: float) -> _Trial:
@@ -95,24 +95,24 @@ def _whims(rng: np.random.Generator, steps: int, fish: int) -> Floats:
     return whims
 
 
-def _home(place: Floats, velocity: Floats, end: Waypoints, left: float) -> tuple[Floats, Floats]:
+def _home(place: Floats, velocity: Floats, end: Waypoints, remaining: float) -> tuple[Floats, Floats]:
     """Return the pushes ``(P, 3)`` towards the waypoints and their weight ``(P, 1)``: 0 with time to spare.
 
     A fish aims at a point before its waypoint, and swims the last seconds with the waypoint's velocity.
     """
-    straight = min(left, STRAIGHT)
+    straight = min(remaining, STRAIGHT)
     gap = end.places - end.velocities * straight - place
     far = np.linalg.norm(gap, axis=1, keepdims=True)
-    wanted = gap * np.minimum(1 / _CLOSING, _SPEEDS[1] / np.maximum(far, 1e-6))
-    if left <= STRAIGHT:
-        return _KEEN * (wanted + end.velocities - velocity), np.ones_like(far)
-    need = far / (0.6 * CRUISE * (left - STRAIGHT + 0.1))
+    desired = gap * np.minimum(1 / _CLOSING, _SPEEDS[1] / np.maximum(far, 1e-6))
+    if remaining <= STRAIGHT:
+        return _KEEN * (desired + end.velocities - velocity), np.ones_like(far)
+    need = far / (0.6 * CRUISE * (remaining - STRAIGHT + 0.1))
     urgent: Floats = np.clip(need, 0, 1) ** 4
-    return _KEEN * (wanted - velocity), urgent
+    return _KEEN * (desired - velocity), urgent
 
 
 def _agile(push: Floats, velocity: Floats, step: int) -> Floats:
-    """Limit pushes ``(P, 3)`` to how fast a fish turns and speeds up; at first it swims straight on."""
+    """Limit pushes ``(P, 3)`` to a fish's turn rate and acceleration; initially it swims straight."""
     speed = np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-6)
     ahead = velocity / speed
     along = (push * ahead).sum(axis=1, keepdims=True)
@@ -143,7 +143,7 @@ def _others(place: Floats) -> Floats:
 
 
 def _bounded(velocity: Floats) -> Floats:
-    """Keep speeds and slopes within what a fish does."""
+    """Limit speeds and slopes to those of a fish."""
     ahead = np.hypot(velocity[:, 0], velocity[:, 1])
     slope = _STEEP * np.maximum(ahead, 0.1)
     level = np.column_stack([velocity[:, :2], np.clip(velocity[:, 2], -slope, slope)])
@@ -153,7 +153,7 @@ def _bounded(velocity: Floats) -> Floats:
 
 
 def _landing(place: Floats, velocity: Floats, steps: int) -> Floats:
-    """Return the cubic ``(T, P, 3)`` that ends with a path's error in place and velocity."""
+    """Return the cubic ``(T, P, 3)`` that corrects a path's final error in position and velocity."""
     clock = np.arange(steps + 1) / RATE - steps / RATE
     share = np.clip(1 + clock / _LANDING, 0, 1)[:, None, None]
     cubic: Floats = place * share**2 * (3 - 2 * share) + velocity * _LANDING * share**2 * (share - 1)

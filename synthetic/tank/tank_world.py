@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from synthetic.cameras.pinhole import Floats, PinholeCamera, Viewpoint
 from synthetic.drawing.figure import Figure, paste
 from synthetic.ground_truth import CameraTruth, FigureLayer, measure_visibility
-from synthetic.tank.fish_drawing import draw_fish
-from synthetic.tank.fish_mesh import fish_vertices
+from synthetic.tank.fish import draw_fish, fish_vertices
 from synthetic.tank.seabed import Seabed
 from synthetic.tank.shoal import Shoal
 from synthetic.tank.water import caustics
@@ -29,7 +28,7 @@ VIEWPOINTS = (
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """All figures before a camera at a moment, furthest first."""
+    """All figures in front of a camera at a moment, farthest first."""
 
     lit: Bytes  # (H, W, 3) the bed
     layers: tuple[tuple[int | None, Figure], ...]  # a fish's number, None for weeds and rocks
@@ -37,34 +36,34 @@ class _Moment:
 
 
 class TankWorld:
-    """Fish that all look the same in a lit, murky tank."""
+    """Fish of identical appearance in a lit, murky tank."""
 
     def __init__(self, parameters: SceneParameters) -> None:
         self._views = [PinholeCamera.at(view, parameters.width, parameters.height) for view in VIEWPOINTS]
         self._weeds = [Weeds(view) for view in self._views]
         self._shoal = Shoal(parameters.objects, parameters.seed)
-        self._bed = lru_cache(maxsize=None)(self._lay)
-        # A recording needs the picture and the ground truth of a frame: it is drawn once for both.
+        self._bed = lru_cache(maxsize=None)(self._create_bed)
+        # A recording needs the image and the ground truth of a frame: it is drawn once for both.
         self._moment = lru_cache(maxsize=parameters.cameras)(self._draw)
 
     @property
     def extent(self) -> tuple[float, float]:
-        """The size of the tank, from glass to glass."""
+        """The inner size of the tank."""
         return _EXTENT
 
     def picture(self, camera: int, seconds: float) -> Bytes:
-        """Return the picture of the tank with all fish."""
+        """Return the image of the tank with all fish."""
         moment = self._moment(camera, seconds)
         return self._paint(camera, moment.lit, moment.layers)
 
     def background(self, camera: int, seconds: float) -> Bytes:
-        """Return the picture of the tank without fish."""
+        """Return the image of the tank without fish."""
         lit = self._bed(camera).lit(seconds)
         still = self._still(camera, lit, seconds)
         return self._paint(camera, lit, tuple((None, figure) for _, _, figure in still))
 
     def truth(self, camera: int, seconds: float) -> CameraTruth:
-        """Measure the ground truth on the fish as they are drawn."""
+        """Measure the ground truth on the drawn fish."""
         moment = self._moment(camera, seconds)
         found = measure_visibility(
             self._views[camera], [FigureLayer(number, figure, None) for number, figure in moment.layers]
@@ -78,18 +77,18 @@ class TankWorld:
         )
 
     def positions(self, seconds: float) -> Floats:
-        """Return above which point of the seabed every fish is."""
+        """Return the points of the seabed below all fish."""
         return self._shoal.at(seconds).places[:, :2].copy()
 
     def inside(self, seconds: float) -> NDArray[np.bool_]:
         """Return which fish are in the tank: all."""
         return np.ones(len(self._shoal.at(seconds).places), dtype=np.bool_)
 
-    def homography(self, camera: int) -> Floats | None:  # noqa: ARG002 — fish are on no floor
-        """Return None: fish are on no floor."""
+    def homography(self, camera: int) -> Floats | None:  # noqa: ARG002 — there is no floor
+        """Return None: there is no floor."""
         return None
 
-    def _lay(self, camera: int) -> Seabed:
+    def _create_bed(self, camera: int) -> Seabed:
         return Seabed(self._views[camera])
 
     def _paint(self, camera: int, lit: Bytes, layers: tuple[tuple[int | None, Figure], ...]) -> Bytes:
@@ -114,11 +113,11 @@ class TankWorld:
         return _Moment(lit, tuple((number, figure) for _, number, figure in layers), distance)
 
     def _still(self, camera: int, lit: Bytes, seconds: float) -> list[tuple[float, int | None, Figure]]:
-        """Return weeds and rocks, which hide fish, furthest first: distance, no number, figure."""
-        found: list[tuple[float, int | None, Figure]] = []
-        found += [(clump.distance, None, clump.figure) for clump in self._weeds[camera].at(seconds)]
+        """Return weeds and rocks, which hide fish, farthest first: distance, None and figure."""
+        layers: list[tuple[float, int | None, Figure]] = []
+        layers += [(clump.distance, None, clump.figure) for clump in self._weeds[camera].at(seconds)]
         for rock in self._bed(camera).rocks:
-            seen = cv2.multiply(lit[rock.area], cv2.merge([rock.share] * 3), scale=1 / 255)
-            patch = np.dstack([seen, rock.share])
-            found.append((rock.distance, None, Figure(rock.area[1].start, rock.area[0].start, patch)))
-        return sorted(found, key=lambda layer: -layer[0])
+            colors = cv2.multiply(lit[rock.area], cv2.merge([rock.share] * 3), scale=1 / 255)
+            patch = np.dstack([colors, rock.share])
+            layers.append((rock.distance, None, Figure(rock.area[1].start, rock.area[0].start, patch)))
+        return sorted(layers, key=lambda layer: -layer[0])

@@ -26,7 +26,7 @@ _CLUMPS = (  # x, y and height in meters
     (5.35, 4.1, 1.7),
     (0.65, 4.2, 1.9),
 )
-_BLADES = (6, 9)  # in a clump, at least and fewer than
+_BLADES = (6, 9)  # least in a clump, and upper bound (exclusive)
 _GREENS = np.array([(0.16, 0.40, 0.15), (0.24, 0.46, 0.16), (0.34, 0.44, 0.14), (0.14, 0.33, 0.18)])
 _TONES = (0.72, 1.12)  # of the shaded and of the lit half of a blade
 _FINE = 2  # drawn pixels per pixel
@@ -77,24 +77,26 @@ class Clump:
 
 
 class Weeds:
-    """The weeds before one camera."""
+    """The weeds in front of one camera."""
 
     def __init__(self, view: PinholeCamera) -> None:
         self._view = view
-        middles = _MEADOW.feet + _MEADOW.heights[:, None] * np.array([0, 0, 0.5])
-        sight = middles - view.center
+        centers = _MEADOW.feet + _MEADOW.heights[:, None] * np.array([0, 0, 0.5])
+        sight = centers - view.center
         distance = np.linalg.norm(sight, axis=1)
-        self._away = [float(distance[clump].mean()) for clump in _MEADOW.clumps]
-        # Of a clump the furthest blades are drawn first.
+        self._distances = [float(distance[clump].mean()) for clump in _MEADOW.clumps]
+        # The farthest blades of a clump are drawn first.
         self._order = [np.arange(c.start, c.stop)[np.argsort(-distance[c])].tolist() for c in _MEADOW.clumps]
         water = open_water(sight / distance[:, None])
         self._inks = []
         for tone in _TONES:
-            seen = np.clip(attenuate_by_water(_MEADOW.colors * tone, distance, water)[:, ::-1] * 255, 0, 255)
-            self._inks.append(np.column_stack([seen, np.full(len(seen), 255.0)]).tolist())
+            colors = np.clip(
+                attenuate_by_water(_MEADOW.colors * tone, distance, water)[:, ::-1] * 255, 0, 255
+            )
+            self._inks.append(np.column_stack([colors, np.full(len(colors), 255.0)]).tolist())
 
     def at(self, seconds: float) -> list[Clump]:
-        """Draw the clumps as they sway at a moment; what is not before the camera is left out."""
+        """Draw the swaying clumps at a moment; those not in front of the camera are left out."""
         spines = _spines(seconds)
         pixels, depth = self._view.project(spines.reshape(-1, 3))
         pixels, depth = pixels.reshape(*spines.shape[:2], 2), depth.reshape(spines.shape[:2])
@@ -105,7 +107,7 @@ class Weeds:
         rims = np.stack([pixels - offsets, pixels, pixels + offsets])  # (3, B, _JOINTS, 2)
         return [
             Clump(distance, self._draw(rims[:, clump], order, clump.start))
-            for clump, order, distance in zip(_MEADOW.clumps, self._order, self._away, strict=True)
+            for clump, order, distance in zip(_MEADOW.clumps, self._order, self._distances, strict=True)
             if depth[clump].min() > 0.3  # noqa: PLR2004 — meters
         ]
 
@@ -115,7 +117,7 @@ class Weeds:
         right, bottom = (np.ceil(high).astype(int) + 1).tolist()
         canvas = np.zeros(((bottom - top) * _FINE, (right - left) * _FINE, 4), dtype=np.uint8)
         fixed = _fixed((rims - (left, top)) * _FINE - 0.5)
-        # From one rim up to the tip and down again along the middle.
+        # From one rim up to the tip and back along the middle.
         halves = np.concatenate([fixed[:2], fixed[1:, :, ::-1]], axis=2)
         for blade in order:
             for half, inks in zip(halves, self._inks, strict=True):

@@ -11,7 +11,7 @@ from synthetic.room.room import Room
 
 _ROUNDS = 60
 _SMOOTH = 0.45  # seconds over which a path is bent
-_SIDE = np.radians(50.0)  # both swerve to the same hand, so that they pass each other
+_SIDE = np.radians(50.0)  # both swerve to the same side, to pass each other
 _FIRM = 0.7  # share of the missing distance that each round corrects
 _EASE = 0.6  # seconds at either end over which bending fades
 MIN_DISTANCE = 0.8  # meters between two people
@@ -21,12 +21,12 @@ _FURNITURE = 0.25  # meters kept from furniture
 
 
 def push_paths_apart(paths: Floats, distances: Floats, rate: float) -> Floats:
-    """Bend paths ``(P, T, 2 or 3)``, sampled `rate` times a second, to distances ``(P, P)`` in meters.
+    """Bend paths ``(P, T, 2 or 3)``, sampled `rate` times per second, to distances ``(P, P)`` in meters.
 
-    Ends stay where they are. Where space is short, some pairs come nearer.
+    The ends are fixed. In a crowded area some pairs come nearer.
     """
     people, count, axes = paths.shape
-    if people < 2:  # noqa: PLR2004 — a pair takes two
+    if people < 2:  # noqa: PLR2004 — no pair
         return paths
     clock = np.arange(count)
     ease = np.clip(np.minimum(clock, count - 1 - clock) / (_EASE * rate), 0, 1)[None, :, None]
@@ -54,16 +54,16 @@ def push_paths_apart(paths: Floats, distances: Floats, rate: float) -> Floats:
 
 
 def proximity_cost(path: Floats, others: Floats, distance: float = MIN_DISTANCE) -> float:
-    """Compute the cost of a path ``(T, 2)`` for coming nearer than `distance` to others ``(O, T, 2)``."""
+    """Return the cost of a path ``(T, 2)`` for being nearer than `distance` to others ``(O, T, 2)``."""
     apart = np.hypot(*(others - path).transpose(2, 0, 1))
     return float((np.maximum(distance - apart, 0) ** 2).sum())
 
 
 def sidestep(room: Room, path: Floats, others: Floats, rate: float) -> Floats:
-    """Move a path ``(T, 2)``, sampled `rate` times a second, aside where it meets others ``(O, T, 2)``.
+    """Move a path ``(T, 2)``, sampled `rate` times per second, aside where it meets others ``(O, T, 2)``.
 
     At each encounter the path moves away from the other one at their closest point, and back, as far as walls
-    and furniture allow: not at all in a doorway.
+    and furniture permit: not at all in a doorway.
     """
     moved = path.copy()
     for other in others:
@@ -93,7 +93,7 @@ def _aside(room: Room, path: Floats, away: Floats, run: NDArray[np.intp], rate: 
 
 
 def _free(room: Room, path: Floats) -> bool:
-    """Return whether a path ``(T, 2)`` keeps off the walls and the furniture."""
+    """Return whether a path ``(T, 2)`` keeps its distance from walls and furniture."""
     inner = np.minimum(path, np.array([room.width, room.depth]) - path).min()
     west, south, east, north = room.footprints().T[:, :, None]
     dx = np.maximum(np.maximum(west - path[:, 0], path[:, 0] - east), 0)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.walking.round_paths import (
+from synthetic.walking.choreographed_crowd import (
     BEFORE,
     ROUND,
     RoundPath,
@@ -20,21 +20,21 @@ from synthetic.walking.round_paths import (
 )
 
 _PACE = (0.95, 1.3)  # meters per second
-_SLOWEST = 0.7  # meters per second: people who would be slower stand and wait
-_TALK = (1.0, 4.0)  # seconds that all of a group stand together
+_SLOWEST = 0.7  # meters per second: slower people stand and wait instead
+_TALK = (1.0, 4.0)  # seconds that a complete group stands together
 _LINGER = 0.8  # seconds between the first and the last to leave
 _SIZES = (1, 2, 3, 4)  # of groups
 _ODDS = (0.12, 0.5, 0.26, 0.12)
 _SHOULDERS = 0.48  # meters from one to the next in a group: shoulders touch
-_ASIDE = 0.5  # meters before a pair that both look at
+_ASIDE = 0.5  # meters in front of a pair: the point that both face
 _KEEP_GROUP = 0.46  # meters between two who stand together
-_KEEP_OTHERS = 0.75  # meters between others, at least, wherever there is room
+_KEEP_OTHERS = 0.75  # least meters between others, if there is room
 _CANDIDATES = 40
 _DETOUR = 0.65  # share of the walks with a detour
-_DAWDLE = 0.5  # seconds, at most, before a person sets out
-_SHORTLIST = 5  # plans whose collisions are avoided, to choose the best then
-_HURRY = 4.0  # cost of a second too late
-_PAUSE = 1.5  # seconds, at most, that a single person stands
+_DAWDLE = 0.5  # longest delay of a person's start, seconds
+_SHORTLIST = 5  # best plans, for which collisions are avoided before the final choice
+_HURRY = 4.0  # cost per second of lateness
+_PAUSE = 1.5  # longest stop of a single person, seconds
 
 Area: TypeAlias = tuple[float, float, float, float]  # west, south, east and north bound, meters
 
@@ -52,18 +52,18 @@ class Gatherings:
         self._area, self._people, self._seed = area, people, seed
 
     def paths(self, number: int) -> list[RoundPath]:
-        """Return all paths of a round, from its first places to those of the next round."""
+        """Return all paths of a round, from its initial positions to those of the next round."""
         rng = np.random.default_rng([self._seed, 0x6A74, number + BEFORE])
         return plan_gathering(rng, self._places(number), self._places(number + 1), self._area)
 
     def _places(self, number: int) -> Floats:
-        """Return everybody's place at the beginning of a round: ``(P, 2)``."""
+        """Return all positions at the beginning of a round: ``(P, 2)``."""
         rng = np.random.default_rng([self._seed, 0x91A5, number + BEFORE])
         return draw_separated_places(rng, self._people, self._area)
 
 
 def draw_separated_places(rng: np.random.Generator, count: int, area: Area) -> Floats:
-    """Draw random places ``(count, 2)`` far apart: the best of some draws."""
+    """Draw random positions ``(count, 2)`` far apart: the best of several draws."""
     west, south, east, north = area
     drawn = rng.uniform((west, south), (east, north), (_CANDIDATES, count, 2))
     gaps = np.linalg.norm(drawn[:, :, None] - drawn[:, None], axis=3)
@@ -73,9 +73,9 @@ def draw_separated_places(rng: np.random.Generator, count: int, area: Area) -> F
 
 
 def plan_gathering(rng: np.random.Generator, starts: Floats, ends: Floats, area: Area) -> list[RoundPath]:
-    """Plan the paths of all from their start ``(P, 2)`` to a group and on to their end ``(P, 2)``.
+    """Plan paths from the starts ``(P, 2)`` to groups and on to the ends ``(P, 2)``.
 
-    The best of several random plans: people keep out of each other's path and have time enough.
+    Returns the best of several random plans by collisions and lateness.
     """
     if not len(starts):
         return []
@@ -91,8 +91,8 @@ class _Plan:
     """A candidate for a round."""
 
     paths: tuple[RoundPath, ...]
-    keep: Floats  # (P, P) meters that any two should keep apart
-    hurry: float  # seconds by which people would come too late
+    keep: Floats  # (P, P) meters to keep between each pair
+    hurry: float  # total lateness in seconds
     penalty: float
 
 
@@ -116,7 +116,7 @@ def _groups(rng: np.random.Generator, count: int) -> list[list[int]]:
             size = int(rng.choice(_SIZES, p=_ODDS))
             groups.append(order[:size])
             order = order[size:]
-        if count < 2 or any(len(group) > 1 for group in groups):  # noqa: PLR2004 — a meeting takes two
+        if count < 2 or any(len(group) > 1 for group in groups):  # noqa: PLR2004 — no meeting possible
             return groups
 
 
@@ -131,10 +131,10 @@ def _lead(
         middle = rng.uniform((west + 0.4, south + 0.4), (east - 0.4, north - 0.4))
         slots, look = _slots(middle, size, float(rng.uniform(0, 2 * np.pi)))
         steps = np.linalg.norm(starts[group][:, None] - slots[None], axis=2)
-        taken = scipy.optimize.linear_sum_assignment(steps)[1]
+        assigned = scipy.optimize.linear_sum_assignment(steps)[1]
         trips = [
             _trip(rng, area, float(rng.uniform(*_PACE)), starts[walker], slots[slot], ends[walker])
-            for walker, slot in zip(group, taken.tolist(), strict=True)
+            for walker, slot in zip(group, assigned.tolist(), strict=True)
         ]
         begin = rng.uniform(0.0, _DAWDLE, size)
         arrive = begin + [trip.there for trip in trips]
@@ -151,7 +151,7 @@ class _Trip:
     """A walk to a group and on, without the time spent there."""
 
     places: Floats  # (K, 2) meters
-    slot: int  # which of them is in the group
+    slot: int  # index of the one in the group
     pace: float  # meters per second
 
     @property
@@ -174,7 +174,7 @@ class _Trip:
 def _trip(
     rng: np.random.Generator, area: Area, pace: float, start: Floats, slot: Floats, end: Floats
 ) -> _Trip:
-    """Draw a trip to a slot and on to the end, either part perhaps with a detour."""
+    """Draw a trip to a slot and on to the end; each part may have a detour."""
     west, south, east, north = area
     places = [start]
     for goal in (slot, end):
@@ -187,7 +187,7 @@ def _trip(
 
 
 def _path(trip: _Trip, begin: float, leave: float, look: Floats) -> RoundPath:
-    """Compute a trip's timed path; a walker who would arrive too early walks more slowly."""
+    """Return a trip's timed path; a walker who would arrive early walks more slowly."""
     spans = trip.spans
     spans[trip.slot :] *= min((ROUND - leave) / trip.back, trip.pace / _SLOWEST)
     there = begin + np.cumsum([0.0, *spans[: trip.slot]])
@@ -202,19 +202,19 @@ def _path(trip: _Trip, begin: float, leave: float, look: Floats) -> RoundPath:
 
 
 def _slots(middle: Floats, size: int, turn: float) -> tuple[Floats, Floats]:
-    """Return the places ``(size, 2)`` around a group's middle, and the point ``(2,)`` that it looks at."""
+    """Return the positions ``(size, 2)`` around a group's center, and the point ``(2,)`` that it faces."""
     if size == 1:
         return middle[None], middle + np.array([np.cos(turn), np.sin(turn)])
     angles = turn + 2 * np.pi * np.arange(size) / size
     radius = _SHOULDERS / 2 / np.sin(np.pi / size)
     slots = middle + radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    # Two stand side by side, half turned to each other; more stand in a ring.
+    # Two stand side by side, half facing each other; more stand in a ring.
     ahead = _ASIDE * np.array([-np.sin(turn), np.cos(turn)]) if size == 2 else np.zeros(2)  # noqa: PLR2004
     return slots, middle + ahead
 
 
 def _keep(groups: list[list[int]], count: int) -> Floats:
-    """Return how far any two should keep apart: ``(count, count)`` meters."""
+    """Return the distances to keep between each pair: ``(count, count)`` meters."""
     keep = np.full((count, count), _KEEP_OTHERS)
     for group in groups:
         keep[np.ix_(group, group)] = _KEEP_GROUP

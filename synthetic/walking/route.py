@@ -1,4 +1,4 @@
-"""Random routes through a room: in by a door, from place to place, and out by a door."""
+"""Random routes through a room: in by a door, from position to position, and out by a door."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ import numpy as np
 from synthetic.room.room import Door, Point, Room
 
 _MARGIN = 1.0  # meters kept from walls
-_CORNER = (
-    2.6  # meters kept from the room's corners: cameras hang there, and feet beneath them are out of view
-)
+_CORNER = 2.6  # meters kept from the room's corners: feet below the cameras there are out of view
 _CLEARANCE = 0.45  # meters kept from furniture
 _TRIES = 40
-_CHOICE = 6  # places that one chooses from
-_NEAREST = 2.0  # meters from one place to the next
+_CHOICE = 6  # candidate positions
+_NEAREST = 2.0  # least meters between successive positions
 _CIRCLE = 0.7  # meters from the middle of a meeting to each participant
-_BETTER = 1.3  # times as large as the best view so far must a view be to become the best
-_ABOVE = 2.1  # meters from a body's middle up to a camera
-_FRAME = 0.4  # seconds from one look at the cameras to the next
+_BETTER = 1.3  # factor by which a view must be larger than the best one to replace it
+_ABOVE = 2.1  # meters from a body's center up to a camera
+_FRAME = 0.4  # seconds between two comparisons of the cameras
 _SOONEST, _LATEST = 7.0, 13.0  # seconds for which one camera should be the best
 
 
@@ -30,12 +28,12 @@ class Leg:
 
     end: Point
     pause: float = 0.0  # seconds
-    face: Point | None = None  # what to look at while standing
+    face: Point | None = None  # point to face while standing
 
 
 @dataclass(slots=True)
 class Route:
-    """The legs of a visit and the seconds that they take at a given pace."""
+    """The legs of a visit and their duration at a given pace."""
 
     start: Point
     pace: float  # meters per second
@@ -45,12 +43,12 @@ class Route:
     best_view: BestView = field(init=False)  # of the person at the end of the route
 
     def __post_init__(self) -> None:
-        """Find the camera that shows the start best."""
+        """Find the best view of the start."""
         self.best_view = best_view_at(self.start, self.camera_positions)
 
     @property
     def here(self) -> Point:
-        """Where the route has come to."""
+        """The current end of the route."""
         return self.legs[-1].end if self.legs else self.start
 
     def add(self, leg: Leg) -> None:
@@ -72,7 +70,7 @@ class Meeting:
 
 
 def is_walkable(room: Room, start: Point, end: Point) -> bool:
-    """Return whether one can walk straight from a point to another."""
+    """Return whether a straight walk between two points is free of furniture."""
     steps = max(int(math.dist(start, end) / 0.1), 1)
     share = np.linspace(0, 1, steps + 1)
     x = start[0] + (end[0] - start[0]) * share
@@ -87,9 +85,9 @@ def is_walkable(room: Room, start: Point, end: Point) -> bool:
 class VisitPlan:
     """The constraints of a random route."""
 
-    seconds: float  # that it may take
+    seconds: float  # available time
     pace: float  # meters per second
-    meetings: tuple[Meeting, ...]  # where others gather meanwhile
+    meetings: tuple[Meeting, ...]  # meetings during the visit
     slot: float  # radians: the side from which this person joins a meeting
     camera_positions: tuple[Point, ...]  # the best view should change between these from time to time
     begun: bool = False  # in the room already, walking
@@ -97,7 +95,7 @@ class VisitPlan:
 
 
 def draw_route(rng: np.random.Generator, room: Room, visit: VisitPlan) -> Route:
-    """Draw a random route: in by one door, about the room, out by a door, away to the side."""
+    """Draw a random route: in by one door, through the room, out by a door, and away to the side."""
     way_in, way_out = (room.doors[int(rng.integers(len(room.doors)))] for _ in range(2))
     corridor = _corridor_side(rng, room, way_out)
     leave = 3.0 / visit.pace
@@ -131,13 +129,13 @@ def _corridor_side(rng: np.random.Generator, room: Room, door: Door) -> Point:
 
 
 def _begin_inside(rng: np.random.Generator, room: Room, visit: VisitPlan, home: Point) -> Route:
-    """Draw the first leg of a route that begins in the room: from anywhere to somewhere far."""
+    """Draw the first leg of a route that begins in the room: between two distant random positions."""
     route = Route(_draw_place(rng, room), visit.pace, visit.camera_positions)
     for _ in range(2 * _TRIES):
         route = Route(_draw_place(rng, room), visit.pace, visit.camera_positions)
         end = _draw_place(rng, room)
-        distance = math.dist(route.here, end) > visit.restless * visit.pace
-        if distance and is_walkable(room, route.here, end) and is_walkable(room, end, home):
+        is_far = math.dist(route.here, end) > visit.restless * visit.pace
+        if is_far and is_walkable(room, route.here, end) and is_walkable(room, end, home):
             route.add(Leg(end))
             break
     return route
@@ -147,26 +145,26 @@ def _choose_leg(rng: np.random.Generator, room: Room, route: Route, home: Point,
     for meeting in visit.meetings:
         arrival = route.seconds + math.dist(route.here, meeting.place) / route.pace
         due = meeting.begin <= arrival < meeting.end and arrival > visit.restless
-        if due and rng.random() < 0.6:  # noqa: PLR2004 — most go and meet
+        if due and rng.random() < 0.6:  # noqa: PLR2004 — most people join
             x, y = meeting.place
             end = (x + _CIRCLE * math.cos(visit.slot), y + _CIRCLE * math.sin(visit.slot))
             if is_walkable(room, route.here, end) and is_walkable(room, end, home):
                 return Leg(end, rng.uniform(1.5, meeting.end - arrival + 1.5), meeting.place)
     end = _choose_place(rng, room, route, home, visit)
     arrival = route.seconds + math.dist(route.here, end) / route.pace
-    stays = rng.random() < 0.45 and arrival > visit.restless  # noqa: PLR2004 — not at every turn
+    stays = rng.random() < 0.45 and arrival > visit.restless  # noqa: PLR2004 — not at every position
     pause = rng.uniform(1.5, 4.5) if stays else 0.0
     turn = rng.uniform(0, 2 * np.pi)
     return Leg(end, pause, (end[0] + math.cos(turn), end[1] + math.sin(turn)))
 
 
 def _choose_place(rng: np.random.Generator, room: Room, route: Route, home: Point, visit: VisitPlan) -> Point:
-    """Choose where to go next: a place on the way to which the best view changes in good time."""
+    """Choose the next position: one on the way to which the best view changes at a suitable time."""
     best, lowest, candidates = home, np.inf, 0
     for _ in range(_TRIES):
         end = _draw_place(rng, room)
         distance = math.dist(route.here, end)
-        # No pacing on the spot.
+        # No short moves.
         if distance > _NEAREST and is_walkable(room, route.here, end) and is_walkable(room, end, home):
             penalty = follow_best_view(
                 route.best_view, route.here, end, distance / route.pace, visit.camera_positions
@@ -180,7 +178,7 @@ def _choose_place(rng: np.random.Generator, room: Room, route: Route, home: Poin
 
 
 def _draw_place(rng: np.random.Generator, room: Room) -> Point:
-    """Choose a place to go to: off the walls and out of the corners."""
+    """Draw a position away from walls and corners."""
     while True:
         x, y = rng.uniform(_MARGIN, room.width - _MARGIN), rng.uniform(_MARGIN, room.depth - _MARGIN)
         if math.hypot(min(x, room.width - x), min(y, room.depth - y)) > _CORNER:
@@ -189,11 +187,11 @@ def _draw_place(rng: np.random.Generator, room: Room) -> Point:
 
 @dataclass(frozen=True, slots=True)
 class BestView:
-    """Which camera shows a person largest, and for how long it has."""
+    """The camera in which a person appears largest, and for how long it has been the same."""
 
     camera: int
     held_seconds: float  # seconds
-    penalty: float = 0.0  # seconds by which best views changed too early or too late so far
+    penalty: float = 0.0  # total seconds by which the best view changed too early or too late
 
 
 def best_view_at(where: Point, camera_positions: tuple[Point, ...]) -> BestView:

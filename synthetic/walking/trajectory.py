@@ -1,4 +1,4 @@
-"""Trajectories: place, heading and distance walked at any moment of a visit."""
+"""Trajectories: position, heading and distance walked at any moment of a visit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """A visit sampled `SAMPLES_PER_SECOND` times a second."""
+    """A visit sampled at `SAMPLES_PER_SECOND`."""
 
     places: Floats  # (S, 2) meters
     headings: Floats  # (S,) radians, unwrapped
@@ -54,10 +54,10 @@ class Trajectory:
         return cls(places, headings, np.cumsum(steps), steps * SAMPLES_PER_SECOND)
 
     def moved(self, places: Floats, every: int) -> Trajectory:
-        """Return the same visit through other places ``(T, 2)``, one for `every` so many samples."""
+        """Return the same visit through other positions ``(T, 2)``, one per `every` samples."""
         whole, coarse = np.arange(len(self.places)), np.arange(len(places)) * every
-        was = self.places[coarse]
-        shift = [np.interp(whole, coarse, (places - was)[:, axis]) for axis in range(2)]
+        before = self.places[coarse]
+        shift = [np.interp(whole, coarse, (places - before)[:, axis]) for axis in range(2)]
         soft = np.column_stack([smooth(axis, 1 / SAMPLES_PER_SECOND) for axis in shift])
         return Trajectory._through(self.places + soft, self.headings)
 
@@ -66,14 +66,14 @@ class Trajectory:
         position = min(max(seconds * SAMPLES_PER_SECOND, 0.0), len(self.walked) - 1.001)
         index = int(position)
         share = position - index
-        rest = 1.0 - share
-        place = self.places[index] * rest + self.places[index + 1] * share
+        complement = 1.0 - share
+        place = self.places[index] * complement + self.places[index + 1] * share
         return Pose(
             float(place[0]),
             float(place[1]),
-            float(self.headings[index] * rest + self.headings[index + 1] * share),
-            float(self.walked[index] * rest + self.walked[index + 1] * share),
-            float(self.speeds[index] * rest + self.speeds[index + 1] * share),
+            float(self.headings[index] * complement + self.headings[index + 1] * share),
+            float(self.walked[index] * complement + self.walked[index + 1] * share),
+            float(self.speeds[index] * complement + self.speeds[index + 1] * share),
         )
 
 
@@ -105,7 +105,7 @@ def smooth(values: Floats, seconds: float) -> Floats:
 
 
 def whole_strides(steps: Floats, stride: float) -> Floats:
-    """Sum steps ``(S,)`` up, stretched to whole strides, so that gaits go on from round to round."""
+    """Return cumulative steps ``(S,)``, stretched to whole strides, so that gaits continue across rounds."""
     walked = np.cumsum(steps) - steps[0]
     strides = float(walked[-1]) / stride
     if strides < 0.25:  # noqa: PLR2004 — hardly a step

@@ -1,8 +1,8 @@
-"""A crowd that comes and goes: visits, planned so that people meet but do not walk through each other.
+"""A crowd of visitors, planned so that people meet but do not walk through each other.
 
 A walker's time is divided into visits of a fixed length. A visit is a pure function of the seed, the walker
 and the visit's number, so any frame can be drawn directly, in any process. Of several random routes a
-walker takes the one that keeps furthest from the walkers with smaller numbers.
+walker uses the one with the largest distance from walkers with smaller numbers.
 """
 
 from __future__ import annotations
@@ -17,36 +17,29 @@ from synthetic.walking.collision_avoidance import proximity_cost, sidestep
 from synthetic.walking.route import Meeting, VisitPlan, draw_route
 from synthetic.walking.trajectory import SAMPLES_PER_SECOND, Pose, Trajectory
 
-_VISIT = 56.0  # seconds, from one coming in to the next
+_VISIT = 56.0  # seconds from one arrival to the next
 _VISIT_STEP = 3.0  # seconds: walkers' visits differ in length, so that the people present change
-_FIRST = (
-    40.0,
-    58.0,
-    31.0,
-    49.0,
-)  # seconds into the scene at which the first visits end
-_FIRST_STEP = 2.3  # seconds, for every four walkers more
-_UNDER_WAY = 1.0  # seconds from the first visits' beginning to frame 0: everybody walks in it
-_RESTLESS = (
-    _UNDER_WAY + 4.5
-)  # seconds of the first visits without standing, so that detectors learn the background
+_FIRST = (40.0, 58.0, 31.0, 49.0)  # seconds into the scene at which the first visits end
+_FIRST_STEP = 2.3  # seconds added for every four walkers
+_UNDER_WAY = 1.0  # seconds from the first visits' beginning to frame 0: in which all people walk
+_RESTLESS = _UNDER_WAY + 4.5  # seconds of the first visits without standing, for background learning
 _CANDIDATES = 16
-_CROWD = (6, 8)  # from walker 6 on there are 8 candidates: in a crowd no route is clear
-_BRISK = 0.5  # meters per second, at least, during these
+_CROWD = (6, 8)  # from walker 6 on there are 8 candidates: in a crowd no route is free
+_BRISK = 0.5  # least meters per second during these
 _COARSE = 4  # every fourth sample is compared
 _RATE = SAMPLES_PER_SECOND / _COARSE
 _STAGED_CAMERAS = 3  # cameras between which the best view should change: the room's first
-_SPREAD = 2.6  # meters that people are apart at the scene's beginning
-_FIRST_SIGHT = 4.0  # weight of being apart at the beginning
+_SPREAD = 2.6  # meters between people at the scene's beginning
+_FIRST_SIGHT = 4.0  # weight of that distance
 _LEARNING = 2.0  # seconds in which detectors learn the background
 _GATHERING = 17.0  # seconds from one meeting to the next
 _SLOTS = 5  # places around a meeting
 _BEFORE = 10_000  # added to numbers of visits in seeds, which cannot be negative
-_STEP = 0.7  # meters across the picture after which a person no longer hides the same background
+_STEP = 0.7  # meters across the image after which a person hides other background
 
 
 class VisitingCrowd:
-    """The people of a room, who come and go by its doors; walker 0 is object 1."""
+    """The people of a room, who enter and leave by its doors; walker 0 is object 1."""
 
     def __init__(self, room: Room, count: int, seed: int) -> None:
         self._room = room
@@ -57,7 +50,7 @@ class VisitingCrowd:
         self._trajectory = lru_cache(maxsize=16 * max(count, 1) + 16)(self._plan)
 
     def poses(self, seconds: float) -> list[Pose]:
-        """Return everybody's pose at a moment of the scene."""
+        """Return all poses at a moment of the scene."""
         return [self._pose(walker, seconds) for walker in range(self._count)]
 
     def _visit(self, walker: int, seconds: float) -> int:
@@ -108,7 +101,7 @@ class VisitingCrowd:
         return best.moved(sidestepped, _COARSE)
 
     def _cost(self, path: Floats, others: Floats, *, first: bool) -> float:
-        """Compute the cost of a path ``(T, 2)`` beside those of others ``(O, T, 2)``; less is better."""
+        """Return the cost of a path ``(T, 2)`` given those of others ``(O, T, 2)``."""
         cost = proximity_cost(path, others)
         if first:
             start = slice(int(_UNDER_WAY * _RATE), int(_RESTLESS * _RATE))
@@ -132,7 +125,7 @@ class VisitingCrowd:
         return tuple(meetings)
 
     def _others(self, walker: int, begin: float, length: float) -> Floats:
-        """Sample where the walkers of smaller numbers are during a visit: ``(others, T, 2)`` meters."""
+        """Sample the positions of walkers with smaller numbers during a visit: ``(others, T, 2)`` meters."""
         clock = begin + np.arange(0, int(length * SAMPLES_PER_SECOND), _COARSE) / SAMPLES_PER_SECOND
         places = np.empty((walker, len(clock), 2))
         for other in range(walker):
@@ -149,11 +142,11 @@ def _coarse(trajectory: Trajectory, others: Floats) -> Floats:
 
 
 def lateral_motion_penalty(path: Floats, camera_positions: Floats) -> float:
-    """Compute the cost of a path ``(T, 2)`` for moving too little across the cameras' ``(C, 2)`` pictures."""
-    rate = 0.0
+    """Return the cost of a path ``(T, 2)`` for moving too little across the images of cameras ``(C, 2)``."""
+    cost = 0.0
     for camera in camera_positions:
         sight = path[0] - camera
         step = path[-1] - path[0]
         across = abs(float(sight[0] * step[1] - sight[1] * step[0])) / max(float(np.hypot(*sight)), 1e-6)
-        rate += max(_STEP - across, 0.0) ** 2
-    return rate
+        cost += max(_STEP - across, 0.0) ** 2
+    return cost

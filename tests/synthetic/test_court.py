@@ -14,8 +14,7 @@ from synthetic.drawing.clothing import choose_team_outfit
 from synthetic.drawing.skeleton import Joint, place_joints
 from synthetic.ground_truth import measure_truth
 from synthetic.room.room_world import RoomWorld
-from synthetic.walking.choreographed_crowd import ChoreographedCrowd
-from synthetic.walking.round_paths import ROUND
+from synthetic.walking.choreographed_crowd import ROUND, ChoreographedCrowd
 from synthetic.walking.trajectory import Pose
 
 RATE = 10  # samples a second

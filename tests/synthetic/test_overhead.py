@@ -14,10 +14,9 @@ from synthetic import Scene
 from synthetic.cameras.pinhole import PinholeCamera, Viewpoint
 from synthetic.drawing.clothing import choose_casual_outfit
 from synthetic.room.layouts import OVERHEAD, OVERHEAD_AREA
-from synthetic.walking.choreographed_crowd import ChoreographedCrowd
+from synthetic.walking.choreographed_crowd import ROUND, ChoreographedCrowd, sample_times
 from synthetic.walking.collision_avoidance import push_paths_apart
 from synthetic.walking.gatherings import Gatherings, plan_gathering
-from synthetic.walking.round_paths import ROUND, sample_times
 
 RATE = 10  # samples a second
 SIZE = (320, 180)

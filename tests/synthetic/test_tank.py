@@ -16,8 +16,7 @@ from synthetic.cameras.pinhole import PinholeCamera
 from synthetic.drawing.figure import Figure
 from synthetic.ground_truth import FigureLayer, measure_visibility
 from synthetic.tank import VIEWPOINTS
-from synthetic.tank.fish_drawing import draw_fish
-from synthetic.tank.fish_mesh import LENGTH, fish_vertices
+from synthetic.tank.fish import LENGTH, draw_fish, fish_vertices
 from synthetic.tank.shoal import ROUND, FishState, Shoal
 from synthetic.tank.water import attenuate_by_water, caustics, open_water
 

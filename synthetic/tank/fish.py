@@ -1,21 +1,24 @@
-"""The mesh of a fish: rings of skin around a spine that bends, and fins.
+"""Fish: a mesh of skin rings around a bending spine, with fins, and its drawing in murky water.
 
-Measures are shares of its length.
+Measures of the mesh are shares of a fish's length.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from synthetic.cameras.pinhole import Floats
+from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.drawing.figure import Figure
 from synthetic.tank.shoal import FishState
+from synthetic.tank.water import TILE, Bytes, attenuate_by_water, caustic_pixels, open_water
 
 LENGTH = 0.8  # meters, all of them, without the tail fin
 _AROUND = 16  # corners of a ring
-# Along the body: where, half its height, half its width, how far its middle is above the axis.
+# Along the body: position, half height, half width, height of the center above the axis.
 _RINGS = np.array(
     [
         (0.000, 0.012, 0.012, -0.010),
@@ -41,9 +44,9 @@ _BACK, _SIDE, _BELLY = (
     np.array([1.00, 0.78, 0.50]),
 )
 _BAND, _EDGE = np.array([0.97, 0.95, 0.90]), np.array([0.16, 0.10, 0.09])
-_PALE = ((3, 4), (8, 8))  # the rings from which white bands begin, first and last
+_PALE = ((3, 4), (8, 8))  # first and last rings of the white bands
 _FIN, _FIN_DARK = np.array([0.95, 0.44, 0.10]), np.array([0.72, 0.25, 0.06])
-# Fins: corners by (along, left, up); the pectorals are the last two, and row.
+# Fins: corners as (along, left, up); the last two are the pectorals, which row.
 _FINS = (
     ((0.965, 0, 0.040), (1.075, 0, 0.095), (1.225, 0, 0.165), (1.165, 0, 0.005)),
     ((0.965, 0, -0.040), (1.165, 0, -0.005), (1.225, 0, -0.155), (1.075, 0, -0.090)),
@@ -54,10 +57,10 @@ _FINS = (
     ((0.285, 0.080, -0.035), (0.375, 0.185, -0.020), (0.440, 0.175, -0.115), (0.330, 0.082, -0.095)),
     ((0.285, -0.080, -0.035), (0.375, -0.185, -0.020), (0.440, -0.175, -0.115), (0.330, -0.082, -0.095)),
 )
-_FIN_DARKS = (0.15, 0.35, 0.3, 0.3, 0.5, 0.5, 0.1, 0.1)  # how much of the dark color is in each
+_FIN_DARKS = (0.15, 0.35, 0.3, 0.3, 0.5, 0.5, 0.1, 0.1)  # share of the dark color in each
 _EYE = (0.098, 0.060, 0.030)  # along, to either side, up
 _EYE_RADII = (0.030, 0.018)  # of the white and of the black
-_LIFTS = np.array([0.010, 0.022])  # by which the eye stands out of the skin
+_LIFTS = np.array([0.010, 0.022])  # height of the eye above the skin
 
 
 def _skin() -> tuple[NDArray[np.intp], Floats]:
@@ -94,10 +97,10 @@ COLORS = np.concatenate(
 )
 """The colors ``(F, 3)`` of all faces: red, green, blue in 0..1."""
 THIN = np.zeros(len(FACES), dtype=np.bool_)
-"""Which faces ``(F,)`` show from both sides: fins."""
+"""Which faces ``(F,)`` are visible from both sides: fins."""
 THIN[len(_CORNERS) : len(_CORNERS) + len(_FINS)] = True
 NEARER = np.zeros(len(FACES))
-"""Meters ``(F,)`` nearer for the drawing order: an eye lies on skin."""
+"""Meters ``(F,)`` nearer in the drawing order: an eye lies on skin."""
 NEARER[len(_CORNERS) + len(_FINS) :] = (0.03, 0.035) * 2
 
 
@@ -115,25 +118,25 @@ def _rest() -> Floats:
 
 def _eyes() -> Floats:
     along, offsets, up = _EYE
-    found = []
+    vertices = []
     for side in (1.0, -1.0):
         for radius, lift in zip(_EYE_RADII, _LIFTS, strict=True):
             square = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)][:: -int(side)]) * radius
-            found += [(along + x, side * (offsets + lift - 0.35 * x), up + z) for x, z in square.tolist()]
-    return np.array(found)
+            vertices += [(along + x, side * (offsets + lift - 0.35 * x), up + z) for x, z in square.tolist()]
+    return np.array(vertices)
 
 
 def fish_vertices(swimmers: FishState) -> Floats:
-    """Return every fish's vertices ``(P, V, 3)`` in meters, as it bends and beats its tail."""
+    """Return all fish's vertices ``(P, V, 3)`` in meters, with bends and tail beats."""
     rest = _rest()
     along = rest[:, 0]
     beat = 2 * np.pi * (swimmers.beats[:, None] - 0.85 * along)
     swing = swimmers.vigour[:, None] * (0.012 + 0.085 * along**2) * np.sin(beat)
-    swing -= swimmers.vigour[:, None] * 0.012 * np.sin(beat[:, :1])  # the nose leads nearly straight
+    swing -= swimmers.vigour[:, None] * 0.012 * np.sin(beat[:, :1])  # the nose moves nearly straight
     bend = 0.10 * swimmers.bends[:, None] * np.maximum(along - 0.3, 0) ** 2
     local = np.repeat(rest[None], len(swimmers.places), axis=0)
     local[:, :, 1] += swing + bend
-    _row(local, swimmers.beats)
+    _move_pectorals(local, swimmers.beats)
     local[:, :, 0] = 0.5 - local[:, :, 0]  # from the middle, ahead
     ahead = swimmers.ahead
     left = np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(ahead))], axis=1)
@@ -143,9 +146,70 @@ def fish_vertices(swimmers: FishState) -> Floats:
     return corners
 
 
-def _row(local: Floats, beats: Floats) -> None:
+def _move_pectorals(local: Floats, beats: Floats) -> None:
     """Move the pectoral fins, in place."""
     stroke = 0.035 * np.sin(2 * np.pi * beats * 0.5)[:, None]
     for fin in (len(_FINS) - 2, len(_FINS) - 1):
         tips = _FIRST_FIN + 4 * fin + np.array([1, 2])
         local[:, tips, 2] += stroke
+
+
+_FINE = 3  # drawn pixels per pixel
+_SHIFT = 4  # fractional bits of cv2's coordinates
+_AMBIENT, _SUN, _NET = 0.72, 0.36, 1.1  # ambient light, sunlight from above, and caustics
+
+
+def draw_fish(view: PinholeCamera, corners: Floats, caustic_map: Bytes) -> list[Figure | None]:
+    """Draw fish by their corners ``(P, V, 3)`` in meters, under caustics ``(TILE, TILE)``.
+
+    Patches extend beyond the image's edge if fish do. None for a fish that is not in front of the camera.
+    """
+    if not len(corners):
+        return []
+    pixels, depth = view.project(corners.reshape(-1, 3))
+    pixels, depth = pixels.reshape(*corners.shape[:2], 2), depth.reshape(corners.shape[:2])
+    inks = _inks(view, corners, caustic_map)
+    return [_draw(*fish) for fish in zip(pixels, depth, inks, strict=True)]
+
+
+def _inks(view: PinholeCamera, corners: Floats, caustic_map: Bytes) -> Floats:
+    """Compute the colors ``(P, F, 4)`` of all faces: blue, green, red and alpha."""
+    facing = corners[:, FACES]  # (P, F, 4, 3)
+    normal = np.cross(facing[:, :, 2] - facing[:, :, 0], facing[:, :, 3] - facing[:, :, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
+    rise = np.where(THIN, np.abs(normal[..., 2]) * 0.3 + 0.3, normal[..., 2])
+    middle = facing.mean(axis=2)
+    spot = caustic_pixels(middle).astype(np.int64) % TILE
+    bright = caustic_map[spot[..., 1], spot[..., 0]] / 255.0
+    light = _AMBIENT + _SUN * np.clip(rise, -0.6, 1) + _NET * bright * np.clip(rise + 0.15, 0, 1)
+    sight = middle.mean(axis=1) - view.center
+    distance = np.linalg.norm(sight, axis=1)
+    water = open_water(sight / distance[:, None])
+    seen = attenuate_by_water(COLORS * light[..., None], distance[:, None], water[:, None])
+    inks = np.full((*light.shape, 4), 255.0)
+    inks[..., :3] = np.clip(seen[..., ::-1] * 255, 0, 255)
+    return inks
+
+
+def _draw(pixels: Floats, depth: Floats, inks: Floats) -> Figure | None:
+    if depth.min() < 0.3:  # noqa: PLR2004 — meters
+        return None
+    left, top = (np.floor(pixels.min(axis=0)).astype(int) - 1).tolist()
+    right, bottom = (np.ceil(pixels.max(axis=0)).astype(int) + 1).tolist()
+    width, height = right - left, bottom - top
+    outline = pixels[FACES]  # (F, 4, 2)
+    first, second = outline[:, 2] - outline[:, 0], outline[:, 3] - outline[:, 1]
+    # In the image, where y runs down, a face seen from outside is oriented the other way.
+    turns = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    visible = np.flatnonzero(THIN | (turns < 0))
+    order = visible[np.argsort(NEARER[visible] - depth[FACES[visible]].mean(axis=1), kind="stable")]
+    fixed = _fixed((outline[order] - (left, top)) * _FINE - 0.5)
+    canvas = np.zeros((height * _FINE, width * _FINE, 4), dtype=np.uint8)
+    for face, ink in zip(fixed, inks[order].tolist(), strict=True):
+        cv2.fillConvexPoly(canvas, face, ink, cv2.LINE_8, _SHIFT)
+    patch = cv2.resize(canvas, (width, height), interpolation=cv2.INTER_AREA)
+    return Figure(left, top, np.asarray(patch, dtype=np.uint8))
+
+
+def _fixed(points: Floats) -> NDArray[np.int32]:
+    return np.rint(points * (1 << _SHIFT)).astype(np.int32)
