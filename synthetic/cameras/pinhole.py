@@ -38,7 +38,7 @@ class PinholeCamera:
 
     @classmethod
     def at(cls, view: Viewpoint, width: int, height: int) -> PinholeCamera:
-        """Build the camera at a viewpoint, with a level horizon; looking straight down, north is at the top."""
+        """Build a camera with a level horizon at a viewpoint; looking straight down, north is at the top."""
         center = np.array(view.position, dtype=np.float64)
         forward = np.array(view.target, dtype=np.float64) - center
         forward /= np.linalg.norm(forward)

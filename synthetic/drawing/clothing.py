@@ -82,7 +82,7 @@ def choose_outfit(walker: int, seed: int) -> Outfit:
 
 
 def choose_casual_outfit(walker: int, seed: int) -> Outfit:
-    """Return an outfit of the catalog for walker 0, 1, …; with some seeds two people have nearly the same clothes."""
+    """Return a catalog outfit for walker 0, 1, …; with some seeds two people have nearly the same clothes."""
     rng = np.random.default_rng([seed, 0xCA50])
     order = rng.permutation(len(_WARDROBE)).tolist()
     alike = rng.random() < _ALIKE
