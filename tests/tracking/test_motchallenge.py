@@ -142,7 +142,7 @@ def test_a_packed_file_that_is_broken_is_refused_in_one_line(tmp_path: Path, cut
     path = tmp_path / "c0.txt.gz"
     whole = gzip.compress(b"1,2,3,4,5,6,1\n" * 50)
     path.write_bytes(b"1,2,3,4,5,6,1\n" if cut == 0 else whole[:cut])
-    with pytest.raises(ValueError, match="not a whole gzip file") as refused:
+    with pytest.raises(ValueError, match="not a complete gzip file") as refused:
         read_rows(path)
     assert "\n" not in str(refused.value)
 
