@@ -19,7 +19,7 @@ from tracking.appearance_samples import add_appearance_samples
 from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
-from tracking.model.object_state import mean_histogram
+from tracking.model.object_state import mean_histogram, uniform_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, WindowTrack
@@ -268,5 +268,5 @@ class StepwiseTracker(Generic[S]):
                 if index != OCCLUDED:
                     histograms.append(detections[row].histograms[index])
                     score += float(detections[row].scores[index])
-        histogram = mean_histogram(np.stack(histograms)) if histograms else np.empty(self._bins())
+        histogram = mean_histogram(np.stack(histograms)) if histograms else uniform_histogram(self._bins())
         return WindowTrack(track.id, boxes, boxes, histogram, score / len(frames))

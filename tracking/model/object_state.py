@@ -124,6 +124,11 @@ class TrackedObject:
         return max(frame - self.frame, 0)
 
 
+def uniform_histogram(bins: int) -> Floats:
+    """Return the histogram `(bins,)` of an object without any pixels, as `gray_histograms` has it."""
+    return np.full(bins, 1.0 / max(bins, 1))
+
+
 def mean_histogram(histograms: Floats) -> Floats:
     """Return the mean of histograms `(K, B)`, `(B,)`, summing to 1."""
     mean = histograms.mean(axis=0)

@@ -90,6 +90,16 @@ def test_who_looks_at_the_picture_follows_where_nothing_was_detected(name: str) 
     assert set(boxes[44]) == {1}
 
 
+@pytest.mark.parametrize("name", [name for name in BY_DETECTIONS if name != "lp" and needs_images(name)])
+def test_a_window_without_a_matched_detection_has_the_uniform_histogram(name: str) -> None:
+    blind = range(18, 24)
+    windows = [result for result in _follow(_tracker(name), 30, 1, blind) if result.first in blind]
+    unmatched = [track for result in windows for track in result.tracks if track.confidence == 0.0]
+    assert unmatched
+    for track in unmatched:
+        assert track.histogram.tolist() == [0.5, 0.5]
+
+
 def test_the_filter_goes_on_as_it_went_and_says_nothing_meanwhile() -> None:
     blind = range(20, 26)
     boxes = final_boxes(_follow(_tracker("kalman"), 45, 1, blind))

@@ -15,7 +15,7 @@ from tracking.baselines.temporal_consistency.trajectories import BlobBoxHistory,
 from tracking.baselines.temporal_consistency.window import Stage, StageDecision, TemporalWindow
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
-from tracking.model.object_state import mean_histogram
+from tracking.model.object_state import mean_histogram, uniform_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, WindowTrack
@@ -246,7 +246,7 @@ def build_window_tracks(
             if index != OCCLUDED
         ]
         bins = detections[0].histograms.shape[1]
-        histogram = mean_histogram(np.stack(histograms)) if histograms else np.empty(bins)
+        histogram = mean_histogram(np.stack(histograms)) if histograms else uniform_histogram(bins)
         score = float(np.mean(~np.isnan(boxes[:, 0])))
         tracks.append(WindowTrack(number, boxes, boxes, histogram, score))
         states.append(matched)
