@@ -1,19 +1,19 @@
 #!/bin/sh
-# Makes the files that docker-compose.secure.yml hands to its services, in the folder secrets/ (or MYVIEW_SECRETS).
+# Creates the files of docker-compose.secure.yml, in the folder secrets/ (or MYVIEW_SECRETS).
 #
 #   sh configs/secrets.sh NAME CAMERA...
 #
-# NAME is the name or address at which browsers, and cameras on other machines, reach this host. What is there
-# already stays as it is, so that a camera can be added: run it again with that camera's name. It needs openssl.
+# NAME is this host's name or address for browsers and cameras on other machines. Existing files do not change:
+# to add a camera, run it again with that camera's name. It needs openssl.
 #
-#   authority.key            makes the certificates below; keep it elsewhere, no process needs it
-#   public/                  certificates: the authority's, the router's, the pulse server's, and https.pem, which yours may replace
-#   web/                     tokens.yaml, who may watch and operate, and https.key
-#   web/pulses               the best view's own password of the pulses
+#   authority.key            signs the certificates below; keep it elsewhere, no process needs it
+#   public/                  certificates: the authority's, the router's, the pulse server's, and https.pem (may be replaced by yours)
+#   web/                     tokens.yaml and https.key
+#   web/pulses               the best-view service's pulse password
 #   router.key, bus          the router's key, and the users of the bus: name:password
 #   sync.key, pulses         the pulse server's key, and the users of the pulses: name:password
-#   cameras/ID/bus, pulses   a camera's own passwords
-#   cameras/ID/token         a token to see whether it is well
+#   cameras/ID/bus, pulses   a camera's passwords
+#   cameras/ID/token         a token for its health check
 set -eu
 [ $# -ge 2 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 command -v openssl > /dev/null || { echo "secrets.sh: needs openssl, which is not there" >&2; exit 1; }
@@ -33,7 +33,7 @@ for camera in "$@"; do
     esac
 done
 
-# Nobody else of this host may look in; inside, the containers' user may read what is handed to it.
+# Closed to other users of the host; inside, the containers' user may read its files.
 umask 022
 folder=${MYVIEW_SECRETS:-secrets}
 mkdir -p "$folder"
@@ -41,13 +41,13 @@ chmod 700 "$folder"
 cd "$folder"
 mkdir -p public web cameras
 
-# certify WORDS: openssl, which says something only where it fails
+# certify WORDS: run openssl, with output only on failure
 certify() {
     openssl "$@" 2> log || { cat log >&2; rm log; exit 1; }
     rm log
 }
 
-# pair FILE KEY NAMES: a certificate of our authority
+# pair FILE KEY NAMES: create a key and a certificate of the authority
 pair() {
     [ ! -e "$1" ] || return 0
     certify req -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -subj "/CN=$name" -out request -keyout "$2"
@@ -58,7 +58,7 @@ pair() {
     chmod 444 "$2"
 }
 
-# token NAME ROLE: a line of tokens.yaml, in place; the token itself is printed
+# token NAME ROLE: add a line to tokens.yaml and print the token
 token() {
     made=$(openssl rand -base64 32 | tr '+/' '-_' | tr -d '=\n')
     hash=$(printf %s "$made" | openssl dgst -sha256 -r | cut -d ' ' -f 1)
@@ -67,7 +67,7 @@ token() {
     printf '%s\n' "$made"
 }
 
-# password NAME ALL OWN: a line name:password of the file of all, and of a file of its own
+# password NAME ALL OWN: add a line name:password to the common file and write it to its own file
 password() {
     [ ! -e "$3" ] || return 0
     printf '%s:%s\n' "$1" "$(openssl rand -hex 32)" | tee -a "$2" > "$3"
@@ -84,7 +84,7 @@ pair public/https.pem web/https.key "$also"
 password bestview pulses web/pulses
 if [ ! -e web/tokens.yaml ]; then
     echo 'tokens:' > web/tokens.yaml
-    echo "A token to operate, which is not kept anywhere: $(token operator 'role: operate')"
+    echo "Operator token (not stored): $(token operator 'role: operate')"
 fi
 for camera in "$@"; do
     mkdir -p "cameras/$camera"
