@@ -4,7 +4,7 @@
 #   docker build --build-arg BASE=python:3.11-slim-bookworm@sha256:… -t myview .
 ARG BASE=python:3.11-slim-bookworm
 
-# The package as a wheel, in a stage of its own: neither the sources nor the build tools stay in the image.
+# Builds the wheel in a separate stage, so that sources and build tools are not in the image.
 FROM ${BASE} AS wheel
 WORKDIR /src
 COPY . .
@@ -12,7 +12,7 @@ RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheel .
 
 FROM ${BASE}
 
-# Not root. A number, so that Kubernetes can check it too; the group `video` may open /dev/video*.
+# Not root, as a number, so that Kubernetes can check it; the group `video` may open /dev/video*.
 RUN useradd --uid 10001 --create-home --groups video myview
 
 # What MyView leans on, in the locked versions and without the development tools. The wheels of av and

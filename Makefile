@@ -1,4 +1,4 @@
-# make demo: see it run.  make test: believe it.  make lint, make bench: for those who change it.
+# make demo: run a synthetic site.  make test: run all tests.  make lint, make bench: for development.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -6,7 +6,7 @@ RUNTIME := $(VENV)/.runtime
 STAMP := $(VENV)/.installed
 NODE_STAMP := node_modules/.installed
 
-# uv takes a seventh of pip's time. It does not read pip's own settings: where those name the index, pip does it.
+# uv is seven times as fast as pip, but ignores pip's settings: if those name the index, pip installs.
 install = UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint requirements/lock.txt --editable $(1) \
 	|| $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/lock.txt --editable $(1)
 
@@ -17,14 +17,14 @@ DOCS_STAMP := $(VENV)/.docs
 demo: $(RUNTIME)
 	$(BIN)/myview demo
 
-# Every part runs, whatever fails, and the last line sums them up (tests/suite.py).
+# Runs every part, even after failures; the last line is the summary (tests/suite.py).
 test: $(STAMP) node_modules
 	$(BIN)/python tests/suite.py $(SUITE)
 
 test-slow: $(STAMP) node_modules
 	$(BIN)/python tests/suite.py --slow $(SUITE)
 
-# Whether a test depends on luck, or on a machine that has nothing else to do: two hours on two cores.
+# Finds tests that are flaky or fail on a loaded machine: two hours on two cores.
 test-loaded: $(STAMP) node_modules
 	$(BIN)/python tests/suite.py --runs 20 --at-once 5 $(SUITE)
 
@@ -37,7 +37,7 @@ lint: $(STAMP) node_modules
 	@if [ -e $(NODE_STAMP) ]; then $(BIN)/node node_modules/typescript/bin/tsc; \
 		else echo "types of the page: left out, npm could not fetch the TypeScript compiler"; fi
 
-# All files of tests at once, and then each conftest.py: those share one name.
+# Checks all test files at once, then each conftest.py, because these share one name.
 lint-tests: $(STAMP)
 	MYPYPATH=tests $(BIN)/mypy --config-file tests/mypy.ini $$(find tests -name '*.py' ! -name conftest.py)
 	for file in $$(find tests -name conftest.py); do \
@@ -50,16 +50,16 @@ format: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks
 
-# The documents as a site, in build/site.
+# Builds the documentation into build/site.
 docs: $(DOCS_STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-# The pins in requirements/lock.txt, made anew from the ranges in pyproject.toml.
+# Pins the versions in requirements/lock.txt from the ranges in pyproject.toml.
 lock: $(STAMP)
 	$(BIN)/uv pip compile --quiet --universal --no-emit-index-url --no-emit-find-links --no-header \
 		--extra dev --extra docs --output-file requirements/lock.txt pyproject.toml
 
-# What runs MyView, and no more: the demo starts soon.
+# Installs only what MyView needs to run, for a fast start of the demo.
 $(RUNTIME): pyproject.toml requirements/lock.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "MyView needs Python 3.11 or newer; say which with: make PYTHON=/path/to/python3.11"; exit 1; }
@@ -69,17 +69,17 @@ $(RUNTIME): pyproject.toml requirements/lock.txt
 	$(call install,.)
 	@touch $@
 
-# What tests, lint and benchmarks need beside it.
+# Installs the tools of tests, lint and benchmarks.
 $(STAMP): $(RUNTIME)
 	$(call install,'.[dev]')
 	@touch $@
 
-# What builds the documents.
+# Installs the tools of the documentation.
 $(DOCS_STAMP): $(STAMP)
 	$(call install,'.[docs]')
 	@touch $@
 
-# What checks the page's JavaScript, where npm answers: the page itself needs nothing of it.
+# Installs the checks of the page's JavaScript, if npm is reachable; the page itself needs none.
 node_modules: $(STAMP)
 	@$(MAKE) --silent $(NODE_STAMP) || echo "npm could not fetch what checks the page's types and accessibility:" \
 		"those checks are left out. To see why: PATH=$(BIN):\$$PATH npm ci"

@@ -58,7 +58,7 @@ class LossRecorder:
             )
         for camera, message in epoch.tracks.items():
             self.decision_writer.note_late(camera, message.shed, "not searched")
-            self.decision_writer.note_late(camera, message.without_peers, "others not heard")
+            self.decision_writer.note_late(camera, message.without_peers, "no peer detections")
 
     def gop(self, decision: GopDecision) -> None:
         """Record pictures missing in a GOP, of cameras that were delivering."""

@@ -146,7 +146,7 @@ async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others
     assert asyncio.get_running_loop().time() - began < FRAMES * 0.5, "not a wait for every frame"
     with (tmp_path / "out" / "late.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert {row["camera"] for row in rows if row["what"] == "others not heard"} <= {"c0", "c1"}
+    assert {row["camera"] for row in rows if row["what"] == "no peer detections"} <= {"c0", "c1"}
 
 
 @pytest.fixture
