@@ -80,9 +80,9 @@ def descriptor_findings(config: Config, descriptors: int) -> list[Finding]:
     viewers = min(config.http.viewers_max, most)
     limit = f"{descriptors} files may be open: {most} connections"
     if viewers < config.http.viewers_max:
-        text = f"{limit}, and so {viewers} viewers; http.viewers_max says {config.http.viewers_max}"
+        text = f"{limit}, and so {viewers} viewers; http.viewers_max is {config.http.viewers_max}"
     elif most < configured:
-        text = f"{limit}, {viewers} viewers among them; http.connections_max says {configured}"
+        text = f"{limit}, {viewers} viewers among them; http.connections_max is {configured}"
     else:
         return [ok("open files", f"{limit} and {viewers} viewers fit")]
     remedy = (

@@ -144,7 +144,7 @@ class Listener:
                 self._pool.evict_waiting()
                 await asyncio.sleep(_ACCEPT_RETRY_S)
                 return
-            sock.setblocking(False)  # noqa: FBT003 — the name of the method says it
+            sock.setblocking(False)  # noqa: FBT003 — clear from the method's name
             self._accept_socket(sock, str(address[0]))
 
         return accept
@@ -223,7 +223,7 @@ async def _listen(host: str, port: int) -> list[socket.socket]:
 def _listening(family: socket.AddressFamily, address: tuple[Any, ...]) -> socket.socket:
     listening = socket.socket(family, socket.SOCK_STREAM)
     try:
-        listening.setblocking(False)  # noqa: FBT003 — the name of the method says it
+        listening.setblocking(False)  # noqa: FBT003 — clear from the method's name
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if family is socket.AF_INET6:  # another process may listen on 0.0.0.0
             listening.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)

@@ -72,7 +72,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path: Path) -> None:
     assert many < few + 50_000
 
 
-def told(gop: int) -> Gop:
+def gop_event(gop: int) -> Gop:
     boxes = tuple((BOX,) * 5 for _ in range(GOP))
     return Gop(first=gop * GOP, frames=GOP, choices={1: "c0"}, boxes={"c0": boxes}, cuts=())
 
@@ -81,11 +81,11 @@ def held(folder: Path, gops: int) -> int:
     """Return the bytes of memory in use after so many events."""
     spool = Spool(folder)
     history = ViewHistory(1, spool=spool)
-    history.take(told(0))
+    history.take(gop_event(0))
     tracemalloc.start()
     try:
         for gop in range(gops):
-            history.take(told(gop))
+            history.take(gop_event(gop))
         kept = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
@@ -104,7 +104,7 @@ def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path:
     spool = Spool(tmp_path)
     history = ViewHistory(1, spool=spool)
     for gop in (2, 0, 1):
-        history.take(told(gop))
+        history.take(gop_event(gop))
     again = tuple((BOX,) for _ in range(GOP))
     history.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": again}, cuts=()))
     frames = list(history.frames(0, 3 * GOP))
@@ -117,7 +117,7 @@ def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path:
 def test_without_disk_space_choices_are_kept_without_boxes(tmp_path: Path) -> None:
     history = ViewHistory(1, spool=Spool(tmp_path / "none"))
     history.take(SITE)
-    history.take(told(0))
+    history.take(gop_event(0))
     assert history.camera_at(0.1) == "c0"
     assert list(history.frames(0, GOP)) == []
 

@@ -111,9 +111,9 @@ async def test_a_browser_plays_the_recording_with_its_duration(hall: Hall, tmp_p
 @needs_ffprobe
 async def test_ffprobe_reports_no_problem_of_the_recording(hall: Hall, tmp_path: Path) -> None:
     await watched(hall, tmp_path / "one.mp4")
-    asked = ["-v", "warning", "-show_entries", "format=start_time,duration", "-of", "csv=p=0"]
+    options = ["-v", "warning", "-show_entries", "format=start_time,duration", "-of", "csv=p=0"]
     done = subprocess.run(
-        ["ffprobe", *asked, str(tmp_path / "one.mp4")], capture_output=True, check=True, text=True
+        ["ffprobe", *options, str(tmp_path / "one.mp4")], capture_output=True, check=True, text=True
     )
     assert (done.stderr, done.stdout.strip()) == ("", "0.000000,0.720000")
 
@@ -180,5 +180,5 @@ async def test_recorded_spans_and_events_can_be_fetched(hall: Hall) -> None:
 
 
 def test_the_command_explains_its_options() -> None:
-    said = CliRunner().invoke(app, ["watch", "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"}).output
-    assert all(re.search(rf"{option}\b", said) for option in ("--from", "--to", "--out", "--seconds"))
+    help_text = CliRunner().invoke(app, ["watch", "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"}).output
+    assert all(re.search(rf"{option}\b", help_text) for option in ("--from", "--to", "--out", "--seconds"))

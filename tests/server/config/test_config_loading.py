@@ -48,7 +48,7 @@ def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, An
 
 
 @pytest.mark.parametrize(
-    ("detect", "said"),
+    ("detect", "reason"),
     [
         ({"gray_bins": 0}, "gray_bins must be 1 to 256, not 0"),
         ({"work_width": 0}, "work_width must be at least 1, not 0"),
@@ -58,8 +58,8 @@ def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, An
         ({"static_foreground": {"check_every": 0}}, "check_every must be at least 1, not 0"),
     ],
 )
-def test_counts_of_zero_are_refused(detect: dict[str, Any], said: str) -> None:
-    assert said in complaint(site(detect=detect))
+def test_counts_of_zero_are_refused(detect: dict[str, Any], reason: str) -> None:
+    assert reason in complaint(site(detect=detect))
 
 
 def test_duplicate_camera_ids_are_refused() -> None:
@@ -86,11 +86,11 @@ def test_homographies_of_a_ground_file_are_validated(tmp_path: Path) -> None:
     ("unit", "meant"), [("M", "m"), ("metres", "m"), ("meteres", "m"), ("Cm", "cm"), ("millimeter", "mm")]
 )
 def test_a_misspelled_metric_unit_is_refused_with_a_suggestion(unit: str, meant: str, tmp_path: Path) -> None:
-    said = f"{unit!r} is not understood; did you mean {meant!r}?"
+    reason = f"{unit!r} is not understood; did you mean {meant!r}?"
     cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
-    assert f"cameras.0.ground_unit: {said}" in complaint({"cameras": cameras})
+    assert f"cameras.0.ground_unit: {reason}" in complaint({"cameras": cameras})
     (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
-    assert f"unit: {said}" in complaint(site(ground="ground.json"), tmp_path)
+    assert f"unit: {reason}" in complaint(site(ground="ground.json"), tmp_path)
 
 
 @pytest.mark.parametrize("unit", [1, "", ["m"]])

@@ -45,7 +45,7 @@ def test_a_duplicate_section_does_not_silently_drop_the_tokens(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reason"),
     [
         ("a:\n  b: 1\n  c: 2\n  b: 3\n", "'b' occurs twice, in lines 2 and 4"),
         ("a: [{b: 1, b: 2}]\n", "'b' occurs twice, in line 1"),
@@ -62,8 +62,8 @@ def test_a_duplicate_section_does_not_silently_drop_the_tokens(tmp_path: Path) -
         ("!!set {a, b, a}\n", "'a' occurs twice, in line 1"),
     ],
 )
-def test_a_duplicate_key_is_refused_with_its_lines(tmp_path: Path, text: str, said: str) -> None:
-    assert said in refusal(tmp_path, text)
+def test_a_duplicate_key_is_refused_with_its_lines(tmp_path: Path, text: str, reason: str) -> None:
+    assert reason in refusal(tmp_path, text)
 
 
 def test_merged_keys_may_be_overridden(tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_a_duplicate_list_of_tokens_is_refused_with_both_lines(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("variables", "said"),
+    ("variables", "reason"),
     [
         (
             {"MYVIEW_ACCESS__TOKENS": "a.yaml", "MYVIEW_access__tokens": ""},
@@ -165,13 +165,13 @@ def test_a_duplicate_list_of_tokens_is_refused_with_both_lines(tmp_path: Path) -
     ],
 )
 def test_a_setting_twice_in_the_environment_is_refused(
-    variables: dict[str, str], said: str, monkeypatch: pytest.MonkeyPatch
+    variables: dict[str, str], reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(UserError, match=r"site\.yaml: environment: ") as refused:
         build_config({"cameras": [{"id": "c0", "source": "a"}]}, where="site.yaml", folder=Path())
-    assert said in str(refused.value)
+    assert reason in str(refused.value)
 
 
 def test_parts_of_a_section_may_come_from_several_variables(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -239,8 +239,8 @@ def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str,
         "-ext",
         "subjectAltName",
     ]
-    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    assert said.splitlines()[1:] == [f"    {also}"]
+    output = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert output.splitlines()[1:] == [f"    {also}"]
 
 
 @needs_openssl

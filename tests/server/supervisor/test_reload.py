@@ -205,10 +205,10 @@ async def test_the_operators_page_and_metrics_show_the_difference(found: ConfigF
         serving(make_app(BestViewService(service), lambda: found), HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
-        told = await (await session.get("/api/operator/config")).json()
+        response = await (await session.get("/api/operator/config")).json()
         metrics = await (await session.get("/metrics")).text()
     service.close()
-    assert (told["error"], told["pending_restart"]) == (found.error, list(found.pending_restart))
+    assert (response["error"], response["pending_restart"]) == (found.error, list(found.pending_restart))
     assert f"myview_config_differs {float(found.differs)}" in metrics
 
 
@@ -241,13 +241,13 @@ async def test_a_process_logs_pending_and_invalid_settings_and_ends_with_its_ter
     path = tmp_path / "site.yaml"
     async with asyncio.timeout(PATIENCE), sync_at_a_terminal(path) as (process, terminal):
         content = yaml.safe_load(path.read_text())
-        for fps, said in (
+        for fps, line in (
             (12.5, b"restart of all processes: site.fps"),
             (-1, b"the previous configuration stays in force"),
         ):
             path.write_text(yaml.safe_dump({**content, "site": {"fps": fps}}))
             process.send_signal(signal.SIGHUP)
-            await until_said(terminal, said)
+            await until_said(terminal, line)
         assert process.returncode is None
         os.close(terminal)
         process.send_signal(signal.SIGHUP)

@@ -59,9 +59,9 @@ def test_a_signal_is_deferred_even_if_another_thread_receives_it(
     until(seen, 1)
     # The last of them may reach a thread that does not get to run only now.
     assert seen in ([number], [number] * 2), "once, however often it came"
-    told = len(seen)
+    count = len(seen)
     signal.pthread_kill(other_thread, number)
-    until(seen, told + 1)  # and it is not put off afterwards
+    until(seen, count + 1)  # and it is not put off afterwards
 
 
 def test_without_a_signal_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:

@@ -51,17 +51,17 @@ def test_a_sighup_between_reading_and_running_is_not_lost(
     }
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
-    told: list[str] = []
+    reloaded: list[str] = []
 
     def run(_: Callable[[], Coroutine[Any, Any, None]], **__: float) -> None:
         hang_up()
         asyncio.run(turn())
-        told.append("to read it again")
+        reloaded.append("to read it again")
 
     monkeypatch.setattr(site_commands, "run_process", run)
     ended = myview(command[0], path, *command[1:])
     assert (ended.code, ended.err) == (0, "")
-    assert told == ["to read it again"]
+    assert reloaded == ["to read it again"]
 
 
 async def test_early_sighups_count_as_one_and_later_ones_separately() -> None:

@@ -70,10 +70,10 @@ def test_the_doctor_reports_the_connections_that_fit() -> None:
     assert "4000 connections and 1000 viewers" in found.text
     (found,) = descriptor_findings(small_config(), 4096)
     assert found.level is Level.WARNING
-    assert "1000 viewers among them; http.connections_max says 4000" in found.text
+    assert "1000 viewers among them; http.connections_max is 4000" in found.text
     (found,) = descriptor_findings(small_config(), 1024)
     assert found.level is Level.WARNING
-    assert "http.viewers_max says 1000" in found.text
+    assert "http.viewers_max is 1000" in found.text
     assert "LimitNOFILE" in found.remedy
 
 

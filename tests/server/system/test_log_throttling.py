@@ -93,14 +93,14 @@ async def test_messages_that_a_camera_cannot_parse_are_in_its_status(monkeypatch
     config = small_config()
     cameras = [it.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for it in config.cameras]
     camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
-    said: list[bytes] = []
-    monkeypatch.setattr(camera, "_publish", lambda _, payload: said.append(payload))
+    payloads: list[bytes] = []
+    monkeypatch.setattr(camera, "_publish", lambda _, payload: payloads.append(payload))
     camera._exchange._decode(Message(KEYS.camera("c1", "detections"), b"{", b""))
     for _ in range(2):
         camera._corrections.put(Message(KEYS.camera("c0", "position_corrections"), b"{", b""))
     camera._send_status()
     camera._pipeline.close()
-    [status] = [msgspec.json.decode(it, type=CameraStatus) for it in said]
+    [status] = [msgspec.json.decode(it, type=CameraStatus) for it in payloads]
     assert status.bad_messages == 3
 
 
@@ -142,10 +142,10 @@ def test_damaged_sound_of_a_looping_recording_is_logged_once(
 
 
 def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[bool] = []
+    reopened: list[bool] = []
 
     def noted(opened: Any, *, again: bool = False) -> Any:
-        asked.append(again)
+        reopened.append(again)
         return read_frames(opened, again=again)
 
     monkeypatch.setattr(recording, "read_frames", noted)
@@ -153,7 +153,7 @@ def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pyt
     for pulse in range(9):
         repeated.take(pulse)
     repeated.close()
-    assert asked == [False, True, True]
+    assert reopened == [False, True, True]
 
 
 def test_frames_that_cannot_be_decoded_are_logged_once_per_stream(

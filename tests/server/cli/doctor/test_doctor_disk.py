@@ -121,7 +121,7 @@ def test_an_inaccessible_parent_folder_is_named_in_one_line(tmp_path: Path) -> N
         site(tmp_path, record={"folder": str(closed / "in" / "kept")})
         closed.chmod(0)
         try:
-            said = subprocess.run(
+            result = subprocess.run(
                 [sys.executable, "-c", AS_SOMEBODY, str(tmp_path / "site.yaml")],
                 capture_output=True,
                 text=True,
@@ -130,5 +130,5 @@ def test_an_inaccessible_parent_folder_is_named_in_one_line(tmp_path: Path) -> N
             )
         finally:
             closed.chmod(0o755)
-    assert said.stderr == ""
-    assert said.stdout == f"record.folder bad {closed}: cannot write there: Permission denied\n"
+    assert result.stderr == ""
+    assert result.stdout == f"record.folder bad {closed}: cannot write there: Permission denied\n"

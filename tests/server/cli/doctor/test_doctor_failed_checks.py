@@ -54,8 +54,8 @@ async def test_a_failed_check_does_not_lose_others_findings(
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
     monkeypatch.setattr(command, check, broken)
     found = [it async for it in command.run_checks(there, 1.0)]
-    (said,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
-    assert {it.check for it in found if it is not said} == before - lost
+    (failed,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
+    assert {it.check for it in found if it is not failed} == before - lost
 
 
 async def test_a_failed_check_of_one_port_or_file_does_not_lose_others(
@@ -86,15 +86,15 @@ async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch:
 async def test_findings_are_printed_as_they_are_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    told = []
+    outputs = []
 
     def probe_all(*_: object) -> dict[str, CameraProbe]:
-        told.append(capsys.readouterr().out)
+        outputs.append(capsys.readouterr().out)
         return {"c0": CameraProbe("away")}
 
     monkeypatch.setattr(command, "probe_cameras", probe_all)
     await command._check_and_report(site(tmp_path), 1.0, as_json=False)
-    (before,) = told
+    (before,) = outputs
     after = capsys.readouterr().out
     assert " http.port " in before
     assert " pulse server " in before
@@ -158,8 +158,8 @@ def test_an_invalid_configuration_is_reported_with_a_remedy(myview: Run, tmp_pat
 
 def test_a_missing_token_file_is_reported_once(tmp_path: Path) -> None:
     found = file_findings(config(tmp_path, access={"tokens": "none.yaml"}))
-    (said,) = [it for it in found if it.level is Level.BAD]
-    assert (said.check, said.remedy) == ("access.tokens", "`myview token NAME` prints a line for it")
+    (failed,) = [it for it in found if it.level is Level.BAD]
+    assert (failed.check, failed.remedy) == ("access.tokens", "`myview token NAME` prints a line for it")
 
 
 @needs_openssl

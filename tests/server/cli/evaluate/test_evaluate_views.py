@@ -118,8 +118,8 @@ def test_a_hidden_person_is_not_visible_by_default(evaluate: Run, tmp_path: Path
     write(tmp_path / "gt" / "c0.txt", boxes({1: BIG}, end="1,1,0.1"))
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
     path = write(tmp_path / "choices.csv", choices({1: "c0"}))
-    told = [evaluate("--gt", tmp_path, "--views", path, *SIZE, "--visible", it)[1] for it in (0.25, 0)]
-    assert [judged(it)["all"][4] for it in told] == ["0.0", "100.0"]
+    outputs = [evaluate("--gt", tmp_path, "--views", path, *SIZE, "--visible", it)[1] for it in (0.25, 0)]
+    assert [judged(it)["all"][4] for it in outputs] == ["0.0", "100.0"]
 
 
 def test_rate_and_sizes_are_read_from_a_rendering(evaluate: Run, hall: Path) -> None:

@@ -78,9 +78,9 @@ async def test_a_site_that_is_not_ready_exits_with_1_and_the_reason(
     assert "no people yet" in said
     see(hall)
     assert await status_once(url(hall), None, as_json=True)
-    told = json.loads(capsys.readouterr().out)
-    assert msgspec.convert(told, client.SiteNow).ready
-    assert [it["camera"] for it in told["cameras"]] == list(CAMERAS)
+    content = json.loads(capsys.readouterr().out)
+    assert msgspec.convert(content, client.SiteNow).ready
+    assert [it["camera"] for it in content["cameras"]] == list(CAMERAS)
 
 
 async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Path) -> None:

@@ -64,12 +64,12 @@ def test_an_invalid_box_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [("180,40,32,32", "is not inside the 192x128"), ("20,40,2,32", "4 pixels a side")]
+    ("text", "reason"), [("180,40,32,32", "is not inside the 192x128"), ("20,40,2,32", "4 pixels a side")]
 )
 def test_a_box_that_cannot_be_tracked_is_refused_and_nothing_is_written(
-    video: Path, text: str, said: str
+    video: Path, text: str, reason: str
 ) -> None:
-    with pytest.raises(UserError, match=said):
+    with pytest.raises(UserError, match=reason):
         follow(video, text)
     assert not (video.parent / "t.txt").exists()
 

@@ -37,22 +37,22 @@ async def get(hall: Hall, path: str, who: str) -> Any:
 
 async def events(answer: aiohttp.ClientResponse, last: int) -> list[tuple[str, Any]]:
     """Read events up to the GOP that begins at a pulse."""
-    told: list[tuple[str, Any]] = []
+    received: list[tuple[str, Any]] = []
     name = ""
-    while not told or told[-1][0] != "gop" or told[-1][1]["first"] < last:
+    while not received or received[-1][0] != "gop" or received[-1][1]["first"] < last:
         line = (await answer.content.readline()).decode().rstrip("\n")
         if line.startswith("event: "):
             name = line.removeprefix("event: ")
         elif line.startswith("data: "):
-            told.append((name, json.loads(line.removeprefix("data: "))))
-    return told
+            received.append((name, json.loads(line.removeprefix("data: "))))
+    return received
 
 
 def people_in(gop: dict[str, Any]) -> set[int]:
     """Return the numbers of all people in a GOP event."""
     boxes = {box[0] for frames in gop["boxes"].values() for frame in frames for box in frame}
-    told = {it[key] for it in gop["merged"] + gop["split"] for key in ("kept",)}
-    return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | told
+    received = {it[key] for it in gop["merged"] + gop["split"] for key in ("kept",)}
+    return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | received
 
 
 async def test_only_the_scoped_person_is_listed(site: Hall) -> None:
@@ -67,23 +67,23 @@ async def test_only_the_scoped_camera_is_listed_without_others_errors(site: Hall
     assert [it["camera"] for it in everything] == [A, B]
     assert "its parameters" in repr(everything)
     assert [it["camera"] for it in (await get(site, "/api/cameras", "door"))["cameras"]] == [A]
-    theirs = (await get(site, "/api/cameras", "family"))["cameras"]
-    assert [it["camera"] for it in theirs] == [A, B]
-    assert "its parameters" not in repr(theirs)
+    response = (await get(site, "/api/cameras", "family"))["cameras"]
+    assert [it["camera"] for it in response] == [A, B]
+    assert "its parameters" not in repr(response)
     assert (await get(site, "/api/site", "door"))["cameras"] == [A]
     assert (await get(site, "/api/site", "family"))["cameras"] == [A, B]
 
 
 async def test_events_are_limited_to_the_scoped_person(site: Hall) -> None:
     async with (
-        site.session.get("/api/events", headers=bearer("family")) as theirs,
+        site.session.get("/api/events", headers=bearer("family")) as response,
         site.session.get("/api/events", headers=bearer("desk")) as all_of_it,
     ):
         site.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
         last = site.service.decision_state.end - 5
-        told = await events(theirs, last)
-        assert [name for name, _ in told[:3]] == ["site", "objects", "cameras"]
-        gops = [content for name, content in told if name == "gop"]
+        received = await events(response, last)
+        assert [name for name, _ in received[:3]] == ["site", "objects", "cameras"]
+        gops = [content for name, content in received if name == "gop"]
         assert len(gops) > 2
         assert {it for gop in gops for it in people_in(gop)} == {1}
         every = [content for name, content in await events(all_of_it, last) if name == "gop"]
@@ -108,7 +108,7 @@ async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.Mo
         RiskEvent(reason="track_loss", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
     said = word(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
-    async with site.session.get("/api/events", headers=bearer("family")) as theirs:
+    async with site.session.get("/api/events", headers=bearer("family")) as response:
         site.service.ingest.tracks(tracks(said))
         site.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
         site.service.decide()
@@ -120,8 +120,8 @@ async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.Mo
         flag = {**everything[0], "objects": [1]}
         assert (await get(site, "/api/flags", "family"))["flags"] == [flag]
         site.service.feed(4, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
-        told = await events(theirs, site.service.decision_state.end - 5)
-        assert [content for name, content in told if name == "flag"] == [flag]
+        received = await events(response, site.service.decision_state.end - 5)
+        assert [content for name, content in received if name == "flag"] == [flag]
     assert len((await get(site, "/api/flags", "door"))["flags"]) == 2
     async with site.session.get("/api/events", headers=bearer("family")) as later:
         names = [name for name, _ in await events(later, 0)]
@@ -130,10 +130,10 @@ async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.Mo
 
 async def test_recorded_decisions_are_limited_to_the_scoped_person(site: Hall) -> None:
     everything = await get(site, "/api/past?from=p0", "desk")
-    theirs = await get(site, "/api/past?from=p0", "family")
+    response = await get(site, "/api/past?from=p0", "family")
     assert {it for gop in everything for it in people_in({"merged": [], "split": [], **gop})} == {1, 2}
-    assert {it for gop in theirs for it in people_in({"merged": [], "split": [], **gop})} == {1}
-    assert [it["first"] for it in theirs] == [it["first"] for it in everything]
+    assert {it for gop in response for it in people_in({"merged": [], "split": [], **gop})} == {1}
+    assert [it["first"] for it in response] == [it["first"] for it in everything]
 
 
 async def test_the_last_subscriber_of_a_scope_leaves_no_state(site: Hall) -> None:

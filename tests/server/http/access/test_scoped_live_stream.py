@@ -40,17 +40,17 @@ HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: Path, form: str) -> None:
     codec = "vp8" if form == "webm" else "h264"
     async with left(tmp_path, encode={"codec": codec}) as hall:
-        told = go_on(hall, range(3))
+        decisions = go_on(hall, range(3))
         theirs, all_of_it = [await begun(hall, f"/objects/1/best.{form}", who) for who in ("family", "desk")]
-        told += go_on(hall, range(3, EPOCHS))
+        decisions += go_on(hall, range(3, EPOCHS))
         narrow, full = map(decoded, await to_the_end(hall, theirs, all_of_it))
-    right = expected(told, codec)
+    right = expected(decisions, codec)
     if form == "ts":  # which begins at some time of its own
         narrow, full = (
             {pulse - max(it) + max(right): shown for pulse, shown in it.items()} for it in (narrow, full)
         )
     equal(narrow, right)
-    equal(full, chosen(told, codec))
+    equal(full, chosen(decisions, codec))
     grey = [pulse for pulse in narrow if is_gray(narrow[pulse])]
     assert grey == list(range(grey[0], grey[-1] + 1))
     assert len(grey) > 3 * GOP
@@ -60,21 +60,23 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
 
 async def test_a_stream_opened_while_the_person_is_away_begins_with_gray(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
-        told = go_on(hall, range(14))
+        decisions = go_on(hall, range(14))
         theirs = await begun(hall, "/objects/1/best.mp4", "family")
-        told += go_on(hall, range(14, EPOCHS))
+        decisions += go_on(hall, range(14, EPOCHS))
         shown = decoded((await to_the_end(hall, theirs))[0])
     assert is_gray(shown[min(shown)])
-    equal(shown, expected(told))
+    equal(shown, expected(decisions))
 
 
 async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
-        told = go_on(hall, range(3))
+        decisions = go_on(hall, range(3))
         theirs = await begun(hall, "/objects/1/best.mp4?prefer=c0", "family")
-        told += go_on(hall, range(3, EPOCHS))
+        decisions += go_on(hall, range(3, EPOCHS))
         shown = decoded((await to_the_end(hall, theirs))[0])
-    is_as_expected = {pulse: is_gray(picture) for pulse, picture in expected(told).items() if pulse in shown}
+    is_as_expected = {
+        pulse: is_gray(picture) for pulse, picture in expected(decisions).items() if pulse in shown
+    }
     assert {pulse: is_gray(picture) for pulse, picture in shown.items()} == is_as_expected
     np.testing.assert_array_equal(shown[max(shown)], own("c0")[max(shown)])
 
@@ -89,14 +91,14 @@ async def listed(hall: Hall, pattern: str, who: str) -> bytes:
 @pytest.mark.parametrize("pattern", [r"^[0-9]+\.m4s$", r'PART:.*URI="([0-9.]+\.m4s)"'])
 async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: Path, pattern: str) -> None:
     async with left(tmp_path, http=HLS) as hall:
-        told = go_on(hall, range(EPOCHS - 5))
+        decisions = go_on(hall, range(EPOCHS - 5))
         narrow, full = [decoded(await listed(hall, pattern, who)) for who in ("family", "desk")]
     until = max(full) + 1
-    right = expected(told)
+    right = expected(decisions)
     for pulse in range(min(narrow), until):  # what stands all segment long lasts
         standing = narrow[max(it for it in narrow if it <= pulse)]
         np.testing.assert_array_equal(standing, right[pulse], str(pulse))
-    equal(full, {pulse: picture for pulse, picture in chosen(told).items() if pulse < until})
+    equal(full, {pulse: picture for pulse, picture in chosen(decisions).items() if pulse < until})
     assert any(map(is_gray, narrow.values()))
 
 
@@ -120,13 +122,13 @@ async def test_a_browser_plays_held_and_gray_pictures_without_a_break(tmp_path: 
         go_on(hall, range(3))
         kind = f'video/{form}; codecs="{hall.service.stream_format.codec}"'
         path = f"/objects/1/best.{form}?token={token_of('family')}"
-        told = await seen_in_chromium(
+        decisions = await seen_in_chromium(
             *(hall.port, hall.service.splicer, EPOCHS - 2, lambda gop: go_on(hall, range(gop + 2, gop + 3))),
             *(PLAY, path, kind, 4),
         )
-    assert told["error"] == ""
-    assert told["ranges"] == 1
-    assert told["range"][1] == pytest.approx((EPOCHS - 1) * GOP / FPS, abs=1e-3)
+    assert decisions["error"] == ""
+    assert decisions["ranges"] == 1
+    assert decisions["range"][1] == pytest.approx((EPOCHS - 1) * GOP / FPS, abs=1e-3)
 
 
 async def test_gray_pictures_are_encoded_once_for_all_viewers(tmp_path: Path) -> None:
@@ -143,6 +145,6 @@ async def test_gray_pictures_are_encoded_once_for_all_viewers(tmp_path: Path) ->
 
 async def test_a_site_without_tokens_has_no_scoped_streams(tmp_path: Path) -> None:
     async with left(tmp_path, access={"tokens": None}) as hall:
-        told = go_on(hall, range(14))
-        assert told[-1].choices[1]
+        decisions = go_on(hall, range(14))
+        assert decisions[-1].choices[1]
         assert not hall.service.splicer.scoped_persons

@@ -61,8 +61,8 @@ async def test_only_the_box_of_the_scoped_person_is_drawn(tmp_path: Path) -> Non
     path = write_tokens(tmp_path / "tokens.yaml", line_of("family"), line_of("desk"))
     async with aclosing(drawn_room(access={"tokens": str(path)})) as rooms:
         room = await anext(rooms)
-        told = room.decisions[max(room.decisions)]
-        boxes = told.boxes[told.choices[1]][-1]
+        decision = room.decisions[max(room.decisions)]
+        boxes = decision.boxes[decision.choices[1]][-1]
         plain = await still(room, "", "desk")
         theirs, all_of_it = [await still(room, "?overlay=1", who) for who in ("family", "desk")]
     assert len(boxes) > 1, "somebody else is in the picture"

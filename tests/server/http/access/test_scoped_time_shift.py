@@ -52,33 +52,33 @@ async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[
     record = {"folder": str(tmp_path / "kept") if on_disk else None, "segment_s": 1.0}
     async with left(tmp_path, record=record, http=HLS) as hall:
         hall.service.recorder.open()
-        told = go_on(hall, range(EPOCHS))
+        decisions = go_on(hall, range(EPOCHS))
         if on_disk:
-            await written(hall, len(told) - 2)
-        yield hall, told
+            await written(hall, len(decisions) - 2)
+        yield hall, decisions
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts"])
 async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form: str) -> None:
-    hall, told = kept
-    path = f"/objects/1/best.{form}?from=p0&to=p{len(told) * GOP}"
+    hall, decisions = kept
+    path = f"/objects/1/best.{form}?from=p0&to=p{len(decisions) * GOP}"
     narrow, full = [decoded(await fetched(hall, path, who)) for who in ("family", "desk")]
     if form == "ts":
         narrow, full = ({pulse - min(it): shown for pulse, shown in it.items()} for it in (narrow, full))
-    equal(narrow, expected(told, holds=False))
-    equal(full, chosen(told))
+    equal(narrow, expected(decisions, holds=False))
+    equal(full, chosen(decisions))
     assert sum(map(is_gray, narrow.values())) > 8 * GOP
 
 
 async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
     async with left(tmp_path) as hall:
-        told = go_on(hall, range(12))
+        decisions = go_on(hall, range(12))
         theirs = await begun(hall, "/objects/1/best.mp4?from=p25", "family")
         while not hall.service.splicer.scoped_persons[1].viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
-        told += go_on(hall, range(12, EPOCHS))
+        decisions += go_on(hall, range(12, EPOCHS))
         shown = decoded((await to_the_end(hall, theirs))[0])
-    right = expected(told, holds=False)
+    right = expected(decisions, holds=False)
     assert min(shown) == 25
     assert [is_gray(shown[it]) for it in (29, 30, 79, 80)] == [False, True, True, False]
     equal(shown, right)
@@ -87,7 +87,7 @@ async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
 async def test_recorded_segments_are_gray_without_the_person(
     kept: Kept,
 ) -> None:
-    hall, told = kept
+    hall, decisions = kept
     shown: dict[str, dict[int, Picture]] = {}
     for who in ("family", "desk"):
         listed = (await fetched(hall, "/objects/1/hls/index.m3u8?from=p0&to=p90", who)).decode()
@@ -98,7 +98,7 @@ async def test_recorded_segments_are_gray_without_the_person(
             reel._segments.clear()
         shown[who] = decoded(b"".join([await fetched(hall, f"/objects/1/hls/{it}", who) for it in names]))
     assert max(shown["desk"]) == 89
-    right = {"family": expected(told, holds=False), "desk": chosen(told)}
+    right = {"family": expected(decisions, holds=False), "desk": chosen(decisions)}
     for who, pictures in shown.items():
         for pulse, picture in pictures.items():
             np.testing.assert_array_equal(picture, right[who][pulse], f"{who} {pulse}")
@@ -112,11 +112,11 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
     async with left(tmp_path, sound={"source": str(recording)}, record=record, http=HLS) as hall:
         hall.service.recorder.open()
         sends(hall.service, recording)
-        told = go_on(hall, range(EPOCHS))
-        await written(hall, len(told) - 2)
+        decisions = go_on(hall, range(EPOCHS))
+        await written(hall, len(decisions) - 2)
         heard: dict[str, list[int]] = {}
         for who in ("family", "desk"):
-            names = [f"best.mp4?from=p0&to=p{len(told) * GOP}"]
+            names = [f"best.mp4?from=p0&to=p{len(decisions) * GOP}"]
             if hls:
                 names = [f"hls/{it}" for it in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
                 for scoped in (True, False):

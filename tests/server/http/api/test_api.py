@@ -110,13 +110,13 @@ async def test_past_choices_are_explained_from_the_first_request_on(busy: Hall) 
     assert (await busy.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
     for at in (f"p{newest['first']}", f"p{newest['first'] + GOP - 1}", f"-{GOP / FPS}"):
         assert await busy.get_json(f"/api/objects/1/choice?at={at}") == newest
-    for asked, expected, words in (
+    for path, expected, words in (
         ("1/choice?at=p0", 404, "no reasons are stored"),
         ("1/choice?at=p999999", 404, "no reasons are stored"),
         ("9/choice?at=-1", 404, "object 9"),
         ("1/choice?at=soon", 400, "at: 'soon' is not a time"),
     ):
-        code, content = await busy.get(f"/api/objects/{asked}")
+        code, content = await busy.get(f"/api/objects/{path}")
         assert code == expected
         assert words in content["error"]
 

@@ -17,24 +17,24 @@ from server.service.service import BestViewService
 
 
 async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, Any]]:
-    told: list[tuple[str, Any]] = []
+    received: list[tuple[str, Any]] = []
     name = ""
-    while len(told) < count:
+    while len(received) < count:
         line = (await answer.content.readline()).decode().rstrip("\n")
         if line.startswith("event: "):
             name = line.removeprefix("event: ")
         elif line.startswith("data: "):
-            told.append((name, json.loads(line.removeprefix("data: "))))
-    return told
+            received.append((name, json.loads(line.removeprefix("data: "))))
+    return received
 
 
 async def test_events_begin_with_the_current_state_and_continue_with_every_gop(busy: Hall) -> None:
     async with busy.session.get("/api/events") as answer:
         assert answer.content_type == "text/event-stream"
-        told = await events(answer, 5)
-        assert [name for name, _ in told] == ["site", "objects", "cameras", "gop", "gop"]
-        assert [content["first"] for _, content in told[3:]] == [0, GOP]
-        assert told[1][1] == await busy.get_json("/api/objects")
+        received = await events(answer, 5)
+        assert [name for name, _ in received] == ["site", "objects", "cameras", "gop", "gop"]
+        assert [content["first"] for _, content in received[3:]] == [0, GOP]
+        assert received[1][1] == await busy.get_json("/api/objects")
         busy.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
         while (event := (await events(answer, 1))[0])[0] != "gop":
             pass
@@ -48,8 +48,8 @@ async def test_a_cut_event_has_both_cameras(busy: Hall) -> None:
     for epoch in range(3, 6):
         busy.service.feed(epoch, {A: {1: LARGE}, B: {}})
     async with busy.session.get("/api/events") as answer:
-        told = await events(answer, 7)
-    cuts = [cut for name, content in told if name == "gop" for cut in content["cuts"]]
+        received = await events(answer, 7)
+    cuts = [cut for name, content in received if name == "gop" for cut in content["cuts"]]
     assert cuts == [{"object": 1, "pulse": 3 * GOP, "from": B, "to": A}]
 
 
@@ -70,12 +70,12 @@ async def test_the_event_of_a_gop_is_sent_before_its_video(hall: Hall) -> None:
 
 
 async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(busy: Hall) -> None:
-    told = Events(BestViewService(busy.service))
-    reader = told.join(ALL)
+    received = Events(BestViewService(busy.service))
+    reader = received.join(ALL)
     for epoch in range(3, 120):
         busy.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
     assert reader.lost_gops, "some of what was told, maybe a list"
-    speaking = asyncio.create_task(told.run())
+    speaking = asyncio.create_task(received.run())
     lists: set[str] = set()
     try:
         async with asyncio.timeout(PATIENCE):

@@ -53,13 +53,13 @@ def test_players_that_fetched_recently_or_wait_are_counted(
     clock = Clock()
     shares = FairShare()
     readers = HlsSessions(KEPT_S / 3, shares, clock)
-    asked: dict[HlsClient, float] = {}
+    last_request: dict[HlsClient, float] = {}
     open_ones: list[tuple[HlsClient, str | None, ExitStack]] = []
 
     def least(it: HlsClient) -> int:
         waiting = [kind for who, kind, _ in open_ones if who == it]
         most = max((waiting.count(kind) for kind in ("playlist", "part")), default=0)
-        lately = clock.now - asked.get(it, -KEPT_S) < KEPT_S
+        lately = clock.now - last_request.get(it, -KEPT_S) < KEPT_S
         return max(most, 1 if lately else 0)
 
     for act, stream, player, kind, seconds in acts:
@@ -69,12 +69,12 @@ def test_players_that_fetched_recently_or_wait_are_counted(
             stack = ExitStack()
             stack.enter_context(readers.request(who, kind))
             open_ones.append((who, kind, stack))
-            asked[who] = clock.now
+            last_request[who] = clock.now
             assert readers.of(who.stream) - before == one_more
         elif act == "is answered" and open_ones:
             who, _, stack = open_ones.pop(0)
             stack.close()
-            asked[who] = clock.now
+            last_request[who] = clock.now
         else:
             clock.now += seconds
         # whoever waits for nothing in particular is answered at once: here they are kept as long as they wait

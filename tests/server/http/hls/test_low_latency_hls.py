@@ -94,9 +94,9 @@ def read(text: str) -> Read:
     duration = 0.0
     for line in text.splitlines():
         if line.startswith("#EXT-X-PART:"):
-            told = re.fullmatch(r'#EXT-X-PART:DURATION=([\d.]+),URI="([^"]+)"(,INDEPENDENT=YES)?', line)
-            assert told, line
-            part = Part(float(told[1]), told[2], bool(told[3]))
+            match = re.fullmatch(r'#EXT-X-PART:DURATION=([\d.]+),URI="([^"]+)"(,INDEPENDENT=YES)?', line)
+            assert match, line
+            part = Part(float(match[1]), match[2], bool(match[3]))
             parts.setdefault(number, []).append(part)
             assert part.duration <= part_target, "4.4.4.9"
         elif line.startswith("#EXTINF:"):

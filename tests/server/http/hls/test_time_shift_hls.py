@@ -119,14 +119,14 @@ async def test_relative_moments_redirect_to_a_playlist_with_pulses(hall: Hall) -
     shows(hall, range(20))
     head = await text(hall, "/objects/1/hls/index.m3u8?from=-2&to=-1")
     assert head.splitlines()[-1] == "index.m3u8?from=p50&to=p75"
-    told = re.search(
+    bandwidth = re.search(
         r'^#EXT-X-STREAM-INF:BANDWIDTH=(\d+),CODECS="avc1\.\w+",RESOLUTION=64x48,FRAME-RATE=25\.000$',
         head,
         re.MULTILINE,
     )
-    assert told
+    assert bandwidth
     sizes = [len(await fetch(hall, f"/objects/1/hls/{number}.m4s")) for number in range(5, 8)]
-    assert int(told[1]) >= max(sizes) * 8 / (LENGTH / FPS)
+    assert int(bandwidth[1]) >= max(sizes) * 8 / (LENGTH / FPS)
     assert numbers(await text(hall, "/objects/1/hls/index.m3u8?from=p50&to=p75")) == [5, 6, 7]
 
 

@@ -40,36 +40,36 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(hall: Hall) -
         Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
     )
     solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
-    said = word(A, 3, {1: SMALL}, solve=solve, detection_s=0.02, solve_s=0.2, solved_at=100.5)
-    hall.service.ingest.tracks(tracks(msgspec.structs.replace(said, first=11, last=15, final_to=15)))
-    hall.service.ingest.tracks(tracks(said))
-    told = await samples(hall)
-    assert told["myview_stage_seconds_bucket", A, "take", "0.05"] == 16
-    assert told["myview_stage_seconds_bucket", A, "take", "0.025"] == 15  # what is fed by hand takes no time
-    assert told["myview_stage_seconds_sum", A, "encode"] == pytest.approx(0.01)
-    assert told["myview_stage_seconds_count", A, "search"] == 1
-    assert told["myview_stage_seconds_sum", A, "solve"] == pytest.approx(0.2)
-    assert told["myview_stage_seconds_count", B, "solve"] == 0
-    assert told["myview_camera_windows_total", A] == 1
-    assert told["myview_camera_certified_windows_total", A] == 0
-    assert told["myview_camera_gap_total", A] == pytest.approx(0.2)
+    message = word(A, 3, {1: SMALL}, solve=solve, detection_s=0.02, solve_s=0.2, solved_at=100.5)
+    hall.service.ingest.tracks(tracks(msgspec.structs.replace(message, first=11, last=15, final_to=15)))
+    hall.service.ingest.tracks(tracks(message))
+    metrics = await samples(hall)
+    assert metrics["myview_stage_seconds_bucket", A, "take", "0.05"] == 16
+    assert metrics["myview_stage_seconds_bucket", A, "take", "0.025"] == 15  # test data takes no time
+    assert metrics["myview_stage_seconds_sum", A, "encode"] == pytest.approx(0.01)
+    assert metrics["myview_stage_seconds_count", A, "search"] == 1
+    assert metrics["myview_stage_seconds_sum", A, "solve"] == pytest.approx(0.2)
+    assert metrics["myview_stage_seconds_count", B, "solve"] == 0
+    assert metrics["myview_camera_windows_total", A] == 1
+    assert metrics["myview_camera_certified_windows_total", A] == 0
+    assert metrics["myview_camera_gap_total", A] == pytest.approx(0.2)
 
 
 async def test_metrics_of_a_cameras_status_appear_once_it_was_received(busy: Hall) -> None:
     before = await samples(busy)
     assert ("myview_camera_waiting_frames", A) not in before
     busy.service.ingest.status(status(A, waiting=7, fps=12.5, synchronized=False))
-    told = await samples(busy)
-    assert told["myview_camera_waiting_frames", A] == 7
-    assert told["myview_camera_fps", A] == 12.5
-    assert told["myview_camera_synchronized", A] == 0
+    metrics = await samples(busy)
+    assert metrics["myview_camera_waiting_frames", A] == 7
+    assert metrics["myview_camera_fps", A] == 12.5
+    assert metrics["myview_camera_synchronized", A] == 0
 
 
 async def test_invalid_messages_are_counted_at_every_receiver(hall: Hall) -> None:
     hall.service.ingest.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
     hall.service.ingest.status(status(B, bad_messages=3))
-    told = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
-    assert told == {(A, "sent"): 1, (B, "sent"): 0, (B, "received"): 3}
+    metrics = {key[1:]: value for key, value in (await samples(hall)).items() if key[0] == _BAD}
+    assert metrics == {(A, "sent"): 1, (B, "sent"): 0, (B, "received"): 3}
 
 
 def test_the_alert_covers_invalid_messages_at_both_receivers() -> None:
@@ -82,16 +82,16 @@ _BAD = "myview_camera_bad_messages_total"
 
 
 async def test_decisions_are_counted_by_epoch_and_sending_by_gop(busy: Hall) -> None:
-    told = await samples(busy)
-    assert told["myview_decide_seconds_count",] == 3
-    assert told["myview_send_seconds_count",] == busy.service.decision_state.end // GOP == 2
-    assert told["myview_delay_seconds_count",] == 0  # nobody knows when pulses were due
+    metrics = await samples(busy)
+    assert metrics["myview_decide_seconds_count",] == 3
+    assert metrics["myview_send_seconds_count",] == busy.service.decision_state.end // GOP == 2
+    assert metrics["myview_delay_seconds_count",] == 0  # unknown when pulses were due
     busy.service.pulse0 = time.time() - 100.0
     busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
-    told = await samples(busy)
-    assert told["myview_delay_seconds_count",] == 1
-    assert told["myview_delay_seconds_sum",] == pytest.approx(100.0 - 2 * GOP / FPS, abs=5.0)
-    assert told["myview_decided_pulse",] == 3 * GOP
+    metrics = await samples(busy)
+    assert metrics["myview_delay_seconds_count",] == 1
+    assert metrics["myview_delay_seconds_sum",] == pytest.approx(100.0 - 2 * GOP / FPS, abs=5.0)
+    assert metrics["myview_decided_pulse",] == 3 * GOP
 
 
 async def test_missing_pictures_are_counted(hall: Hall) -> None:
@@ -101,9 +101,9 @@ async def test_missing_pictures_are_counted(hall: Hall) -> None:
         hall.service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
     del frame_buffer._pictures[7]
     hall.service.feed(2, {A: {1: SMALL}, B: {1: LARGE}})
-    told = await samples(hall)
-    assert told["myview_camera_lost_pictures_total", A] == 1
-    assert told["myview_camera_lost_pictures_total", B] == 0
+    metrics = await samples(hall)
+    assert metrics["myview_camera_lost_pictures_total", A] == 1
+    assert metrics["myview_camera_lost_pictures_total", B] == 0
 
 
 async def test_viewers_are_counted_by_kind_and_sent_bytes_are_counted(busy: Hall) -> None:
@@ -115,10 +115,10 @@ async def test_viewers_are_counted_by_kind_and_sent_bytes_are_counted(busy: Hall
     ):
         received = len(await best.content.readany())
         received += len(await live.content.readany()) + len(await events.content.readany())
-        told = await samples(busy)
-        kinds = {it: told["myview_viewers_by_kind", it] for it in ("object", "camera", "events", "past")}
+        metrics = await samples(busy)
+        kinds = {it: metrics["myview_viewers_by_kind", it] for it in ("object", "camera", "events", "past")}
         assert kinds == {"object": 1, "camera": 1, "events": 1, "past": 0}
-        assert told["myview_sent_bytes_total", "streams"] >= received > 0
+        assert metrics["myview_sent_bytes_total", "streams"] >= received > 0
     size = len(await (await busy.session.get("/api/site")).read())
     after = await samples(busy)
     answers = after["myview_sent_bytes_total", "answers"] - before["myview_sent_bytes_total", "answers"]

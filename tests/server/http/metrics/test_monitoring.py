@@ -33,16 +33,16 @@ async def printed(hall: Hall) -> Printed:
 async def test_every_expression_yields_series_with_the_labels_in_its_legend(busy: Hall) -> None:
     there = await printed(busy)
     assert len(ASKED) > 50
-    for asked in ASKED:
-        if {it.name for it in selectors(asked.expression)} <= OF_PROMETHEUS:
+    for query in ASKED:
+        if {it.name for it in selectors(query.expression)} <= OF_PROMETHEUS:
             continue
-        series = given(asked.expression, there)
-        assert series, asked.place
-        assert all(asked.shown <= dict(it).keys() for it in series), asked.place
+        series = given(query.expression, there)
+        assert series, query.place
+        assert all(query.shown <= dict(it).keys() for it in series), query.place
 
 
 async def test_every_exported_metric_is_used_by_a_panel_or_alert(busy: Hall) -> None:
-    looked_at = {it.name for asked in ASKED for it in selectors(asked.expression)}
+    looked_at = {it.name for query in ASKED for it in selectors(query.expression)}
     for name in (await printed(busy)).samples:
         if name.startswith("myview_") and not name.endswith(("_created", "_sum", "_count")):
             assert name in looked_at or name in _LOOKED_AT_OTHERWISE, name

@@ -15,13 +15,13 @@ from server.messaging.messages import ZenohKeys
 
 async def test_every_camera_is_listed_with_its_measurements(busy: Hall) -> None:
     busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
-    told = (await busy.get_json("/api/operator/cameras"))["cameras"]
+    answer = (await busy.get_json("/api/operator/cameras"))["cameras"]
     plain = (await busy.get_json("/api/cameras"))["cameras"]
-    assert [it["camera"] for it in told] == [A, B]
-    for mine, everybodys in zip(told, plain, strict=True):
-        assert mine.items() >= everybodys.items()
-    first = told[0]
-    assert (first["clock_offset"], told[1]["clock_offset"]) == (0.25, None)
+    assert [it["camera"] for it in answer] == [A, B]
+    for diagnostics, plain_info in zip(answer, plain, strict=True):
+        assert diagnostics.items() >= plain_info.items()
+    first = answer[0]
+    assert (first["clock_offset"], answer[1]["clock_offset"]) == (0.25, None)
     assert first["sync_error"] == {"median": 0.0, "worst": 0.0}
     assert first["picture"] == {"width": 64, "height": 48, "scale": 1.0, "left": 0.0, "top": 0.0}
     assert (first["certified"], first["windows"], first["last_error"]) == (None, 0, None)
@@ -67,13 +67,13 @@ async def test_the_pulse_servers_clients_and_missing_ones_are_listed() -> None:
     ):
         for client in (camera, stranger):
             await anext(aiter(client))  # it is connected
-        told = await (await anext(halls)).get_json("/api/operator/pulses")
-        assert (told["server"], told["error"]) == (f"127.0.0.1:{server.port}", "")
-    assert {(it["name"], it["expected"], it["behind"]) for it in told["clients"]} == {
+        answer = await (await anext(halls)).get_json("/api/operator/pulses")
+        assert (answer["server"], answer["error"]) == (f"127.0.0.1:{server.port}", "")
+    assert {(it["name"], it["expected"], it["behind"]) for it in answer["clients"]} == {
         (A, True, 0),
         ("stranger", False, 0),
     }
-    assert told["missing"] == [B, "bestview"]
+    assert answer["missing"] == [B, "bestview"]
 
 
 async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() -> None:
@@ -87,14 +87,14 @@ async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() 
         hall = await anext(halls)
         assert "needs a login" in (await hall.get_json("/api/operator/pulses"))["error"]
         hall.service.pulse_credentials = Credentials("bestview", users["bestview"])
-        told = await hall.get_json("/api/operator/pulses")
-    assert (told["error"], [it["name"] for it in told["clients"]]) == ("", [A])
-    assert told["missing"] == [B, "bestview"]
+        answer = await hall.get_json("/api/operator/pulses")
+    assert (answer["error"], [it["name"] for it in answer["clients"]]) == ("", [A])
+    assert answer["missing"] == [B, "bestview"]
 
 
 @pytest.mark.parametrize("port", [1])
 async def test_an_unreachable_pulse_server_is_reported_in_one_line(port: int) -> None:
     async with aclosing(opened(sync={"port": port})) as halls:
-        told = await (await anext(halls)).get_json("/api/operator/pulses")
-    assert told["error"].startswith(f"there is no pulse server at 127.0.0.1:{port}")
-    assert "\n" not in told["error"]
+        answer = await (await anext(halls)).get_json("/api/operator/pulses")
+    assert answer["error"].startswith(f"there is no pulse server at 127.0.0.1:{port}")
+    assert "\n" not in answer["error"]

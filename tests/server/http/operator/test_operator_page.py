@@ -337,8 +337,8 @@ async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browse
         await page.get_by_role("button", name="Start the walk").click()
         await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
         await expect(page.locator("#walk-uncovered li")).to_have_count(len(CAMERAS))
-        for said in words(hall.service.config, curved(500)):
-            walking.add(said)
+        for sample in words(hall.service.config, curved(500)):
+            walking.add(sample)
         await expect(state).to_have_text("Walk now. 0:20 minutes so far.")
         await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
         await expect(page.locator("#walk-cameras tr")).to_have_text([re.compile(r"(\d+ %){3}")] * 2)

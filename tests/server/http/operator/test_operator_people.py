@@ -37,8 +37,8 @@ def feed(hall: Hall, epoch: int) -> None:
     hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
 
 
-async def say(hall: Hall, **said: Any) -> tuple[int, Any]:
-    async with hall.session.post(PEOPLE, headers={CSRF_HEADER: "1"}, json=said) as answer:
+async def post_edit(hall: Hall, **edit: Any) -> tuple[int, Any]:
+    async with hall.session.post(PEOPLE, headers={CSRF_HEADER: "1"}, json=edit) as answer:
         return answer.status, await answer.json()
 
 
@@ -47,16 +47,16 @@ async def objects(hall: Hall) -> dict[int, Any]:
 
 
 async def test_a_persons_name_appears_in_every_list(busy: Hall) -> None:
-    assert (await say(busy, object=1, name=" Ann  Lee "))[0] == 200
+    assert (await post_edit(busy, object=1, name=" Ann  Lee "))[0] == 200
     assert (await objects(busy))[1]["name"] == "Ann Lee"
     assert (await objects(busy))[2]["name"] is None
     assert (await busy.get_json(PEOPLE))["names"] == {"1": "Ann Lee"}
-    await say(busy, object=1, name="")
+    await post_edit(busy, object=1, name="")
     assert (await objects(busy))[1]["name"] is None
 
 
 async def test_a_name_is_listed_unchanged(busy: Hall, capsys: pytest.CaptureFixture[str]) -> None:
-    await say(busy, object=1, name="Ann [bold]")
+    await post_edit(busy, object=1, name="Ann [bold]")
     await run_watch(f"http://127.0.0.1:{busy.port}", None, None, None, None, None)
     lines = capsys.readouterr().out.splitlines()
     assert any(it.split()[:3] == ["1", "Ann", "[bold]"] for it in lines)
@@ -66,40 +66,40 @@ async def test_a_name_is_listed_unchanged(busy: Hall, capsys: pytest.CaptureFixt
 async def test_merged_people_have_one_number_from_the_next_gop_on(real: Hall) -> None:
     people = await objects(real)
     kept, lost = sorted(people)[:2]
-    told: list[Any] = []
-    real.service.on_decision.append(told.append)
-    status, answer = await say(real, object=kept, merge=lost)
-    assert (await say(real, object=lost, name="Bob"))[0] == 200, "at once, too, the lost number is theirs"
+    decisions: list[Any] = []
+    real.service.on_decision.append(decisions.append)
+    status, answer = await post_edit(real, object=kept, merge=lost)
+    assert (await post_edit(real, object=lost, name="Bob"))[0] == 200, "the merged number is valid at once"
     assert (status, answer["merged"]) == (200, {str(lost): kept})
     for epoch in range(3, 8):
         feed(real, epoch)
-    assert [(it.kept, it.lost) for gop in told for it in gop.merged] == [(kept, lost)]
+    assert [(it.kept, it.lost) for gop in decisions for it in gop.merged] == [(kept, lost)]
     people = await objects(real)
     assert lost not in people
     assert people[kept]["aliases"] == [lost]
     assert people[kept]["name"] == "Bob"
     assert (await real.get_json(f"/api/objects/{lost}/choice"))["object"] == kept
-    assert (await say(real, object=kept, merge=lost))[0] == 400
+    assert (await post_edit(real, object=kept, merge=lost))[0] == 400
 
 
 async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: Hall) -> None:
     who = real.service.decider.people.number(A, 1, 10)
     assert who is not None
-    told: list[Any] = []
-    real.service.on_decision.append(told.append)
-    status, answer = await say(real, object=who, split=[A])
+    decisions: list[Any] = []
+    real.service.on_decision.append(decisions.append)
+    status, answer = await post_edit(real, object=who, split=[A])
     assert status == 200
     new = answer["new_object"]
     for epoch in range(3, 8):
         feed(real, epoch)
-    splits = [(it.kept, it.new_object, it.camera) for gop in told for it in gop.split]
+    splits = [(it.kept, it.new_object, it.camera) for gop in decisions for it in gop.split]
     assert splits == [(who, new, A)]
     assert A in (await objects(real))[new]["cameras"]
     assert (await real.get_json(f"/api/objects/{new}/choice"))["camera"] is not None
 
 
 @pytest.mark.parametrize(
-    ("said", "status", "error"),
+    ("edit", "status", "error"),
     [
         ({"object": 9, "name": "Ann"}, 404, "there is no object 9"),
         ({"object": 1, "merge": 9}, 404, "there is no object 9"),
@@ -113,16 +113,16 @@ async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: Hall) -
     ],
 )
 async def test_an_invalid_edit_is_refused_with_one_line(
-    busy: Hall, said: dict[str, Any], status: int, error: str
+    busy: Hall, edit: dict[str, Any], status: int, error: str
 ) -> None:
-    told = await say(busy, **said)
-    assert told[0] == status
-    assert told[1]["error"].startswith(error)
+    response = await post_edit(busy, **edit)
+    assert response[0] == status
+    assert response[1]["error"].startswith(error)
 
 
 async def test_people_cannot_be_edited_on_a_sharded_site() -> None:
     async with aclosing(opened(view={"share": {"of": 2}})) as halls:
         hall = await anext(halls)
-        status, told = await say(hall, object=1, name="Ann")
+        status, response = await post_edit(hall, object=1, name="Ann")
         assert status == 409
-        assert (await hall.get_json(PEOPLE))["unavailable"] == told["error"]
+        assert (await hall.get_json(PEOPLE))["unavailable"] == response["error"]

@@ -112,10 +112,10 @@ async def test_trial_settings_are_in_force_at_once_with_configuration_lines(busy
     ],
 )
 async def test_invalid_trial_settings_change_nothing(busy: Hall, json: Any, error: str) -> None:
-    status, told = await put(busy, json)
+    status, response = await put(busy, json)
     assert status == 400
-    assert told["error"].startswith(error)
-    assert "\n" not in told["error"]
+    assert response["error"].startswith(error)
+    assert "\n" not in response["error"]
     assert busy.service.decider.view == busy.service.config.view
 
 

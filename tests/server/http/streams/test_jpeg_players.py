@@ -73,6 +73,6 @@ async def test_ffmpeg_reads_mjpeg_without_a_warning(going: Drawn, path: str) -> 
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
     )
-    out, said = await reading.communicate()
-    assert said.decode() == ""
+    out, warnings = await reading.communicate()
+    assert warnings.decode() == ""
     assert sum(not line.startswith(b"#") for line in out.splitlines()) == 15

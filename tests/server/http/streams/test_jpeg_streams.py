@@ -61,8 +61,8 @@ async def test_boxes_are_drawn_on_their_frames(drawn: Drawn) -> None:
     edges: list[list[float]] = []
     for pulse in pulses[:-GOP]:
         image = pictures[pulse][0]
-        told = drawn.decisions[pulse // GOP * GOP]
-        camera = told.choices[SOMEBODY]
+        decision = drawn.decisions[pulse // GOP * GOP]
+        camera = decision.choices[SOMEBODY]
         near = {place: difference(image, own[camera][place]) for place in (pulse - 1, pulse, pulse + 1)}
         assert min(near, key=lambda place: near[place]) == pulse
         x, y, width, height = cv2.boundingRect(green(image))

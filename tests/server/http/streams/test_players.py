@@ -98,7 +98,7 @@ async def played(hall: Hall, *commands: Sequence[str], user: str | None = None) 
             await asyncio.sleep(STRIDE / FPS / 5)
             feed(hall, epoch)
         hall.service.splicer.close()
-        said = await asyncio.gather(*ends)
+        results = await asyncio.gather(*ends)
     finally:
         for player in players:
             if player.returncode is None:
@@ -106,7 +106,7 @@ async def played(hall: Hall, *commands: Sequence[str], user: str | None = None) 
         await asyncio.gather(*ends, return_exceptions=True)
     return [
         Played(player.returncode, output, complaints.decode())
-        for player, (output, complaints) in zip(players, said, strict=True)
+        for player, (output, complaints) in zip(players, results, strict=True)
     ]
 
 

@@ -23,7 +23,7 @@ NOT_HERE = {"Host": "hall"}
 GET = "GET {} HTTP/1.1\r\nHost: hall\r\n\r\n"
 
 
-async def asked(hall: Hall, request: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
+async def send_request(hall: Hall, request: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
     """Ask by hand; give the connection and the answer's head, in small letters."""
     reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
     writer.write(request.encode())
@@ -38,7 +38,7 @@ async def deserted(hall: Hall) -> None:
 
 @pytest.mark.parametrize("path", STREAMS)
 async def test_head_takes_no_slot_and_keeps_the_connection_usable(busy: Hall, path: str) -> None:
-    reader, writer, head = await asked(busy, GET.format(path).replace("GET", "HEAD"))
+    reader, writer, head = await send_request(busy, GET.format(path).replace("GET", "HEAD"))
     for _ in range(2):
         assert head.startswith("http/1.1 200")
         assert f"content-type: {STREAMS[path]}\r\n" in head
@@ -53,7 +53,7 @@ async def test_head_takes_no_slot_and_keeps_the_connection_usable(busy: Hall, pa
 
 @pytest.mark.parametrize("path", STREAMS)
 async def test_an_http_1_0_client_gets_a_stream_until_the_connection_closes(busy: Hall, path: str) -> None:
-    reader, writer, head = await asked(busy, f"GET {path} HTTP/1.0\r\n\r\n")
+    reader, writer, head = await send_request(busy, f"GET {path} HTTP/1.0\r\n\r\n")
     assert head.startswith("http/1.0 200")
     assert "chunked" not in head
     assert "content-length" not in head
@@ -88,7 +88,7 @@ async def test_pages_of_other_origins_may_request_streams(busy: Hall, path: str)
 
 @pytest.mark.parametrize("path", STREAMS)
 async def test_a_broken_connection_frees_its_slot(busy: Hall, path: str) -> None:
-    _, writer, _ = await asked(busy, GET.format(path))
+    _, writer, _ = await send_request(busy, GET.format(path))
     assert busy.service.splicer.viewers == 1
     writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     writer.transport.abort()
@@ -101,8 +101,8 @@ async def test_beyond_the_limit_a_viewer_gets_503_with_retry_after(limit: str) -
         hall.service.come(*CAMERAS)
         for epoch in range(3):
             hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
-        _, first, _ = await asked(hall, GET.format("/objects/1/best.mp4"))
-        _, second, _ = await asked(hall, GET.format("/objects/1/best.ts"))
+        _, first, _ = await send_request(hall, GET.format("/objects/1/best.mp4"))
+        _, second, _ = await send_request(hall, GET.format("/objects/1/best.ts"))
         async with hall.session.get("/objects/1/best.mp4", headers=NOT_HERE) as answer:
             assert answer.status == 503
             assert int(answer.headers["Retry-After"]) > 0
@@ -122,7 +122,7 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(busy: Hal
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     stalled.connect(("127.0.0.1", busy.port))
     stalled.sendall(b"GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
-    reader, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+    reader, writer, _ = await send_request(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     while channel.viewers < 2:  # noqa: ASYNC110 — both have come
         await asyncio.sleep(0.005)
     await reader.readuntil(b"mdat")
@@ -153,7 +153,7 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(busy: Hal
 
 async def test_a_viewer_that_disconnects_while_blocked_is_removed(busy: Hall) -> None:
     channel = busy.service.splicer.persons[1]
-    _, writer, _ = await asked(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+    _, writer, _ = await send_request(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     for _ in range(100):
         channel.publish(BytesChunk(bytes(100_000), random_access=True))
         await asyncio.sleep(0)

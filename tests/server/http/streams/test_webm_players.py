@@ -52,10 +52,10 @@ async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]
         feed(hall, epoch)
         await asyncio.sleep(0.02)
     hall.service.splicer.close()
-    said = await asyncio.gather(*ends)
+    results = await asyncio.gather(*ends)
     return [
         (player.returncode, output, complaints.decode())
-        for player, (output, complaints) in zip(players, said, strict=True)
+        for player, (output, complaints) in zip(players, results, strict=True)
     ]
 
 
@@ -152,8 +152,8 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
         await page.goto(f"http://127.0.0.1:{free.port}/?object=1&camera=c1")
         await page.wait_for_function("myview.state === 'playing' && myview.camera === 'c1'")
         await page.keyboard.press(",")
-        said = await page.locator("#notice").text_content()
-        assert said == "Nothing is recorded of that time: this is live."
+        results = await page.locator("#notice").text_content()
+        assert results == "Nothing is recorded of that time: this is live."
         going_on.cancel()
     assert errors == []
 
