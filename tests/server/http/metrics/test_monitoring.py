@@ -91,7 +91,7 @@ def test_the_evaluator_yields_known_results(expression: str, series: list[dict[s
         ("rate(b[5m])", "rate of b, which is a gauge"),
         ("delta(a_total[5m])", "delta of a_total, which is a counter"),
         ("sum by (object) (b)", "by missing labels"),
-        ("histogram_quantile(0.5, b)", "what has no buckets"),
+        ("histogram_quantile(0.5, b)", "quantile of a metric without buckets"),
         ("rate(a_total[5m)", "."),
     ],
 )
