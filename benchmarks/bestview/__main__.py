@@ -1,28 +1,28 @@
-"""Identities across cameras, and the best view of each person, beside simpler methods and the ground truth.
+"""Identities across cameras, and the best view of each person, against simpler methods and ground truth.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.bestview --data ../shared/data --out out/bench
 
-Joint IDF1 takes all cameras as one recording, in which an id is one person everywhere. The choices are
-scored as `myview evaluate --views` does, beside the exact offline optimum of the true visibility.
+Joint IDF1 evaluates all cameras as one recording with common ids. View choices are scored as by `myview
+evaluate --views`, compared with the exact offline optimum of the true visibility.
 
-The ground truth replaces MyView's stages, one after the other; the loss between two rows is that stage's:
-*true boxes* of visible people; *own boxes, true ids*: the boxes that MyView's cameras tracked, each with the
-id of the person it is on, and the same with short gaps interpolated; *own tracklets, true ids*: each tracklet
-with the id of the person it is mostly on; *own tracks, true ids*: the same of whole tracks; *final ids*: the
-ids that MyView ended with, known from the start, and every person always present. The mean of *own tracks,
-not associated* is the score of each camera's tracker by itself.
+The ground truth replaces MyView's stages one after the other; the difference of two rows is the loss of a
+stage: *true boxes* of visible people; *own boxes, true ids*: MyView's tracked boxes with the id of the person
+in each, also with short gaps interpolated; *own tracklets, true ids*: each tracklet with the id of its most
+frequent person; *own tracks, true ids*: likewise for whole tracks; *final ids*: MyView's final ids, known
+from the start, with every person always present. The mean of *own tracks, not associated* is the score of the
+single-camera trackers.
 
-Detectors prescan recordings, as MyView does; `--as-live` has them learn the background as they go.
+Detectors prescan recordings, as MyView does; with `--as-live` they learn the background on the fly.
 
-*Appearance only* is for sites whose cameras share no floor: association without travel times.
+*Appearance only* is association without travel times, for sites whose cameras share no floor.
 
-*Detected only* leaves out views of people whom a camera does not detect, though others know where they stand.
-*No peer evidence* is without the detections that cameras exchange. *Calibrated* has the homographies that
-`myview calibrate` computes from the cameras' own tracks. *Largest* selects frame by frame the camera with the
-largest box. *Nearest feet* associates whole tracks of each camera's own tracker (or of ByteTrack, on the same
-boxes) by the median distance of their foot points, and selects the largest box, too. *Occupancy map* detects
-people on the ground from all cameras' foreground and links them by min-cost flow; its views are selected by
-MyView's program. The sweeps are on true boxes.
+*Detected only* excludes views of people that the camera does not detect, although other cameras locate them.
+*No peer evidence* is without detections from other cameras. *Calibrated* has the homographies that `myview
+calibrate` computes from the cameras' tracks. *Largest* selects in each frame the camera with the largest box.
+*Nearest feet* associates whole tracks of MyView's single-camera tracker (or ByteTrack's, on the same boxes)
+by the median distance of foot points, and selects the largest box. *Occupancy map* detects people on the
+ground from all cameras' foreground and links them by min-cost flow; MyView's program selects its views. The
+sweeps use true boxes.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from pathlib import Path
 import cv2
 
 from benchmarks.bestview.association_baselines import own_tracks
-from benchmarks.bestview.camera_tracks import SceneDetections, followed
+from benchmarks.bestview.camera_tracks import SceneDetections, track_scene
 from benchmarks.bestview.identity_errors import MatchedBoxes
 from benchmarks.bestview.methods import (
-    LEAST_IOU,
+    MIN_IOU,
+    DetectedScene,
     MethodResult,
     MethodScores,
-    SearchedScene,
     run_methods,
     score_method,
 )
@@ -70,29 +70,29 @@ GALLERY, QUICK_GALLERY = (6, 240.0), (3, 30.0)
 COLUMNS = ["", "joint", "mean", "Agree", "Regret", "Visible", "Chosen", "Cuts", "Best", "Shot"]
 
 LATER_S = (1.0, 15.0)
-"""Seconds after which a camera's identities are compared with its own earlier ones."""
+"""Time differences at which a camera's ids are compared with its earlier ones."""
 IDENTITY_COLUMNS = [
     "",
     "recall",
     "precision",
-    *(word for seconds in LATER_S for word in (f"{seconds:g} s: recall", "precision")),
+    *(column for seconds in LATER_S for column in (f"{seconds:g} s: recall", "precision")),
 ]
 LOSS_COLUMNS = ["", "Visible", "selection", "identity", "detection"]
 
 
 def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[BenchmarkScene]:
     """Yield the scenes one after the other; report those whose recordings are missing."""
-    wanted = options.scene or SCENES
+    selected = options.scene or SCENES
     for name, find in (("terrace", terrace), ("auditorium", auditorium)):
-        if name in wanted:
+        if name in selected:
             try:
                 yield find(options.data)
             except CannotRunError as problem:
                 report.line(f"{name}: skipped: {problem}")
     for cameras, people, seconds in QUICK_ROOMS if options.quick else ROOMS:
-        if "room" in wanted or f"room-{cameras}-{people}" in wanted:
+        if "room" in selected or f"room-{cameras}-{people}" in selected:
             yield room(folder, cameras, people, seconds)
-    if "gallery" in wanted:
+    if "gallery" in selected:
         yield gallery(folder, *(QUICK_GALLERY if options.quick else GALLERY))
 
 
@@ -102,11 +102,11 @@ def as_live(scene: BenchmarkScene) -> BenchmarkScene:
 
 
 def score_row(scores: MethodScores) -> list[str]:
-    """Return a row of the main table: percent, cuts a minute, and the shortest shot in frames."""
+    """Return a row of the main table: percent, cuts per minute, and the shortest shot in frames."""
     idf1 = (
         ["", ""]
         if scores.tracks is None
-        else [f"{100 * s.idf1:.1f}" for s in (scores.tracks.joint, scores.tracks.mean)]
+        else [f"{100 * score.idf1:.1f}" for score in (scores.tracks.joint, scores.tracks.mean)]
     )
     views = scores.views
     shares = (views.agreement, views.regret, views.visible, views.chosen)
@@ -133,7 +133,7 @@ def loss_row(name: str, losses: VisibilityLosses) -> list[str]:
 
 def identity_row(scene: BenchmarkScene, result: MethodResult) -> list[str]:
     """Return a row of the table of identity errors, percent."""
-    matched = MatchedBoxes.of(result.rendering.tracks, scene.gt, LEAST_IOU)
+    matched = MatchedBoxes.of(result.rendering.tracks, scene.gt, MIN_IOU)
     fps = float(scene.content["site"]["fps"])
     scores = (matched.across_cameras(), *(matched.over_time(round(seconds * fps)) for seconds in LATER_S))
     return [
@@ -143,27 +143,27 @@ def identity_row(scene: BenchmarkScene, result: MethodResult) -> list[str]:
 
 
 def find_other_trackers(options: argparse.Namespace, report: Report) -> OtherTrackerEnvironment | None:
-    """Return the environment of the other trackers; report why where it cannot be made."""
+    """Return the environment of the other trackers; report why if it cannot be created."""
     if options.no_peers or options.quick:
         return None
     try:
         return peer_environment(default_folder())
     except OtherTrackersUnavailableError as problem:
-        report.line(f"without other trackers, which cannot be installed here: {problem}")
+        report.line(f"other trackers are skipped, they cannot be installed: {problem}")
         return None
 
 
 def self_calibrated_scene(
     scene: BenchmarkScene, uncalibrated_detections: SceneDetections, folder: Path, report: Report
-) -> SearchedScene | None:
-    """Return the scene calibrated by its own tracks; report why where that fails."""
+) -> DetectedScene | None:
+    """Return the scene calibrated from its cameras' tracks; report why if that fails."""
     try:
         calibrated_scene = calibrated(
-            scene, own_tracks(followed(scene.config(ground=False), uncalibrated_detections.frames)), folder
+            scene, own_tracks(track_scene(scene.config(ground=False), uncalibrated_detections.frames)), folder
         )
-        return SearchedScene(calibrated_scene, calibrated_scene.detect())
+        return DetectedScene(calibrated_scene, calibrated_scene.detect())
     except CannotCalibrateError as problem:
-        report.line(f"{scene.name}: not calibrated by its own tracks: {problem}")
+        report.line(f"{scene.name}: not calibrated from its tracks: {problem}")
         return None
 
 
@@ -209,15 +209,15 @@ def measure(options: argparse.Namespace) -> None:
             if not options.no_sweeps:
                 swept[scene.name] = sweep(scene, truth, quick=options.quick)
     report.line(
-        "joint, mean: IDF1. Cuts, Best: cuts a minute, selected and optimal. Shot: shortest, in frames."
+        "joint, mean: IDF1. Cuts, Best: cuts per minute, selected and optimal. Shot: shortest, in frames."
     )
     report.line(
-        "Identities: pairs of boxes in two cameras at once, or in one camera so many seconds apart. Recall: "
-        "the share of pairs on one person with one id; precision: of pairs with one id on one person."
+        "Identities: pairs of boxes in two cameras at the same time, or in one camera at a time difference. "
+        "Recall: share of pairs of one person with one id; precision: of pairs with one id, of one person."
     )
     report.line(
-        "Not visible in the selected view, though in another: selection, a camera that shows them had them "
-        "under their own id; identity, only under another id; detection, no camera had a box on them."
+        "Not visible in the selected view, but in another: selection, a camera that shows them has a box "
+        "with their id; identity, only with another id; detection, no camera has a box on them."
     )
     sweep_tables(report, swept)
     report.save(options.out / "bestview.txt")
@@ -234,9 +234,9 @@ def main() -> None:
     )
     options.add_argument("--as-live", action="store_true", help="no prescan of recordings")
     options.add_argument("--quick", action="store_true", help="short synthetic scenes, no other trackers")
-    options.add_argument("--no-peers", action="store_true", help="leave out the other tracker")
+    options.add_argument("--no-peers", action="store_true", help="skip the other tracker")
     options.add_argument(
-        "--no-sweeps", action="store_true", help="leave out look-ahead, cost of a cut and GOP"
+        "--no-sweeps", action="store_true", help="skip the sweeps of look-ahead, switch cost and GOP"
     )
     measure(options.parse_args())
 

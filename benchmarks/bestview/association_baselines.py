@@ -16,8 +16,8 @@ from tracking.evaluation import oracle_association
 from tracking.evaluation.frame_matching import align_frames
 from tracking.motchallenge import MotRow
 
-LEAST_COMMON = 5
-"""Frames that two tracks must have in common to be compared."""
+MIN_COMMON_FRAMES = 5
+"""Common frames needed to compare two tracks."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -54,9 +54,9 @@ def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
 
 
 def unassociated_tracks(rows: Rows) -> dict[str, list[MotRow]]:
-    """Return the tracks with an id of its own for each track of each camera."""
+    """Return the tracks with a unique id for each track of each camera."""
     keys = sorted({_TrackKey(camera, row.id) for camera, found in rows.items() for row in found})
-    number = {key: place for place, key in enumerate(keys, start=1)}
+    number = {key: index for index, key in enumerate(keys, start=1)}
     return {
         camera: [replace(row, id=number[_TrackKey(camera, row.id)]) for row in found]
         for camera, found in rows.items()
@@ -64,10 +64,10 @@ def unassociated_tracks(rows: Rows) -> dict[str, list[MotRow]]:
 
 
 def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[MotRow]]:
-    """Associate whole tracks of different cameras by the median distance of foot points, the nearest first.
+    """Associate whole tracks of different cameras greedily by the median distance of foot points.
 
-    The gate is MyView's own, `gate_heights` of a person. Two tracks of one camera that overlap in time are
-    never joined, and neither are those of a camera without homography.
+    The gate is MyView's `gate_heights`. Tracks of one camera that overlap in time, and tracks of cameras
+    without a homography, are never joined.
     """
     walks, heights = _walks(rows, ground)
     gate = IdentitySettings().gate_heights * heights
@@ -81,7 +81,7 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
     group = {key: [key] for key in keys}
     for _, one, other in near:
         group_a, group_b = group[one], group[other]
-        if group_a is not group_b and not _clash(group_a, group_b, walks):
+        if group_a is not group_b and not _overlap_in_time(group_a, group_b, walks):
             group_a += group_b
             group.update(dict.fromkeys(group_b, group_a))
     unassociated = unassociated_tracks(rows)
@@ -102,15 +102,15 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
 
 
 def boxes_by_truth(rows: Rows, gt: Rows) -> dict[str, list[MotRow]]:
-    """Return each box with the id of the person it is on; boxes on nobody are dropped."""
+    """Return each box with the id of the person in it; false positives are dropped."""
     return {camera: oracle_association(found, gt[camera]) for camera, found in rows.items()}
 
 
 def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, list[MotRow]]:
-    """Return each whole track with the id of the person it is most often on.
+    """Return each whole track with the id of its most frequent person.
 
-    A track that is never on a person is dropped. Where two tracks of one person overlap, the one that is on
-    them for longer stays.
+    A track without a person is dropped. Of overlapping tracks of one person, the one with more frames on them
+    is kept.
     """
     joined = {}
     for camera, found in rows.items():
@@ -127,8 +127,8 @@ def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, l
     return joined
 
 
-def interpolated_gaps(rows: Rows, most: int) -> dict[str, list[MotRow]]:
-    """Interpolate boxes linearly where a camera detects a person again within `most` frames."""
+def interpolated_gaps(rows: Rows, max_gap: int) -> dict[str, list[MotRow]]:
+    """Interpolate boxes linearly over gaps of up to `max_gap` frames."""
     filled = {}
     for camera, found in rows.items():
         by_person: dict[int, list[MotRow]] = defaultdict(list)
@@ -138,7 +138,7 @@ def interpolated_gaps(rows: Rows, most: int) -> dict[str, list[MotRow]]:
             _interpolated(one, other, frame)
             for track in by_person.values()
             for one, other in pairwise(track)
-            if other.frame - one.frame <= most
+            if other.frame - one.frame <= max_gap
             for frame in range(one.frame + 1, other.frame)
         ]
         filled[camera] = sorted([*found, *interpolated], key=lambda row: (row.frame, row.id))
@@ -181,14 +181,14 @@ def _walks(rows: Rows, ground: Mapping[str, Floats]) -> tuple[dict[_TrackKey, _G
 
 
 def _distance(one: _GroundTrack, other: _GroundTrack) -> float:
-    """Return the median distance in the common frames; infinite where these are few."""
+    """Return the median distance in the common frames; infinite if there are too few."""
     _, here, there = np.intersect1d(one.frames, other.frames, return_indices=True)
     distances = np.linalg.norm(one.feet[here] - other.feet[there], axis=1)
     distances = distances[~np.isnan(distances)]
-    return float(np.median(distances)) if len(distances) >= LEAST_COMMON else np.inf
+    return float(np.median(distances)) if len(distances) >= MIN_COMMON_FRAMES else np.inf
 
 
-def _clash(
+def _overlap_in_time(
     group_a: Sequence[_TrackKey], group_b: Sequence[_TrackKey], walks: Mapping[_TrackKey, _GroundTrack]
 ) -> bool:
     return any(

@@ -1,4 +1,4 @@
-"""Each camera's detections, from pictures or files, and the track messages made of them."""
+"""Each camera's detections, from pictures or files, and its track messages."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CameraDetections:
     """One camera's detections, frame by frame.
 
     Attributes:
-        size: of the camera's own pictures.
+        size: of the camera's pictures.
         detections: of each frame.
         searched: whether the detector could search the frame.
     """
@@ -46,7 +46,7 @@ class CameraDetections:
 
 @dataclass(frozen=True, slots=True)
 class SceneDetections:
-    """The detections of all cameras of a scene, each by itself.
+    """The detections of all cameras of a scene.
 
     Attributes:
         frames: all detections.
@@ -57,7 +57,7 @@ class SceneDetections:
     boxes: Rows
 
 
-def in_pictures(config: Config, camera: str) -> CameraDetections:
+def detect_in_pictures(config: Config, camera: str) -> CameraDetections:
     """Detect people in a recording as a camera process does, without encoding."""
     pipeline = CameraPipeline(config, camera)
     frames = CameraDetections(pipeline.source.size, [], [])
@@ -72,33 +72,33 @@ def in_pictures(config: Config, camera: str) -> CameraDetections:
     return frames
 
 
-def in_file(config: Config, path: Path) -> CameraDetections:
+def read_detections(config: Config, path: Path) -> CameraDetections:
     """Read detections without pictures, as `myview track --det` does."""
     detector = MotFileDetector(path)
     detections = [detector.detect(_NO_PICTURE, pulse) for pulse in range(detector.last_frame + 1)]
     return CameraDetections((config.site.width, config.site.height), detections, [True] * len(detections))
 
 
-def sure_rows(frames: CameraDetections) -> list[MotRow]:
+def confident_rows(frames: CameraDetections) -> list[MotRow]:
     """Return the confident detections."""
     rows = (row for pulse, detections in enumerate(frames.detections) for row in rows_of(pulse, detections))
     return [row for row in rows if row.confidence >= CONFIDENT]
 
 
-def followed(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str, list[CameraTracks]]:
-    """Track people in all cameras, in step, as `myview render` does; return each camera's messages."""
+def track_scene(config: Config, frames: Mapping[str, CameraDetections]) -> dict[str, list[CameraTracks]]:
+    """Track people in all cameras frame by frame, as `myview render` does; return each camera's messages."""
     cameras = {camera: _Camera(config, camera, frame) for camera, frame in frames.items()}
     messages: dict[str, list[CameraTracks]] = {camera: [] for camera in frames}
     for pulse in range(max(len(frame.detections) for frame in frames.values())):
-        there = {
+        active = {
             camera: reader for camera, reader in cameras.items() if pulse < len(frames[camera].detections)
         }
         shared = {
             camera: reader.scorer.build_message(pulse, reader.shared(pulse))
-            for camera, reader in there.items()
+            for camera, reader in active.items()
             if reader.scorer
         }
-        for camera, reader in there.items():
+        for camera, reader in active.items():
             detections = frames[camera].detections[pulse]
             if reader.scorer is not None:
                 others = [message for other, message in shared.items() if other != camera]
@@ -124,5 +124,5 @@ class _Camera:
         self._frames = frames
 
     def shared(self, pulse: int) -> Detections | None:
-        """Return the detections of a frame that other cameras get; None: the frame was not searched."""
+        """Return the detections of a frame for other cameras; None if the frame was not searched."""
         return self._frames.detections[pulse] if self._frames.searched[pulse] else None

@@ -1,4 +1,4 @@
-"""Where identities go wrong: between cameras at one moment, or in one camera over time."""
+"""Identity errors between cameras at the same time, and in one camera over time."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class PairScores:
     """Pairwise scores of identities.
 
     Attributes:
-        recall: of the pairs of boxes on one person, the share with one id; NaN where there are none.
-        precision: of the pairs of boxes with one id, the share on one person; NaN likewise.
+        recall: of the pairs of boxes on one person, the share with one id; NaN without any.
+        precision: of the pairs of boxes with one id, the share on one person; NaN without any.
     """
 
     recall: float
@@ -67,25 +67,25 @@ class MatchedBoxes:
         return _pair_scores(people, numbers, _pairs(self.frame, self.person, self.number))
 
     def over_time(self, frames: int) -> PairScores:
-        """Compare boxes of the same camera so many frames apart."""
+        """Compare boxes of the same camera at a distance in frames."""
         people = self._count_over_time(frames, self.person)
         numbers = self._count_over_time(frames, self.number)
         return _pair_scores(people, numbers, self._count_over_time(frames, self.person, self.number))
 
-    def _count_over_time(self, frames: int, *names: Ints) -> int:
-        """Count the boxes whose names occur in the same camera again so many frames later."""
-        now = set(_rows(self.camera, self.frame, *names))
-        return len(now.intersection(_rows(self.camera, self.frame + frames, *names)))
+    def _count_over_time(self, frames: int, *labels: Ints) -> int:
+        """Count the boxes whose labels occur in the same camera again `frames` later."""
+        now = set(_rows(self.camera, self.frame, *labels))
+        return len(now.intersection(_rows(self.camera, self.frame + frames, *labels)))
 
 
 def _pair_scores(people: int, numbers: int, both: int) -> PairScores:
     return PairScores(both / people if people else np.nan, both / numbers if numbers else np.nan)
 
 
-def _pairs(*names: Ints) -> int:
-    """Count the pairs of boxes that have all these names in common."""
-    return sum(count * (count - 1) // 2 for count in Counter(_rows(*names)).values())
+def _pairs(*labels: Ints) -> int:
+    """Count the pairs of boxes with all these labels in common."""
+    return sum(count * (count - 1) // 2 for count in Counter(_rows(*labels)).values())
 
 
-def _rows(*names: Ints) -> Iterator[tuple[int, ...]]:
-    return zip(*(name.tolist() for name in names), strict=True)
+def _rows(*labels: Ints) -> Iterator[tuple[int, ...]]:
+    return zip(*(name.tolist() for name in labels), strict=True)

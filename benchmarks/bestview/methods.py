@@ -15,11 +15,11 @@ from benchmarks.bestview.association_baselines import (
     tracks_by_truth,
     unassociated_tracks,
 )
-from benchmarks.bestview.camera_tracks import Rows, SceneDetections, followed
+from benchmarks.bestview.camera_tracks import Rows, SceneDetections, track_scene
 from benchmarks.bestview.occupancy.foreground_masks import CannotMapError
 from benchmarks.bestview.occupancy.reference_tracker import track_by_occupancy
 from benchmarks.bestview.scenes import BenchmarkScene
-from benchmarks.bestview.service_decisions import Rendering, decide, decide_given, largest
+from benchmarks.bestview.service_decisions import Rendering, decide, decide_with_true_ids, largest
 from benchmarks.bestview.tracklet_cuts import own_tracklets
 from benchmarks.other_trackers.virtual_environment import PEERS, OtherTrackerEnvironment
 from bestview import ViewScore
@@ -31,13 +31,13 @@ from server.service.view_selection.decider import camera_homographies
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 
-LEAST_IOU = 0.5
+MIN_IOU = 0.5
 MAX_GAP = 20
 """Frames of a gap that is interpolated."""
 DETECTED_ONLY = {"undetected_weight": 0.0}
 APPEARANCE_ONLY = {"identity": {"maximum_travel_evidence": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
-OURS, CALIBRATED, UNCALIBRATED = "MyView", "MyView, calibrated", "no homographies"
+MYVIEW, CALIBRATED, UNCALIBRATED = "MyView", "MyView, calibrated", "no homographies"
 PEER = "ByteTrack"
 MAP = "occupancy map"
 
@@ -49,7 +49,7 @@ class MethodResult:
     name: str
     rendering: Rendering
     ground_truth: bool = False
-    """The tracks are the ground truth's, so they are not scored."""
+    """Whether the tracks are the ground truth, so that they are not scored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +75,11 @@ def visible_rows(scene: BenchmarkScene, truth: SceneTruth) -> dict[str, list[Mot
 
 
 @dataclass(frozen=True, slots=True)
-class SearchedScene:
+class DetectedScene:
     """A calibrated scene with its detections.
 
     Attributes:
-        scene: with homographies, which its detectors know.
+        scene: with homographies, which the detectors use.
         detections: of its cameras.
     """
 
@@ -93,7 +93,7 @@ def run_methods(
     detections: SceneDetections,
     uncalibrated_detections: SceneDetections,
     peers: OtherTrackerEnvironment | None,
-    self_calibrated: SearchedScene | None,
+    self_calibrated: DetectedScene | None,
 ) -> Iterator[MethodResult]:
     """Run all methods, those with true boxes first.
 
@@ -101,15 +101,15 @@ def run_methods(
         scene: to run them on.
         truth: its ground truth.
         detections: of its cameras.
-        uncalibrated_detections: the detections where no homographies are known.
-        peers: where the other tracker is installed.
-        self_calibrated: the scene with the homographies of its own tracks.
+        uncalibrated_detections: the detections without homographies.
+        peers: the environment of the other tracker.
+        self_calibrated: the scene with homographies from its cameras' tracks.
     """
     frames = truth.boxes.shape[1]
     config = scene.config()
 
     def select(rows: Rows) -> Rendering:
-        return Rendering(_as_lists(rows), decide_given(config, rows, frames).choices)
+        return Rendering(_as_lists(rows), decide_with_true_ids(config, rows, frames).choices)
 
     def select_largest(rows: Rows) -> Rendering:
         return Rendering(_as_lists(rows), largest(rows, scene.sizes, frames))
@@ -117,7 +117,7 @@ def run_methods(
     true_rows = visible_rows(scene, truth)
     yield MethodResult(TRUE, select(true_rows), ground_truth=True)
     yield MethodResult(TRUE_LARGEST, select_largest(true_rows), ground_truth=True)
-    messages = followed(config, detections.frames)
+    messages = track_scene(config, detections.frames)
     own_rows = own_tracks(messages)
     true_ids = boxes_by_truth(own_rows, scene.gt)
     yield MethodResult("own boxes, true ids", select(true_ids))
@@ -128,7 +128,7 @@ def run_methods(
     yield MethodResult("own tracks, true ids", select(tracks_by_truth(own_rows, scene.gt)))
     yield MethodResult("own tracks, not associated", select_largest(unassociated_tracks(own_rows)))
     uncalibrated = scene.config(ground=False)
-    uncalibrated_messages = followed(uncalibrated, uncalibrated_detections.frames)
+    uncalibrated_messages = track_scene(uncalibrated, uncalibrated_detections.frames)
     uncalibrated_result = decide(uncalibrated, uncalibrated_messages)
     yield MethodResult(UNCALIBRATED, uncalibrated_result)
     if scene.disjoint:
@@ -139,16 +139,16 @@ def run_methods(
     if not scene.calibrated:
         yield MethodResult(f"{UNCALIBRATED}, largest", select_largest(uncalibrated_result.tracks))
     for name, searched in (
-        (OURS, SearchedScene(scene, detections) if scene.calibrated else None),
+        (MYVIEW, DetectedScene(scene, detections) if scene.calibrated else None),
         (CALIBRATED, self_calibrated),
     ):
         if searched is None:
             continue
         calibrated_scene, found = searched.scene, searched.detections
         messages = (
-            messages if calibrated_scene is scene else followed(calibrated_scene.config(), found.frames)
+            messages if calibrated_scene is scene else track_scene(calibrated_scene.config(), found.frames)
         )
-        without_peers = followed(uncalibrated, found.frames)
+        without_peers = track_scene(uncalibrated, found.frames)
         result = decide(calibrated_scene.config(), messages)
         yield MethodResult(name, result)
         yield MethodResult(
@@ -181,7 +181,7 @@ def run_methods(
 
 
 def _occupancy_tracks(calibrated_scene: BenchmarkScene, found: SceneDetections) -> Iterator[Rows]:
-    """Yield the tracks of the occupancy map; print why where it cannot be made."""
+    """Yield the tracks of the occupancy map; print why if it cannot be computed."""
     try:
         yield track_by_occupancy(calibrated_scene, found.boxes)
     except CannotMapError as problem:
@@ -200,8 +200,8 @@ def score_method(scene: BenchmarkScene, truth: SceneTruth, result: MethodResult)
     if result.ground_truth:
         scores, person_of = None, {person: person for person in truth.people}
     else:
-        scores = evaluate_cameras(recordings, LEAST_IOU)
-        person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
+        scores = evaluate_cameras(recordings, MIN_IOU)
+        person_of = people_of_objects(truth.people, recordings, MIN_IOU)
     return MethodScores(result.name, scores, score_choices(scene, truth, result.rendering.choices, person_of))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.bestview.methods import visible_rows
 from benchmarks.bestview.scenes import BenchmarkScene
-from benchmarks.bestview.service_decisions import decide_given
+from benchmarks.bestview.service_decisions import decide_with_true_ids
 from benchmarks.common.report import Report
 from bestview import NO_CAMERA, ViewScore, score_views, select_views
 from server.cli.evaluate.choices_file import views_of
@@ -17,7 +17,7 @@ from server.cli.evaluate.ground_truth import SceneTruth
 from server.config.sections import EncodeSettings, ViewSettings
 
 STRIDE = 5
-"""Frames between two windows of the tracker, as by default, so that the delay is realistic."""
+"""Frames between two windows of the tracker: the default, for realistic delays."""
 LOOKAHEADS = (10, 15, 25, 50, 100)
 GOPS = (1, 5, 10, 25)
 SWITCH_COSTS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
@@ -87,7 +87,7 @@ def sweep(scene: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[Swee
                     "extrapolate_s": setting.extrapolate_s,
                 },
             )
-            choices = decide_given(config, rows, frames).choices
+            choices = decide_with_true_ids(config, rows, frames).choices
             same = {person: person for person in truth.people}
             views = views_of(choices, same, truth.people, truth.cameras, frames)
         score = score_views(truth.views.cost, truth.views.visible, views, switch_cost, fps)

@@ -66,7 +66,7 @@ def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
                 "o-",
                 label=f"GOP {gop}",
             )
-        line[0].set_xlabel("delay declared, s")
+        line[0].set_xlabel("delay, s")
         line[0].legend(fontsize="x-small")
         offline = [score for score in default_cost if score.setting.lookahead is None]
         line[1].plot(
@@ -86,8 +86,8 @@ def plot_sweeps(swept: Mapping[str, Sequence[SweepResult]], out: Path) -> None:
         values = [cost.setting.switch_cost_s for cost in costs]
         line[2].plot(values, [cost.score.cuts_per_minute for cost in costs], "o-", label="MyView's choice")
         line[2].plot(values, [cost.score.optimum_cuts_per_minute for cost in costs], "s--", label="optimum")
-        line[2].set_xlabel("switch cost, seconds of not seeing a person")
-        line[2].set_ylabel("cuts a minute")
+        line[2].set_xlabel("switch cost, seconds without a view of the person")
+        line[2].set_ylabel("cuts per minute")
         line[2].legend(fontsize="x-small")
         line[0].set_title(f"{name}, true boxes", fontsize="small")
     save_figure(figure, out)

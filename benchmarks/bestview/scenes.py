@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bestview.camera_tracks import Rows, SceneDetections, in_file, in_pictures, sure_rows
+from benchmarks.bestview.camera_tracks import (
+    Rows,
+    SceneDetections,
+    confident_rows,
+    detect_in_pictures,
+    read_detections,
+)
 from benchmarks.common.environment import CannotRunError
 from benchmarks.common.recorded_views import RecordedViews, find_views
 from server.cli.evaluate.ground_truth import SceneTruth, build_truth
@@ -33,8 +39,8 @@ class BenchmarkScene:
         content: the configuration, with the known homographies, if any.
         gt: the ground truth of each camera.
         min_visible: the visible share of a person from which a view shows them.
-        detections: files of detections; None: the pictures are searched.
-        disjoint: the cameras have no floor in common.
+        detections: files of detections; None: detect in the pictures.
+        disjoint: whether the cameras have no floor in common.
     """
 
     name: str
@@ -68,23 +74,23 @@ class BenchmarkScene:
         return build_truth(self.gt, self.sizes, self.min_visible)
 
     def detect(self, *, ground: bool = True) -> SceneDetections:
-        """Detect people in every camera; with `ground`, the detectors know the homographies."""
+        """Detect people in every camera; with `ground`, the detectors use the homographies."""
         config = self.config(ground=ground)
         if self.detections is not None:
             files = self.detections
             return SceneDetections(
-                {camera: in_file(config, files[camera]) for camera in self.gt},
+                {camera: read_detections(config, files[camera]) for camera in self.gt},
                 {camera: read_rows(files[camera]) for camera in self.gt},
             )
-        frames = {camera: in_pictures(config, camera) for camera in self.gt}
-        return SceneDetections(frames, {camera: sure_rows(frame) for camera, frame in frames.items()})
+        frames = {camera: detect_in_pictures(config, camera) for camera in self.gt}
+        return SceneDetections(frames, {camera: confident_rows(frame) for camera, frame in frames.items()})
 
 
 def terrace(data: Path) -> BenchmarkScene:
-    """Two views, searched by background subtraction, the watermark masked.
+    """Return two views, with detection by background subtraction and a masked watermark.
 
     Raises:
-        CannotRunError: it is not there.
+        CannotRunError: the recordings are missing.
     """
     views = find_views(data, "terrace")
     folder = data / "terrace"
@@ -93,13 +99,13 @@ def terrace(data: Path) -> BenchmarkScene:
 
 
 def auditorium(data: Path) -> BenchmarkScene:
-    """Four views without pictures or calibration, by public detections.
+    """Return four views with public detections, without pictures or calibration.
 
-    The occlusion flag of its ground truth is set for nearly everybody in two cameras, so it is ignored:
-    whoever has a box counts as visible.
+    The occlusion flag of its ground truth is set for almost everyone in two cameras, so it is ignored: each
+    person with a box counts as visible.
 
     Raises:
-        CannotRunError: it is not there.
+        CannotRunError: the recordings are missing.
     """
     folder = data / "auditorium"
     if not folder.is_dir():

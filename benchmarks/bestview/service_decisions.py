@@ -1,4 +1,4 @@
-"""Decisions of the best-view service's own classes, on track messages or on boxes with true ids."""
+"""Decisions of the best-view service's classes, on track messages or on boxes with true ids."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Rendering:
 
 
 class GroundTruthRegistry:
-    """A person registry that knows the ground truth: a local track id is a place in `people`."""
+    """A person registry that knows the ground truth: a local track id is an index in `people`."""
 
     def __init__(self, people: Sequence[int]) -> None:
         self._people = people
@@ -47,7 +47,7 @@ class GroundTruthRegistry:
 
 
 def decide(config: Config, messages: Messages, people: Sequence[int] | None = None) -> Rendering:
-    """Align the cameras' messages, associate tracks and select views; with `people`, identities are known."""
+    """Align the cameras' messages, associate tracks and select views; with `people`, true ids are given."""
     aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
     last = {camera: camera_messages[-1].last for camera, camera_messages in messages.items()}
     decider = ViewDecider(
@@ -74,7 +74,7 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
         return Rendering(tracks, read_choices(folder / "choices.csv"))
 
 
-def decide_given(config: Config, rows: Rows, frames: int) -> Rendering:
+def decide_with_true_ids(config: Config, rows: Rows, frames: int) -> Rendering:
     """Select views by final boxes with true ids."""
     people = sorted({row.id for found in rows.values() for row in found})
     messages = {camera: _messages_of(config, camera, found, people, frames) for camera, found in rows.items()}
@@ -84,7 +84,7 @@ def decide_given(config: Config, rows: Rows, frames: int) -> Rendering:
 def _messages_of(
     config: Config, camera: str, rows: Sequence[MotRow], people: Sequence[int], frames: int
 ) -> list[CameraTracks]:
-    """Build track messages with all people in each, so that local track ids are places in `people`."""
+    """Build track messages with all people in each, so that local track ids are indices in `people`."""
     stride = config.track.window.stride
     boxes: dict[tuple[int, int], Box] = {(row.id, row.frame - 1): row.box for row in rows}
     spans = [(end - stride + 1, end) for end in range(stride - 1, frames, stride)]
@@ -115,7 +115,7 @@ def _messages_of(
 
 
 def largest(rows: Rows, sizes: Mapping[str, tuple[int, int]], frames: int) -> list[Choice]:
-    """Select frame by frame the camera with the largest box of a person; of equals the first."""
+    """Select in each frame the camera with the largest box of a person; ties go to the first."""
     cameras = list(rows)
     people = sorted({row.id for found in rows.values() for row in found})
     place = {person: index for index, person in enumerate(people)}

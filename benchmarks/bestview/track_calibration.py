@@ -1,4 +1,4 @@
-"""Calibration of a scene from its cameras' own tracks, by `myview calibrate`."""
+"""Calibration of a scene from its cameras' tracks, by `myview calibrate`."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.common.environment import ROOT, one_thread_environment
 from tracking.motchallenge import write_rows
 
-_PATIENCE_S = 600.0
+_TIMEOUT_S = 600.0
 
 
 class CannotCalibrateError(Exception):
     """Calibration failed; the text says why."""
 
 
-def calibrated(scene: BenchmarkScene, own: Rows, folder: Path) -> BenchmarkScene:
-    """Return the scene with homographies from its cameras' own tracks, in place of any it has.
+def calibrated(scene: BenchmarkScene, tracks: Rows, folder: Path) -> BenchmarkScene:
+    """Return the scene with homographies from its cameras' tracks.
 
     Raises:
         CannotCalibrateError: the command failed.
     """
     work = folder / f"{scene.name}-calibrated"
     work.mkdir()
-    for camera, rows in own.items():
+    for camera, rows in tracks.items():
         write_rows(work / f"{camera}.txt", rows)
     out = work / "ground.json"
     width, height = next(iter(scene.sizes.values()))
     command = [
         "calibrate",
-        *(str(work / f"{camera}.txt") for camera in own),
+        *(str(work / f"{camera}.txt") for camera in tracks),
         "--out",
         str(out),
         "--shift",
@@ -47,11 +47,11 @@ def calibrated(scene: BenchmarkScene, own: Rows, folder: Path) -> BenchmarkScene
             env=one_thread_environment(),
             capture_output=True,
             text=True,
-            timeout=_PATIENCE_S,
+            timeout=_TIMEOUT_S,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise CannotCalibrateError(f"not done in {_PATIENCE_S:g} s") from error
+        raise CannotCalibrateError(f"not finished in {_TIMEOUT_S:g} s") from error
     if process.returncode != 0 or not out.exists():
         stderr_lines = [line for line in process.stderr.splitlines() if line.strip()]
         raise CannotCalibrateError(

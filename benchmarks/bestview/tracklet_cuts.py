@@ -32,7 +32,7 @@ def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]
         for epoch in aligner.ready(now=-1):
             tracks = [track for window in reader.read(epoch) for track in window.local_tracks()]
             seen = align_tracks(tracks, ground, error, config.overhead)
-            # No tracklet is ever settled here, so that a row stays the same tracklet.
+            # No tracklet is finalized here, so that a row remains the same tracklet.
             rows, _ = tracklets.update(seen, {track.key: track.appearance for track in tracks})
             for track, column in zip(*np.nonzero(rows >= 0), strict=True):
                 camera = seen.keys[track].camera

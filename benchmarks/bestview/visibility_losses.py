@@ -1,4 +1,4 @@
-"""Why people are not visible in the view selected for them: the stage that lost them."""
+"""The stages by which people are not visible in their selected view."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.bestview.methods import LEAST_IOU, MethodResult
+from benchmarks.bestview.methods import MIN_IOU, MethodResult
 from benchmarks.bestview.scenes import BenchmarkScene
 from server.cli.evaluate.choices_file import views_of
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
@@ -46,7 +46,7 @@ def losses(scene: BenchmarkScene, truth: SceneTruth, result: MethodResult) -> Vi
     recordings = {
         camera: TruthAndTracks(scene.gt[camera], result.rendering.tracks[camera]) for camera in scene.gt
     }
-    person_of = people_of_objects(truth.people, recordings, LEAST_IOU)
+    person_of = people_of_objects(truth.people, recordings, MIN_IOU)
     visible = truth.views.visible
     views = views_of(result.rendering.choices, person_of, truth.people, truth.cameras, visible.shape[1])
     shown = (np.take_along_axis(visible, np.maximum(views, 0)[:, :, None], axis=2)[:, :, 0]) & (views >= 0)
@@ -72,7 +72,7 @@ def _matched(
                 continue
             there = truth.views.visible[:, row.frame - 1, column]
             overlap = iou(truth.boxes[:, row.frame - 1, column], np.array(row.box)[None])
-            matched = there & (np.nan_to_num(overlap) >= LEAST_IOU)
+            matched = there & (np.nan_to_num(overlap) >= MIN_IOU)
             for person in np.flatnonzero(matched):
                 by_selection = person_of.get(row.id) == truth.people[person]
                 (own if by_selection else others)[person, row.frame - 1] = True

@@ -4,10 +4,10 @@
     python -m benchmarks.fuzz --target bus-sessions --first 5000 --inputs 5000
     python -m benchmarks.fuzz --replay out/fuzz/mot-text.ValueError-read_rows.1.bin
 
-A wrong input must be refused with one clear line, or counted and dropped. Anything else is a crash: another
-exception, a traceback in a response or in the log, status 500, two seconds of processor time, 200 MB more
-memory, a process that dies. Inputs are made from their number and --seed, so every run has the same ones. An
-input may be a script of many messages, which are all counted.
+An invalid input must be refused with a one-line error, or counted and dropped. Anything else is a crash:
+another exception, a traceback in a response or in the log, status 500, two seconds of processor time, 200 MB
+more memory, or the death of the process. Inputs are reproducible from their number and --seed. An input may
+be a script of many messages, which are all counted.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PARTS = {
 }
 """The module that lists the targets of each part."""
 MESSAGES = 1_000_000
-_COLUMNS = ("target", "inputs", "messages", "a second", "refused", "accepted", "crashes", "kinds of crash")
+_COLUMNS = ("target", "inputs", "messages", "per second", "refused", "accepted", "crashes", "kinds of crash")
 
 
 def targets_of(part: str) -> tuple[type[Target], ...]:
@@ -50,7 +50,7 @@ def targets_of(part: str) -> tuple[type[Target], ...]:
 def run_parallel(
     targets: Sequence[type[Target]], plan: FuzzPlan, jobs: int
 ) -> Iterator[tuple[int, TargetResult]]:
-    """Run targets, `jobs` at a time; yield each one's place and result, as they end."""
+    """Run targets in `jobs` processes; yield the index and result of each as it ends."""
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
         running = {pool.submit(_run, target, plan): place for place, target in enumerate(targets)}
         for done in as_completed(running):
@@ -65,12 +65,12 @@ def replay(path: Path) -> int:
     """Feed a saved input again; return 1 if it still crashes."""
     name = path.name.split(".")[0]
     part = name.split("-", maxsplit=1)[0]
-    kind = (
+    target_type = (
         next((target for target in targets_of(part) if target.name == name), None) if part in PARTS else None
     )
-    if kind is None:
-        sys.exit(f"{path}: no saved input of this name; they are called TARGET.KIND.NUMBER.bin")
-    target = kind()
+    if target_type is None:
+        sys.exit(f"{path}: not a saved input; their names are TARGET.KIND.NUMBER.bin")
+    target = target_type()
     feeder = InputFeeder(target)
     with feeder.watching():
         found = feeder.feed(path.read_bytes())
@@ -94,16 +94,16 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__.splitlines()[0])
     options.add_argument("--part", action="append", choices=PARTS, help="only this one; may be repeated")
     options.add_argument("--target", action="append", help="only this one of a part; may be repeated")
-    options.add_argument("--messages", type=int, help=f"of each target; {MESSAGES} by default")
-    options.add_argument("--inputs", type=int, help="of each target, regardless of messages")
+    options.add_argument("--messages", type=int, help=f"per target; {MESSAGES} by default")
+    options.add_argument("--inputs", type=int, help="per target, regardless of messages")
     options.add_argument("--first", type=int, default=0, help="the number of the first input")
-    options.add_argument("--seconds", type=float, help="of each target at most")
+    options.add_argument("--seconds", type=float, help="maximum per target")
     options.add_argument(
-        "--jobs", type=int, default=len(os.sched_getaffinity(0)), help="targets at a time, a process each"
+        "--jobs", type=int, default=len(os.sched_getaffinity(0)), help="number of parallel targets"
     )
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--out", type=Path, default=ROOT / "out" / "fuzz", help="folder for crashing inputs")
-    options.add_argument("--replay", type=Path, metavar="FILE", help="only feed this input again")
+    options.add_argument("--replay", type=Path, metavar="FILE", help="only feed this saved input")
     chosen = options.parse_args()
     if chosen.replay is not None:
         sys.exit(replay(chosen.replay))

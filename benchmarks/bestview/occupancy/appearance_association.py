@@ -1,8 +1,8 @@
-"""Identity assignment after people met: paths ignore appearance, so ids are reassigned by color.
+"""Identity assignment by color after people meet, since the paths ignore appearance.
 
-The occupancy map says that a person is there, not who. Where paths meet, the shortest ones go straight on or
-swap by chance. As in Fleuret et al. (section 4) each person has a color model in each camera, learned where
-they stand apart; after a meeting ids go to the paths with the most similar appearance.
+The occupancy map does not identify people: where paths meet, the shortest paths may swap people. As in
+Fleuret et al. (section 4), each person has a color model per camera, learned while they are apart; after a
+meeting, ids are assigned to the paths with the most similar appearance.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class MeetingSettings:
-    """When people meet, and when their ids are swapped afterwards.
+    """Parameters of meetings, and of swapping ids after them.
 
     Attributes:
         near: distance of a meeting, in person heights.
         margin: Bhattacharyya distance by which a swap must be better than keeping the ids.
-        least_pixels: unoccluded foreground in one camera from which its histogram counts.
-        most_frames: frames after a meeting over which appearance is accumulated.
+        min_pixels: unoccluded foreground in one camera from which its histogram counts.
+        max_frames: frames after a meeting over which appearance is accumulated.
     """
 
     near: float = 0.4
     margin: float = 0.02
-    least_pixels: float = 500.0
-    most_frames: int = 250
+    min_pixels: float = 500.0
+    max_frames: int = 250
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,13 +75,13 @@ class _AppearanceSums:
         return _AppearanceSums(self.rows + other.rows, self.pixels + other.pixels)
 
     def distance(self, other: _AppearanceSums, least: float) -> float:
-        """Return the mean Bhattacharyya distance over the cameras that saw both; NaN: none did."""
+        """Return the mean Bhattacharyya distance over the cameras with both; NaN without any."""
         known = (self.pixels >= least) & (other.pixels >= least)
         if not known.any():
             return float("nan")
-        one = self.rows[known] / self.pixels[known][:, None]
-        two = other.rows[known] / other.pixels[known][:, None]
-        similarity = np.sqrt(one * two).sum(axis=1)
+        first = self.rows[known] / self.pixels[known][:, None]
+        second = other.rows[known] / other.pixels[known][:, None]
+        similarity = np.sqrt(first * second).sum(axis=1)
         return float(np.sqrt(np.maximum(1.0 - similarity, 0.0)).mean())
 
 
@@ -123,9 +123,9 @@ def assign_ids(paths: Sequence[PathAppearance], person: float, settings: Meeting
             last_seen[path] = meeting.end
         for column, path in enumerate(continuing):
             later = (meeting.begin for meeting in meetings[place + 1 :] if path in meeting.members)
-            end = min(next(later, paths[path].end), meeting.end + settings.most_frames)
+            end = min(next(later, paths[path].end), meeting.end + settings.max_frames)
             after = paths[path].sum_over(meeting.end, end)
-            distance[:, column] = [known[number].distance(after, settings.least_pixels) for number in ids]
+            distance[:, column] = [known[number].distance(after, settings.min_pixels) for number in ids]
         if len(continuing) < 2 or np.isnan(distance).any():
             continue
         rows, columns = linear_sum_assignment(distance - settings.margin * np.eye(len(continuing)))
@@ -151,11 +151,11 @@ def _meetings(paths: Sequence[PathAppearance], near: float) -> list[_Meeting]:
                 found.append(_Meeting(begin + start, begin + stop, frozenset((one, other))))
     merged: list[_Meeting] = []
     for meeting in sorted(found, key=lambda meeting: (meeting.begin, meeting.end, sorted(meeting.members))):
-        it = meeting
+        union = meeting
         for before in list(merged):
-            if before.members & it.members and before.end >= it.begin:
+            if before.members & union.members and before.end >= union.begin:
                 merged.remove(before)
-                span = min(before.begin, it.begin), max(before.end, it.end)
-                it = _Meeting(*span, before.members | it.members)
-        merged.append(it)
+                span = min(before.begin, union.begin), max(before.end, union.end)
+                union = _Meeting(*span, before.members | union.members)
+        merged.append(union)
     return sorted(merged, key=lambda meeting: (meeting.begin, meeting.end, sorted(meeting.members)))

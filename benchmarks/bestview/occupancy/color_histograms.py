@@ -1,4 +1,4 @@
-"""Color histograms of the people on paths, in every frame of a camera, where they are not occluded."""
+"""Color histograms of the unoccluded parts of people on paths, in each frame of a camera."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.boxes import Floats
 from tracking.detectors.color_histogram import AppearanceSettings, color_histograms
 
 _EVERY = 2
-"""Every so many frames one is used."""
+"""One frame in so many is used."""
 _BINS = AppearanceSettings().color_bins
 
 

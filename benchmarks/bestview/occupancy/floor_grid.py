@@ -1,4 +1,4 @@
-"""The grid of ground places where a person may stand, and the box of a person there in every camera."""
+"""The grid of ground positions of people, and the box of a person at each position in each camera."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tracking.detectors.background.height_model import HeightModel
 
 Ints = NDArray[np.int64]
 _BEYOND = 0.25
-"""Share of the picture's height by which people may stand below it, as MyView's detector has it."""
+"""Share of the picture's height by which people may stand below it, as in MyView's detector."""
 _SAMPLES = 40
 """Points along each side of a picture that are projected to find the ground in view."""
 
@@ -26,18 +26,18 @@ class GridSettings:
     """The grid on the ground. Lengths are in person heights.
 
     Attributes:
-        step: between neighboring places; 0.15 is a quarter of a metre, the paper's.
+        step: between neighboring places; 0.15 is a quarter of a meter, as in the paper.
         aspect: width of a person over their height in the picture.
-        least_seen: share of a person that must be inside some picture and not ignored.
+        min_visible: share of a person that must be inside some picture and not ignored.
         gate: distance from the border of the visible ground within which people enter and leave.
-        most_places: limit; the step grows where there would be more.
+        max_places: limit of the number of places, enforced by a larger step.
     """
 
     step: float = 0.15
     aspect: float = 0.34
-    least_seen: float = 0.5
+    min_visible: float = 0.5
     gate: float = 0.3
-    most_places: int = 4000
+    max_places: int = 4000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +127,7 @@ def build_grid(views: Sequence[CameraView], settings: GridSettings) -> FloorGrid
     step = settings.step * person
     while True:
         mesh, inside = _mesh(views, ground_points, step, settings)
-        if np.count_nonzero(inside) <= settings.most_places:
+        if np.count_nonzero(inside) <= settings.max_places:
             break
         step *= 1.1
     number = np.full((inside.shape[0] + 2, inside.shape[1] + 2), np.count_nonzero(inside), dtype=np.int64)
@@ -150,4 +150,4 @@ def _mesh(
     mesh = np.stack([x, y], axis=-1)
     flat = mesh.reshape(-1, 2)
     visible_share = np.max([view.visible_share(view.boxes(flat, settings.aspect)) for view in views], axis=0)
-    return mesh, (visible_share >= settings.least_seen).reshape(x.shape)
+    return mesh, (visible_share >= settings.min_visible).reshape(x.shape)

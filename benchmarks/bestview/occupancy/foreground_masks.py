@@ -1,4 +1,4 @@
-"""The foreground masks of MyView's own detector, frame by frame."""
+"""The foreground masks of MyView's detector, frame by frame."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class ForegroundMasks:
 
 
 class CannotMapError(Exception):
-    """No occupancy map can be made; the text says why."""
+    """No occupancy map can be computed; the text gives the reason."""
 
 
 def compute_masks(config: Config, camera: str) -> ForegroundMasks:
     """Detect people in a recording as a camera process does, and keep the foreground.
 
     Raises:
-        CannotMapError: the detector is no background detector, or never learns the heights of people.
+        CannotMapError: the detector is not the background detector, or never learns the heights of people.
     """
     pipeline = CameraPipeline(config, camera)
     detector = pipeline._detector  # noqa: SLF001 — its boxes come from these masks

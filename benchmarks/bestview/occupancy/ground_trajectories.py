@@ -1,4 +1,4 @@
-"""From paths over the grid to trajectories on the ground and boxes in the pictures."""
+"""Conversion of grid paths to trajectories on the ground and boxes in the pictures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.bestview.occupancy.shortest_paths import GridPath
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
-_LEAST = 1e-9
+_MIN_WEIGHT = 1e-9
 """Weight of the path's own place, so that the weights never sum to zero."""
 
 
@@ -23,12 +23,12 @@ class TrajectorySettings:
     Attributes:
         smooth_s: seconds over which places are averaged, on either side.
         aspect: width of a box over its height, with arms and steps; the map's rectangle has only the torso.
-        least_seen: share of a box that must be in the picture.
+        min_visible: share of a box that must be in the picture.
     """
 
     smooth_s: float = 0.5
     aspect: float = 0.4
-    least_seen: float = 0.3
+    min_visible: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ def trajectory_of(floor: FloorGrid, q: Floats, path: GridPath, reach: int) -> Gr
     valid = neighbors < len(floor.places)
     near = np.where(valid, neighbors, 0)
     weight = np.where(valid, q[frames[:, None], near], 0.0)
-    weight += _LEAST * (near == path.places[:, None])
+    weight += _MIN_WEIGHT * (near == path.places[:, None])
     places = (weight[..., None] * floor.places[near]).sum(axis=1) / weight.sum(axis=1)[:, None]
     return GroundTrajectory(path.first, moving_average(np.asarray(places), reach))
 
@@ -73,7 +73,7 @@ def rows_of(
         whole = np.clip(np.nan_to_num(boxes), 0.0, [width, height, width, height])
         area = np.nan_to_num((boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1]), nan=np.inf)
         inside = (whole[:, 2] - whole[:, 0]) * (whole[:, 3] - whole[:, 1])
-        for place in np.flatnonzero((inside > 0.0) & (inside >= settings.least_seen * area)).tolist():
+        for place in np.flatnonzero((inside > 0.0) & (inside >= settings.min_visible * area)).tolist():
             left, top, right, bottom = whole[place].tolist()
             frame = trajectory.first + place + 1
             rows.append(MotRow(frame, int(number[place]), left, top, right - left, bottom - top))

@@ -16,7 +16,7 @@ from tracking.motchallenge import MotRow
 _GATE = 0.5
 """Largest distance, in person heights, of two cameras' foot points of one person."""
 _ROUNDS = 5
-_LEAST_PAIRS = 20
+_MIN_PAIRS = 20
 
 
 def align_homographies(
@@ -24,8 +24,8 @@ def align_homographies(
 ) -> dict[str, Floats]:
     """Return the homographies, each with its ground shifted; the shifts sum to zero.
 
-    Foot points of two cameras that are each other's nearest in a frame are taken as one person's. The shifts
-    fit the median difference of each pair of cameras, by least squares.
+    Mutually nearest foot points of two cameras in a frame are assumed to be one person. The shifts fit the
+    median difference of each pair of cameras by least squares.
 
     Args:
         boxes: each camera's detections.
@@ -47,7 +47,7 @@ def align_homographies(
                 shifts[one] - shifts[other],
                 _GATE * person,
             )
-            if len(pairs) < _LEAST_PAIRS:
+            if len(pairs) < _MIN_PAIRS:
                 continue
             root = np.sqrt(len(pairs))
             row = np.zeros(len(cameras))
@@ -57,10 +57,10 @@ def align_homographies(
         if rows:
             # The minimum-norm solution: shifts of cameras that share ground sum to zero.
             shifts = np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)[0]
-    moved = {}
+    aligned = {}
     for camera, (x, y) in zip(cameras, shifts, strict=True):
-        moved[camera] = np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]]) @ ground[camera]
-    return moved
+        aligned[camera] = np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]]) @ ground[camera]
+    return aligned
 
 
 def _foot_points(rows: list[MotRow], homography: Floats, height: int) -> dict[int, Floats]:

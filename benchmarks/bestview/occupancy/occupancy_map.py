@@ -1,7 +1,7 @@
 """A probabilistic occupancy map of the ground in one frame, from all cameras' foreground.
 
 Fleuret, Berclaz, Lengagne and Fua, "Multicamera people tracking with a probabilistic occupancy map", IEEE
-PAMI 2008, section 5 and appendix. The symbols are theirs.
+PAMI 2008, section 5 and appendix, whose symbols are used.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats
 
 Plane = NDArray[np.float64]
-_SUREST = 1e-6
-"""No probability gets nearer to 0 or 1, so that the iteration can still change it."""
+_MIN_PROBABILITY = 1e-6
+"""Distance of probabilities from 0 and 1, so that the iteration can still change them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +72,9 @@ class OccupancyMap:
     def compute(self, observations: Sequence[ForegroundObservation]) -> Floats:
         """Return the probabilities (L,), the fixed point of the paper's mean field (its equation 15).
 
-        With A_c the picture of all rectangles where somebody is, expected under q, and B_c the foreground,
-        `q_i = 1 / (1 + exp(log((1 - prior) / prior) + sum_c Psi(B_c, E[A_c | X_i = 1]) -
-        Psi(B_c, E[A_c | X_i = 0])))`, where `Psi(B, A) = |B (1 - A) + (1 - B) A| / (sigma |A|)`.
+        With A_c the picture of the rectangles of all present people, expected under q, and B_c the
+        foreground, `q_i = 1 / (1 + exp(log((1 - prior) / prior) + sum_c Psi(B_c, E[A_c | X_i = 1]) - Psi(B_c,
+        E[A_c | X_i = 0])))`, where `Psi(B, A) = |B (1 - A) + (1 - B) A| / (sigma |A|)`.
         """
         settings = self._settings
         cameras = [
@@ -86,7 +86,7 @@ class OccupancyMap:
         for _ in range(settings.iterations):
             energy_difference = sum(camera.energy_difference(q) for camera in cameras) / settings.sigma
             answer = 1.0 / (1.0 + np.exp(np.clip(before + energy_difference, -500.0, 500.0)))
-            change = settings.step * (np.clip(answer, _SUREST, 1.0 - _SUREST) - q)
+            change = settings.step * (np.clip(answer, _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY) - q)
             q = q + change
             if np.abs(change).max(initial=0.0) < settings.settled:
                 break
@@ -123,7 +123,7 @@ class _Camera:
         empty, unexplained = uncovered * self._weight, uncovered * self._foreground
         area = self._all - float(empty.sum())
         distance = self._foreground_area + area - 2.0 * (self._foreground_area - float(unexplained.sum()))
-        # What a rectangle adds to the area and the distance when it is surely covered instead.
+        # The change of area and distance if a rectangle is certainly covered.
         added_area, added_distance = self._inside(empty), self._inside(empty - 2.0 * unexplained)
         odds = q / (1.0 - q)
         occupied_distance = (distance + added_distance) / np.maximum(area + added_area, self._least)

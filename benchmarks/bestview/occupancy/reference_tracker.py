@@ -43,7 +43,7 @@ class PathSettings:
     Attributes:
         doubt: probabilities are clipped to this distance from 0 and 1, which bounds the weight of one frame.
         gate_cost: of entering, and of leaving, at the border of the visible ground.
-        inside_cost: the same anywhere else, which the paper does not allow.
+        inside_cost: likewise anywhere else, which the paper does not allow.
     """
 
     doubt: float = 0.001

@@ -1,4 +1,4 @@
-"""Targets for messages from the bus: one by one, and whole sessions of a site up to its viewers' media."""
+"""Targets for messages from the bus: single ones, and whole sessions of a site up to its viewers' media."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from benchmarks.fuzz.engine.fed_site import (
     video,
 )
 from benchmarks.fuzz.engine.target import ScriptTarget, Target
-from server.camera.operator_corrections import CorrectionInbox as PointedAt
+from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_buffer import PeerDetectionBuffer
 from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.http.api.responses import cameras_info, objects_info, site_info
@@ -69,7 +69,7 @@ class IngestMessages(Target):
     def make(self, rng: Random) -> bytes:
         """Return a message."""
         pulse = rng.randrange(10)
-        right = rng.choice(
+        message = rng.choice(
             (
                 lambda: video("c0", self._pictures[pulse]),
                 lambda: tracks(make_tracks(rng, "c0", pulse)),
@@ -78,23 +78,23 @@ class IngestMessages(Target):
                 lambda: sound(pulse),
             )
         )()
-        sent = damaged_message(rng, right) if rng.random() < 0.95 else right
+        sent = damaged_message(rng, message) if rng.random() < 0.95 else message
         return _packed([(sent.key.encode("utf-8", "replace").decode(), sent.payload, sent.attachment)])
 
     def feed(self, data: bytes) -> bool:
-        """Handle the message, and take the epoch that it may complete."""
+        """Handle the message, and the epoch that it may complete."""
         stream_format = StreamFormat()
         frame_buffers = {camera: FrameBuffer(FPS, 50, stream_format) for camera in CAMERAS}
         aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
-        frame_buffer = AudioBuffer(self._form, FPS, 10.0)
-        ingest = Ingest(frame_buffers, aligner, lambda *_: None, frame_buffer, audio_camera=CAMERAS[0])
+        audio_buffer = AudioBuffer(self._form, FPS, 10.0)
+        ingest = Ingest(frame_buffers, aligner, lambda *_: None, audio_buffer, audio_camera=CAMERAS[0])
         handlers = (ingest.video, ingest.tracks, ingest.status, ingest.thumbnail)
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)
             if key == KEYS.sound:
                 ingest.audio(message)
-            for what, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
-                if f"/{what}" in key:
+            for topic, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
+                if f"/{topic}" in key:
                     handle(message)
         aligner.ready(now=100)
         ingest.forget_thumbnails_before(1)
@@ -126,9 +126,9 @@ class PeerMessages(ScriptTarget):
         for pulse, (_, payload, _) in enumerate(_script.decode(data)):
             self.messages += 1
             # The bus delivers only the subscribed key.
-            heard = self._exchange._decode(Message(KEYS.camera("c1", "detections"), payload, b""))
-            if heard is not None and heard.camera == "c1":
-                buffer.put(heard, 0.0)
+            received = self._exchange._decode(Message(KEYS.camera("c1", "detections"), payload, b""))
+            if received is not None and received.camera == "c1":
+                buffer.put(received, 0.0)
             buffer.expect(pulse, 1.0)
             buffer.is_missing(pulse)
             buffer.give_up(pulse)
@@ -155,12 +155,12 @@ class OperatorPlaces(ScriptTarget):
 
     def feed(self, data: bytes) -> bool:
         """Handle the messages."""
-        heard = PointedAt("c0", 1)
+        inbox = CorrectionInbox("c0", 1)
         for key, payload, _ in _script.decode(data):
             self.messages += 1
-            heard.put(Message(key, payload, b""))
-            assert len(heard.take()) <= CORRECTIONS_MAX
-        return not heard.bad_messages
+            inbox.put(Message(key, payload, b""))
+            assert len(inbox.take()) <= CORRECTIONS_MAX
+        return not inbox.bad_messages
 
 
 class SiteSessions(ScriptTarget):
@@ -177,7 +177,7 @@ class SiteSessions(ScriptTarget):
         """Return some hundred messages, some of them damaged."""
         script: Script = []
         share = rng.choice((0.0, 0.02, 0.02, 0.1, 0.5))
-        only_one = rng.random() < 0.5
+        only_second_camera = rng.random() < 0.5
         for epoch in range(_EPOCHS):
             messages = [sound(epoch)]
             for seed, camera in enumerate(CAMERAS):
@@ -190,7 +190,7 @@ class SiteSessions(ScriptTarget):
                     thumbnail(camera, epoch),
                 ]
             for message in messages:
-                if rng.random() >= share or (only_one and "c1" not in message.key):
+                if rng.random() >= share or (only_second_camera and "c1" not in message.key):
                     sent = [message]
                 else:
                     sent = rng.choice(

@@ -23,7 +23,7 @@ _script = msgspec.msgpack.Decoder(tuple[int, list[tuple[str, bytes]]])
 
 
 class RetainedStates(ScriptTarget):
-    """Identity snapshots of cameras: valid, damaged, or of other people."""
+    """Target for identity snapshots: valid, damaged, or of other people."""
 
     name = "bus-retained-state"
 
@@ -43,8 +43,8 @@ class RetainedStates(ScriptTarget):
                 people=[self._person_snapshot(rng) for _ in range(rng.randrange(4))],
             )
             message = Message(KEYS.camera(camera, "retained_identities"), msgspec.json.encode(snapshot), b"")
-            replication = damaged_message(rng, message) if rng.random() < 0.5 else message
-            script.append((replication.key, replication.payload))
+            sent = damaged_message(rng, message) if rng.random() < 0.5 else message
+            script.append((sent.key, sent.payload))
         return msgspec.msgpack.encode((rng.randrange(1000), script))
 
     @staticmethod
@@ -80,7 +80,7 @@ class RetainedStates(ScriptTarget):
             replication.begin(last)
             track_messages = [make_tracks(rng, camera, last // STRIDE) for camera in CAMERAS]
             people.update(
-                Epoch(last // STRIDE, last, {snapshot.camera: snapshot for snapshot in track_messages})
+                Epoch(last // STRIDE, last, {message.camera: message for message in track_messages})
             )
             replication.advance(last)
             assert not set(people.registry.merged) & set(people.registry.everybody), (

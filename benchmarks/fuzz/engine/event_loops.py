@@ -1,8 +1,7 @@
 """Event loops for fuzzing: one skips waiting times, one has no threads.
 
-The first advances its clock to the next timeout when nothing is ready. So timeouts of two seconds pass at
-once, over real sockets, regardless of the machine's load. Threads are waited for as usual, and child
-processes for a while.
+The first advances its clock to the next timeout when nothing is ready, so that timeouts pass immediately,
+even with real sockets and on a busy machine. It waits normally for threads, and briefly for child processes.
 """
 
 from __future__ import annotations
@@ -14,20 +13,20 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-_AWHILE_S = 1.0
+_PROCESS_WAIT_S = 1.0
 _AT_ONCE = struct.pack("ii", 1, 0)
 
 
 class _TimeSkippingSelector(selectors.DefaultSelector):
-    """A selector that skips the waiting: timeouts pass at once, without wall-clock time."""
+    """A selector that skips waiting times: timeouts pass without wall-clock time."""
 
     def __init__(self) -> None:
         super().__init__()
         self.skipped = 0.0
         self.threads = 0
-        """Running threads, which are waited for."""
+        """Number of running threads, for which the selector waits."""
         self.processes = 0
-        """Running child processes, which are waited for a while, since they may be idle."""
+        """Number of running child processes, for which it waits briefly, since they may be idle."""
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """Return what is ready now; if nothing is, skip the timeout.
@@ -39,7 +38,7 @@ class _TimeSkippingSelector(selectors.DefaultSelector):
             return ready
         if timeout is None or self.threads:
             return super().select(timeout)
-        if self.processes and (ready := super().select(min(timeout, _AWHILE_S))):
+        if self.processes and (ready := super().select(min(timeout, _PROCESS_WAIT_S))):
             return ready
         self.skipped += timeout
         return []
@@ -63,7 +62,7 @@ class TimeSkippingLoop(asyncio.SelectorEventLoop):
     def run_in_executor(  # type: ignore[override]  # any arguments
         self, executor: Any, func: Callable[..., Any], *args: Any
     ) -> asyncio.Future[Any]:
-        """Run a function in a thread, which is waited for."""
+        """Run a function in a thread, for which the loop waits."""
         future = super().run_in_executor(executor, func, *args)
         self._skipping_selector.threads += 1
         future.add_done_callback(self._thread_done)
@@ -85,7 +84,7 @@ class TimeSkippingLoop(asyncio.SelectorEventLoop):
 
 
 class InlineExecutorLoop(asyncio.SelectorEventLoop):
-    """An event loop that runs executor functions at once in its own thread."""
+    """An event loop that runs executor functions synchronously."""
 
     def run_in_executor(  # type: ignore[override]  # any arguments
         self, _: Any, func: Callable[..., Any], *args: Any
@@ -94,11 +93,11 @@ class InlineExecutorLoop(asyncio.SelectorEventLoop):
         future = self.create_future()
         try:
             future.set_result(func(*args))
-        except Exception as error:  # noqa: BLE001 — whoever waits for it gets it
+        except Exception as error:  # noqa: BLE001 — passed on to the caller
             future.set_exception(error)
         return future
 
 
 def skip_time_wait(connection: socket.socket) -> None:
-    """Let a connection skip TIME_WAIT when closed: a million of them would use up all ports."""
+    """Let a connection skip TIME_WAIT when closed: a million of them would use up the ports."""
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)

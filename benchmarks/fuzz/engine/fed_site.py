@@ -69,10 +69,10 @@ def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> 
     """Encode pictures that differ by camera (seed) and by frame."""
     encoder = Encoder(SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, codec=codec))
     rng = np.random.default_rng(seed)
-    made = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
+    images = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
     return tuple(
         encoder.encode(pulse, np.repeat(np.repeat(picture, 8, axis=0), 8, axis=1))
-        for pulse, picture in enumerate(made)
+        for pulse, picture in enumerate(images)
     )
 
 
@@ -134,7 +134,7 @@ def _track(rng: Random, person: int, first: int) -> TrackMessage:
 
 
 def make_separate_tracks(rng: Random, camera: str, epoch: int) -> CameraTracks:
-    """Return a track message with one person, who is in view of this camera only."""
+    """Return a track message with one person who is visible to this camera only."""
     number, first = CAMERAS.index(camera), epoch * STRIDE
     boxes = [(4.0 + 40 * number, 10.0 + 8 * number, 14.0 + 40 * number, 34.0 + 8 * number)] * STRIDE
     appearance = [
@@ -205,11 +205,11 @@ class FedService(BestViewPipeline):
         if message.key == KEYS.sound:
             self.ingest.audio(message)
         parts = message.key.split("/")
-        what = parts[4] if len(parts) > 4 else ""
-        if what == "alive":
+        topic = parts[4] if len(parts) > 4 else ""
+        if topic == "alive":
             self.ingest.alive(message.key, is_present=message.payload == b"1")
-        elif what in self._handlers:
-            self._handlers[what](message)
+        elif topic in self._handlers:
+            self._handlers[topic](message)
 
     @property
     def dropped(self) -> int:

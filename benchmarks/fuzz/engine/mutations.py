@@ -41,11 +41,11 @@ WORDS = (
     b"\xff\xff\xff\xff",
     b"\x00\x00\x00\x01",
 )
-"""Typical troublemakers: invalid text, invalid and huge numbers, nesting."""
+"""Typical problematic input: invalid text, invalid and huge numbers, deep nesting."""
 
 _DIGIT = re.compile(rb"[0-9]")
 _SPAN = 24
-_MOST_BYTES = 100_000
+_MAX_BYTES = 100_000
 _DEEP = 60
 
 _ODD: tuple[Callable[[Random], Any], ...] = (
@@ -74,7 +74,7 @@ def mutate_bytes(rng: Random, data: bytes, words: Sequence[bytes] = WORDS) -> by
     """Return the bytes with one to four mutations."""
     for _ in range(rng.choice((1, 1, 1, 2, 2, 3, 4))):
         data = rng.choice(_BYTE_MUTATIONS)(rng, data, words)
-    return data[:_MOST_BYTES]
+    return data[:_MAX_BYTES]
 
 
 def odd(rng: Random) -> Any:
@@ -91,7 +91,7 @@ def nested(depth: int) -> Any:
 
 
 def mutate_value(rng: Random, value: Any) -> Any:
-    """Return a copy of a value with one mutation: an odd value, a missing, doubled or retyped part."""
+    """Return a copy of a value with one mutation: an unexpected, missing, duplicated or retyped part."""
     if isinstance(value, dict) and value and rng.random() < _DESCEND:
         key = rng.choice(list(value))
         return {**value, key: mutate_value(rng, value[key])}
@@ -138,8 +138,8 @@ def odd_key(rng: Random) -> str:
 
 
 def _without_key(rng: Random, value: dict[str, Any]) -> dict[str, Any]:
-    gone = rng.choice(list(value)) if value else ""
-    return {key: item for key, item in value.items() if key != gone}
+    removed = rng.choice(list(value)) if value else ""
+    return {key: item for key, item in value.items() if key != removed}
 
 
 def as_json(value: Any) -> bytes:

@@ -1,4 +1,4 @@
-"""Runs a target over many inputs in a child process, which may hang, grow or die."""
+"""Runs a target on many inputs in a child process, which may hang, leak or die."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pathlib import Path
 from random import Random
 from types import FrameType
 
-from benchmarks.fuzz.engine.shared_counts import ROOM, InputCounts, SharedCounts
+from benchmarks.fuzz.engine.shared_counts import MAX_INPUT_BYTES, InputCounts, SharedCounts
 from benchmarks.fuzz.engine.target import Target
 
 HANG_S = 2.0
@@ -27,8 +27,8 @@ HANG_S = 2.0
 STUCK_S = 60.0
 """Wall-clock seconds after which the process is killed."""
 GROWTH_MB = 200
-"""Megabytes that the process may grow by within one input."""
-DEAD, MOST_MB = "died", 4096
+"""Memory growth allowed for one input, megabytes."""
+DEAD, MAX_MB = "died", 4096
 _KEPT = 3
 """Saved inputs of each kind of crash."""
 
@@ -87,7 +87,7 @@ class InputFeeder:
         root.handlers[:] = [self._log]
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that are too large
+                warnings.simplefilter("ignore", RuntimeWarning)  # from excessive numbers
                 yield
         finally:
             root.handlers[:] = handlers
@@ -99,7 +99,7 @@ class InputFeeder:
         self._log.last = None
         signal.setitimer(signal.ITIMER_PROF, self._hang_s)
         try:
-            taken = self.target.hand_over(data)
+            accepted = self.target.hand_over(data)
             signal.setitimer(signal.ITIMER_PROF, 0)
             if self._log.last is not None:
                 return Crash(_logged(self._log.last), self._log.last)
@@ -108,7 +108,7 @@ class InputFeeder:
             signal.setitimer(signal.ITIMER_PROF, 0)
             self._peak_mb = _read_peak_mb()
             return Crash(_kind(error), "".join(traceback.format_exception(error)))
-        return taken
+        return accepted
 
     def _check_growth(self) -> None:
         most = _read_peak_mb()
@@ -127,12 +127,12 @@ def _raise_hang(_: int, __: FrameType | None) -> None:
 
 
 def _kind(error: BaseException) -> str:
-    """Name a crash by its exception and place, so that crashes of one kind have one cause."""
+    """Name a crash by its exception and place in the code, which identify its cause."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [
+    own_frames = [
         frame for frame in frames if "site-packages" not in frame.filename and "fuzz_" not in frame.filename
     ]
-    place = ours[-1] if ours else frames[-1] if frames else None
+    place = own_frames[-1] if own_frames else frames[-1] if frames else None
     where = "" if place is None else f"{Path(place.filename).stem}-{place.name.strip('<>')}"
     return f"{type(error).__name__}-{where}"
 
@@ -146,13 +146,13 @@ def _logged(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FuzzPlan:
-    """Which inputs to run, and the bounds; the first one that is reached ends the run."""
+    """The inputs to run, and the bounds; the first bound that is reached ends the run."""
 
     inputs: int | None = None
     seconds: float | None = None
     seed: int = 1
     out: Path | None = None
-    """The folder for crashes; None: they are not saved."""
+    """The folder for crashes; None: do not save them."""
     hang_s: float = HANG_S
     messages: int | None = None
     first: int = 0
@@ -161,8 +161,8 @@ class FuzzPlan:
     def done(self, counts: InputCounts) -> bool:
         """Return whether a bound is reached."""
         return any(
-            most is not None and so_far >= most
-            for so_far, most in ((counts.inputs, self.inputs), (counts.messages, self.messages))
+            limit is not None and count >= limit
+            for count, limit in ((counts.inputs, self.inputs), (counts.messages, self.messages))
         )
 
 
@@ -179,7 +179,7 @@ class TargetRunner:
         self._kinds: dict[str, int] = {}
 
     def run(self) -> TargetResult:
-        """Run the target in child processes; one that dies or grows is replaced."""
+        """Run the target in child processes, replacing those that die or leak."""
         began = time.monotonic()
         shared, fork, counts = SharedCounts(), multiprocessing.get_context("fork"), InputCounts()
         until = None if self._plan.seconds is None else began + self._plan.seconds
@@ -202,7 +202,7 @@ class TargetRunner:
         return TargetResult(counts, time.monotonic() - began, len(self._kinds))
 
     def _wait(self, child: multiprocessing.process.BaseProcess, shared: SharedCounts) -> str | None:
-        """Wait for a process; return how it died, None: it did not."""
+        """Wait for a process; return how it died, or None if it exited normally."""
         last, since = -1, time.monotonic()
         while child.is_alive():
             child.join(1.0)
@@ -223,7 +223,7 @@ class TargetRunner:
         self, shared: SharedCounts, until: float | None, kinds: multiprocessing.queues.SimpleQueue[str]
     ) -> None:
         counts = shared.counts
-        resource.setrlimit(resource.RLIMIT_AS, (MOST_MB << 20, MOST_MB << 20))
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_MB << 20, MAX_MB << 20))
         target = self._make()
         feeder, first, growth = InputFeeder(target, self._plan.hang_s), counts.inputs, False
         before = counts.messages - target.messages
@@ -232,7 +232,7 @@ class TargetRunner:
             while not growth and not self._plan.done(counts):
                 if until is not None and time.monotonic() > until and counts.inputs > first:
                     break
-                data = make_input(target, self._plan.seed, self._plan.first + counts.inputs)[:ROOM]
+                data = make_input(target, self._plan.seed, self._plan.first + counts.inputs)[:MAX_INPUT_BYTES]
                 shared.store(counts, data)
                 match feeder.feed(data):
                     case Crash() as crash:

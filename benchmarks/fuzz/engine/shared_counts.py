@@ -6,7 +6,7 @@ import mmap
 import struct
 from dataclasses import dataclass
 
-ROOM = 1 << 20
+MAX_INPUT_BYTES = 1 << 20
 """Largest size of an input, bytes."""
 _HEAD = struct.Struct("<6Q")
 
@@ -27,7 +27,7 @@ class SharedCounts:
     """Memory shared with child processes: the counts, and the current input."""
 
     def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, _HEAD.size + ROOM)
+        self._memory = mmap.mmap(-1, _HEAD.size + MAX_INPUT_BYTES)
 
     def store(self, counts: InputCounts, data: bytes = b"") -> None:
         """Store the counts before an input, and the input."""

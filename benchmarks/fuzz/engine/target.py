@@ -1,4 +1,4 @@
-"""The base class of targets, which make inputs and feed them to the code under test."""
+"""The base class of targets, which generate inputs and feed them to the code under test."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import ClassVar
 
-_LONGEST = 2000
+_MAX_LENGTH = 2000
 """Longest readable message, characters."""
 
 
@@ -29,8 +29,7 @@ class Target(ABC):
 
     name: ClassVar[str]
     messages = 0
-    """Messages fed so far: lines, requests, access units, files, or whatever is read one by one. Here one per
-    input."""
+    """Number of messages so far: lines, requests, access units or files; by default one per input."""
 
     @abstractmethod
     def make(self, rng: Random) -> bytes:
@@ -68,6 +67,6 @@ def refused(error: BaseException | str) -> bool:
         UnclearError: the message is not one readable line.
     """
     text = str(error)
-    if not text or len(text) > _LONGEST or len(text.splitlines()) > 1 or "Traceback" in text:
+    if not text or len(text) > _MAX_LENGTH or len(text.splitlines()) > 1 or "Traceback" in text:
         raise UnclearError(f"not a clear line: {text[:200]!r}")
     return False

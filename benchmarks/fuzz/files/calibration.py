@@ -1,4 +1,4 @@
-"""Calibration files: marked points as JSON and CSV, the floor plan made of them, and ground.json."""
+"""Targets for calibration files: marked points as JSON and CSV, their floor plan, and ground.json."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ WORDS = (
 )  # fmt: skip
 _DRAWN_EVERY = 8192
 _FEW, _MORE = (4, 4, 5, 6), (3, 8, 16)
-"""Pairs of points; with more than five, all choices of four are tried, which is slow for many."""
-_SELDOM = 1 / 32
+"""Numbers of point pairs; with more than five, all subsets of four are tried, which is slow."""
+_MORE_SHARE = 1 / 32
 _TRUE = np.array([[0.012, 0.001, -3.0], [0.0004, 0.03, -2.0], [0.00001, 0.002, 0.2]])
 
 
 def _pairs(rng: Random) -> list[dict[str, Any]]:
     """Return picture points of a camera above a floor, with their floor points."""
     pairs = []
-    for _ in range(rng.choice(_MORE if rng.random() < _SELDOM else _FEW)):
+    for _ in range(rng.choice(_MORE if rng.random() < _MORE_SHARE else _FEW)):
         x, y = rng.uniform(0, 640), rng.uniform(100, 360)
         right, far, scale = _TRUE @ (x, y, 1.0)
         pairs.append({"image": [round(x, 1), round(y, 1)], "floor": [right / scale, far / scale]})
@@ -100,13 +100,13 @@ class MarkedPoints(_GroundFiles):
     def __init__(self) -> None:
         super().__init__()
         rng = Random(1)
-        self._right = [
+        self._valid = [
             {f"c{camera}": _pairs(rng) for camera in range(rng.choice((1, 1, 2)))} for _ in range(400)
         ]
 
     def make(self, rng: Random) -> bytes:
         """Return a file of points."""
-        return _points(rng, rng.choice(self._right))
+        return _points(rng, rng.choice(self._valid))
 
     def feed(self, data: bytes) -> bool:
         """Read the file, and fit the cameras."""
@@ -121,7 +121,7 @@ class MarkedPoints(_GroundFiles):
 class CalibrationCommand(_GroundFiles):
     """Target for the calibrate command: homographies that the configuration accepts, a plan, printable lines.
 
-    Drawing the plan takes hundreds of times as long as all else: for most it is seen that it could be drawn.
+    Drawing the plan takes hundreds of times as long as the rest, so most plans are only laid out.
     """
 
     name = "calibration-plans"
@@ -131,8 +131,8 @@ class CalibrationCommand(_GroundFiles):
         cameras = {f"c{number}": _pairs(rng) for number in range(rng.choice((1, 2)))}
         content: Any = {"unit": rng.choice(("m", "$x", "", "\n", "\ud800", "$\\frac$")), "cameras": cameras}
         if rng.random() < 0.5:
-            strange = rng.choice(("_c", "$\\frac{", "\ud800", "a\nb", "", "c" * 500, "é"))
-            content["cameras"][strange] = _pairs(rng)
+            odd_name = rng.choice(("_c", "$\\frac{", "\ud800", "a\nb", "", "c" * 500, "é"))
+            content["cameras"][odd_name] = _pairs(rng)
         return as_json(mutate_value(rng, content) if rng.random() < 0.3 else content)
 
     def feed(self, data: bytes) -> bool:
@@ -140,7 +140,7 @@ class CalibrationCommand(_GroundFiles):
         out = self._path / "ground.json"
         drawn = zlib.crc32(data) % _DRAWN_EVERY == 0
         try:
-            with nullcontext() if drawn else patch.object(calibration, "plot_floor_plan", _laid_out):
+            with nullcontext() if drawn else patch.object(calibration, "plot_floor_plan", _lay_out_plan):
                 lines = calibration.calibrate_points(self.written(data), out, self._path / "plan.png", None)
         except UserError as error:
             return refused(error)
@@ -151,7 +151,7 @@ class CalibrationCommand(_GroundFiles):
         return True
 
 
-def _laid_out(views: Sequence[FloorPlanCamera], unit: str, _: object) -> None:
+def _lay_out_plan(views: Sequence[FloorPlanCamera], unit: str, _: object) -> None:
     """Lay out the plan, and check that no label would be parsed as a formula."""
     for view in views:
         floor_plan._area(view)

@@ -46,36 +46,36 @@ _TOKENS = b"""tokens:
     role: operate
 """ % (b"a1" * 32, b"0f" * 32)
 _VARIABLE = "MYVIEW_"
-_MOST_CAMERAS = 20
-_WHOLE = 1 / 16
-"""Of the inputs so many give whole sections; reading what is said of all else takes longer than all else."""
-_SELDOM = 256
-"""Telling all settings takes longer than reading them: it is done for one in so many."""
+_MAX_CAMERAS = 20
+_WHOLE_SHARE = 1 / 16
+"""Share of inputs with whole sections, which take longest to parse."""
+_DESCRIBE_EVERY = 256
+"""One configuration in so many is also described, which takes longer than parsing."""
 
 
 class _IsolatedConfig(Target):
-    """A target that reads configurations without the machine's own environment variables."""
+    """A target that reads configurations without the machine's environment variables."""
 
     def __init__(self) -> None:
-        self._surroundings = patch.dict(os.environ, clear=True)
+        self._environment = patch.dict(os.environ, clear=True)
 
     def hand_over(self, data: bytes) -> bool:
         """Feed an input, and restore the environment."""
-        with self._surroundings:
+        with self._environment:
             return super().hand_over(data)
 
 
-def _looked_at(config: Config, *, seldom: bool) -> None:
+def _use(config: Config, *, describe: bool) -> None:
     """Use a configuration as every process does."""
-    if seldom:
+    if describe:
         for setting in settings_of(config):
             msgspec.json.encode(setting)
-    if len(config.cameras) <= _MOST_CAMERAS:
+    if len(config.cameras) <= _MAX_CAMERAS:
         BestViewPipeline(config)
 
 
 class ConfigFile(_IsolatedConfig):
-    """A file."""
+    """Target for a configuration file."""
 
     name = "config-text"
 
@@ -95,7 +95,7 @@ class ConfigFile(_IsolatedConfig):
             config = load_config(self._path)
         except UserError as error:
             return refused(error)
-        _looked_at(config, seldom=len(data) % _SELDOM == 0)
+        _use(config, describe=len(data) % _DESCRIBE_EVERY == 0)
         return True
 
     def close(self) -> None:
@@ -143,19 +143,21 @@ class ConfigValues(_IsolatedConfig):
 
     def make(self, rng: Random) -> bytes:
         """Return sections, and environment variables."""
-        names, whole = rng.sample(sorted(self._sections), 2), rng.random() < _WHOLE
+        names, whole = rng.sample(sorted(self._sections), 2), rng.random() < _WHOLE_SHARE
         content: Any = {name: self._sections[name] for name in names} | {"cameras": self._cameras}
         if not whole:
-            some = {name: _some(rng, content[name]) for name in names}
-            content = some | {"cameras": [_some(rng, camera, ("id", "source")) for camera in self._cameras]}
+            sections = {name: _some_keys(rng, content[name]) for name in names}
+            content = sections | {
+                "cameras": [_some_keys(rng, camera, ("id", "source")) for camera in self._cameras]
+            }
         variables: dict[str, str] = {}
         if rng.random() < 0.1:
             section = rng.choice(names)
             inner = self._sections[section]
             key = rng.choice(list(inner)) if isinstance(inner, dict) else ""
             value = odd(rng)
-            said = as_json(value).decode() if rng.random() < 0.5 else str(value)
-            variables[f"{section}__{key}".upper() if key else section.upper()] = said.replace("\x00", "")
+            text = as_json(value).decode() if rng.random() < 0.5 else str(value)
+            variables[f"{section}__{key}".upper() if key else section.upper()] = text.replace("\x00", "")
         else:
             content = mutate_value(rng, content)
         return as_json([content, variables])
@@ -166,17 +168,17 @@ class ConfigValues(_IsolatedConfig):
         if not isinstance(content, dict):
             content = {}
         content = {str(key): value for key, value in content.items()}
-        told = {
+        environment = {
             _VARIABLE + name: value.encode("utf-8", "replace").decode() for name, value in variables.items()
         }
-        os.environ.update(told)
+        os.environ.update(environment)
         try:
             config = build_config(content, where="site.yaml", folder=Path())
-            _looked_at(config, seldom=len(data) % _SELDOM == 0)
+            _use(config, describe=len(data) % _DESCRIBE_EVERY == 0)
         except UserError as error:
             return refused(error)
         finally:
-            for name in told:
+            for name in environment:
                 del os.environ[name]
         return True
 
@@ -215,7 +217,7 @@ class TrialSettings(Target):
         return True
 
 
-def _some(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
+def _some_keys(rng: Random, section: Any, needed: tuple[str, ...] = ()) -> Any:
     """Return some keys of a section, including the required ones."""
     if not isinstance(section, dict):
         return section

@@ -23,11 +23,11 @@ WORDS = (
 _PACKED = b"\x1f\x8b"
 
 
-def _rows(rng: Random, least_id: int) -> bytes:
+def _rows(rng: Random, min_id: int) -> bytes:
     rows = [
         MotRow(
             frame=rng.randrange(1, 40),
-            id=rng.randrange(least_id, 6),
+            id=rng.randrange(min_id, 6),
             left=rng.uniform(-5, 300),
             top=rng.uniform(-5, 200),
             width=rng.uniform(1, 60),
@@ -42,17 +42,17 @@ def _rows(rng: Random, least_id: int) -> bytes:
 class _MotFiles(Target):
     """MOTChallenge files in a temporary folder."""
 
-    least_id = -1
+    min_id = -1
 
     def __init__(self) -> None:
         self._folder = folder()
         self._path = Path(self._folder.name)
         rng = Random(1)
-        self._right = [_rows(rng, self.least_id) for _ in range(200)]
+        self._valid = [_rows(rng, self.min_id) for _ in range(200)]
 
     def file(self, rng: Random) -> bytes:
         """Return a slightly damaged file."""
-        data = rng.choice(self._right)
+        data = rng.choice(self._valid)
         return mutate_bytes(rng, data, WORDS) if rng.random() < 0.9 else data
 
     def written(self, data: bytes) -> Path:
@@ -85,7 +85,7 @@ class MotRoundTrip(_MotFiles):
             rows = read_rows(self.written(data))
         except ValueError as error:
             return refused(error)
-        assert np.isfinite([row.box for row in rows]).all(), "a box without end"
+        assert np.isfinite([row.box for row in rows]).all(), "infinite box"
         written = _readable(format_rows(rows))
         again = format_rows(parse_rows(written, "again")).splitlines()
         assert sorted(again) == sorted(written)
@@ -127,7 +127,7 @@ class TrackFile(_MotFiles):
     """Target for tracks of a walk, from which cameras are calibrated."""
 
     name = "mot-trajectories"
-    least_id = 1
+    min_id = 1
 
     def make(self, rng: Random) -> bytes:
         """Return a file of tracks."""

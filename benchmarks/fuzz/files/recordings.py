@@ -40,9 +40,9 @@ WORDS = (
 )  # fmt: skip
 _EPOCHS = 6
 _FAR = 10_000
-_MOST_GOPS = 40
+_MAX_GOPS = 40
 _PULSE0 = 1_700_000_000.0
-_DROPS_EVERY = 16
+_DELETE_EVERY = 16
 _LONG_S = 1e9
 _Files = list[tuple[str, bytes]]
 _files = msgspec.msgpack.Decoder(_Files)
@@ -62,16 +62,16 @@ class RecordedRuns(ScriptTarget):
         self._service = self._loop.run_until_complete(self._record())
         (self._run,) = (self._path / "kept").glob("2*")
         files = sorted(path for path in self._run.rglob("*") if path.is_file())
-        self._right = {str(file.relative_to(self._run)): file.read_bytes() for file in files}
+        self._valid = {str(file.relative_to(self._run)): file.read_bytes() for file in files}
         when = {
             "started": _PULSE0,
             "person_numbers_since": _PULSE0,
             "age_clock": "",
             "age_clock_at_pulse0": 1.0,
-        }  # inputs are the same in every run
-        self._right[INFO_FILE] = as_json({**msgspec.json.decode(self._right[INFO_FILE]), **when})
+        }  # so that inputs are the same in every run
+        self._valid[INFO_FILE] = as_json({**msgspec.json.decode(self._valid[INFO_FILE]), **when})
         self._kinds = {
-            file.suffix: [name for name in self._right if name.endswith(file.suffix)] for file in files
+            file.suffix: [name for name in self._valid if name.endswith(file.suffix)] for file in files
         }
         self._restore()
 
@@ -87,8 +87,8 @@ class RecordedRuns(ScriptTarget):
     def _restore(self) -> None:
         shutil.rmtree(self._path / "kept", ignore_errors=True)
         self._precious.parent.mkdir(exist_ok=True)
-        self._precious.write_bytes(b"nobody's")
-        for name, data in self._right.items():
+        self._precious.write_bytes(b"unrelated")
+        for name, data in self._valid.items():
             (self._run / name).parent.mkdir(parents=True, exist_ok=True)
             (self._run / name).write_bytes(data)
 
@@ -97,7 +97,7 @@ class RecordedRuns(ScriptTarget):
         files: _Files = []
         for kind in rng.sample(sorted(self._kinds), rng.choice((1, 1, 1, 2))):
             name = rng.choice(self._kinds[kind])
-            data = self._right[name]
+            data = self._valid[name]
             if name.endswith(".json") and rng.random() < 0.6:
                 files.append((name, as_json(mutate_value(rng, msgspec.json.decode(data)))))
             else:
@@ -118,14 +118,16 @@ class RecordedRuns(ScriptTarget):
         store = recorder.folder
         assert store is not None
         store.open()
-        lot = zlib.crc32(data)
-        drops = lot % _DROPS_EVERY == 0
+        checksum = zlib.crc32(data)
+        deletes = checksum % _DELETE_EVERY == 0
         try:
             found = bool(store.earlier)
             if found:
                 store.session = store.earlier.pop()
-                asked = bool(self._loop.run_until_complete(self._asked(recorder, lot // _DROPS_EVERY)))
-            if drops:
+                played = bool(
+                    self._loop.run_until_complete(self._play_back(recorder, checksum // _DELETE_EVERY))
+                )
+            if deletes:
                 size = sum(run.size for run in (*store.earlier, *([store.session] if store.session else [])))
                 for bounds in (
                     RetentionLimits(_LONG_S, (size - 1) * 8 / 7 / 1e6, 60.0),
@@ -133,26 +135,26 @@ class RecordedRuns(ScriptTarget):
                 ):
                     store._retention = RetentionPolicy(
                         bounds, lambda: store._clock.now
-                    )  # the oldest segment goes, then all
+                    )  # the oldest segment is deleted, then all
                     store._apply_retention()
-                assert self._precious.exists(), "what is not recorded was taken away"
+                assert self._precious.exists(), "an unrelated file was deleted"
         finally:
             store.close()
-            if drops:
+            if deletes:
                 self._restore()
             else:
                 for name, _ in files:
-                    (self._run / name).write_bytes(self._right[name])
-        return found and asked
+                    (self._run / name).write_bytes(self._valid[name])
+        return found and played
 
     @staticmethod
-    async def _asked(recorder: Recorder, lot: int) -> int:
-        """List everything; play one camera and one person only, which halves the time."""
+    async def _play_back(recorder: Recorder, checksum: int) -> int:
+        """List everything, and play one camera and one person."""
         assert recorder.session is not None
         lines = [line async for line in read_decision_lines(recorder, 0, _FAR)]
         sources: tuple[PlaybackSource, ...] = (
-            CameraPlayback(recorder, CAMERAS[lot % 2]),
-            PersonPlayback(recorder, (1 + lot // 2 % 2,)),
+            CameraPlayback(recorder, CAMERAS[checksum % 2]),
+            PersonPlayback(recorder, (1 + checksum // 2 % 2,)),
         )
         for source in sources:
             available_ranges(source, 0, _FAR)
@@ -162,7 +164,7 @@ class RecordedRuns(ScriptTarget):
             count = 0
             async for _ in play_gops(source, 0):
                 count += 1
-                if count == _MOST_GOPS:
+                if count == _MAX_GOPS:
                     break
             await last_gop_before(source, 12)
         recorded_audio(recorder)

@@ -38,12 +38,12 @@ def address(rng: Random, path: str, queries: tuple[str, ...]) -> str:
         while "{" + name + "}" in path:
             value = rng.choice(values) if rng.random() < 0.8 else quote(str(odd(rng)), errors="replace")[:300]
             path = path.replace("{" + name + "}", value, 1)
-    asked = [f"{query}={_value(rng, query)}" for query in queries if rng.random() < 0.5]
+    parameters = [f"{query}={_value(rng, query)}" for query in queries if rng.random() < 0.5]
     if rng.random() < 0.1:
         name = rng.choice(("overlay", "from", "prefer", "x"))
-        asked.append(f"{name}={quote(str(odd(rng)), errors='replace')[:200]}")
-    asked = [parameter for parameter in asked if parameter != "overlay=1" or rng.random() < 0.01]
-    return f"{path}{'?' + '&'.join(asked) if asked else ''}"
+        parameters.append(f"{name}={quote(str(odd(rng)), errors='replace')[:200]}")
+    parameters = [parameter for parameter in parameters if parameter != "overlay=1" or rng.random() < 0.01]
+    return f"{path}{'?' + '&'.join(parameters) if parameters else ''}"
 
 
 def some_range(rng: Random) -> str:
@@ -63,10 +63,10 @@ def _value(rng: Random, name: str) -> str:
 
 def _moment(rng: Random) -> str:
     """Return a time: recorded, far away, or invalid."""
-    way = rng.random()
-    if way < 0.5:
+    kind = rng.random()
+    if kind < 0.5:
         return quote(rng.choice(_MOMENTS), safe="+")
-    if way < 0.8:
+    if kind < 0.8:
         return f"p{rng.randrange(-3, 40)}"
-    hurt = mutate_bytes(rng, rng.choice(_MOMENTS).encode(), WORDS)
-    return quote(hurt, safe="+")[:300]
+    damaged = mutate_bytes(rng, rng.choice(_MOMENTS).encode(), WORDS)
+    return quote(damaged, safe="+")[:300]

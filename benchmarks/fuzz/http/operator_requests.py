@@ -9,7 +9,7 @@ from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
 
-_ASKED: tuple[tuple[str, str, Any], ...] = (
+_REQUESTS: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
     ("POST", "/api/operator/people", {"object": 1, "merge": 2}),
     ("POST", "/api/operator/people", {"object": 1, "split": ["c0", "c1"]}),
@@ -33,7 +33,7 @@ _ASKED: tuple[tuple[str, str, Any], ...] = (
     ("GET", "/api/operator/walk", None),
     ("GET", "/api/operator/view_selection", None),
 )
-"""Finishing a walk starts a process, which is left to other tests."""
+"""Without finishing a walk, which starts a process; other tests cover it."""
 
 
 class OperatorRequests(OpenSiteTarget):
@@ -43,8 +43,10 @@ class OperatorRequests(OpenSiteTarget):
 
     def make(self, rng: Random) -> bytes:
         """Return the bytes of a request."""
-        method, path, right = rng.choice(_ASKED)
-        body = b"" if right is None else as_json(mutate_value(rng, right) if rng.random() < 0.85 else right)
+        method, path, content = rng.choice(_REQUESTS)
+        body = b""
+        if content is not None:
+            body = as_json(mutate_value(rng, content) if rng.random() < 0.85 else content)
         if rng.random() < 0.15:
             body = mutate_bytes(rng, body)
         head = (

@@ -9,7 +9,7 @@ from benchmarks.fuzz.http.addresses import METHODS, WORDS, address, some_range
 from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
 
-_CHANGES_SHARE = 0.8
+_CSRF_SHARE = 0.8
 _BODIES = (
     {"object": 1, "name": "Ada"},
     {"object": 1, "merge": 2},
@@ -18,7 +18,7 @@ _BODIES = (
     {"token": "secret"},
     {"boxes": [[1.0, 2.0, 3.0, 4.0]]},
 )
-_SELDOM = (".mjpeg", ".jpg", "/stills", "overlay")
+_RENDERING = (".mjpeg", ".jpg", "/stills", "overlay")
 """Addresses that start a render worker, which is a hundred times slower."""
 _HEADERS = (
     "Range: bytes=0-",
@@ -48,19 +48,19 @@ class AnonymousRequests(OpenSiteTarget):
     def make(self, rng: Random) -> bytes:
         """Return the bytes of a request."""
         path, queries = rng.choice(self._paths)
-        if path.endswith(_SELDOM) and rng.random() < 0.999:
+        if path.endswith(_RENDERING) and rng.random() < 0.999:
             path, queries = "/api/objects", ()
-        asked = address(rng, path, queries)
+        url = address(rng, path, queries)
         method = rng.choice(METHODS)
         body = b""
         if method in {"POST", "PUT", "PATCH"}:
             body = as_json(mutate_value(rng, rng.choice(_BODIES)))
             body = mutate_bytes(rng, body) if rng.random() < 0.2 else body
-        lines = [f"{method} {asked} HTTP/1.1", "Host: 127.0.0.1"]
+        lines = [f"{method} {url} HTTP/1.1", "Host: 127.0.0.1"]
         if rng.random() < 0.1:
             lines.append(rng.choice(_HEADERS) if rng.random() < 0.7 else some_range(rng))
-        if rng.random() < _CHANGES_SHARE:
-            lines.append(f"{CSRF_HEADER}: 1")  # or it is refused before it is read
+        if rng.random() < _CSRF_SHARE:
+            lines.append(f"{CSRF_HEADER}: 1")  # else it is refused before its body is read
         if body:
             lines += [f"Content-Length: {len(body)}", "Content-Type: application/json"]
         request = "\r\n".join([*lines, "Connection: close", "", ""]).encode("utf-8", "replace") + body

@@ -22,18 +22,18 @@ from server.http.api.openapi import describe
 from server.http.app import make_app, serving
 from server.service.service import BestViewService
 
-_WELL_EVERY = 100
+_HEALTH_EVERY = 100
 EPOCHS = 6
 _WAIT_S = 10.0
 """Seconds to wait for a response, by the time-skipping clock."""
-_MOST = 65_536
+_MAX_BYTES = 65_536
 _HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
 
 
 class ServedSite:
     """A site that has run for some epochs and is then idle; ``sections`` are added to its configuration.
 
-    ``before`` is given the application before it is served.
+    ``before`` is called with the application before it is served.
     """
 
     def __init__(
@@ -76,20 +76,22 @@ class ServedSite:
         return found
 
     def send(self, data: bytes, address: str = "127.0.0.1") -> bytes:
-        """Send bytes on a new connection; return the response, of streams the beginning."""
+        """Send bytes on a new connection; return the response, or the beginning of a stream."""
         return self.loop.run_until_complete(self._ask(data, address))
 
     async def _ask(self, data: bytes, address: str) -> bytes:
         answer = b""
-        with socket.socket() as asking:
-            skip_time_wait(asking)
-            asking.bind((address, 0))
-            asking.connect(("127.0.0.1", self.port))  # the server need not accept it yet
-            asking.settimeout(0)
+        with socket.socket() as client:
+            skip_time_wait(client)
+            client.bind((address, 0))
+            client.connect(("127.0.0.1", self.port))  # the server need not accept it yet
+            client.settimeout(0)
             with contextlib.suppress(TimeoutError, ConnectionError):
                 async with asyncio.timeout(_WAIT_S):
-                    await self.loop.sock_sendall(asking, data)
-                    while len(answer) < _MOST and (more := await self.loop.sock_recv(asking, _MOST)):
+                    await self.loop.sock_sendall(client, data)
+                    while len(answer) < _MAX_BYTES and (
+                        more := await self.loop.sock_recv(client, _MAX_BYTES)
+                    ):
                         answer += more
         return answer
 
@@ -121,13 +123,13 @@ class OpenSiteTarget(Target):
 
     def __init__(self) -> None:
         self._served = ServedSite()
-        self._fed = 0
+        self._count = 0
 
     def feed(self, data: bytes) -> bool:
         """Send the request, and check the response."""
         granted = check_response(data, self._served.send(data))
-        self._fed += 1
-        if self._fed % _WELL_EVERY == 0:
+        self._count += 1
+        if self._count % _HEALTH_EVERY == 0:
             assert self._served.is_healthy()
         return granted
 

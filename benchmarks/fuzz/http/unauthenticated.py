@@ -26,9 +26,9 @@ from server.http.access.authorization import ACCESS
 from server.http.access.sessions import _Session
 from server.http.app_keys import SERVICE
 
-_WHO = ("hall", "family", "door", "night", "void")
-SECRETS = {who: f"{who}-{Random(who).randbytes(24).hex()}" for who in _WHO}
-_COOKIES = {who: f"{who}+{Random(who + who).randbytes(24).hex()}" for who in _WHO}
+_TOKEN_NAMES = ("hall", "family", "door", "night", "void")
+SECRETS = {who: f"{who}-{Random(who).randbytes(24).hex()}" for who in _TOKEN_NAMES}
+_COOKIES = {who: f"{who}+{Random(who + who).randbytes(24).hex()}" for who in _TOKEN_NAMES}
 _RIGHTS: dict[str, dict[str, object]] = {
     "hall": {"role": "watch"},
     "family": {"role": "watch", "object": 1, "made": "2999-01-01T00:00:00Z"},
@@ -39,11 +39,11 @@ _RIGHTS: dict[str, dict[str, object]] = {
 _NAMES = {1: "Ada Lovelace", 2: "Charles Babbage"}
 _OPEN = {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json", "/healthz", "/readyz", "/api/session"}
 _NARROW = {"/api/site", "/api/objects", "/api/cameras", "/api/events", "/api/flags", "/api/past"}
-"""Addresses that answer every token, with the content of its scope."""
+"""Addresses that accept every token, and limit the content to its scope."""
 _ADDRESSES = ("127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.2", "127.0.0.9")
 """Client addresses; the last one is blocked after too many wrong tokens."""
 _WINDOW = 24
-_MADE = (".mjpeg", "best.jpg", "live.jpg")
+_RENDERED = (".mjpeg", "best.jpg", "live.jpg")
 """Addresses that start a render worker."""
 
 
@@ -86,10 +86,10 @@ class UnauthenticatedRequests(Target):
         self._authenticator = self._served.app[ACCESS].authenticator
         ends = time.monotonic() + 1e9
         self._sessions = {
-            token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _WHO
+            token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _TOKEN_NAMES
         }
         self._paths = [
-            address for address in self._served.documented_addresses if not address[0].endswith(_MADE)
+            address for address in self._served.documented_addresses if not address[0].endswith(_RENDERED)
         ]
         self._pictures = {
             "c0": _windows(0, 0.5) - _windows(1, 0.0),
@@ -98,9 +98,9 @@ class UnauthenticatedRequests(Target):
 
     def _watch(self, app: web.Application) -> None:
         """Record the request of every response."""
-        app.on_response_prepare.append(self._note)
+        app.on_response_prepare.append(self._record)
 
-    async def _note(self, request: web.Request, response: web.StreamResponse) -> None:
+    async def _record(self, request: web.Request, response: web.StreamResponse) -> None:
         resource, names = request.match_info.route.resource, request.match_info
         number = (
             request.app[SERVICE].people.current_number(int(names["object"])) if "object" in names else None
@@ -119,33 +119,33 @@ class UnauthenticatedRequests(Target):
     def make(self, rng: Random) -> bytes:
         """Return the client address and the bytes of a request."""
         path, queries = rng.choice(self._paths)
-        asked = address(rng, path, queries)
+        url = address(rng, path, queries)
         lines = ["Host: 127.0.0.1"]
         for _ in range(rng.choice((0, 1, 1, 1, 1, 2))):
-            who = rng.choice(_WHO)
-            way = rng.random()
-            if way < 0.35:
-                kind = rng.choice(("Bearer", "Bearer", "bearer", "BEARER ", "Basic", ""))
-                lines.append(f"Authorization: {kind} {_nearly(rng, SECRETS[who])}")
-            elif way < 0.7:
-                asked += f"{'&' if '?' in asked else '?'}token={_nearly(rng, SECRETS[who])}"
+            who = rng.choice(_TOKEN_NAMES)
+            kind = rng.random()
+            if kind < 0.35:
+                scheme = rng.choice(("Bearer", "Bearer", "bearer", "BEARER ", "Basic", ""))
+                lines.append(f"Authorization: {scheme} {_nearly(rng, SECRETS[who])}")
+            elif kind < 0.7:
+                url += f"{'&' if '?' in url else '?'}token={_nearly(rng, SECRETS[who])}"
             else:
                 name = rng.choice(("myview_hall_0",) * 4 + ("myview", "MYVIEW_HALL_0"))
-                others = rng.choice(("", "a=b; ", "=; "))
-                lines.append(f"Cookie: {others}{name}={_nearly(rng, _COOKIES[who])}")
+                other_cookies = rng.choice(("", "a=b; ", "=; "))
+                lines.append(f"Cookie: {other_cookies}{name}={_nearly(rng, _COOKIES[who])}")
         if rng.random() < 0.05:
             lines.append(rng.choice(("X-Forwarded-For: 127.0.0.1", "Origin: http://x", some_range(rng))))
         method, body = rng.choice(("GET",) * 12 + ("HEAD", "OPTIONS", "POST", "DELETE")), b""
         if method == "POST":
-            asked, body = (
+            url, body = (
                 "/api/session",
-                as_json({"token": _nearly(rng, SECRETS[rng.choice(_WHO)])}),
+                as_json({"token": _nearly(rng, SECRETS[rng.choice(_TOKEN_NAMES)])}),
             )
             lines += ["X-MyView-Changes: 1", f"Content-Length: {len(body)}"]
         elif method == "DELETE":
-            asked = "/api/session"
+            url = "/api/session"
             lines.append("X-MyView-Changes: 1")
-        head = "\r\n".join([f"{method} {asked} HTTP/1.1", *lines, "Connection: close", "", ""])
+        head = "\r\n".join([f"{method} {url} HTTP/1.1", *lines, "Connection: close", "", ""])
         request = head.encode("utf-8", "surrogateescape") + body
         request = mutate_bytes(rng, request, WORDS) if rng.random() < 0.25 else request
         return bytes([rng.randrange(len(_ADDRESSES))]) + request
@@ -159,23 +159,28 @@ class UnauthenticatedRequests(Target):
         self._answered.clear()
         answer = self._served.send(data[1:], came_from)
         granted = check_response(data[1:], answer)
-        said = data + unquote_to_bytes(data)
-        who = {
-            secret for secret in _WHO if SECRETS[secret].encode() in said or _COOKIES[secret].encode() in said
+        text = data + unquote_to_bytes(data)
+        holders = {
+            name for name in _TOKEN_NAMES if SECRETS[name].encode() in text or _COOKIES[name].encode() in text
         }
-        for one in self._answered:
-            assert one.status >= HTTPStatus.BAD_REQUEST or _may(who, one), f"{sorted(who)}: {one}"
-        if not who & {"hall", "night"}:
-            self._nothing_else_of(who, answer)
+        for answered in self._answered:
+            refused = answered.status >= HTTPStatus.BAD_REQUEST
+            assert refused or _may_get(holders, answered), f"{sorted(holders)}: {answered}"
+        if not holders & {"hall", "night"}:
+            self._check_content(holders, answer)
         return granted
 
-    def _nothing_else_of(self, who: set[str], answer: bytes) -> None:
+    def _check_content(self, holders: set[str], answer: bytes) -> None:
         pieces = {answer[at : at + _WINDOW] for at in range(0, len(answer) - _WINDOW, _WINDOW)}
-        for camera, theirs in self._pictures.items():
-            may = camera == "c0" and who & {"family", "door"}
-            assert may or theirs.isdisjoint(pieces), f"{sorted(who)}: a picture of {camera}"
+        for camera, pictures_of_camera in self._pictures.items():
+            allowed = camera == "c0" and holders & {"family", "door"}
+            assert allowed or pictures_of_camera.isdisjoint(pieces), (
+                f"{sorted(holders)}: a picture of {camera}"
+            )
         for number, name in _NAMES.items():
-            assert name.encode() not in answer or (number == 1 and "family" in who), f"{sorted(who)}: {name}"
+            assert name.encode() not in answer or (number == 1 and "family" in holders), (
+                f"{sorted(holders)}: {name}"
+            )
 
     def close(self) -> None:
         """Stop the server."""
@@ -183,17 +188,17 @@ class UnauthenticatedRequests(Target):
         self._folder.cleanup()
 
 
-def _may(who: set[str], one: _AnsweredRequest) -> bool:
+def _may_get(holders: set[str], answered: _AnsweredRequest) -> bool:
     """Return whether a client with these secrets may get this response."""
-    if one.path in _OPEN or one.method == "OPTIONS" or "night" in who:
+    if answered.path in _OPEN or answered.method == "OPTIONS" or "night" in holders:
         return True
-    if "hall" in who:
-        return not one.path.startswith("/api/operator")
-    if one.path in _NARROW:
-        return bool(who & {"family", "door"})
-    if one.object is not None:
-        return "family" in who and one.object == 1 and not one.held
-    return one.camera == "c0" and "door" in who
+    if "hall" in holders:
+        return not answered.path.startswith("/api/operator")
+    if answered.path in _NARROW:
+        return bool(holders & {"family", "door"})
+    if answered.object is not None:
+        return "family" in holders and answered.object == 1 and not answered.held
+    return answered.camera == "c0" and "door" in holders
 
 
 def _nearly(rng: Random, secret: str) -> str:
@@ -202,8 +207,8 @@ def _nearly(rng: Random, secret: str) -> str:
         return secret
     if rng.random() < 0.2:
         return token_digest(secret)
-    hurt = mutate_bytes(rng, secret.encode()).decode("utf-8", "surrogateescape")
-    return hurt.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else hurt
+    damaged = mutate_bytes(rng, secret.encode()).decode("utf-8", "surrogateescape")
+    return damaged.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else damaged
 
 
 def _windows(seed: int, begin: float) -> frozenset[bytes]:

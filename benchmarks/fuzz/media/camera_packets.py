@@ -34,7 +34,7 @@ def _take(source: FrameSource) -> None:
 
 
 class PassthroughPackets(Target):
-    """Target for packets of a camera's own H.264."""
+    """Target for packets of a camera's H.264 stream, as for passthrough."""
 
     name = "media-packets"
 
@@ -43,20 +43,20 @@ class PassthroughPackets(Target):
         sps = b"\x67\x42\xc0\x1e\xd9"
         avcc = b"\x01\x42\xc0\x1e\xff\xe1" + struct.pack(">H", len(sps)) + sps + b"\x01\x00\x02\x68\xce"
         lengths = b"".join(struct.pack(">I", len(unit)) + unit for unit in (b"\x65\x88\x84", b"\x41\x9a"))
-        self._right = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
+        self._valid = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
 
     def make(self, rng: Random) -> bytes:
         """Return the extradata of a stream, and a packet."""
-        beside, packet = rng.choice(self._right)
-        beside = damage_media(rng, beside) if rng.random() < 0.6 else beside
+        extradata, packet = rng.choice(self._valid)
+        extradata = damage_media(rng, extradata) if rng.random() < 0.6 else extradata
         packet = damage_media(rng, packet) if rng.random() < 0.6 else packet
-        return msgspec.msgpack.encode((beside, packet))
+        return msgspec.msgpack.encode((extradata, packet))
 
     def feed(self, data: bytes) -> bool:
         """Parse the packet."""
-        beside, packet = msgspec.msgpack.decode(data, type=tuple[bytes, bytes])
+        extradata, packet = msgspec.msgpack.decode(data, type=tuple[bytes, bytes])
         try:
-            parse_packing(beside).annex_b(packet)
+            parse_packing(extradata).annex_b(packet)
         except ValueError as error:
             return refused(error)
         return True
@@ -69,7 +69,9 @@ class RecordingFile(Target):
 
     def __init__(self) -> None:
         self._folder, self._memory = TemporaryDirectory(), folder()
-        self._path = Path(self._folder.name) / "kept" / "c0.mp4"  # below /dev it would be taken for a camera
+        self._path = (
+            Path(self._folder.name) / "kept" / "c0.mp4"
+        )  # a path below /dev would be a capture device
         self._path.parent.symlink_to(self._memory.name)
         with av.open(str(self._path), "w") as out:
             stream = out.add_stream(
@@ -90,17 +92,17 @@ class RecordingFile(Target):
     def feed(self, data: bytes) -> bool:
         """Read its frames, decoded and passed through."""
         self._path.write_bytes(data)
-        wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
+        required = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
         try:
             recording = Recording(str(self._path), 0, "stop")
         except UserError as error:
             return refused(error)
         _take(recording)
         try:
-            own = PassthroughRecording(str(self._path), 0, "stop", wanted)
+            passthrough = PassthroughRecording(str(self._path), 0, "stop", required)
         except (UserError, IncompatibleStreamError) as error:
             return refused(error)
-        _take(own)
+        _take(passthrough)
         return True
 
     def close(self) -> None:

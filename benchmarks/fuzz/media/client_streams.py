@@ -61,7 +61,7 @@ class ClientMp4(_ClientStream):
 
 
 class ClientWebm(_ClientStream):
-    """WebM, likewise."""
+    """WebM, as `myview watch` reads it."""
 
     name = "media-webm"
     codec = "vp8"
@@ -80,12 +80,16 @@ class ClientEvents(Target):
 
     def feed(self, data: bytes) -> bool:
         """Read the events in pieces."""
-        whole, pieces = SseParser(), SseParser()
+        whole_parser, piecewise_parser = SseParser(), SseParser()
         try:
-            events = whole.feed(data)
+            events = whole_parser.feed(data)
             step = 1 + len(data) % 7
-            cut = [piece for at in range(0, len(data), step) for piece in pieces.feed(data[at : at + step])]
+            piecewise = [
+                event
+                for at in range(0, len(data), step)
+                for event in piecewise_parser.feed(data[at : at + step])
+            ]
         except EventStreamError as error:
             return refused(error)
-        assert cut == events, "how a stream is cut changes what it says"
+        assert piecewise == events, "the result depends on the pieces"
         return True

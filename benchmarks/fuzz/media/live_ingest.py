@@ -39,7 +39,7 @@ class _SingleRead(LiveStream):
         try:
             if opened is not None:
                 self._read(opened)
-        except BaseException as error:  # noqa: BLE001 — it would be lost in a thread
+        except BaseException as error:  # noqa: BLE001 — re-raised by the target
             self.failure = error
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
@@ -48,7 +48,7 @@ class _SingleRead(LiveStream):
 
 
 class _SinglePassthroughRead(PassthroughStream, _SingleRead):
-    """The same for passthrough."""
+    """The passthrough stream, likewise."""
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
         self.units += bool(packet.size)
@@ -56,14 +56,16 @@ class _SinglePassthroughRead(PassthroughStream, _SingleRead):
 
 
 class LiveIngest(ScriptTarget):
-    """Live streams of a camera, read from a file; network protocols are FFmpeg's."""
+    """Target for live streams of a camera, read from a file, without network protocols."""
 
     name = "media-live"
-    _wanted = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
+    _required = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
 
     def __init__(self) -> None:
         self._folder, self._memory = TemporaryDirectory(), folder()
-        self._path = Path(self._folder.name) / "sent" / "camera"  # below /dev it would be taken for a device
+        self._path = (
+            Path(self._folder.name) / "sent" / "camera"
+        )  # a path below /dev would be a capture device
         self._path.parent.symlink_to(self._memory.name)
         self._sent = [_sent(form, codec) for form, codec in _FORMS.items()]
 
@@ -77,7 +79,9 @@ class LiveIngest(ScriptTarget):
         sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
         try:
             if data[:1] == b"P":
-                self._watch(_SinglePassthroughRead(str(self._path), {}, sound, self._wanted), range(_FRAMES))
+                self._watch(
+                    _SinglePassthroughRead(str(self._path), {}, sound, self._required), range(_FRAMES)
+                )
             else:
                 self._watch(_SingleRead(str(self._path), {}, sound), range(1))
         except (UserError, IncompatibleStreamError) as error:
@@ -111,18 +115,18 @@ def _sent(form: str, codec: str) -> bytes:
             stream.options = {"preset": "ultrafast", "g": str(STRIDE), "bf": "0", "sc_threshold": "0"}
         stream.width, stream.height = WIDTH, HEIGHT
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
-        heard = out.add_stream("aac", 48_000) if form == "mpegts" else None
+        audio_stream = out.add_stream("aac", 48_000) if form == "mpegts" else None
         rng = np.random.default_rng(1)
         for frame in range(_FRAMES):
             image = np.repeat(rng.integers(0, 255, (HEIGHT, WIDTH // 8, 3), dtype=np.uint8), 8, axis=1)
             picture = av.VideoFrame.from_ndarray(image, format="bgr24").reformat(format=stream.pix_fmt)
             picture.pts = frame
             out.mux(stream.encode(picture))
-            if heard is not None:
+            if audio_stream is not None:
                 tone = av.AudioFrame.from_ndarray(np.zeros((2, 1920), dtype=np.float32), "fltp", "stereo")
                 tone.sample_rate, tone.pts = 48_000, frame * 1920
-                out.mux(heard.encode(tone))
+                out.mux(audio_stream.encode(tone))
         out.mux(stream.encode())
-        if heard is not None:
-            out.mux(heard.encode())
+        if audio_stream is not None:
+            out.mux(audio_stream.encode())
     return sent.getvalue()

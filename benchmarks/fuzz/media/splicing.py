@@ -31,10 +31,10 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 _EPOCHS = 4
 _FRAMES = _EPOCHS * STRIDE
 _PEOPLE = (1, 2)
-_WHOLE = 1 / 64
-"""Every so many inputs one is decided by the service itself, which is ten times slower."""
+_WHOLE_SHARE = 1 / 64
+"""Share of inputs with the service's decisions, which are ten times slower."""
 _Cuts = list[tuple[int | None, int | None]]
-"""For each GOP: the cameras of two people; empty: the service decides itself."""
+"""For each GOP: the cameras of two people; empty: the service decides."""
 _Units = list[tuple[int, int, bytes]]
 """Camera, pulse, access unit."""
 _script = msgspec.msgpack.Decoder(tuple[_Cuts, _Units])
@@ -65,7 +65,7 @@ class _Splice(ScriptTarget):
     def make(self, rng: Random) -> bytes:
         """Return frames of two cameras in the order of their pulses."""
         share = rng.choice((0.05, 0.1, 0.3))
-        whole = rng.random() < _WHOLE
+        whole = rng.random() < _WHOLE_SHARE
         gops = _EPOCHS if whole else rng.choice((2, 2, 3))
         views = (0, 0, 1, 1, None)
         cuts: _Cuts = [] if whole else [(rng.choice(views), rng.choice(views)) for _ in range(gops)]
@@ -93,7 +93,7 @@ class _Splice(ScriptTarget):
             self._decided.append(decision)
             published(decision)
 
-        service._publish = publish  # type: ignore[method-assign]  # what a cut is made like
+        service._publish = publish  # type: ignore[method-assign]  # the template of later decisions
         viewers = [broadcaster.subscribe() for broadcaster in _broadcasters(service)]
         for epoch in range(_EPOCHS):
             self._show(service, units, epoch)

@@ -1,4 +1,4 @@
-"""Targets for the service's own streams: rendering, and stored media."""
+"""Targets for streams of the service: rendering, and stored media."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from server.service.time_shift.playback_audio import read_audio_frames
 
 _DRAWN = STRIDE + 1
 """Frames of a GOP and the beginning of the next."""
-_FILMED_EVERY = 8
-"""The encoder is shared: opening one takes half of the time."""
+_ENCODED_EVERY = 8
+"""One input in so many is encoded, since opening an encoder takes half of the time."""
 
 
 class RenderedStreams(Target):
@@ -47,7 +47,7 @@ class RenderedStreams(Target):
             jpeg_quality=80,
         )
         boxes = [[(1, 2.0, 3.0, 20.0, 40.0)]] * _DRAWN
-        video = zlib.crc32(data) % _FILMED_EVERY == 0
+        video = zlib.crc32(data) % _ENCODED_EVERY == 0
         drawn = StreamRenderer(settings).render(
             RenderRequest(fragments=data, boxes=boxes, video=video, boxed=[2.0], still="plain")
         )

@@ -7,7 +7,7 @@ from typing import Any
 
 
 class ManualClock:
-    """A clock that is set by hand, unix seconds."""
+    """A clock that a target sets, Unix seconds."""
 
     def __init__(self) -> None:
         self.now = 1000.0

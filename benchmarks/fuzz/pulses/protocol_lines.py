@@ -75,7 +75,7 @@ class ProtocolLines(Target):
 
     def feed(self, data: bytes) -> bool:
         """Parse the line as the server and as the client; parsed messages can be encoded again."""
-        taken = False
+        accepted = False
         for parse in (parse_client_line, parse_server_line):
             try:
                 message = parse(data[: 16 * MAX_LINE])
@@ -84,7 +84,7 @@ class ProtocolLines(Target):
                 answer = encode(ErrorMessage(error.code, str(error)))
                 assert isinstance(parse_server_line(answer[:-1]), ErrorMessage), answer
             else:
-                taken = message is not None or taken
+                accepted = message is not None or accepted
                 if message is not None:
                     parse(encode(cast("Any", message))[:-1])
-        return taken
+        return accepted

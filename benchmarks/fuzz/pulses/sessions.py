@@ -26,8 +26,8 @@ def _scripted(rng: Random, lines: tuple[bytes, ...], connections: int) -> bytes:
     for _ in range(rng.randrange(1, 10)):
         line = some_line(rng, lines)
         at = rng.randrange(len(line) + 1) if rng.random() < 0.2 else len(line)
-        who = rng.randrange(connections)
-        script += [(who, part) for part in (line[:at], line[at:]) if part]
+        number = rng.randrange(connections)
+        script += [(number, part) for part in (line[:at], line[at:]) if part]
     return msgspec.msgpack.encode(script)
 
 
@@ -55,10 +55,10 @@ class ServerSessions(ScriptTarget):
         peers = [hub.new_connection() for _ in wires]
         for peer, wire in zip(peers, wires, strict=True):
             peer.connection_made(wire)
-        for who, said in script:
-            if not wires[who].closed:
-                self.messages += said.count(b"\n")
-                peers[who].data_received(said)
+        for number, data in script:
+            if not wires[number].closed:
+                self.messages += data.count(b"\n")
+                peers[number].data_received(data)
             clock.now += 0.01
         server._begin_without() if server.epoch is None else None
         for _ in range(3):
@@ -66,7 +66,7 @@ class ServerSessions(ScriptTarget):
             server._tick()
         errors = sum(client.errors for client in server.clients())
         for wire in wires:
-            self._spoken(wire)
+            self._check_sent_lines(wire)
         if server.pulse is not None:
             _pulse.decode(str(server.pulse).encode())  # a number that cameras can send back
         await server.stop()
@@ -75,7 +75,7 @@ class ServerSessions(ScriptTarget):
         return errors == 0 and not any(wire.closed for wire in wires)
 
     @staticmethod
-    def _spoken(wire: FakeWriter) -> None:
+    def _check_sent_lines(wire: FakeWriter) -> None:
         for line in wire.lines:
             assert parse_server_line(line) is not None, line
 
@@ -110,10 +110,10 @@ class ClientSessions(ScriptTarget):
         client._server._connection = link
         wire = FakeWriter()
         link.connection_made(wire)
-        for _, said in script:
+        for _, data in script:
             if not wire.closed:
-                self.messages += said.count(b"\n")
-                link.data_received(said)
+                self.messages += data.count(b"\n")
+                link.data_received(data)
             clock.now += 0.01
         for _ in range(3):
             clock.now += 0.2
@@ -123,7 +123,7 @@ class ClientSessions(ScriptTarget):
         client.status()
         client._hello()
         numbers = [pulse.number for pulse in client._queue]
-        assert numbers == sorted(set(numbers)), "pulses go back"
+        assert numbers == sorted(set(numbers)), "pulse numbers must rise"
         link.end("over")
         client._cancel_timer()
         return "protocol" not in link.lost.result()

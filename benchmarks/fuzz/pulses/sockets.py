@@ -14,9 +14,9 @@ from camsync.messages import ClientList, ErrorMessage
 from camsync.protocol import parse_server_line
 
 _OTHERS_EVERY = 20
-_LISTENS_S = 0.25
+_CLIENT_S = 0.25
 """Seconds for which a client reads, and reconnects."""
-_SELDOM = 8
+_HALF_CLOSE_EVERY = 8
 """Half-closed connections occupy a port for a minute."""
 
 
@@ -29,61 +29,61 @@ class SocketBytes(ScriptTarget):
         self._loop = TimeSkippingLoop()
         self._server = PulseServer(25.0, clock=self._loop.time)
         self._loop.run_until_complete(self._server.start())
-        self._said = b""
-        self._stranger = self._loop.run_until_complete(
-            asyncio.start_server(self._insert_word, "127.0.0.1", 0)
+        self._server_bytes = b""
+        self._fake_server = self._loop.run_until_complete(
+            asyncio.start_server(self._send_bytes, "127.0.0.1", 0)
         )
-        self._fed = 0
+        self._count = 0
 
     def make(self, rng: Random) -> bytes:
         """Return the receiver, and the bytes of a connection."""
         lines = rng.choice((CLIENT_LINES, SERVER_LINES))
-        said = b"".join(some_line(rng, lines) for _ in range(rng.randrange(1, 6)))
-        return (b"C" if lines is CLIENT_LINES else b"S") + said
+        lines_sent = b"".join(some_line(rng, lines) for _ in range(rng.randrange(1, 6)))
+        return (b"C" if lines is CLIENT_LINES else b"S") + lines_sent
 
     def feed(self, data: bytes) -> bool:
         """Send the bytes."""
-        said = self._to_server if data[:1] == b"C" else self._to_client
-        return self._loop.run_until_complete(said(data[1:]))
+        send = self._to_server if data[:1] == b"C" else self._to_client
+        return self._loop.run_until_complete(send(data[1:]))
 
     async def _to_server(self, data: bytes) -> bool:
         reader, writer = await asyncio.open_connection("127.0.0.1", self._server.port)
         skip_time_wait(writer.get_extra_info("socket"))
-        said = data + b"\n"
-        self.messages += said.count(b"\n")
-        writer.write(said + b"WHO\n")
-        heard = []
+        lines = data + b"\n"
+        self.messages += lines.count(b"\n")
+        writer.write(lines + b"WHO\n")
+        answers = []
         with contextlib.suppress(ConnectionError, TimeoutError):
-            # A client that has left too much unread is not served.
+            # A client with too much unread data is not served.
             async with asyncio.timeout(0.3):
                 while line := await reader.readline():
-                    heard.append(parse_server_line(line.rstrip(b"\n")))
-                    if isinstance(heard[-1], ClientList) or _ended(heard[-1]):
+                    answers.append(parse_server_line(line.rstrip(b"\n")))
+                    if isinstance(answers[-1], ClientList) or _ended(answers[-1]):
                         break
         writer.transport.abort()
-        self._fed += 1
-        if self._fed % _OTHERS_EVERY == 0 or not heard:
+        self._count += 1
+        if self._count % _OTHERS_EVERY == 0 or not answers:
             await query_clients("127.0.0.1", self._server.port)
-        return not any(isinstance(message, ErrorMessage) for message in heard)
+        return not any(isinstance(message, ErrorMessage) for message in answers)
 
-    async def _insert_word(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _send_bytes(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         skip_time_wait(writer.get_extra_info("socket"))
         with contextlib.suppress(OSError):
-            writer.write(self._said)
+            writer.write(self._server_bytes)
             await writer.drain()
-            if len(self._said) % _SELDOM == 0:
+            if len(self._server_bytes) % _HALF_CLOSE_EVERY == 0:
                 writer.write_eof()
             else:
                 writer.close()
 
     async def _to_client(self, data: bytes) -> bool:
-        self._said = data
-        self.messages += data.count(b"\n")  # once, however often the client reconnects
-        port = self._stranger.sockets[0].getsockname()[1]
+        self._server_bytes = data
+        self.messages += data.count(b"\n")  # once, even if the client reconnects
+        port = self._fake_server.sockets[0].getsockname()[1]
         client = PulseClient("127.0.0.1", port, "c0", clock=self._loop.time)
         client.start()
         try:
-            async with asyncio.timeout(_LISTENS_S):
+            async with asyncio.timeout(_CLIENT_S):
                 async for _ in client:
                     pass
         except TimeoutError:
@@ -96,7 +96,7 @@ class SocketBytes(ScriptTarget):
 
     def close(self) -> None:
         """Stop the server."""
-        self._stranger.close()
+        self._fake_server.close()
         self._loop.run_until_complete(self._server.stop())
         self._loop.close()
 

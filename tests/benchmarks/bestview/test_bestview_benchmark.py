@@ -23,7 +23,7 @@ from benchmarks.bestview.camera_tracks import Rows
 from benchmarks.bestview.methods import MethodResult, score_method, visible_rows
 from benchmarks.bestview.parameter_sweep import DEFAULT_SWITCH_COST_S, STRIDE, SweepSetting, sweep
 from benchmarks.bestview.scenes import BenchmarkScene
-from benchmarks.bestview.service_decisions import Rendering, decide_given, largest
+from benchmarks.bestview.service_decisions import Rendering, decide_with_true_ids, largest
 from benchmarks.bestview.visibility_losses import VisibilityLosses, losses
 from server.cli.evaluate.choices_file import Choice
 from server.messaging.messages import CameraTracks, TrackMessage
@@ -61,8 +61,8 @@ def passing() -> BenchmarkScene:
 def test_on_true_boxes_myviews_choice_is_the_optimum_where_it_is_plain(passing: BenchmarkScene) -> None:
     truth = passing.truth()
     for found in (
-        decide_given(passing.config(), passing.gt, FRAMES),
-        decide_given(passing.config(), visible_rows(passing, truth), FRAMES),
+        decide_with_true_ids(passing.config(), passing.gt, FRAMES),
+        decide_with_true_ids(passing.config(), visible_rows(passing, truth), FRAMES),
     ):
         score = score_method(passing, truth, MethodResult("true", found, ground_truth=True)).views
         assert (score.agreement, score.regret, score.visible, score.chosen) == (1.0, 0.0, 1.0, 1.0)

@@ -24,8 +24,8 @@ def corridor(places: int) -> np.ndarray:
 
 
 @st.composite
-def lattices(draw: st.DrawFn, most_frames: int, most_places: int) -> Lattice:
-    frames, places = draw(st.integers(1, most_frames)), draw(st.integers(1, most_places))
+def lattices(draw: st.DrawFn, most_frames: int, max_places: int) -> Lattice:
+    frames, places = draw(st.integers(1, most_frames)), draw(st.integers(1, max_places))
     cost = st.integers(-9, 9)
     costs = draw(st.lists(cost, min_size=frames * places, max_size=frames * places))
     gates = draw(st.lists(st.sampled_from([0, 2, 7, int(INFINITE)]), min_size=places, max_size=places))
@@ -71,7 +71,7 @@ def least_by_trying(lattice: Lattice) -> int:
 
 
 @bounded
-@given(lattices(most_frames=4, most_places=2) | lattices(most_frames=2, most_places=4))
+@given(lattices(most_frames=4, max_places=2) | lattices(most_frames=2, max_places=4))
 def test_paths_are_the_cheapest_of_all_that_never_share_a_place(lattice: Lattice) -> None:
     paths = shortest_paths(lattice)
     nodes = [(path.first + step, int(place)) for path in paths for step, place in enumerate(path.places)]
@@ -110,7 +110,7 @@ def least_by_program(lattice: Lattice) -> float:
 
 
 @bounded
-@given(lattices(most_frames=8, most_places=6))
+@given(lattices(most_frames=8, max_places=6))
 def test_paths_are_the_optimum_of_the_flow_program(lattice: Lattice) -> None:
     paths = shortest_paths(lattice)
     assert sum(cost_of(lattice, path) for path in paths) == pytest.approx(least_by_program(lattice), abs=1e-6)

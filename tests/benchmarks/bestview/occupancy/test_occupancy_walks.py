@@ -35,7 +35,7 @@ def plan_view(left: float) -> CameraView:
 
 def test_the_grid_covers_what_is_seen_and_its_border_is_the_gate() -> None:
     view = plan_view(0.0)
-    floor = build_grid([view], GridSettings(step=0.2, gate=0.2, least_seen=0.5))
+    floor = build_grid([view], GridSettings(step=0.2, gate=0.2, min_visible=0.5))
     assert (view.visible_share(view.boxes(floor.places, 0.34)) >= 0.5).all()
     neighbors = (floor.moves < len(floor.places)).sum(axis=1)
     assert floor.gates[neighbors < 9].all()
