@@ -61,7 +61,7 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         cameras[1]["offset"] = 5
         await reload(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
         await wait_for_log(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")
-        await wait_for_log(site, "c1: configuration reloaded, and changes this camera")
+        await wait_for_log(site, "c1: configuration reloaded: this camera restarts")
         assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
         assert (await ask("api/operator/config"))["pending_restart"] == ["encode.crf"]
         await bounded(viewer)
