@@ -116,7 +116,7 @@ const signIn = new SignIn(() => location.reload(), showSignInError);
 
 /** @param {unknown} error null: no error */
 function showSignInError(error) {
-  setText(element('sign-in-trouble'), error instanceof Error ? error.message : '');
+  setText(element('sign-in-error'), error instanceof Error ? error.message : '');
 }
 
 /** Update the visitor's rights. Without a token the server's events fail like a lost connection, so ask after both. */

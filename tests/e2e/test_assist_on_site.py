@@ -63,7 +63,7 @@ async def test_a_scripted_pointer_answers_a_flag_without_interrupting_the_stream
     await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
     point = page.locator("#flag-point")
     await page.wait_for_function("myview.flags.length && !document.querySelector('#flag-point').hidden")
-    assert (await page.locator("#flag-words").inner_text()).strip()
+    assert (await page.locator("#flag-text").inner_text()).strip()
     await point.click()
     await page.wait_for_function("myview.pointing.object !== null")
     await point_until(page, "myview.pointing.taken >= 20")

@@ -80,7 +80,7 @@ class CameraTile {
     this.image = make('img', { alt: `What ${camera} sees now` });
     this.state = make('span', { className: 'state' });
     this.values = ROWS.map(([name, title]) => [make('dt', { textContent: name, title }), make('dd')]);
-    this.error = make('p', { className: 'last-trouble' });
+    this.error = make('p', { className: 'last-error' });
     const chip = make('span', { className: 'chip', textContent: camera });
     chip.style.setProperty('--camera', color);
     this.item = make(

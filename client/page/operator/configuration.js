@@ -11,8 +11,8 @@ export class ConfigurationTable {
   /** @type {Setting[]} */
   #settings = [];
   /** @type {HTMLInputElement} */
-  #search = element('find-setting');
-  #differingButton = element('only-differing');
+  #search = element('setting-search');
+  #differingButton = element('only-non-defaults');
 
   /** @param {ShowError} showError */
   constructor(showError) {
@@ -27,7 +27,7 @@ export class ConfigurationTable {
   open() {
     void requestOperator('config').then((/** @type {Settings} */ { settings, error, pending_restart: pending }) => {
       this.#settings = settings;
-      setText(element('config-on-disk'), describeFile(error, pending));
+      setText(element('config-file-status'), describeFile(error, pending));
       this.#show();
     }, this.showError);
   }
@@ -45,7 +45,7 @@ export class ConfigurationTable {
         (differs || usual === null || !this.#onlyDiffering) && `${key}: ${value}`.toLowerCase().includes(search),
     );
     element('settings').replaceChildren(...shown.map(settingRow));
-    setText(element('settings-none'), shown.length || !this.#settings.length ? '' : 'No matching setting.');
+    setText(element('no-settings'), shown.length || !this.#settings.length ? '' : 'No matching setting.');
   }
 }
 

@@ -70,7 +70,7 @@ export class FloorPlan {
   #draw({ cameras, uncalibrated }) {
     const outlines = cameras.map(({ outline }) => outline).filter((outline) => outline.length > 0);
     element('plan').toggleAttribute('hidden', !outlines.length);
-    setText(element('floor-words'), describe(outlines.length, uncalibrated));
+    setText(element('floor-message'), describe(outlines.length, uncalibrated));
     element('floor-cameras').replaceChildren(...cameras.map(({ camera }) => make('li', {}, this.#chip(camera))));
     if (!outlines.length) return;
     const corners = outlines.flat();
@@ -83,7 +83,7 @@ export class FloorPlan {
     plan.setAttribute('viewBox', box.join(' '));
     const areas = cameras.map(({ camera, outline }) => {
       const color = this.palette.color(camera);
-      return svg('polygon', { points: svgPoints(outline), fill: color, stroke: color, class: 'part' });
+      return svg('polygon', { points: svgPoints(outline), fill: color, stroke: color, class: 'coverage' });
     });
     plan.replaceChildren(...areas, this.#people);
   }
@@ -96,7 +96,7 @@ export class FloorPlan {
       const [x, y] = positions[positions.length - 1];
       return `${shortLabel(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
     });
-    const list = element('places');
+    const list = element('positions');
     while (list.children.length > lines.length) list.lastChild?.remove();
     lines.forEach((line, at) => setText(list.children[at] ?? list.appendChild(make('li')), line));
     const heading = element('floor').querySelector('h2') ?? list;
@@ -112,8 +112,8 @@ export class FloorPlan {
     const name = svg('text', { x, y: -y - size * DOT * 1.6, 'font-size': size * 0.035, class: 'name' });
     name.textContent = shortLabel(object);
     return [
-      svg('polyline', { points: svgPoints(positions), class: 'way' }),
-      svg('circle', { cx: x, cy: -y, r: size * DOT, class: 'walker' }),
+      svg('polyline', { points: svgPoints(positions), class: 'track' }),
+      svg('circle', { cx: x, cy: -y, r: size * DOT, class: 'dot' }),
       name,
     ];
   }

@@ -28,7 +28,7 @@ const signIn = new SignIn(() => void enter(), showError);
 
 /** @param {unknown} error null: no error */
 function showError(error) {
-  setText(element('trouble'), error instanceof Error ? error.message : '');
+  setText(element('error-message'), error instanceof Error ? error.message : '');
   if (error instanceof HttpError && error.status === 401) askForToken();
 }
 
@@ -68,8 +68,8 @@ function createSections(site) {
   const downloads = new Downloads(site);
   sections.set('cameras', new CameraTiles(palette, showError));
   sections.set('floor', floor);
-  sections.set('known', people);
-  sections.set('flagged', flags);
+  sections.set('people', people);
+  sections.set('flags', flags);
   sections.set('downloads', downloads);
   sections.set('zones', new ZoneEditor(site, showError));
   sections.set('calibration', new CalibrationWalk(showError));

@@ -17,13 +17,13 @@ const NO_PEOPLE = 'No people yet.';
 export class PeopleEditor {
   /** @type {Map<number, PersonEditor>} */
   #editors = new Map();
-  #message = element('known-words');
+  #message = element('people-message');
   /** @type {HTMLSelectElement} */
   #mergeKept = element('merge-kept');
   /** @type {HTMLSelectElement} */
   #mergeLost = element('merge-lost');
   /** @type {HTMLSelectElement} */
-  #splitObject = element('split-who');
+  #splitObject = element('split-object');
   /** @type {HTMLSelectElement} */
   #splitCamera = element('split-camera');
 
@@ -64,7 +64,7 @@ export class PeopleEditor {
       editor.item.remove();
       this.#editors.delete(object);
     }
-    const list = element('known-people');
+    const list = element('people-list');
     for (const person of [...people].sort((a, b) => a.object - b.object)) {
       let editor = this.#editors.get(person.object);
       if (!editor) {

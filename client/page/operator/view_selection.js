@@ -42,7 +42,7 @@ export class ViewSelectionForm {
       event.preventDefault();
       void this.#change('PUT', this.#entered());
     });
-    element('selection-back').addEventListener('click', () => void this.#change('DELETE'));
+    element('selection-revert').addEventListener('click', () => void this.#change('DELETE'));
     element('selection-copy').addEventListener('click', async () => {
       const copied = await copy(this.#lines.value);
       setText(this.#state, copied ? 'Copied.' : 'Select the lines and copy them.');

@@ -30,7 +30,7 @@ export class ZoneEditor {
   #lines = element('mark-lines');
   /** @type {HTMLInputElement} */
   #unit = element('mark-unit');
-  #message = element('mark-said');
+  #message = element('mark-message');
   #areasButton = element('mark-areas');
 
   /**
@@ -166,7 +166,7 @@ export class ZoneEditor {
   #show() {
     element('mark-next').hidden = !this.#markingAreas;
     element('mark-table').hidden = element('mark-download').hidden = this.#markingAreas;
-    element('mark-how').textContent = this.#markingAreas
+    element('mark-help').textContent = this.#markingAreas
       ? 'Press the corners of the area to ignore in order. The lines below replace those of the configuration.'
       : 'Press a point on the floor and enter its position below. The file is for: myview calibrate points.json --out ground.json';
     if (!this.#markingAreas) this.#showPairs();

@@ -44,8 +44,8 @@ async def test_viewers_see_flags_without_a_button(browser: Browser) -> None:
     site.flags.append(flag(site))
     async with visiting(browser, site) as visit:
         await visit.playing(1)
-        await expect(visit.page.locator("#flag-words")).to_have_text("2 and 1 look alike and cross")
-        await visit.until("/ in [0-9.]+ s/.test(document.querySelector('#flag-when').textContent)")
+        await expect(visit.page.locator("#flag-text")).to_have_text("2 and 1 look alike and cross")
+        await visit.until("/ in [0-9.]+ s/.test(document.querySelector('#flag-time').textContent)")
         await expect(visit.page.locator("#flag-point")).to_be_hidden()
         await expect(visit.page.locator("#point")).to_be_hidden()
         await visit.page.keyboard.press("h")
@@ -86,7 +86,7 @@ async def test_a_past_flag_is_answered_in_the_past_and_playback_returns_to_live(
         await seconds_of_playing(visit, 6)
         past = flag(site, -5.0)
         site.flags.append(past)
-        await visit.until("/ [0-9] s ago/.test(document.querySelector('#flag-when').textContent)")
+        await visit.until("/ [0-9] s ago/.test(document.querySelector('#flag-time').textContent)")
         await visit.page.locator("#flag-point").click()
         await visit.playing(2)
         went_back = "(delay, at, all) => at && delay.pulse < all[at - 1].pulse - 2 * 25"
@@ -113,7 +113,7 @@ async def test_while_pointing_the_persons_flag_is_shown_even_if_another_is_more_
     async with visiting(browser, site) as visit:
         await visit.playing(1)
         await visit.page.locator("#flag-point").click()
-        text = visit.page.locator("#flag-words")
+        text = visit.page.locator("#flag-text")
         await expect(text).to_have_text("Follow 2: 2 and 1 look alike and cross")
         site.flags.append(flag(site, 20.0, id=2, objects=[3], reason="track_loss"))
         await visit.until("myview.flags.length === 2 && myview.flags[0].id === 2")
@@ -128,7 +128,7 @@ async def test_the_operator_points_at_the_selected_person_by_keyboard(browser: B
         await visit.playing(1)
         await visit.until("!document.querySelector('#point').hidden")
         await visit.page.keyboard.press("h")
-        await expect(visit.page.locator("#flag-words")).to_have_text("Follow 1")
+        await expect(visit.page.locator("#flag-text")).to_have_text("Follow 1")
         await visit.page.keyboard.press("Space")
         await visit.until("document.querySelector('video').paused && myview.boxes.length > 0")
         *_, x, y = await center(visit, 1)
@@ -153,11 +153,11 @@ async def test_the_operator_points_at_the_selected_person_while_a_flag_is_about_
         await visit.playing(1)
         await visit.until("!document.querySelector('#point').hidden && myview.flags.length === 1")
         await visit.page.keyboard.press("h")
-        await expect(visit.page.locator("#flag-words")).to_have_text("Follow 1")
+        await expect(visit.page.locator("#flag-text")).to_have_text("Follow 1")
         assert await visit.get("[myview.object, myview.pointing.object]") == [1, 1]
         await expect(visit.page.locator("#automatic")).to_be_hidden()  # no camera is held for the flag
         await visit.page.keyboard.press("h")
-        await expect(visit.page.locator("#flag-words")).to_have_text("2 may be lost")
+        await expect(visit.page.locator("#flag-text")).to_have_text("2 may be lost")
 
 
 async def test_pointing_started_by_key_continues_when_a_flag_is_answered(browser: Browser) -> None:

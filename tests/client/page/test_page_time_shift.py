@@ -215,8 +215,8 @@ async def test_an_unrecorded_moment_is_reported_and_playback_is_live(browser: Br
         await seconds_of_playing(visit, 3)
         await visit.page.keyboard.press(",")
         await expect(visit.page.locator("#notice")).to_contain_text("There is no recording of that time")
-        seen = await visit.get("myview.pulse")
-        await visit.until(f"myview.pulse > {seen + GOP} && {LIVE}")
+        pulse = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {pulse + GOP} && {LIVE}")
 
 
 @pytest.mark.slow

@@ -13,8 +13,8 @@ const LEAD_IN_S = 1; // a past event is played again from this long before it
 export class FlagBanner {
   flags = new OpenFlags();
   #banner = element('flags');
-  #text = element('flag-words');
-  #time = element('flag-when');
+  #text = element('flag-text');
+  #time = element('flag-time');
   #answerButton = element('flag-point');
   #pointButton = element('point');
   /** @type {string | null} the camera held for pointing */

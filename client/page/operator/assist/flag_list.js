@@ -16,7 +16,7 @@ export class FlagList {
   /** @type {Map<number, Flag>} */
   #flags = new Map();
   #list = element('flag-list');
-  #none = element('flag-none');
+  #none = element('no-flags');
 
   /**
    * @param {Site} site

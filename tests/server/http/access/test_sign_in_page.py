@@ -55,7 +55,7 @@ async def test_a_viewer_watches_from_signing_in_to_signing_out(browser: Browser,
         field = page.get_by_label("Watching needs a token")
         await field.fill("wrong")
         await page.get_by_role("button", name="Sign in").click()
-        await expect(page.locator("#sign-in-trouble")).to_have_text("unknown or revoked token")
+        await expect(page.locator("#sign-in-error")).to_have_text("unknown or revoked token")
         await expect(page.locator("#stage")).to_be_hidden()
         await field.fill(token_of("desk"))
         await page.keyboard.press("Enter")

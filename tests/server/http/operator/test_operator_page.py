@@ -31,7 +31,7 @@ from server.cli.calibrate.points_file import read_points
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
 
-SECTIONS = ["cameras", "floor", "known", "flagged", "downloads"]
+SECTIONS = ["cameras", "floor", "people", "flags", "downloads"]
 SECTIONS += ["zones", "calibration", "view-selection", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
@@ -78,14 +78,14 @@ async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_p
         field = page.get_by_label("An operator's token")
         await field.fill("wrong")
         await page.get_by_role("button", name="Sign in").click()
-        await expect(page.locator("#trouble")).to_have_text("unknown or revoked token")
+        await expect(page.locator("#error-message")).to_have_text("unknown or revoked token")
         await page.keyboard.type(token_of("desk"))
         await page.keyboard.press("Enter")
-        await expect(page.locator("#trouble")).to_have_text("the token 'desk' is only for watching")
+        await expect(page.locator("#error-message")).to_have_text("the token 'desk' is only for watching")
         await field.fill(token_of("lead"))
         await page.keyboard.press("Enter")
         await expect(field).to_be_hidden()
-        await expect(page.locator("#trouble")).to_be_empty()
+        await expect(page.locator("#error-message")).to_be_empty()
         assert await page.evaluate("document.cookie") == ""
         await page.reload()
         await expect(page.locator("#cameras")).to_be_visible()
@@ -122,14 +122,14 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
         await expect(tile.get_by_text("-250 ms")).to_be_visible()
         hall.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
         await expect(tile.locator(".state")).to_have_text("Gone")
-        await expect(tile.locator(".last-trouble")).to_contain_text("its process disconnected")
+        await expect(tile.locator(".last-error")).to_contain_text("its process disconnected")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
 
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:
     cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
     async with operating(browser, "#floor", cameras=cameras) as (hall, page):
-        await expect(page.locator("#floor-words")).to_have_text("No camera has reported yet.")
+        await expect(page.locator("#floor-message")).to_have_text("No camera has reported yet.")
         see(hall)
         await page.reload()
         await expect(page.locator("#plan polygon")).to_have_count(2)
@@ -137,40 +137,40 @@ async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browse
         hall.service.feed(4, {A: {2: SMALL}, B: {1: SMALL}})
         left, _, right, bottom = SMALL
         stands = f"{(left + right) / 20:.2f}, {bottom / 10:.2f}"
-        await expect(page.locator("#places li").nth(1)).to_have_text(f"2 at {stands}, seen by {A}")
-        await expect(page.locator("#plan .walker")).to_have_count(2)
-        assert await page.locator("#plan .way").nth(1).get_attribute("points") is not None
+        await expect(page.locator("#positions li").nth(1)).to_have_text(f"2 at {stands}, seen by {A}")
+        await expect(page.locator("#plan .dot")).to_have_count(2)
+        assert await page.locator("#plan .track").nth(1).get_attribute("points") is not None
 
 
 async def test_an_uncalibrated_site_shows_how_to_calibrate(browser: Browser) -> None:
     async with operating(browser, "#floor") as (hall, page):
         see(hall)
-        await expect(page.locator("#floor-words")).to_contain_text("No camera is calibrated")
+        await expect(page.locator("#floor-message")).to_contain_text("No camera is calibrated")
         await expect(page.locator("#plan")).to_be_hidden()
 
 
 async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browser) -> None:
-    async with operating(browser, "#known") as (hall, page):
+    async with operating(browser, "#people") as (hall, page):
         people = hall.service.decider.people
         people._registry = IdentityRegistry(hall.service.config.view.identity, dict.fromkeys(CAMERAS))
-        await expect(page.locator("#known-words")).to_have_text("No people yet.")
+        await expect(page.locator("#people-message")).to_have_text("No people yet.")
         see(hall)
         first, second, *_ = people.known
         await page.get_by_label(f"Name of person {first}").fill("Ann")
         await page.keyboard.press("Enter")
-        await expect(page.locator("#known-words")).to_have_text(f"{first} is called Ann.")
+        await expect(page.locator("#people-message")).to_have_text(f"{first} is called Ann.")
         await expect(page.locator("#merge-kept option").first).to_have_text(f"{first} Ann")
         await page.get_by_label("and merge into it").select_option(str(second))
         await page.get_by_role("button", name="Merge").click()
-        await expect(page.locator("#known-words")).to_have_text(f"{second} is merged into {first}.")
+        await expect(page.locator("#people-message")).to_have_text(f"{second} is merged into {first}.")
         assert people.registry.merged == {second: first}
         hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
-        await expect(page.locator(f'#known-people [data-object="{second}"]')).to_have_count(0)
+        await expect(page.locator(f'#people-list [data-object="{second}"]')).to_have_count(0)
         shown = people.number(A, 1, 15)
         await page.get_by_label("Split", exact=True).select_option(str(shown))
         await page.get_by_label("as seen by").select_option(A)
         await page.get_by_role("button", name="Split off as new person").click()
-        await expect(page.locator("#known-words")).to_have_text(re.compile(r"Split off as person \d+\."))
+        await expect(page.locator("#people-message")).to_have_text(re.compile(r"Split off as person \d+\."))
         assert people.number(A, 1, 19) != shown
         await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
         await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
@@ -178,8 +178,8 @@ async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browse
 
 
 async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
-    async with operating(browser, "#flagged") as (hall, page):
-        await expect(page.locator("#flag-none")).to_have_text("None so far.")
+    async with operating(browser, "#flags") as (hall, page):
+        await expect(page.locator("#no-flags")).to_have_text("None so far.")
         see(hall)
         hall.service.decider.people.registry.set_name(1, "Ann")
         trouble = RiskEvent(reason="crossing", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
@@ -189,7 +189,7 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
         hall.service.decide()
         line = page.locator("#flag-list li")
         await expect(line).to_have_text(re.compile(r"2 and 1.* cross .* \(c0\): open"))
-        await expect(page.locator("#flag-none")).to_have_text("")
+        await expect(page.locator("#no-flags")).to_have_text("")
         hall.service.assist.flags.step(29 + 8 * FPS + 1, [], int)
         await expect(line).to_have_text(re.compile(r": expired without an answer"))
         await page.reload()
@@ -200,7 +200,7 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
         lines, events._by_scope = events._by_scope, {}
         for it in lines.values():
             it.channel.close()
-        await expect(page.locator("#flag-none")).to_have_text("None so far.")
+        await expect(page.locator("#no-flags")).to_have_text("None so far.")
 
 
 async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browser) -> None:
@@ -316,9 +316,9 @@ async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, 
             await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
             await page.get_by_label(f"Pair {pair}, x on the floor").fill(str(10 * x))
             if pair == 4:
-                await expect(page.locator("#mark-said")).to_contain_text("1 of 4 pairs have no position")
+                await expect(page.locator("#mark-message")).to_contain_text("1 of 4 pairs have no position")
             await page.get_by_label(f"Pair {pair}, y on the floor").fill(str(-10 * y))
-        await expect(page.locator("#mark-said")).to_be_empty()
+        await expect(page.locator("#mark-message")).to_be_empty()
         async with page.expect_download() as download:
             await page.get_by_role("button", name="Download the points").click()
         await (await download.value).save_as(tmp_path / "points.json")
@@ -384,10 +384,10 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
         for name in ("Truncation", "Occlusion", "Centering"):
             await page.get_by_label(name).fill("0")
         await page.get_by_role("button", name="Apply").click()
-        await expect(page.locator("#trouble")).to_contain_text("all weights are 0")
+        await expect(page.locator("#error-message")).to_contain_text("all weights are 0")
         await page.get_by_role("button", name="Revert to file").click()
         await expect(page.locator("#selection-state")).to_have_text("As in the file.")
-        await expect(page.locator("#trouble")).to_be_empty()
+        await expect(page.locator("#error-message")).to_be_empty()
         assert decider.view == hall.service.config.view
 
 

@@ -44,15 +44,15 @@ async def test_a_followed_person_is_large_and_inside_the_picture(browser: Browse
         assert whole < 2 * SQUARE**2 / WIDTH / HEIGHT
         await visit.page.get_by_role("button", name="Follow").click()
         await visit.until("document.querySelector('#toggle-follow').ariaPressed === 'true'")
-        seen = await visit.get("myview.pulse")
-        await visit.until(f"myview.pulse > {seen + 75}")
+        pulse = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {pulse + 75}")
         while (
             await bright_share_now(visit) < 4 * whole
         ):  # three times as large in both directions, except for the edges
             pass
         await visit.page.keyboard.press("z")
-        seen = await visit.get("myview.pulse")
-        await visit.until(f"myview.pulse > {seen + 15}")
+        pulse = await visit.get("myview.pulse")
+        await visit.until(f"myview.pulse > {pulse + 15}")
         assert await bright_share(visit) < 2 * whole
 
 
@@ -63,8 +63,8 @@ async def test_a_person_is_found_under_the_pointer_while_followed(browser: Brows
         rows = columns = np.empty(0)
         while not rows.size:
             await visit.get("video.play()")
-            seen = await visit.get("myview.pulse")
-            await visit.until(f"myview.pulse > {seen + 33}")
+            pulse = await visit.get("myview.pulse")
+            await visit.until(f"myview.pulse > {pulse + 33}")
             await visit.get("video.pause()")
             frame = await visit.screenshot()
             rows, columns = (frame[:, :, 0] - frame[:, :, 2] > BROWN).nonzero()
