@@ -59,7 +59,8 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
 
         cameras = [dict(camera) for camera in site.config["cameras"]]
         cameras[1]["offset"] = 5
-        await reload(site, config, cameras=cameras, view={"switch_cost_s": 0.7}, encode={"crf": 30})
+        view = {**site.config["view"], "switch_cost_s": 0.7}
+        await reload(site, config, cameras=cameras, view=view, encode={"crf": 30})
         await wait_for_log(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")
         await wait_for_log(site, "c1: configuration reloaded: this camera restarts")
         assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
