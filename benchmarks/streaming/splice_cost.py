@@ -52,7 +52,7 @@ class SplicerFixture:
         """Return a decision with a camera for each object."""
         names = list(self._buffers)
         choices = tuple(
-            ObjectChoice(number, names[camera], None, away=False)
+            ObjectChoice(number, names[camera], None, departed=False)
             for number, camera in enumerate(cameras, start=1)
         )
         return GopDecision(gop * self.gop, self.gop, choices, {}, {}, (), _NO_REASON)

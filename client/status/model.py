@@ -22,7 +22,7 @@ class CameraNow(msgspec.Struct, frozen=True):
     """Recent median of a frame's delay after its pulse."""
     tracking_delay_s: float | None = None
     """Recent median of the tracks' delay after their pulse."""
-    certified: float | None = None
+    optimal: float | None = None
     """Share of the windows with a proven optimum, 0 to 1, since the service began."""
     waiting: int | None = None
     """Frames that wait for detection."""

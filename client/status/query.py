@@ -92,8 +92,8 @@ def _measured(camera: CameraNow, metrics: Metrics | None) -> CameraNow:
         synchronized=camera.synchronized,
         sync_error_s=metrics.get("myview_camera_sync_error_seconds", camera=name, statistic="median"),
         tracking_delay_s=metrics.get("myview_camera_tracking_delay_seconds", camera=name, statistic="median"),
-        certified=metrics.share(
-            "myview_camera_certified_windows_total", "myview_camera_windows_total", camera=name
+        optimal=metrics.share(
+            "myview_camera_optimal_windows_total", "myview_camera_windows_total", camera=name
         ),
         waiting=None if waiting is None else int(waiting),
     )

@@ -1,4 +1,4 @@
-"""The best-view service's connection to the bus: messages from the cameras in, choices and commands out."""
+"""The best-view service's connection to the bus: receives the cameras' messages, sends commands."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MessageHandler = Callable[[Message], None]
 
 
 class BusConnection:
-    """Opens the bus and carries the service's messages. Until it is opened, nothing is sent."""
+    """Opens the bus, and sends and receives the service's messages; before :meth:`open` nothing is sent."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
@@ -25,7 +25,7 @@ class BusConnection:
         self._keys = ZenohKeys(config.site.name)
         self._bus: Bus | None = None
         self.inboxes: list[Inbox[Message]] = []
-        """Messages that wait for the event loop."""
+        """The queues of received messages."""
 
     def open(
         self,
@@ -37,8 +37,9 @@ class BusConnection:
 
         Args:
             camera_handlers: by the last part of a camera's key.
-            on_audio: handles the site's audio; None at a site without.
-            on_alive: called with a camera's key when its liveliness token comes (True) or goes (False).
+            on_audio: handles the site's audio; None if the site has none.
+            on_alive: called with a camera's key when its liveliness token appears (True) or disappears
+                (False).
 
         Raises:
             UserError: the address is in use, or a password file cannot be read.

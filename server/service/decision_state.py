@@ -1,4 +1,4 @@
-"""The state of decisions, for the API and the page: each person's view now, and why it was selected."""
+"""The state of decisions, for the API and the page: each person's current view, and why it was selected."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class DecisionState:
         numbers = {choice.number for choice in decision.choices}
         self.selected_views = {number: it for number, it in self.selected_views.items() if number in numbers}
         self.merged = decision.merged
-        self._reasons.put(self.selected_views, decision.first, decision.why)
+        self._reasons.put(self.selected_views, decision.first, decision.reasons)
         self.cuts += len(cuts)
         self.end = decision.first + decision.frames
         return GopChoices(
@@ -93,28 +93,28 @@ def _cut(choice: ObjectChoice, pulse: int) -> ViewCut | None:
     return ViewCut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
 
 
-def reason(choice: ObjectChoice, why: Explanation) -> str:
+def reason(choice: ObjectChoice, explanation: Explanation) -> str:
     """Return why this view was selected, as one plain sentence."""
     camera = choice.camera
     if camera is None:
-        return "No camera's picture can be shown at the moment."
-    if choice.away or not any(view.seen or view.undetected for view in why.views.values()):
+        return "No camera can be shown at the moment."
+    if choice.departed or not any(view.seen or view.undetected for view in explanation.views.values()):
         return f"No camera sees this person at the moment; {camera} saw them last."
-    return _compared(camera, why)
+    return _compare(camera, explanation)
 
 
-def _compared(camera: str, why: Explanation) -> str:
+def _compare(camera: str, explanation: Explanation) -> str:
     """Return why this camera was selected among those that see the person, or should."""
-    view = why.views.get(camera)
+    view = explanation.views.get(camera)
     if view is not None and not view.seen and view.undetected:
         return f"{camera} does not detect this person, but other cameras locate them in its view."
-    possible = {name: view.cost for name, view in why.views.items() if view.cost is not None}
+    possible = {name: view.cost for name, view in explanation.views.items() if view.cost is not None}
     if camera not in possible:  # frames are missing in the look-ahead
         return f"{camera} is shown for as long as it can be: some of its next frames are missing."
     if len(possible) == 1:
-        return f"{camera} is the only camera whose picture can be shown."
+        return f"{camera} is the only camera that can be shown."
     if possible[camera] <= min(possible.values()):
         return f"{camera} sees this person best over the next frames."
-    if why.stay is not None and why.cut is not None and why.stay > why.cut:
+    if explanation.stay is not None and explanation.cut is not None and explanation.stay > explanation.cut:
         return f"Another camera will see this person better than {camera}: it is too soon to cut."
     return f"Another camera sees this person a little better than {camera}, but not enough to be worth a cut."

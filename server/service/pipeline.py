@@ -23,7 +23,7 @@ from server.service.bus_connection import BusConnection
 from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.decision_state import DecisionState
-from server.service.identity.state_replication import PATIENCE_S, StateReplication
+from server.service.identity.state_replication import SNAPSHOT_WAIT_S, StateReplication
 from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch, EpochAligner
 from server.service.ingest.ingest import Ingest
@@ -40,7 +40,7 @@ from server.system.errors import UserError
 log = logging.getLogger(__name__)
 
 _MAX_AHEAD_S = 60.0
-"""How far a camera's pulses may be ahead of this service's, which may have been suspended."""
+"""Seconds that a camera's pulses may be ahead of this service's, which may have been suspended."""
 _INBOX_TURNS = 10
 """How often the inboxes are served between two epochs, at most."""
 _FIRST_PULSE_S = 3.0
@@ -48,7 +48,7 @@ _FIRST_PULSE_S = 3.0
 
 
 class BestViewPipeline:
-    """Everything of the best-view process but HTTP. ``out`` is a folder for tracks and choices."""
+    """The best-view process without HTTP. ``out`` is a folder for tracks and choices."""
 
     def __init__(self, config: Config, out: Path | None = None) -> None:
         self.config = config
@@ -123,7 +123,7 @@ class BestViewPipeline:
         self.pulse_tls: ssl.SSLContext | None = None
         self._changed = asyncio.Event()
         self._runs_without_pulses = False
-        """Whether the first pulse is no longer waited for."""
+        """Whether waiting for the first pulse has timed out."""
 
     def open(self) -> None:
         """Open the bus that the cameras connect to.
@@ -146,7 +146,7 @@ class BestViewPipeline:
         self.bus.open(handlers, on_audio, self._alive)
 
     async def run(self) -> None:
-        """Serve until every camera's recording is over.
+        """Serve until every camera's recording has ended.
 
         Raises:
             UserError: the output folder cannot be written.
@@ -154,7 +154,7 @@ class BestViewPipeline:
         if self._out is not None:  # once all ports are open: a failed start leaves no files
             self._decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
         self.recorder.open()
-        patience = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
+        first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self._follow_pulses(), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
@@ -162,19 +162,19 @@ class BestViewPipeline:
                 await self._changed.wait()
                 self._changed.clear()
                 if follow.done():
-                    await follow  # raises what ended it
+                    await follow  # raises its error
                 if (self.pulse >= 0 or self._runs_without_pulses) and not self.state_replication.is_waiting:
                     await self.decide_cooperatively()
             for decision in self.finish():
                 self._publish(decision)
-            log.info("every camera's recording is over")
+            log.info("every camera's recording has ended")
         finally:
-            patience.cancel()
+            first_pulse_timeout.cancel()
             follow.cancel()
             await asyncio.gather(follow, return_exceptions=True)
 
     def finish(self) -> list[GopDecision]:
-        """Decide the remaining GOPs when every recording is over."""
+        """Decide the remaining GOPs after the end of every recording."""
         newest = max(frame_buffer.newest for frame_buffer in self.frame_buffers.values())
         return self.decider.finish(min(newest, self._last_decided))
 
@@ -190,8 +190,8 @@ class BestViewPipeline:
     async def decide_cooperatively(self) -> None:
         """Decide and publish all epochs that are ready, and serve inboxes and tasks between two epochs.
 
-        On an overloaded machine another epoch may always be ready. Frames are taken in first: a lost frame
-        cannot be shown. Epochs whose decisions would come too late to be shown are skipped.
+        On an overloaded machine another epoch may always be ready. Frames are received first: a lost frame
+        cannot be shown. Epochs whose decisions would be too late are skipped.
         """
         while self._decide_next():
             await asyncio.sleep(0)
@@ -243,20 +243,21 @@ class BestViewPipeline:
     def apply_config(self, config: Config) -> None:
         """Apply a configuration that differs only in what can change at run time, or in the cameras' part.
 
-        View settings that were tried out are replaced where the configuration's own have changed.
+        View settings that were changed at run time are replaced if those of the configuration have changed.
 
         Raises:
             UserError: the look-ahead is too short, or longer than the frame buffers allow.
         """
         if config.view != self.config.view:
             self.apply_view_settings(config.view)
-        ground = {it.id: {"ground": it.ground} for it in self.config.cameras}  # no file has a drawn scene's
-        cameras = [it.model_copy(update=ground[it.id]) for it in config.cameras]
+        # The ground of synthetic cameras is in no file.
+        ground = {camera.id: {"ground": camera.ground} for camera in self.config.cameras}
+        cameras = [camera.model_copy(update=ground[camera.id]) for camera in config.cameras]
         self.config = config.model_copy(update={"cameras": cameras})
 
     def close(self) -> None:
         """End all streams, and close the bus and the files."""
-        with contextlib.ExitStack() as closing:  # all of them, even if one raises; the last one first
+        with contextlib.ExitStack() as closing:  # all of them, even if one raises; in reverse order
             closing.callback(self.bus.close)
             if self._decision_writer is not None:
                 closing.callback(self._decision_writer.close)
@@ -292,7 +293,7 @@ class BestViewPipeline:
         self.state_replication.alive(key, is_present)
         self._changed.set()
         if self.state_replication.is_waiting:
-            asyncio.get_running_loop().call_later(PATIENCE_S, self._changed.set)
+            asyncio.get_running_loop().call_later(SNAPSHOT_WAIT_S, self._changed.set)
 
     def _retained_identities(self, message: Message) -> None:
         self.ingest.retained_identities(message, self.state_replication.snapshot_received)
@@ -300,12 +301,12 @@ class BestViewPipeline:
 
     def _step(self, epoch: Epoch) -> None:
         self._last_decided = epoch.last
-        self.loss_recorder.epoch(epoch)
+        self.loss_recorder.record_epoch(epoch)
         self.walk_session.add(epoch)
         self.state_replication.begin(epoch.last)
         with self.stage_timers.deciding():
             decisions = self.decider.step(epoch)
-        self.state_replication.advance(epoch.last)  # before publishing: names are restored by then
+        self.state_replication.advance(epoch.last)  # before publishing, so that names are restored
         for decision in decisions:
             self._publish(decision)
         self.assist.step(epoch, self.config)
@@ -329,5 +330,5 @@ class BestViewPipeline:
         self.bus.publish_choices(choices)
         if self._decision_writer is not None:
             self._decision_writer.write(decision)
-        self.loss_recorder.gop(decision)
+        self.loss_recorder.record_gop(decision)
         self.ingest.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)

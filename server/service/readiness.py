@@ -19,9 +19,9 @@ def why_not_ready(pipeline: BestViewPipeline) -> list[str]:
     fps = pipeline.config.site.fps
     since_pulse = pipeline.seconds_since_pulse
     if pipeline.pulse < 0:
-        reasons.append("no pulse has come from the pulse server")
+        reasons.append("no pulse received from the pulse server")
     elif since_pulse is not None and since_pulse > max(_MAX_PULSE_GAP_S, 3 / fps):
-        reasons.append(f"no pulse has come for {since_pulse:.0f} s")
+        reasons.append(f"no pulse received for {since_pulse:.0f} s")
     if not any(state.label == "live" for state in pipeline.ingest.states.values()):
         reasons.append("no camera delivers frames")
     behind = pipeline.pulse + 1 - pipeline.decision_state.end
@@ -35,6 +35,6 @@ def why_not_ready(pipeline: BestViewPipeline) -> list[str]:
 def max_backlog(pipeline: BestViewPipeline) -> int:
     """Return the largest normal delay of decisions, in pulses."""
     config, fps = pipeline.config, pipeline.config.site.fps
-    waits = config.view.late_after_s + config.track.backlog_s + _SLACK_S
+    wait_s = config.view.late_after_s + config.track.backlog_s + _SLACK_S
     designed = pipeline.decider.view.lookahead + config.encode.gop + config.track.window.stride
-    return designed + round(waits * fps)
+    return designed + round(wait_s * fps)

@@ -42,7 +42,7 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) 
     for name in WRITTEN:
         live, offline = (tmp_path / way / name for way in ("live", "offline"))
         assert live.read_bytes() == offline.read_bytes(), f"{name} differs\n" + "\n".join(site.lines)
-    assert (tmp_path / "live" / "late.csv").read_text() == "frame,camera,what\n"
+    assert (tmp_path / "live" / "late.csv").read_text() == "frame,camera,reason\n"
     choices = (tmp_path / "live" / "choices.csv").read_text().splitlines()
     assert len(choices) > 400, "people were detected"
     assert {line.rsplit(",")[2] for line in choices[1:]} <= set(CAMERAS)

@@ -83,7 +83,7 @@ class RetainedStates(ScriptTarget):
                 Epoch(last // STRIDE, last, {message.camera: message for message in track_messages})
             )
             replication.advance(last)
-            assert not set(people.registry.merged) & set(people.registry.everybody), (
+            assert not set(people.registry.merged) & set(people.registry.all_numbers), (
                 "a merged number is still in use"
             )
         for payload in published:

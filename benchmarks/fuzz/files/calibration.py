@@ -156,7 +156,7 @@ def _lay_out_plan(views: Sequence[FloorPlanCamera], unit: str, _: object) -> Non
     for view in views:
         floor_plan._area(view)
     for text in (unit, *(view.camera for view in views)):
-        assert not is_math_text(floor_plan._plain(text)), text
+        assert not is_math_text(floor_plan._escape(text)), text
 
 
 class GroundFile(_GroundFiles):

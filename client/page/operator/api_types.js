@@ -25,8 +25,8 @@
  * @property {number | null} clock_offset seconds
  * @property {Spread | null} sync_error
  * @property {Spread | null} tracking_delay
- * @property {number | null} certified share of the windows
- * @property {number} windows
+ * @property {number | null} optimal share of the windows
+ * @property {number} solved_windows
  * @property {{text: string, at: number} | null} last_error
  * @property {CameraPicture | null} picture
  *

@@ -73,7 +73,7 @@ class FilmWriter:
                 film = self._films[choice.number] = self._begin(choice.number, decision)
             for chunk in film.showing.show(choice.camera, gop):
                 self._write(film, chunk)
-            if not choice.away:
+            if not choice.departed:
                 film.trimmed_size, film.until = film.file.tell(), decision.first + decision.frames
 
     def close(self) -> None:

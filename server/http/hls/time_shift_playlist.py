@@ -68,7 +68,7 @@ async def time_shift_playlist(request: web.Request, stream: HlsStream) -> web.Re
     missing = await refuse_unrecorded(recorded, playback)
     if missing is not None:
         return missing
-    time_shift, layout = recorded.time_shift(over=stream.is_over), service.streams.segment_plan
+    time_shift, layout = recorded.time_shift(has_ended=stream.is_over), service.streams.segment_plan
     listing = time_shift.segments(playback.start, playback.end)
     if listing is None:
         return unavailable("the first segment is not complete yet")
@@ -89,7 +89,7 @@ async def time_shift_playlist(request: web.Request, stream: HlsStream) -> web.Re
 async def time_shift_segment(request: web.Request, stream: HlsStream, number: int) -> HlsSegment | None:
     """Return a recorded segment that the live playlist no longer has; None: it is not recorded."""
     recorded, frames = stream.recorded, request.app[SERVICE].streams.segment_plan.segment_frames
-    time_shift = recorded.time_shift(over=stream.is_over)
+    time_shift = recorded.time_shift(has_ended=stream.is_over)
     with suppress(OSError):  # an unreadable segment counts as not recorded
         await recorded.check_ends(number * frames, (number + 1) * frames)
     return await time_shift.segment(number)

@@ -25,9 +25,9 @@ from server.service.calibration.worker import CalibrationResult, CalibrationTask
 
 def calibrate(task: CalibrationTask) -> CalibrationResult:
     """Calibrate; return the result, or why there is none."""
-    empty = [it.camera for it in task.cameras if not it.frames]
-    walks = tuple(_walk(it, task.fps) for it in task.cameras if it.frames)
-    live = tuple(it.camera for it in walks if it.camera not in task.offsets)
+    empty = [boxes.camera for boxes in task.cameras if not boxes.frames]
+    walks = tuple(_walk(boxes, task.fps) for boxes in task.cameras if boxes.frames)
+    live = tuple(walk.camera for walk in walks if walk.camera not in task.offsets)
     recorded = RecordedWalk(walks, task.fps, offsets=task.offsets, live=live)
     try:
         report = calibrate_walk(recorded, walk_settings(task.fps, task.max_offset_s), task.person)

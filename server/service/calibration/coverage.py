@@ -53,12 +53,12 @@ def walk_coverage(walks: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
     """Return what a walk has covered; compared moments are ``seconds`` apart."""
     samples = [it.samples for it in walks]
     moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
-    there = np.zeros((len(samples), moments), dtype=np.bool_)
-    for row, it in zip(there, samples, strict=True):
+    is_present = np.zeros((len(samples), moments), dtype=np.bool_)
+    for row, it in zip(is_present, samples, strict=True):
         row[it.moment] = True
-    count = there.sum(axis=0)
+    count = is_present.sum(axis=0)
     cameras = [_camera(walk.camera, it, count) for walk, it in zip(walks, samples, strict=True)]
-    both = there.astype(np.int64) @ there.T.astype(np.int64)
+    both = is_present.astype(np.int64) @ is_present.T.astype(np.int64)
     pairs = [
         PairCoverage(walks[one].camera, walks[other].camera, seconds * int(both[one, other]))
         for one, other in combinations(range(len(walks)), 2)

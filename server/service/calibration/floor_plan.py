@@ -63,8 +63,8 @@ def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | Bin
         axis.set_aspect("equal")
         axis.margins(_MARGIN)
         axis.autoscale_view()
-        axis.set_xlabel(_plain(unit))
-        axis.set_ylabel(_plain(unit))
+        axis.set_xlabel(_escape(unit))
+        axis.set_ylabel(_escape(unit))
         axis.legend(title="camera", markerscale=3)
     figure.suptitle("Floor plan: coverage, foot points and their errors", fontsize="medium")
     figure.savefig(out, dpi=100, format="png", bbox_inches="tight", metadata={"Software": None})
@@ -72,14 +72,14 @@ def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | Bin
 
 def _draw(axis: Axes, view: FloorPlanCamera, color: str) -> None:
     step = -(-len(view.image) // _MAX_POINTS)
-    seen = to_ground(view.homography, view.image[::step])
+    floor_points = to_ground(view.homography, view.image[::step])
     axis.fill(*_area(view).T, facecolor=to_rgba(color, 0.12), edgecolor=color, linewidth=1)
-    lines = np.stack([seen, view.place[::step]], axis=1)
+    lines = np.stack([floor_points, view.place[::step]], axis=1)
     axis.add_collection(LineCollection(list(lines), colors=color, linewidths=0.6, alpha=0.6))
-    axis.plot(*seen.T, ".", markersize=3, color=color, label=_plain(view.camera))
+    axis.plot(*floor_points.T, ".", markersize=3, color=color, label=_escape(view.camera))
 
 
-def _plain(text: str) -> str:
+def _escape(text: str) -> str:
     """Escape a text for Matplotlib, which reads formulas between dollar signs."""
     return text.replace("$", r"\$")
 

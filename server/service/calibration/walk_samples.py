@@ -21,11 +21,11 @@ _THIRDS = 3
 
 @dataclass(frozen=True, slots=True)
 class WalkSamples:
-    """S boxes that are not cut off by the picture's edge.
+    """S boxes that are not cut off by the image's edge.
 
     Attributes:
         moment: (S,) index of the compared moment.
-        third: (S,) the third of the picture that the person stands in, 0 to 2 from the left.
+        third: (S,) the third of the image that the person stands in, 0 to 2 from the left.
         height: (S,) pixels.
     """
 
@@ -37,7 +37,7 @@ class WalkSamples:
 class CameraWalk:
     """Collects one camera's final boxes.
 
-    ``site`` is the size of the site's picture, whose pixels boxes are in; every ``step``-th frame is sampled.
+    ``site`` is the size of the site's image, whose pixels boxes are in; every ``step``-th frame is sampled.
     """
 
     def __init__(self, camera: str, site: tuple[int, int], step: int) -> None:
@@ -69,11 +69,11 @@ class CameraWalk:
             self._track_indices.setdefault((message.boot, it.id), len(self._track_indices))
             for it in message.tracks
         ]
-        own = Letterbox(message.size, self._site).boxes_to_camera(boxes[track, frame])
+        camera_boxes = Letterbox(message.size, self._site).boxes_to_camera(boxes[track, frame])
         self._frames.append(frame + first - start)
         self._track.append(np.array(indices, dtype=np.int64)[track])
-        self._boxes.append(own)
-        self._sample(self._frames[-1], own, message.size)
+        self._boxes.append(camera_boxes)
+        self._sample(self._frames[-1], camera_boxes, message.size)
 
     def pause(self, until: int) -> None:
         """Ignore boxes before a frame."""
@@ -95,15 +95,15 @@ class CameraWalk:
     @property
     def samples(self) -> WalkSamples:
         """The sampled boxes at the moments at which cameras are compared."""
-        # Called every second: arrays once joined stay joined.
+        # Called every second: keep the concatenated arrays.
         self._moments, self._third = [np.concatenate(self._moments)], [np.concatenate(self._third)]
         self._height = [np.concatenate(self._height)]
         return WalkSamples(self._moments[0], self._third[0], self._height[0])
 
     def _sample(self, frames: Ints, boxes: Floats, size: tuple[int, int]) -> None:
-        taken = (frames % self._step == 0) & ~boxes_at_edge(boxes, size)
-        whole = boxes[taken]
-        self._moments.append(frames[taken] // self._step)
-        across = _THIRDS * foot_points(whole)[:, 0] / size[0]
+        is_sampled = (frames % self._step == 0) & ~boxes_at_edge(boxes, size)
+        sampled = boxes[is_sampled]
+        self._moments.append(frames[is_sampled] // self._step)
+        across = _THIRDS * foot_points(sampled)[:, 0] / size[0]
         self._third.append(np.clip(across.astype(np.int64), 0, _THIRDS - 1))
-        self._height.append(whole[:, 3] - whole[:, 1])
+        self._height.append(sampled[:, 3] - sampled[:, 1])

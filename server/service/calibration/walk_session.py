@@ -67,7 +67,7 @@ class WalkSession:
         self.discard()
         site = (self._config.site.width, self._config.site.height)
         step = comparison_step(self._fps)
-        self._walks = {it: CameraWalk(it, site, step) for it in self._config.camera_ids}
+        self._walks = {camera: CameraWalk(camera, site, step) for camera in self._config.camera_ids}
         self._start, self._epochs = self._last + 1, 0
         self.state = WalkState.WALKING
 
@@ -81,11 +81,11 @@ class WalkSession:
     def finish(self, person: float) -> None:
         """Calibrate from the walk of a person who is `person` meters tall."""
         self._cancel_calibration()
-        boxes = [it.boxes for it in self._walks.values()]
+        boxes = [walk.boxes for walk in self._walks.values()]
         offsets = {
-            it.id: it.offset
-            for it in self._config.cameras
-            if source_kind(it.source) in (SourceKind.FILE, SourceKind.FOLDER)
+            camera.id: camera.offset
+            for camera in self._config.cameras
+            if source_kind(camera.source) in (SourceKind.FILE, SourceKind.FOLDER)
         }
         task = CalibrationTask([it for it in boxes if it is not None], self._fps, _SHIFT_S, person, offsets)
         self.result, self.state = None, WalkState.WORKING

@@ -15,13 +15,13 @@ class CameraBoxes(msgspec.Struct, frozen=True, array_like=True):
 
     camera: str
     size: tuple[int, int]
-    """Width and height of its own picture, pixels."""
+    """Width and height of its image, pixels."""
     frames: bytes
     """(R,) int64 from 0."""
     track: bytes
     """(R,) int64, the index of the track."""
     boxes: bytes
-    """(R, 4) float64, left, top, right, bottom in pixels of that picture."""
+    """(R, 4) float64, left, top, right, bottom in pixels of that image."""
 
 
 class CalibrationTask(msgspec.Struct, frozen=True):
@@ -58,14 +58,14 @@ log = logging.getLogger(__name__)
 
 
 async def run_calibration(task: CalibrationTask) -> CalibrationResult:
-    """Calibrate from a walk in a process of its own, which is killed if the caller is cancelled."""
+    """Calibrate from a walk in a separate process, which is killed if the caller is cancelled."""
     try:
         process = await start_worker("server.service.calibration")
     except OSError as error:
         return CalibrationResult(error=f"the calibration cannot be started: {error.strerror}")
     try:
-        answer, _ = await process.communicate(msgspec.msgpack.encode(task))
-        return msgspec.msgpack.decode(answer, type=CalibrationResult)
+        output, _ = await process.communicate(msgspec.msgpack.encode(task))
+        return msgspec.msgpack.decode(output, type=CalibrationResult)
     except msgspec.DecodeError:
         log.error("the calibration process ended with status %s", process.returncode)  # noqa: TRY400
         return CalibrationResult(error="the calibration failed; see the server's log")

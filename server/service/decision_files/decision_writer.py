@@ -18,19 +18,19 @@ from server.system.private_files import make_private_folder, open_private
 from tracking.motchallenge import MotRow, format_row
 
 CHOICES_HEADER = "frame,object,camera\n"
-CORRECTIONS_HEADER = "frame,what,object,other,camera\n"
-LATE_HEADER = "frame,camera,what\n"
+CORRECTIONS_HEADER = "frame,correction,object,other,camera\n"
+LATE_HEADER = "frame,camera,reason\n"
 
 
 class DecisionWriter:
     """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
 
-    ``letterboxes`` may grow: a camera is added with its first window. A choice is written even if no camera
-    sees the person: it is the camera that their stream shows.
+    ``letterboxes`` may grow: a camera is added with its first window. A choice is the camera that a
+    person's stream shows, even if no camera sees the person.
 
     Frames count from 1 in all of them, as in MOTChallenge files: frame 1 is pulse 0. Boxes are in pixels of
-    the camera's own picture. If ``late.csv`` is empty, the files are exactly those that `myview render`
-    writes for the same recordings.
+    the camera's image. If ``late.csv`` is empty, `myview render` writes identical files for the same
+    recordings.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class DecisionWriter:
         Raises:
             OSError: a file cannot be written.
         """
-        self._fits = letterboxes
+        self._letterboxes = letterboxes
         if private:
             make_private_folder(folder / "tracks")
         else:
@@ -66,7 +66,7 @@ class DecisionWriter:
         """Write a decision, and rows of ``late.csv``.
 
         Raises:
-            OSError: the disk does not take it; the files are as before.
+            OSError: the disk is full or fails; the files are unchanged.
         """
         texts: dict[Path, list[str]] = defaultdict(list)
         for camera, frames in decision.boxes.items():
@@ -79,7 +79,9 @@ class DecisionWriter:
                 for choice in decision.choices
                 if choice.camera is not None
             )
-        texts[self._corrections] += (f"{decision.first + 1},{_line(it)}\n" for it in decision.corrections)
+        texts[self._corrections] += (
+            f"{decision.first + 1},{_line(correction)}\n" for correction in decision.corrections
+        )
         texts[self._late] += late
         self._files.append({path: "".join(rows) for path, rows in texts.items() if rows})
 
@@ -96,8 +98,10 @@ class DecisionWriter:
         self._files.close()
 
     def _rows(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> Iterator[str]:
-        own = self._fits[camera].boxes_to_camera(np.array([box for _, *box in boxes], dtype=np.float64))
-        for (number, *_), (left, top, right, bottom) in zip(boxes, own.tolist(), strict=True):
+        camera_boxes = self._letterboxes[camera].boxes_to_camera(
+            np.array([box for _, *box in boxes], dtype=np.float64)
+        )
+        for (number, *_), (left, top, right, bottom) in zip(boxes, camera_boxes.tolist(), strict=True):
             yield format_row(MotRow(frame, number, left, top, right - left, bottom - top)) + "\n"
 
 
@@ -118,7 +122,7 @@ class AtomicFiles:
         """
         with contextlib.ExitStack() as opened:
             opener = open_private if private else None
-            self._files = {it: opened.enter_context(FileIO(it, "w", opener=opener)) for it in headers}
+            self._files = {path: opened.enter_context(FileIO(path, "w", opener=opener)) for path in headers}
             self.append(headers)
             self._opened = opened.pop_all()
 
@@ -126,14 +130,14 @@ class AtomicFiles:
         """Append ASCII texts, unbuffered.
 
         Raises:
-            OSError: the disk does not take all of it; the files are as before.
+            OSError: the disk is full or fails; the files are unchanged.
         """
-        before = {it: self._files[it].tell() for it in texts}
+        lengths = {path: self._files[path].tell() for path in texts}
         try:
             for path, text in texts.items():
                 _write(self._files[path], text.encode("ascii"))
         except OSError:
-            for path, length in before.items():
+            for path, length in lengths.items():
                 with contextlib.suppress(OSError):  # the first error is raised
                     self._files[path].truncate(length)
                     self._files[path].seek(length)

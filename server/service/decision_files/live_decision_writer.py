@@ -16,15 +16,15 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class _LateFrame:
-    """A line of ``late.csv``: a frame that came too late, and why."""
+    """A row of ``late.csv``: a late or missing frame, and the reason."""
 
     pulse: int
     camera: str
-    what: str
+    reason: str
 
     @property
     def row(self) -> str:
-        return f"{self.pulse + 1},{self.camera},{self.what}\n"
+        return f"{self.pulse + 1},{self.camera},{self.reason}\n"
 
 
 class LiveDecisionWriter:
@@ -46,12 +46,12 @@ class LiveDecisionWriter:
         self._missing = range(0)
         """Pulses of skipped decisions that ``late.csv`` does not list yet."""
 
-    def note_late(self, camera: str, pulses: Sequence[int], what: str) -> None:
-        """Note late frames; they are written with the next decision."""
-        self._late += (_LateFrame(it, camera, what) for it in pulses)
+    def add_late(self, camera: str, pulses: Sequence[int], reason: str) -> None:
+        """Add late frames; they are written with the next decision."""
+        self._late += (_LateFrame(pulse, camera, reason) for pulse in pulses)
 
     def write(self, decision: GopDecision) -> None:
-        """Write a decision; skip it if the disk does not take it."""
+        """Write a decision; skip it if writing fails."""
         try:
             self._writer.write(decision, self._rows())
         except OSError as error:
@@ -80,10 +80,10 @@ class LiveDecisionWriter:
             )
         last = decision.first + decision.frames
         self._missing = range(self._missing.start if self._missing else decision.first, last)
-        self._late = [it for it in self._late if it.pulse not in self._missing]
+        self._late = [frame for frame in self._late if frame.pulse not in self._missing]
 
     def _rows(self) -> list[str]:
-        rows = [it.row for it in self._late]
+        rows = [frame.row for frame in self._late]
         if self._missing:
             rows.append(f"{self._missing.start + 1},,not written up to {self._missing.stop}\n")
         return rows

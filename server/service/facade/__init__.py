@@ -1,1 +1,1 @@
-"""The best-view service as HTTP sees it: one class of queries and commands per subject."""
+"""The interface of the best-view service to HTTP: one class of queries and commands per subject."""

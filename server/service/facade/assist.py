@@ -12,8 +12,8 @@ from server.service.facade.errors import (
     UnknownCameraError,
     UnknownObjectError,
 )
-from server.service.operator_assist.corrections import MarkedPosition
 from server.service.operator_assist.flags import Flag
+from server.service.operator_assist.operator_assist import MarkedPosition
 from server.service.pipeline import BestViewPipeline
 
 __all__ = [
@@ -26,24 +26,24 @@ __all__ = [
 ]
 
 _DEFAULT_TOLERANCE = 0.02
-"""The default tolerance of a position, as a share of the picture's width."""
+"""The default tolerance of a position, as a share of the image width."""
 _MAX_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class OperatorPosition:
-    """A position in a frame, in pixels of the site's picture."""
+    """A position in a frame, in pixels of the site's image."""
 
     pulse: int
     x: float
     y: float
     tolerance: float | None
-    """Tolerance in pixels; None: a fiftieth of the picture's width."""
+    """Tolerance in pixels; None: a fiftieth of the image width."""
 
 
 @dataclass(frozen=True, slots=True)
 class CorrectPositions:
-    """Command: a person is at these positions in a camera's picture."""
+    """Command: a person is at these positions in a camera's image."""
 
     number: int
     camera: str
@@ -92,7 +92,7 @@ class AssistService:
         if config.view.share.of > 1:
             return "several services share this site (view.share), and their person numbers must stay equal"
         if not config.track.assist.enabled:
-            return "cameras take no corrections: track.assist.enabled is off"
+            return "cameras accept no corrections: track.assist.enabled is off"
         return ""
 
     def correct_positions(self, command: CorrectPositions) -> CorrectionResult:
@@ -102,7 +102,7 @@ class AssistService:
             ConflictError: positions cannot be corrected here, or the camera did not show the person then.
             UnknownCameraError: there is no such camera.
             UnknownObjectError: no person has this number.
-            InvalidCommandError: a position is outside the picture, or its frame has not come yet.
+            InvalidCommandError: a position is outside the image, or its frame is in the future.
         """
         pipeline, camera = self._pipeline, command.camera
         if self.unavailable:
@@ -118,7 +118,7 @@ class AssistService:
         positions = [self._marked(position) for position in command.positions]
         accepted, flags = pipeline.assist.correct(number, camera, positions)
         if not accepted:
-            raise ConflictError(f"camera {camera} did not show object {number} then, or it is too long ago")
+            raise ConflictError(f"camera {camera} did not show object {number} then, or the frame is too old")
         return CorrectionResult(accepted, flags)
 
     def _check(self, position: OperatorPosition) -> None:
@@ -129,7 +129,7 @@ class AssistService:
                 f"corrections: {place} is not in a picture of {site.width}x{site.height}"
             )
         if position.pulse > self._pipeline.pulse:
-            raise InvalidCommandError(f"corrections: pulse {position.pulse} has not come yet")
+            raise InvalidCommandError(f"corrections: pulse {position.pulse} is in the future")
 
     def _marked(self, position: OperatorPosition) -> MarkedPosition:
         width = self._pipeline.config.site.width

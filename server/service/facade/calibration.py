@@ -10,7 +10,7 @@ from server.service.calibration.worker import CalibrationResult
 from server.service.facade.errors import ConflictError
 from server.service.pipeline import BestViewPipeline
 
-_LINES = "ground: ground.json\n"
+_GROUND_LINE = "ground: ground.json\n"
 
 
 class WalkCamera(msgspec.Struct, frozen=True):
@@ -20,7 +20,7 @@ class WalkCamera(msgspec.Struct, frozen=True):
     foot_points: int
     """Foot points seen while another camera saw a person, too; some five a second."""
     thirds: list[float]
-    """Shares of them in the left, middle and right third of the picture."""
+    """Shares of them in the left, middle and right third of the image."""
     depth_ratio: float | None
     """Apparent height of the nearest over that of the farthest; null: too few foot points."""
 
@@ -84,7 +84,7 @@ class CalibrationService:
             error=result.error,
             lines=result.lines,
             insufficient=result.insufficient,
-            configuration=_LINES + result.offsets if result.ground else "",
+            configuration=_GROUND_LINE + result.offsets if result.ground else "",
         )
 
     def start(self) -> None:
@@ -102,7 +102,7 @@ class CalibrationService:
             self._walk.resume()
 
     def finish(self, person_height: float) -> None:
-        """Calibrate from the walk, in a process of its own; ``person_height`` is in meters.
+        """Calibrate from the walk, in a separate process; ``person_height`` is in meters.
 
         Raises:
             ConflictError: there is no walk.

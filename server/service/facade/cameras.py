@@ -33,8 +33,8 @@ class CameraInfo(msgspec.Struct, frozen=True):
     message: str
 
 
-class OwnPicture(msgspec.Struct, frozen=True):
-    """A camera's own picture, and its place in the site's: site = own · scale + (left, top), in pixels."""
+class ImagePlacement(msgspec.Struct, frozen=True):
+    """A camera's image size, and its placement: site pixel = camera pixel · scale + (left, top)."""
 
     width: int
     height: int
@@ -50,16 +50,16 @@ class CameraDiagnostics(CameraInfo, frozen=True):
     clock_offset: float | None
     """Seconds, pulse server's clock minus the camera's; null: unknown."""
     sync_error: RecentSeconds | None
-    """Seconds from a pulse to the moment its frame was taken, over the last ten seconds or so."""
+    """Seconds from a pulse to the capture of its frame, over about the last ten seconds."""
     tracking_delay: RecentSeconds | None
     """Seconds from the pulse of a window's last frame to the window's solution."""
-    certified: float | None
+    optimal: float | None
     """Share of the windows whose solution is proven optimal."""
-    windows: int
-    """The number of windows behind ``certified``."""
+    solved_windows: int
+    """The number of windows behind ``optimal``."""
     last_error: CameraProblem | None
     """The last problem; it stays when the camera has recovered."""
-    picture: OwnPicture | None
+    picture: ImagePlacement | None
     """Null: unknown."""
 
 
@@ -68,7 +68,7 @@ class FloorCamera(msgspec.Struct, frozen=True):
 
     camera: str
     homography: list[list[float]]
-    """3x3, from pixels of the site's picture to the floor; a third coordinate below 0: above the horizon."""
+    """3x3, from pixels of the site's image to the floor; a third coordinate below 0: above the horizon."""
     outline: list[list[float]]
     """Corners, x and y on the floor; empty: it sees no floor."""
 
@@ -77,7 +77,7 @@ class Floor(msgspec.Struct, frozen=True):
     """The floor plan."""
 
     cameras: list[FloorCamera]
-    """Calibrated cameras whose own picture size is known."""
+    """Calibrated cameras whose image size is known."""
     uncalibrated: list[str]
 
 
@@ -103,23 +103,25 @@ class CameraService:
 
     def list_cameras(self) -> list[CameraInfo]:
         """Return each camera's state, as far as any viewer may know it."""
-        return [self._info(*it) for it in self._pipeline.ingest.states.items()]
+        return [self._info(camera, state) for camera, state in self._pipeline.ingest.states.items()]
 
     def diagnose_cameras(self) -> list[CameraDiagnostics]:
         """Return each camera's diagnostics, for the operator."""
-        return [self._diagnostics(*it) for it in self._pipeline.ingest.states.items()]
+        return [self._diagnostics(camera, state) for camera, state in self._pipeline.ingest.states.items()]
 
     def map_floor(self) -> Floor:
         """Return each calibrated camera's coverage of the floor."""
         config = self._pipeline.config
         cameras = []
         for camera in config.cameras:
-            own = self._pipeline.ingest.states[camera.id].metrics.size
-            if camera.ground is not None and own is not None:
+            size = self._pipeline.ingest.states[camera.id].metrics.size
+            if camera.ground is not None and size is not None:
                 ground = np.array(camera.ground, dtype=np.float64)
-                part = floor_coverage(ground, own, (config.site.width, config.site.height))
-                cameras.append(FloorCamera(camera.id, part.homography.tolist(), part.outline.tolist()))
-        return Floor(cameras, [it.id for it in config.cameras if it.ground is None])
+                coverage = floor_coverage(ground, size, (config.site.width, config.site.height))
+                cameras.append(
+                    FloorCamera(camera.id, coverage.homography.tolist(), coverage.outline.tolist())
+                )
+        return Floor(cameras, [camera.id for camera in config.cameras if camera.ground is None])
 
     def _info(self, camera: str, state: CameraState) -> CameraInfo:
         status = state.status
@@ -144,14 +146,14 @@ class CameraService:
             clock_offset=status.clock_offset if status else None,
             sync_error=metrics.sync_error,
             tracking_delay=metrics.tracking_delay,
-            certified=metrics.certified,
-            windows=metrics.windows,
+            optimal=metrics.optimal,
+            solved_windows=metrics.solved_windows,
             last_error=metrics.last_error,
-            picture=None if metrics.size is None else self._picture(metrics.size),
+            picture=None if metrics.size is None else self._placement(metrics.size),
         )
 
-    def _picture(self, own: tuple[int, int]) -> OwnPicture:
+    def _placement(self, size: tuple[int, int]) -> ImagePlacement:
         site = self._pipeline.config.site
-        letterbox = Letterbox(own, (site.width, site.height))
+        letterbox = Letterbox(size, (site.width, site.height))
         left, top = letterbox.to_site(np.zeros(2)).tolist()
-        return OwnPicture(width=own[0], height=own[1], scale=letterbox.scale, left=left, top=top)
+        return ImagePlacement(width=size[0], height=size[1], scale=letterbox.scale, left=left, top=top)

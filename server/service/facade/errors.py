@@ -1,4 +1,4 @@
-"""Why a query or command is refused. HTTP turns each into its status."""
+"""Errors of queries and commands; HTTP maps each to a status code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class UnknownObjectError(RefusedError):
             f"object {number} cannot be shown yet" if is_recovering else f"there is no object {number}"
         )
         self.is_recovering = is_recovering
-        """Whether the number may come back once the state of an earlier run is recovered."""
+        """Whether the number may be recovered from an earlier run."""
 
 
 class UnknownCameraError(RefusedError):

@@ -40,7 +40,7 @@ class Pulses(msgspec.Struct, frozen=True):
     server: str
     """Its host and port."""
     error: str
-    """Why the server did not answer; empty: it did."""
+    """Why the server did not respond; empty: it did."""
     clients: list[PulseListener]
     missing: list[str]
     """Clients that the configuration names but that are not connected."""

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _THUMBNAIL_RECENT_S = 3
-"""A thumbnail of the chosen camera is preferred to newer ones of other cameras while it is no older."""
+"""Age in seconds up to which a thumbnail of the chosen camera is preferred to newer ones of other cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class PersonSummary:
     number: int
     name: str | None
     former_numbers: list[int]
-    """Numbers that were merged into this one; they still work in addresses."""
+    """Numbers that were merged into this one; they still work in URLs."""
     first_seen: int
     last_seen: int
     camera: str | None
@@ -134,7 +134,10 @@ class PeopleService:
     def list_remote_people(self) -> list[RemotePerson]:
         """Return the people of the site's other services, by number."""
         share = self._pipeline.config.view.share
-        return [RemotePerson(it, shard_address(it, share)) for it in self._pipeline.decider.people.remote]
+        return [
+            RemotePerson(number, shard_address(number, share))
+            for number in self._pipeline.decider.people.remote
+        ]
 
     def shard_of(self, number: int) -> Shard:
         """Return the service that a number belongs to, whether or not it is in use."""
@@ -183,7 +186,7 @@ class PeopleService:
     def manual_overrides(self) -> PersonOverrides:
         """Return the operator's names and merges."""
         people = self._pipeline.decider.people
-        return PersonOverrides(dict(sorted(people.registry.names.items())), people.merged_by_hand)
+        return PersonOverrides(dict(sorted(people.registry.names.items())), people.manual_merges)
 
     def check_editable(self, number: int) -> None:
         """Check that a person can be edited.
@@ -238,7 +241,7 @@ class PeopleService:
         return new
 
     def _editable(self, number: int) -> int:
-        """Return the number that a person goes by, also where a merge has not been published yet."""
+        """Return a person's current number, which includes merges that are not published yet."""
         if self.editing_blocked:
             raise ConflictError(self.editing_blocked)
         people = self._pipeline.decider.people
@@ -263,4 +266,10 @@ class PeopleService:
         chosen = view.choice.camera if view else None
         newest = max(thumbnail.pulse for _, thumbnail in thumbnails)
         recent = newest - round(_THUMBNAIL_RECENT_S * self._pipeline.config.site.fps)
-        return max(thumbnails, key=lambda it: (it[0] == chosen and it[1].pulse >= recent, it[1].pulse))[1]
+        return max(
+            thumbnails,
+            key=lambda candidate: (
+                candidate[0] == chosen and candidate[1].pulse >= recent,
+                candidate[1].pulse,
+            ),
+        )[1]

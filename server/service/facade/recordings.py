@@ -101,27 +101,31 @@ class RecordedStream:
     ) -> AsyncGenerator[MediaChunk, None]:
         """Play GOP after GOP; ``live`` returns the stream to continue with at the present."""
         fps, audio = self._pipeline.config.site.fps, self._pipeline.recorder.audio_buffer
-        hearing = None if audio is None else PlaybackAudio(audio, self._recorded_audio, lambda: self.end)
-        stream = TimeShiftStream(self._source, self._timeline(), fps, live, hearing)
+        playback_audio = (
+            None if audio is None else PlaybackAudio(audio, self._recorded_audio, lambda: self.end)
+        )
+        stream = TimeShiftStream(self._source, self._timeline(), fps, live, playback_audio)
         return stream.send(playback)
 
-    def time_shift(self, *, over: bool) -> TimeShift:
-        """Return the stream in HLS segments numbered as the live ones; ``over``: nothing will be added."""
+    def time_shift(self, *, has_ended: bool) -> TimeShift:
+        """Return the stream in HLS segments, numbered like live ones; ``has_ended``: nothing is added."""
         pipeline = self._pipeline
         return TimeShift(
             self._source,
             pipeline.splicer.layout,
             self._timeline,
-            self._hearing,
+            self._playback_audio,
             gop=pipeline.config.encode.gop,
             decided=pipeline.recorder.recent.end,
-            has_ended=over,
+            has_ended=has_ended,
         )
 
     def peak_bit_rate(self) -> float:
         """Return the most bits a second of video, by whole files on disk and GOPs in memory."""
         source = self._source
-        rates = [8 * it.length / it.frames for one in source.recorded for it in one.index.all]
+        rates = [
+            8 * entry.length / entry.frames for recorded in source.recorded for entry in recorded.index.all
+        ]
         gop = source.gop_in_memory(0)
         while gop is not None:
             rates.append(8 * sum(map(len, gop.fragments)) / len(gop.fragments))
@@ -132,7 +136,7 @@ class RecordedStream:
         config = self._pipeline.config
         return GaplessTimeline(self._pipeline.stream_format, config.site.fps, config.encode.gop)
 
-    def _hearing(self) -> PlaybackAudio | None:
+    def _playback_audio(self) -> PlaybackAudio | None:
         audio = self._pipeline.recorder.audio_buffer
         return None if audio is None else PlaybackAudio(audio, self._recorded_audio)
 
@@ -160,8 +164,8 @@ class RecordingService:
     def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
         """Return a person's recorded stream; ``scoped``: blanked where no camera saw them."""
         pipeline, recorder = self._pipeline, self._recorder
-        now = pipeline.decision_state.resolve(number)
-        numbers = (number,) if number == now else (now, number)
+        current = pipeline.decision_state.resolve(number)
+        numbers = (number,) if number == current else (current, number)
         presence = None
         if scoped:
             fps = pipeline.config.site.fps

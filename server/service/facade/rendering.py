@@ -1,4 +1,4 @@
-"""Rendered streams: JPEG pictures and video with boxes burnt in, drawn by worker processes on demand."""
+"""Rendered streams: JPEG pictures, and video with boxes burnt in, rendered by worker processes on demand."""
 
 from __future__ import annotations
 

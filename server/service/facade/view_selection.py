@@ -37,9 +37,9 @@ class ViewSelection(msgspec.Struct, frozen=True):
     lookahead: int
     """Frames of the look-ahead, from `first` on."""
     switch_cost: float
-    """The cost of a cut, in frames of not seeing the person."""
+    """The cost of a cut, in frames without the person."""
     stay: float | None
-    """The cost of the look-ahead with `before`, likewise; null: there is none, or it cannot be shown."""
+    """The cost of the look-ahead with `before`; null: there is none, or it cannot be shown."""
     cut: float | None
     """The cost with the best other camera, the cut included; null: there is none."""
     cut_to: str | None
@@ -49,25 +49,27 @@ class ViewSelection(msgspec.Struct, frozen=True):
 
 def view_selection_of(selection: SelectionReason) -> ViewSelection:
     """Return a selected view with the costs behind it."""
-    view, why = selection.view, selection.why
+    view, explanation = selection.view, selection.explanation
     return ViewSelection(
         object=view.choice.number,
         first=view.first,
         frames=view.frames,
         camera=view.choice.camera,
         since=view.since,
-        costs={camera: it.cost for camera, it in why.views.items()},
-        seen={camera: it.seen for camera, it in why.views.items()},
-        quality={camera: it.quality for camera, it in why.views.items()},
-        terms={camera: it.terms for camera, it in why.views.items()},
-        undetected={camera: it.undetected for camera, it in why.views.items()},
-        undetected_quality={camera: it.undetected_quality for camera, it in why.views.items()},
-        weights=why.weights,
+        costs={camera: camera_view.cost for camera, camera_view in explanation.views.items()},
+        seen={camera: camera_view.seen for camera, camera_view in explanation.views.items()},
+        quality={camera: camera_view.quality for camera, camera_view in explanation.views.items()},
+        terms={camera: camera_view.terms for camera, camera_view in explanation.views.items()},
+        undetected={camera: camera_view.undetected for camera, camera_view in explanation.views.items()},
+        undetected_quality={
+            camera: camera_view.undetected_quality for camera, camera_view in explanation.views.items()
+        },
+        weights=explanation.weights,
         before=view.choice.before,
-        lookahead=why.frames,
-        switch_cost=why.switch_cost,
-        stay=why.stay,
-        cut=why.cut,
-        cut_to=why.cut_to,
-        reason=reason(view.choice, why),
+        lookahead=explanation.frames,
+        switch_cost=explanation.switch_cost,
+        stay=explanation.stay,
+        cut=explanation.cut,
+        cut_to=explanation.cut_to,
+        reason=reason(view.choice, explanation),
     )

@@ -26,15 +26,15 @@ class CameraWindow:
     Attributes:
         message: the message itself.
         keys: the site-wide keys of the tracks; T of them.
-        locals: (T,) the keys' local ids.
-        letterbox: the letterbox from the camera's own picture to the site's.
-        boxes: (T, F, 4) pixels of the site's picture, NaN where hidden.
+        local_ids: (T,) the keys' local ids.
+        letterbox: the letterbox from the camera's image to the site's.
+        boxes: (T, F, 4) pixels of the site's image, NaN where hidden.
         fresh: the first frame that was not final before; later than `first` for a revision of the past.
     """
 
     message: CameraTracks
     keys: tuple[TrackKey, ...]
-    locals: NDArray[np.int64]
+    local_ids: NDArray[np.int64]
     letterbox: Letterbox
     boxes: Floats
     fresh: int
@@ -47,9 +47,9 @@ class CameraWindow:
     def local_tracks(self) -> list[TrackUpdate]:
         """Return the newly final, visible parts of the tracks, boxes in the camera's own pixels."""
         _, height = self.message.size
-        known = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
-        hidden = np.isnan(self.boxes[:, known, 0])
-        own = self.letterbox.boxes_to_camera(self.boxes[:, known])
+        final = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
+        hidden = np.isnan(self.boxes[:, final, 0])
+        camera_boxes = self.letterbox.boxes_to_camera(self.boxes[:, final])
         return [
             TrackUpdate(
                 camera=key.camera,
@@ -59,11 +59,13 @@ class CameraWindow:
                 appearance=_appearance_samples(track.appearance, self.fresh),
                 picture_height=float(height),
             )
-            for key, track, boxes, gone in zip(self.keys, self.message.tracks, own, hidden, strict=True)
-            if not gone.all()
+            for key, track, boxes, is_hidden in zip(
+                self.keys, self.message.tracks, camera_boxes, hidden, strict=True
+            )
+            if not is_hidden.all()
         ]
 
-    def seen_spans(self) -> list[tuple[int, int]]:
+    def visible_spans(self) -> list[tuple[int, int]]:
         """Return each track's first and last frame with a box; without any, the last is before the first."""
         visible = ~np.isnan(self.boxes[:, :, 0])
         if not visible.size:
@@ -79,9 +81,9 @@ def _appearance_samples(
 ) -> tuple[AppearanceSample, ...]:
     """Return the samples in the frames from `first` on."""
     return tuple(
-        AppearanceSample(max(it.first, first), it.last, np.array(it.histogram, dtype=np.float64))
-        for it in histograms
-        if it.last >= first
+        AppearanceSample(max(sample.first, first), sample.last, np.array(sample.histogram, dtype=np.float64))
+        for sample in histograms
+        if sample.last >= first
     )
 
 
@@ -90,20 +92,20 @@ class WindowReader:
 
     def __init__(self, site_size: tuple[int, int]) -> None:
         self._site_size = site_size
-        self.locals = LocalNumbers()
+        self.local_numbers = LocalNumbers()
         self.letterboxes: dict[str, Letterbox] = {}
-        """By camera, from its first message on; replaced when the size of its picture changes."""
+        """By camera, from its first message on; replaced when its image size changes."""
         self._final: dict[str, int] = {}
         """By camera, the last frame that was final."""
 
     def read(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Decode the messages of all cameras, in the order of the epoch."""
         windows = [self._window(message) for message in epoch.tracks.values()]
-        self._final |= {it.message.camera: it.message.final_to for it in windows}
+        self._final |= {window.message.camera: window.message.final_to for window in windows}
         return windows
 
     def read_late(self, epoch: Epoch) -> Iterator[CameraWindow]:
-        """Yield the revisions of the past that came too late for their own epoch.
+        """Yield the revisions of the past that arrived too late for their epoch.
 
         Decoded lazily: the repair of one may exchange the keys that the next is decoded with.
         """
@@ -114,16 +116,16 @@ class WindowReader:
         letterbox = self.letterboxes.get(message.camera)
         if letterbox is None or letterbox.camera_size != message.size:
             letterbox = self.letterboxes[message.camera] = Letterbox(message.size, self._site_size)
-        keys = self.locals.of(message)
+        keys = self.local_numbers.of(message)
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)
-        locals_ = np.array([key.local_id for key in keys], dtype=np.int64)
+        local_ids = np.array([key.local_id for key in keys], dtype=np.int64)
         fresh = message.first
         if message.revised_from is not None:
             fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
-        return CameraWindow(message, keys, locals_, letterbox, boxes.reshape(len(keys), frames, 4), fresh)
+        return CameraWindow(message, keys, local_ids, letterbox, boxes.reshape(len(keys), frames, 4), fresh)
 
     def with_current_keys(self, window: CameraWindow) -> CameraWindow:
         """Return a window with its tracks' current keys."""
-        keys = self.locals.of(window.message)
-        return replace(window, keys=keys, locals=np.array([key.local_id for key in keys], dtype=np.int64))
+        keys = self.local_numbers.of(window.message)
+        return replace(window, keys=keys, local_ids=np.array([key.local_id for key in keys], dtype=np.int64))

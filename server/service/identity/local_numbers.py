@@ -55,7 +55,7 @@ class LocalNumbers:
         self._keys[one.camera, boot] |= {first: two, second: one}
 
     def forget(self, key: TrackKey) -> None:
-        """Forget a track; if it comes back it gets a new number."""
+        """Forget a track; if it reappears it gets a new number."""
         origin = self._origin.pop(key, None)
         if origin is None:
             return

@@ -1,7 +1,7 @@
 """Manual merges of person numbers, applied on top of the automatic association.
 
-The association goes on unchanged, and its numbers are mapped here. So a manual merge holds whatever the
-evidence says, and the page, the streams and the files see it as any other merge.
+The association continues unchanged, and its numbers are mapped here. So a manual merge holds regardless of
+the evidence, and to the page, the streams and the files it is like any other merge.
 """
 
 from __future__ import annotations
@@ -27,16 +27,18 @@ class ManualOverrides:
         return dict(sorted(self._person_of.items()))
 
     def current(self, number: int) -> int:
-        """Return the number that this one goes by now."""
+        """Return the current number of this one."""
         return self._person_of.get(number, number)
 
     def automatic_numbers(self, number: int) -> list[int]:
         """Return the automatic numbers behind a number, in order."""
         return sorted({number, *(raw for raw, kept in self._person_of.items() if kept == number)})
 
-    def merge(self, kept: int, lost: int, away: Collection[int] = ()) -> None:
-        """Merge two numbers into one person; `away` names the absent one of numbers never merged."""
-        self._departed |= {it for it in (kept, lost) if it in away and it not in self._involved}
+    def merge(self, kept: int, lost: int, departed: Collection[int] = ()) -> None:
+        """Merge two numbers into one person; `departed` are the departed people."""
+        self._departed |= {
+            number for number in (kept, lost) if number in departed and number not in self._involved
+        }
         for raw in self.automatic_numbers(lost):
             self._person_of[raw] = kept
 
@@ -52,9 +54,9 @@ class ManualOverrides:
             created=tuple(number for number in update.created if number not in self._person_of),
             returned=self._people(update.returned),
             departed=tuple(
-                it
-                for it in self._people(update.departed)
-                if self._departed.issuperset(self.automatic_numbers(it))
+                number
+                for number in self._people(update.departed)
+                if self._departed.issuperset(self.automatic_numbers(number))
             ),
             merged=merged,
             split=self.apply_splits(update.split),

@@ -35,13 +35,13 @@ from server.service.ingest.window_history import WindowHistory
 ALL = ShareSettings()
 """A single service for all people."""
 _RECENT_FRAMES = 100
-"""Frames by which it is judged whether a camera detects; at least those of an epoch."""
+"""Recent frames in which a camera must have run detection to count; at least those of an epoch."""
 
 
 class PersonTracker:
     """Associates the cameras' tracks epoch by epoch, and keeps recent boxes.
 
-    ``homographies`` map each camera's own picture to the ground; None where there is none. ``share`` is
+    ``homographies`` map each camera's image to the ground; None where there is none. ``share`` is
     this service's shard; identities are computed for all people, identically in every service. Tracks are
     final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
     cameras that look straight down; ``fps`` are the site's frames a second.
@@ -84,22 +84,22 @@ class PersonTracker:
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Associate an epoch's tracks; return its windows, late revisions first."""
-        late = [self._stored(window) for window in self._reader.read_late(epoch)]
-        windows = [self._stored(window) for window in self._reader.read(epoch)]
+        late = [self._store(window) for window in self._reader.read_late(epoch)]
+        windows = [self._store(window) for window in self._reader.read(epoch)]
         self._recall(windows)
         tracks = [track for window in windows for track in window.local_tracks()]
         since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
-        pictures = self._pictures(windows, since - self._lag, epoch.last - self._lag)
+        image_sizes = self._detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
-        update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, pictures))
+        update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, image_sizes))
         for key, parts in track_parts(update.person_ids).items():
             self._parts[key] = merge_settled_parts(self._parts.get(key, ()), parts, self._needed_from)
         self._id_switch_repair.overlay(self._parts)
         keys = chain.from_iterable(window.keys for window in windows)
-        seen = chain.from_iterable(window.seen_spans() for window in windows)
+        seen = chain.from_iterable(window.visible_spans() for window in windows)
         for key, (first, last) in zip(keys, seen, strict=True):
             self._last_reported[key] = epoch.last
-            self.registry.note(self._parts.get(key, ()), first, last)
+            self.registry.record_visible(self._parts.get(key, ()), first, last)
         self.registry.update_presence(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
@@ -109,27 +109,27 @@ class PersonTracker:
 
     @property
     def letterboxes(self) -> Mapping[str, Letterbox]:
-        """The letterbox of each camera's picture, known from its first message on."""
+        """Each camera's letterbox, known from its first message on."""
         return self._reader.letterboxes
 
     @property
     def known(self) -> list[int]:
         """The numbers of this shard's people, in order; departed ones included."""
-        return own_numbers(self.registry.everybody, self.registry.merged, self._share)
+        return own_numbers(self.registry.all_numbers, self.registry.merged, self._share)
 
     @property
     def remote(self) -> list[int]:
         """The numbers of the other shards' people, in order."""
-        own = set(self.known)
-        return [number for number in self.registry.everybody if number not in own]
+        known = set(self.known)
+        return [number for number in self.registry.all_numbers if number not in known]
 
     @property
     def next_number(self) -> int:
         """The first unused number."""
         return self._registry.next_id
 
-    def begin_at(self, number: int) -> None:
-        """Assign no number below this one any more: an earlier run has used them."""
+    def reserve_numbers_below(self, number: int) -> None:
+        """Assign no number below this one: an earlier run has used them."""
         self._registry.reserve_below(number)
 
     def expect(self, tracks: Mapping[TrackName, int], pulse: int) -> None:
@@ -139,26 +139,26 @@ class PersonTracker:
         }
 
     def cancel_expected(self, tracks: Iterable[TrackName]) -> None:
-        """Expect these tracks no more: should they appear, they are new people's."""
+        """Expect these tracks no longer: if they appear, they are new people."""
         for track in tracks:
             self._expected.pop(track, None)
 
     @property
-    def merged_by_hand(self) -> dict[int, int]:
+    def manual_merges(self) -> dict[int, int]:
         """Return the manual merges: by merged number, the number that was kept."""
         return self._overrides.merged
 
     def merge(self, kept: int, lost: int) -> None:
-        """Merge two people by the operator's order, whatever the evidence says from now on."""
-        is_present = not {kept, lost} <= self.registry.away
-        self._overrides.merge(kept, lost, self.registry.away)
+        """Merge two people on the operator's command, permanently and regardless of the evidence."""
+        is_present = not {kept, lost} <= self.registry.departed
+        self._overrides.merge(kept, lost, self.registry.departed)
         self._merge(kept, lost)
         if is_present:
-            self.registry.away.discard(kept)
+            self.registry.departed.discard(kept)
         self._corrections.append(Merge(kept, lost))
 
     def split_off(self, number: int, cameras: Collection[str]) -> int | None:
-        """Split the tracks of these cameras off a person as a new person, by the operator's order.
+        """Split the tracks of these cameras off a person as a new person, on the operator's command.
 
         Returns:
             The new number; None: none of the cameras shows the person now.
@@ -176,7 +176,7 @@ class PersonTracker:
         for key in tracks:  # the registry does not report settled tracks again
             since = max(self._needed_from, self._parts[key][-1].first)
             self._parts[key] = [*self._parts[key], TrackPart(since, new)]
-            self.registry.note([TrackPart(since, new)], since, max(since, self._newest))
+            self.registry.record_visible([TrackPart(since, new)], since, max(since, self._newest))
         self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
         return new
 
@@ -192,20 +192,20 @@ class PersonTracker:
 
     def person_of(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
         """Return the person of a tracker's track in a frame; None: unknown or not confirmed."""
-        key = self._reader.locals.known(camera, boot, track)
+        key = self._reader.local_numbers.known(camera, boot, track)
         return None if key is None else self.number(key.camera, key.local_id, pulse)
 
     def is_known(self, track: TrackName) -> bool:
         """Return whether a camera has reported this track recently."""
-        return self._reader.locals.known(track.camera, track.boot, track.track) is not None
+        return self._reader.local_numbers.known(track.camera, track.boot, track.track) is not None
 
     def tracks_of(self, numbers: Collection[int], since: int) -> dict[int, list[TrackName]]:
-        """Return these people's tracks that were reported since a pulse; people without any are left out."""
+        """Return these people's tracks that were reported since a pulse; people without any are omitted."""
         tracks: dict[int, list[TrackName]] = {}
         selected = set(numbers)
         for key, parts in self._parts.items():
             if parts[-1].number in selected and self._last_reported.get(key, -1) >= since:
-                tracks.setdefault(parts[-1].number, []).append(self._reader.locals.origin(key))
+                tracks.setdefault(parts[-1].number, []).append(self._reader.local_numbers.origin(key))
         return dict(sorted(tracks.items()))
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
@@ -214,32 +214,34 @@ class PersonTracker:
 
     def take_corrections(self) -> tuple[Merge | Split, ...]:
         """Return the merges and splits since the last call, in order."""
-        taken, self._corrections = tuple(self._corrections), []
-        return taken
+        corrections, self._corrections = tuple(self._corrections), []
+        return corrections
 
     def forget_boxes_before(self, pulse: int) -> None:
         """Forget the boxes and person numbers before a pulse."""
         if self.published.frames:
             spans = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
             for it in sorted(spans, key=lambda it: it.last):
-                self.published.note(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
+                self.published.record(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
         self._needed_from = max(self._needed_from, pulse)
         self.undetected.forget_before(pulse)
         self._id_switch_repair.keep_only(self._parts, self._needed_from)
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _pictures(self, windows: Sequence[CameraWindow], first: int, last: int) -> dict[str, tuple[int, int]]:
-        """Return the picture sizes of the cameras that ran detection in any of these frames."""
+    def _detecting_cameras(
+        self, windows: Sequence[CameraWindow], first: int, last: int
+    ) -> dict[str, tuple[int, int]]:
+        """Return the image sizes of the cameras that ran detection in any of these frames."""
         return {
             it.message.camera: it.message.size
             for it in windows
             if not self.undetected.over(it.message.camera, first, last + 1 - first).all()
         }
 
-    def _stored(self, window: CameraWindow) -> CameraWindow:
+    def _store(self, window: CameraWindow) -> CameraWindow:
         """Store a window, after repairing identity switches where it revises the past."""
-        self.undetected.note(window.message)
+        self.undetected.add(window.message)
         history = self._histories[window.message.camera]
         if window.message.revised_from is not None:
             before = history.over(window.first, window.fresh - 1)
@@ -251,7 +253,7 @@ class PersonTracker:
     def _recall(self, windows: Iterable[CameraWindow]) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
         for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
-            number, pulse = self._expected.pop(self._reader.locals.origin(key), (0, 0))
+            number, pulse = self._expected.pop(self._reader.local_numbers.origin(key), (0, 0))
             if number:
                 self._registry.recall(key, self.registry.current(number), pulse)
 
@@ -268,5 +270,5 @@ class PersonTracker:
         for key in [key for key, last in self._last_reported.items() if last < now - self._forget_after]:
             del self._last_reported[key]
             self._parts.pop(key, None)
-            self._reader.locals.forget(key)
+            self._reader.local_numbers.forget(key)
         self.registry.forget_unseen_since(now - self._forget_after)

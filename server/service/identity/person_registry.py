@@ -11,38 +11,38 @@ class PersonRegistry:
     """All people who have a number, from their first frame until they are forgotten.
 
     Args:
-        most_merged: how many merged numbers are remembered; the newest are kept.
+        max_merged: limit of the merged numbers to keep; the newest are kept.
     """
 
-    def __init__(self, most_merged: int) -> None:
-        self._most_merged = most_merged
+    def __init__(self, max_merged: int) -> None:
+        self._max_merged = max_merged
         self.first_seen: dict[int, int] = {}
         """By number, the first frame that shows the person; its keys are all known people."""
         self.last_seen: dict[int, int] = {}
-        self.away: set[int] = set()
-        """Departed people: no camera has seen them for a while."""
+        self.departed: set[int] = set()
+        """People whom no camera has seen for a while."""
         self.merged: dict[int, int] = {}
         """By merged number: the number that was kept."""
         self.names: dict[int, str] = {}
         """Names given by the operator."""
 
     @property
-    def everybody(self) -> list[int]:
+    def all_numbers(self) -> list[int]:
         """All people's numbers, in order."""
         return sorted(self.first_seen)
 
     def current(self, number: int) -> int:
-        """Return the number that a merged number goes by now, or the number itself."""
+        """Return the current number of a merged one, or the number itself."""
         return self.merged.get(number, number)
 
     def aliases(self, number: int) -> list[int]:
         """Return the numbers that were merged into this one, in order."""
         return sorted(old for old, new in self.merged.items() if new == number)
 
-    def note(self, parts: Sequence[TrackPart], first: int, last: int) -> None:
+    def record_visible(self, parts: Sequence[TrackPart], first: int, last: int) -> None:
         """Record that a track was visible between two frames, for the person of each of its parts."""
-        for place, part in enumerate(parts):
-            ends = last if place + 1 == len(parts) else min(last, parts[place + 1].first - 1)
+        for index, part in enumerate(parts):
+            ends = last if index + 1 == len(parts) else min(last, parts[index + 1].first - 1)
             if part.number != UNCONFIRMED and max(first, part.first) <= ends:
                 # A person exists from the start of the part: frames not decided yet can still show them.
                 self.first_seen[part.number] = min(part.first, self.first_seen.get(part.number, part.first))
@@ -50,7 +50,7 @@ class PersonRegistry:
 
     def update_presence(self, departed: Iterable[int], returned: Iterable[int]) -> None:
         """Record people who departed and who returned."""
-        self.away = (self.away | set(departed)) - set(returned)
+        self.departed = (self.departed | set(departed)) - set(returned)
 
     def set_name(self, number: int, name: str) -> None:
         """Set a person's name; an empty one removes it."""
@@ -63,14 +63,14 @@ class PersonRegistry:
         self.merged |= {old: number for old in aliases if old != number and old not in self.first_seen}
 
     def merge(self, kept: int, lost: int) -> None:
-        """Merge two people: the union of their sightings, and the name that either had."""
+        """Merge two people: the union of the frames that show them, and the name that either had."""
         merged = {old: kept if new == lost else new for old, new in self.merged.items()} | {lost: kept}
-        self.merged = dict(list(merged.items())[-self._most_merged :] if self._most_merged else [])
+        self.merged = dict(list(merged.items())[-self._max_merged :] if self._max_merged else [])
         name = self.names.pop(lost, "")
         if name:
             self.names.setdefault(kept, name)
         first, last = self.first_seen.pop(lost, None), self.last_seen.pop(lost, None)
-        self.away.discard(lost)
+        self.departed.discard(lost)
         if first is not None and last is not None:
             self.first_seen[kept] = min(first, self.first_seen.get(kept, first))
             self.last_seen[kept] = max(last, self.last_seen.get(kept, last))
@@ -79,6 +79,6 @@ class PersonRegistry:
         """Forget people who were last seen before this frame."""
         for number in [number for number, last in self.last_seen.items() if last < frame]:
             del self.first_seen[number], self.last_seen[number]
-            self.away.discard(number)
+            self.departed.discard(number)
             self.names.pop(number, None)
             self.merged = {old: new for old, new in self.merged.items() if new != number}

@@ -1,4 +1,4 @@
-"""Remembers which track was behind a person's published box, so that corrections reach the right track."""
+"""Keeps which track was behind a person's published box, so that corrections reach the right track."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from server.service.ingest.window_history import HistorySpan
 
 
 class PublishedTracks:
-    """Remembers the tracks behind published numbers, for at least ``frames`` back; 0: nothing."""
+    """Keeps the tracks behind published person numbers for at least ``frames`` frames; 0: none."""
 
     def __init__(self) -> None:
         self.frames = 0
         self._published: deque[tuple[int, int, Mapping[tuple[str, int], TrackName]]] = deque()
         self._oldest: int | None = None
 
-    def note(self, span: HistorySpan[CameraWindow], numbers: NDArray[np.int64]) -> None:
+    def record(self, span: HistorySpan[CameraWindow], numbers: NDArray[np.int64]) -> None:
         """Record the person numbers (T,) of a window's tracks; those below 0 are unconfirmed.
 
         Spans must come in frame order across all cameras.
@@ -38,8 +38,8 @@ class PublishedTracks:
         while self._published[0][1] < span.last - self.frames:
             self._oldest = self._published.popleft()[1] + 1
 
-    def remembers(self, pulse: int) -> bool:
-        """Return whether a frame is still remembered."""
+    def covers(self, pulse: int) -> bool:
+        """Return whether a frame is still covered."""
         return self._oldest is not None and self._oldest <= pulse
 
     def of(self, camera: str, numbers: Collection[int], pulse: int) -> TrackName | None:

@@ -8,7 +8,7 @@ from server.config.sections import ShareSettings
 
 
 def shard_of(number: int, share: ShareSettings) -> int:
-    """Return the shard that a number belongs to: the same in all services, without asking."""
+    """Return the shard that a number belongs to: the same in all services, without communication."""
     return number % share.of
 
 
@@ -20,8 +20,8 @@ def own_numbers(numbers: Iterable[int], merged: Mapping[int, int], share: ShareS
     """
     if share.of == 1:
         return list(numbers)
-    known_as = {new for old, new in merged.items() if shard_of(old, share) == share.index}
-    return [number for number in numbers if shard_of(number, share) == share.index or number in known_as]
+    kept_numbers = {new for old, new in merged.items() if shard_of(old, share) == share.index}
+    return [number for number in numbers if shard_of(number, share) == share.index or number in kept_numbers]
 
 
 def shard_address(number: int, share: ShareSettings) -> str | None:

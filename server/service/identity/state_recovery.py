@@ -1,4 +1,4 @@
-"""Recovery of person numbers after a restart, from the snapshots that the cameras retain."""
+"""Recovery of person numbers after a restart, from the snapshots that the cameras keep."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
 
 SINGLE_CAMERA_NUMBER_MAX = 1_000_000
-"""The largest first free number that one camera alone is trusted with; another must confirm larger ones."""
+"""The largest first free number that is accepted from a single camera; another must confirm larger ones."""
 _NUMBER_SLACK = 10_000
 """Numbers by which the newest snapshot may be ahead of the one before: far more than a second's."""
 MAX_DOWNTIME_S = 30.0
@@ -28,7 +28,7 @@ def state_for_cameras(
     people: PersonTracker, cameras: Iterable[str], pulse: int, recent: int, since: float
 ) -> dict[str, IdentitySnapshot]:
     """Build the snapshot for each camera: the people it tracked recently, and the first free number."""
-    tracks_by_number = people.tracks_of(people.registry.everybody, pulse - recent)
+    tracks_by_number = people.tracks_of(people.registry.all_numbers, pulse - recent)
     boots: dict[str, int] = {}
     for it in chain.from_iterable(tracks_by_number.values()):
         boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
@@ -36,16 +36,16 @@ def state_for_cameras(
     for old, number in people.registry.merged.items():
         if old <= PERSON_NUMBER_MAX:
             former.setdefault(number, []).append(old)
-    manual = set(people.merged_by_hand.values())
+    manual = set(people.manual_merges.values())
     known: dict[str, list[PersonSnapshot]] = {camera: [] for camera in cameras}
     for number, tracks in tracks_by_number.items():
         if number > PERSON_NUMBER_MAX:
             continue
-        own_tracks: dict[str, list[int]] = {}
+        camera_tracks: dict[str, list[int]] = {}
         for it in tracks:
-            if it.boot == boots[it.camera]:  # tracks of an earlier run of the camera are over
-                own_tracks.setdefault(it.camera, []).append(it.track)
-        for camera, local_ids in own_tracks.items():
+            if it.boot == boots[it.camera]:  # tracks of an earlier run of the camera have ended
+                camera_tracks.setdefault(it.camera, []).append(it.track)
+        for camera, local_ids in camera_tracks.items():
             known[camera].append(
                 PersonSnapshot(
                     number=number,
@@ -83,21 +83,23 @@ class StateRecovery:
     """Restores people's numbers and manual overrides after a restart, as their tracks reappear.
 
     Args:
-        snapshots: each camera's snapshot; those older than ``longest`` only reserve numbers.
+        snapshots: each camera's snapshot; those older than ``max_downtime`` only reserve numbers.
         pulse: the first pulse of this run.
-        longest: the longest downtime, in frames.
+        max_downtime: the longest downtime, in frames.
     """
 
-    def __init__(self, snapshots: dict[str, IdentitySnapshot], pulse: int, longest: int) -> None:
+    def __init__(self, snapshots: dict[str, IdentitySnapshot], pulse: int, max_downtime: int) -> None:
         self._until = -1
-        self._over = False
+        self._has_ended = False
         self._tracks: dict[TrackName, int] = {}
         self._pending: list[_PendingPerson] = []
         self._reappeared_at: dict[TrackName, int] = {}
         """The pulse at which each track reappeared."""
         self.next_number = max((first_free_number(it) for it in snapshots.values()), default=1)
         """The first number to assign in this run, whatever the downtime."""
-        recent = {camera: it for camera, it in snapshots.items() if it.pulse < pulse <= it.pulse + longest}
+        recent = {
+            camera: it for camera, it in snapshots.items() if it.pulse < pulse <= it.pulse + max_downtime
+        }
         # Recent snapshots agree; the median keeps a single deviating camera from deciding.
         since = sorted(it.numbered_since for it in recent.values())
         self.numbered_since = (
@@ -107,14 +109,14 @@ class StateRecovery:
         )
         """When numbering began, unix seconds; infinite: unknown."""
         if recent:
-            self._until = max(it.pulse for it in recent.values()) + longest
+            self._until = max(it.pulse for it in recent.values()) + max_downtime
             self._pending = _combine_snapshots(recent)
             self._tracks = {track: it.number for it in self._pending for track in it.tracks}
 
     @property
-    def over(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether recovery has ended: no more tracks are recovered."""
-        return self._over
+        return self._has_ended
 
     @property
     def numbers(self) -> Collection[int]:
@@ -123,13 +125,13 @@ class StateRecovery:
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
         """Assign the pending tracks to their people before any of them is reported."""
-        people.begin_at(self.next_number)
+        people.reserve_numbers_below(self.next_number)
         people.expect(self._tracks, pulse - 1)
 
     def advance(self, people: PersonTracker, pulse: int) -> None:
         """Recover people whose tracks have reappeared, after the epoch that ends with a pulse."""
         if pulse > self._until:
-            self._pending, self._over = [], True
+            self._pending, self._has_ended = [], True
             people.cancel_expected(self._tracks)
         self._pending = [it for it in self._pending if not self._restore(it, people, pulse)]
 
@@ -143,9 +145,9 @@ class StateRecovery:
         if pending.name and kept not in people.registry.names:
             people.registry.set_name(kept, pending.name)
         people.registry.add_aliases(kept, pending.former)
-        for other in numbers if pending.manual else ():
-            if other != kept:
-                people.merge(kept, other)
+        for merged in numbers if pending.manual else ():
+            if merged != kept:
+                people.merge(kept, merged)
         return not pending.manual or None not in found_numbers
 
     def _number(self, track: TrackName, people: PersonTracker, pulse: int) -> int | None:

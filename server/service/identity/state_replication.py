@@ -23,8 +23,8 @@ from server.service.identity.state_recovery import (
 
 log = logging.getLogger(__name__)
 
-PATIENCE_S = 1.0
-"""How long to wait for the snapshot of a camera that has connected."""
+SNAPSHOT_WAIT_S = 1.0
+"""Seconds to wait for the snapshot of a camera that has connected."""
 _RECENT_S = 10.0
 """Tracks reported this recently are replicated: a camera on a busy machine reports late."""
 _JOIN_S = 10.0
@@ -34,7 +34,7 @@ _INTERVAL_S = 1.0
 
 
 class StateReplication:
-    """Starts from the state that cameras retain, and sends them the state to retain.
+    """Recovers the state that the cameras keep, and sends them the current state.
 
     Args:
         people: the person tracker.
@@ -42,7 +42,7 @@ class StateReplication:
         fps: frames a second.
         send: sends a camera its snapshot.
         sends: whether this service sends snapshots; of several services one is enough, since they agree.
-        clock: seconds that only go forward.
+        clock: monotonic seconds.
     """
 
     def __init__(
@@ -57,38 +57,38 @@ class StateReplication:
     ) -> None:
         self._people, self._cameras, self._fps = people, cameras, fps
         self._send, self._sends, self._clock = send, sends, clock
-        self._came_at: dict[str, float] = {}
-        """When each camera first connected whose snapshot has not come yet."""
+        self._connected_at: dict[str, float] = {}
+        """When each camera without a received snapshot first connected."""
         self._present: set[str] = set()
         self._snapshots: dict[str, IdentitySnapshot] = {}
         self._first_free: dict[str, int] = {}
         """By camera, the first free number of its last snapshot."""
         self._recoveries: list[StateRecovery] = []
-        """The first of all cameras present at the start, then one for each that came later."""
+        """The first for all cameras present at the start, then one for each later camera."""
         self._any_camera = False
-        self._began_at: float | None = None
+        self._started_at: float | None = None
         self._free = math.inf
         """The first number that this run assigns; infinite before the start."""
         self._reported: set[str] = set()
-        """Cameras whose snapshot has come: sending to them earlier would overwrite it."""
+        """Cameras whose snapshot was received; sending earlier would overwrite theirs."""
         self._sent: dict[str, IdentitySnapshot] = {}
         self._since = time.time()
 
     def alive(self, key: str, is_present: bool) -> None:
-        """A camera's liveliness token came or went."""
+        """Record that a camera's liveliness token appeared or disappeared."""
         camera = camera_of_key(key)
         if camera in self._cameras and is_present:
             self._any_camera = True
             self._present.add(camera)
             if camera not in self._reported:  # the token may come after the snapshot
-                self._came_at.setdefault(camera, self._clock())
+                self._connected_at.setdefault(camera, self._clock())
         else:
             self._present.discard(camera)
 
     def snapshot_received(self, message: Message) -> None:
-        """Take in a camera's retained snapshot.
+        """Add a camera's snapshot.
 
-        One that comes after the start is used, too; of a second snapshot only the first free number.
+        One received after the start is used as well; of a second snapshot only the first free number.
 
         Raises:
             DecodeError or another of `DECODE_ERRORS`: it cannot be decoded.
@@ -96,49 +96,53 @@ class StateReplication:
         camera = camera_of_key(message.key)
         if camera not in self._cameras:
             return
-        again = self._began_at is not None and camera in self._reported
-        self._came_at.pop(camera, None)
+        again = self._started_at is not None and camera in self._reported
+        self._connected_at.pop(camera, None)
         self._reported.add(camera)
         if not message.payload:
             return
         snapshot = msgspec.json.decode(message.payload, type=IdentitySnapshot)
         self._first_free[camera] = first_free_number(snapshot)
         if again:
-            self._people.begin_at(min(snapshot.next_number, trusted_first_free(self._first_free.values())))
+            self._people.reserve_numbers_below(
+                min(snapshot.next_number, trusted_first_free(self._first_free.values()))
+            )
         else:
             self._snapshots[camera] = snapshot
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a snapshot is still to come, so that nothing should be decided yet."""
-        if self._began_at is not None:
+        """Whether a snapshot is still expected, so that nothing should be decided yet."""
+        if self._started_at is not None:
             return False
         now = self._clock()
         return any(
-            now < came + PATIENCE_S for camera, came in self._came_at.items() if camera in self._present
+            now < connected_at + SNAPSHOT_WAIT_S
+            for camera, connected_at in self._connected_at.items()
+            if camera in self._present
         )
 
     def may_recover(self, number: int) -> bool:
         """Return whether a person of this number is known, or may still be recovered."""
         if (
-            self._began_at is None
+            self._started_at is None
             or self._people.registry.current(number) in self._people.registry.first_seen
         ):
             return True
-        may_connect = self._reported < set(self._cameras) and self._clock() < self._began_at + _JOIN_S
+        may_connect = self._reported < set(self._cameras) and self._clock() < self._started_at + _JOIN_S
         return (may_connect and number < self._free) or any(number in it.numbers for it in self._recoveries)
 
     @property
     def numbers_since(self) -> float:
         """When numbering began, unix seconds: no number was assigned twice since. 0: none was assigned."""
-        return self._since if self._began_at is not None or self._people.registry.first_seen else 0.0
+        return self._since if self._started_at is not None or self._people.registry.first_seen else 0.0
 
     def begin(self, pulse: int) -> None:
         """Start recovery from the snapshots, before the epoch that ends with a pulse is processed.
 
         Does nothing before the first camera has connected. Later snapshots start further recoveries.
         """
-        if not self._any_camera or (self._began_at is not None and not self._snapshots):
+        if not self._any_camera or (self._started_at is not None and not self._snapshots):
             return
         most = trusted_first_free(self._first_free.values())
         for camera in [camera for camera, it in self._snapshots.items() if first_free_number(it) > most]:
@@ -149,8 +153,8 @@ class StateReplication:
         recovery = StateRecovery(snapshot, pulse, round(MAX_DOWNTIME_S * self._fps))
         recovery.begin(self._people, pulse)
         self._recoveries.append(recovery)
-        if self._began_at is None:
-            self._began_at, self._free = self._clock(), self._people.next_number
+        if self._started_at is None:
+            self._started_at, self._free = self._clock(), self._people.next_number
             self._since = min(self._since, recovery.numbered_since)
         if snapshot:
             log.info(
@@ -161,8 +165,8 @@ class StateReplication:
         """Continue recovery, and send snapshots, after the epoch that ends with a pulse was processed."""
         for recovery in self._recoveries:
             recovery.advance(self._people, pulse)
-        self._recoveries = [it for it in self._recoveries if not it.over]
-        if self._began_at is not None and self._sends:
+        self._recoveries = [it for it in self._recoveries if not it.has_ended]
+        if self._started_at is not None and self._sends:
             self._send_state(pulse)
 
     def _send_state(self, pulse: int) -> None:
@@ -180,7 +184,7 @@ class StateReplication:
 
 
 def _below(free: float, snapshot: IdentitySnapshot) -> IdentitySnapshot:
-    """Leave out people whose number this run may have assigned to another person."""
+    """Remove people whose number this run may have assigned to another person."""
     known = [it for it in snapshot.people if max([it.number, *it.aliases]) < free]
     return msgspec.structs.replace(snapshot, people=known)
 

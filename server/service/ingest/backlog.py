@@ -6,8 +6,8 @@ import time
 
 from camsync.clock import Clock
 
-_PATIENCE_S = 2.0
-"""How long decisions may be too far behind before epochs are skipped: they may catch up."""
+_SKIP_AFTER_S = 2.0
+"""Seconds that decisions may be too far behind before epochs are skipped: they may catch up."""
 _CATCHES_UP = 0.95
 """Decisions catch up when the backlog has shrunk to this share."""
 
@@ -30,7 +30,7 @@ class BacklogMonitor:
             self._since = None
         elif self._since is None:
             self._since, self._backlog_before = now, backlog
-        elif now - self._since >= _PATIENCE_S:
+        elif now - self._since >= _SKIP_AFTER_S:
             lost = backlog > _CATCHES_UP * self._backlog_before
             self._since, self._backlog_before = (None, 0) if lost else (now, backlog)
             return lost

@@ -1,4 +1,4 @@
-"""Fast conversion of a message's boxes to an array: they are most of what the service reads."""
+"""Fast conversion of a message's boxes to an array: boxes are most of the data that the service receives."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ def boxes_array(tracks: Iterable[list[Box | None]]) -> NDArray[np.float64]:
     The boxes are encoded as MessagePack, whose bytes NumPy reads as an array: three times as fast as
     converting tuples.
     """
-    boxes = list(chain.from_iterable(it if all(it) else [box or _HIDDEN for box in it] for it in tracks))
+    boxes = list(
+        chain.from_iterable(track if all(track) else [box or _HIDDEN for box in track] for track in tracks)
+    )
     packed = msgspec.msgpack.encode(boxes)
     head = len(packed) - len(boxes) * _PACKED.itemsize
     if head in (1, 3, 5):  # bytes of the outer array's length

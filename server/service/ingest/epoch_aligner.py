@@ -27,7 +27,7 @@ class Epoch:
     late_revisions: tuple[CameraTracks, ...] = ()
     """Windows that arrived too late for their own epoch, but revise track identities of the past."""
     skipped: int = 0
-    """Epochs before it that are skipped: no camera reported them, and they are too long ago."""
+    """Epochs before it that are skipped: no camera reported them, and they are too old."""
 
 
 @dataclass(slots=True)
@@ -40,7 +40,7 @@ class _CameraQueue:
     """First pulse of this boot."""
     ended: bool = False
     trusted: bool = True
-    """False after it was late: it is not waited for until it is in time again."""
+    """False after a late window, until one arrives in time: it is not waited for."""
     waiting: dict[int, CameraTracks] = field(default_factory=dict)
     """By epoch."""
 
@@ -54,7 +54,7 @@ class EpochAligner:
         grace: pulses to wait for a connected camera, after an epoch's end and the first window of it.
         backlog: further pulses to wait while no camera has reported: then all of them are behind.
         max_distance: pulses between an epoch and the present, at most. Windows farther away are dropped at
-            the start, and epochs that no camera reports are skipped once they are so long ago. None: there
+            the start, and epochs that no camera reports are skipped once they are that old. None: there
             is no present, as with recordings, and nothing is skipped.
     """
 
@@ -129,23 +129,23 @@ class EpochAligner:
 
     @property
     def all_ended(self) -> bool:
-        """Whether every camera's recording is over and was taken out."""
+        """Whether every camera's recording has ended and was decided."""
         return all(queue.ended and not queue.waiting for queue in self._queues.values())
 
     def ready(self, now: int) -> list[Epoch]:
-        """Take out the epochs that can be decided at pulse ``now``, in order."""
+        """Remove and return the epochs that can be decided at pulse ``now``, in order."""
         epochs = []
         while (epoch := self.next_ready(now)) is not None:
             epochs.append(epoch)
         return epochs
 
     def next_ready(self, now: int) -> Epoch | None:
-        """Take out the next epoch that can be decided at pulse ``now``; None: none can."""
+        """Remove and return the next epoch that can be decided at pulse ``now``; None: none can."""
         if self._next is None:
             self._begin(now)
         if self._next is None or self.all_ended:
             return None
-        number = self._next = self._skip_long_past(now, self._next)
+        number = self._next = self._skip_outdated(now, self._next)
         end = end_of_epoch(number, self.stride)
         missing = [name for name, queue in self._queues.items() if self._is_expected(queue, end)]
         any_reported = any(queue.waiting for queue in self._queues.values())
@@ -154,7 +154,7 @@ class EpochAligner:
         if (missing or not any_reported) and now <= self._deadline(end):
             return None
         if self._max_distance is not None and 0 <= now < end - self._grace:
-            return None  # a window ahead of time does not cut the others' time short
+            return None  # an early window does not shorten the wait for others
         for name in missing:
             self._queues[name].trusted = False
         self._next, self._reported_at = number + 1, None
@@ -178,8 +178,8 @@ class EpochAligner:
         self._next = min(epochs, default=None)
         self._first_frames.clear()
 
-    def _skip_long_past(self, now: int, number: int) -> int:
-        """Return the epoch to continue with: if ``number`` is too long ago, one of the present."""
+    def _skip_outdated(self, now: int, number: int) -> int:
+        """Return the epoch to continue with: if ``number`` is too old, a present one."""
         if (
             end_of_epoch(number, self.stride) > now
             or self._is_near(number, now)
@@ -205,7 +205,7 @@ class EpochAligner:
         return self._max_distance is None or now < 0 or distance <= self._max_distance
 
     def _drop(self, is_dropped: Callable[[int], bool]) -> None:
-        """Drop the waiting windows of some epochs, as if they had come too late."""
+        """Drop the waiting windows of some epochs, and count them as late."""
         for queue in self._queues.values():
             for epoch in [epoch for epoch in queue.waiting if is_dropped(epoch)]:
                 self._count_late(queue.waiting.pop(epoch))

@@ -36,9 +36,9 @@ log = logging.getLogger(__name__)
 _MAX_THUMBNAILS = 300
 """Thumbnails kept of one camera: one for each recent track."""
 _PRESENCE_LOG_BURST, _PRESENCE_LOG_RATE = 10, 1 / 30
-"""Log lines about a camera that connects or disconnects: at once, and a second; it may flap for ever."""
+"""Log lines about a camera that connects or disconnects: burst, and rate per second; it may flap."""
 _THUMBNAIL_BYTES_MAX = 1 << 17
-"""More than any thumbnail of 160 lines takes."""
+"""Larger than any thumbnail of 160 lines."""
 
 
 @dataclass(slots=True)
@@ -70,16 +70,16 @@ class CameraState:
 
     @property
     def away(self) -> bool:
-        """Whether the camera's process is connected but its source delivers no pictures."""
+        """Whether the camera's process is connected but its source delivers no frames."""
         return self.status is not None and self.status.state == "away"
 
     @property
     def message(self) -> str:
-        """A message for people about what is wrong; empty: nothing is."""
+        """A message to the operator about a problem; empty: none."""
         if self.refused:
             return self.refused
         if self.alive and self.away:
-            return "its source delivers no pictures; retrying"
+            return "its source delivers no frames; retrying"
         return self.status.load if self.alive and self.status is not None else ""
 
     def count_bad_message(self, why: Exception | str) -> None:
@@ -90,7 +90,7 @@ class CameraState:
 
 @dataclass(frozen=True, slots=True)
 class Thumbnail:
-    """A small JPEG picture of a person."""
+    """A JPEG thumbnail of a person."""
 
     jpeg: bytes
     pulse: int
@@ -101,13 +101,13 @@ class Ingest:
 
     Args:
         frame_buffers: by camera.
-        aligner: takes the tracks, and who is connected.
+        aligner: receives the tracks, and which cameras are connected.
         on_frame: called with each frame of a camera.
-        audio_buffer: takes the site's audio; None at a site without.
+        audio_buffer: receives the site's audio; None if there is none.
         audio_camera: the camera that sends the audio.
         current_pulse: returns the newest pulse; below 0: unknown.
         max_ahead: pulses by which a message may be ahead of it. A later one is dropped: the aligner would
-            wait until its time has come.
+            wait until then.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class Ingest:
         self._thumbnail_header = msgspec.json.Decoder(ThumbnailHeader)
 
     def alive(self, key: str, is_present: bool) -> None:
-        """Record that a camera's liveliness token came or went."""
+        """Record that a camera's liveliness token appeared or disappeared."""
         camera = camera_of_key(key)
         state = self.states.get(camera)
         if state is None:

@@ -1,4 +1,4 @@
-"""Records missing and late tracks and pictures: in metrics, in the log, and in ``late.csv``."""
+"""Records missing and late tracks and frames: in metrics, in the log, and in ``late.csv``."""
 
 from __future__ import annotations
 
@@ -31,50 +31,50 @@ class LossRecorder:
         self._late_logs = {camera: LogThrottle(clock) for camera in frame_buffers}
         self.decision_writer: LiveDecisionWriter | None = None
         self.late_epochs = 0
-        """Windows of connected cameras that came too late for their epoch."""
-        self.lost_pictures = dict.fromkeys(frame_buffers, 0)
-        """By camera: pictures missing in decided GOPs while it was delivering."""
+        """Windows of connected cameras that arrived too late for their epoch."""
+        self.lost_frames = dict.fromkeys(frame_buffers, 0)
+        """By camera: frames missing in decided GOPs while it was delivering."""
         self._skip_log = LogThrottle(clock)
         self._decided_end: int | None = None
         """The first pulse that is not decided yet."""
 
-    def epoch(self, epoch: Epoch) -> None:
+    def record_epoch(self, epoch: Epoch) -> None:
         """Record cameras with late tracks, frames without detection, and frames without peers' detections."""
         for camera in epoch.late:
             self.late_epochs += 1
             if (more := self._late_logs[camera].record()) is not None:
-                text = "camera %s: its tracks for pulses up to %d came too late%s"
+                text = "camera %s: its tracks for pulses up to %d arrived too late%s"
                 log.warning(text, camera, epoch.last, more)
         for camera, message in epoch.tracks.items():
             self._states[camera].frames_without_peers += len(message.without_peers)
             if ended := self._late_logs[camera].end():
-                text = "camera %s: its tracks come in time again; %d windows in %.0f s were late"
+                text = "camera %s: its tracks arrive in time again; %d windows in %.0f s were late"
                 log.info(text, camera, ended.count, ended.seconds)
         if self.decision_writer is None:
             return
         for camera in epoch.late:
-            self.decision_writer.note_late(
+            self.decision_writer.add_late(
                 camera, range(epoch.last - self._stride + 1, epoch.last + 1), "tracks late"
             )
         for camera, message in epoch.tracks.items():
-            self.decision_writer.note_late(camera, message.shed, "not searched")
-            self.decision_writer.note_late(camera, message.without_peers, "no peer detections")
+            self.decision_writer.add_late(camera, message.shed, "no detection")
+            self.decision_writer.add_late(camera, message.without_peers, "no peer detections")
 
-    def gop(self, decision: GopDecision) -> None:
-        """Record pictures missing in a GOP, of cameras that were delivering."""
+    def record_gop(self, decision: GopDecision) -> None:
+        """Record frames missing in a GOP, of cameras that were delivering."""
         if self._decided_end is not None and decision.first > self._decided_end:
-            self._skipped(range(self._decided_end, decision.first))
+            self._record_skipped(range(self._decided_end, decision.first))
         self._decided_end = decision.first + decision.frames
         for camera, frame_buffer in self._frame_buffers.items():
             lost = frame_buffer.missing(decision.first, decision.frames)
-            self.lost_pictures[camera] += len(lost)
+            self.lost_frames[camera] += len(lost)
             if self.decision_writer is not None:
-                self.decision_writer.note_late(camera, lost, "no picture")
+                self.decision_writer.add_late(camera, lost, "no frame")
 
-    def _skipped(self, pulses: range) -> None:
+    def _record_skipped(self, pulses: range) -> None:
         """Record skipped frames, in a single line: there may be millions."""
         if (more := self._skip_log.record()) is not None:
-            text = "pulses %d to %d are skipped: they are too long ago%s"
+            text = "pulses %d to %d are skipped: they are too old%s"
             log.warning(text, pulses.start, pulses.stop - 1, more)
         if self.decision_writer is not None:
-            self.decision_writer.note_late("", [pulses.start], f"not decided up to {pulses.stop}")
+            self.decision_writer.add_late("", [pulses.start], f"not decided up to {pulses.stop}")

@@ -8,7 +8,7 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import CameraTracks
 
 _WINDOW_MAX = 100_000
-"""Frames of one message, at most; far more than any window or any gap that a tracker bridges."""
+"""Limit of frames in one message: far more than any window, or any gap that a tracker bridges."""
 
 
 def is_plausible(message: CameraTracks, stride: int) -> bool:

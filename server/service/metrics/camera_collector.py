@@ -27,7 +27,7 @@ class CameraCollector(Collector):
         """Return all metrics as they are now."""
         yield from self._cameras()
         yield self._stages()
-        yield self._gauge("fps", "Frames taken a second.", _of_status(lambda it: it.fps))
+        yield self._gauge("fps", "Frames captured per second.", _of_status(lambda it: it.fps))
         yield self._gauge(
             "synchronized",
             "Pulses come from the server; otherwise the camera counts by itself.",
@@ -43,16 +43,16 @@ class CameraCollector(Collector):
         )
         for what, description, spread in _SPREADS:
             yield self._spread(what, description, spread)
-        late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_pictures
-        yield self._counter("late_windows", "Windows that came too late to count.", lambda it, _: late[it])
+        late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_frames
+        yield self._counter("late_windows", "Windows that arrived too late to count.", lambda it, _: late[it])
         yield self._counter(
-            "lost_pictures", "Pictures missing when their GOP was decided.", lambda it, _: lost[it]
+            "lost_frames", "Frames missing when their GOP was decided.", lambda it, _: lost[it]
         )
         yield self._counter("windows", "Windows solved.", lambda _, it: it.metrics.totals.windows)
         yield self._counter(
-            "certified_windows",
+            "optimal_windows",
             "Windows whose solution is proven optimal.",
-            lambda _, it: it.metrics.totals.certified,
+            lambda _, it: it.metrics.totals.optimal,
         )
         yield self._counter(
             "position_corrections",
@@ -147,7 +147,7 @@ def _of_status(value: Callable[[CameraStatus], float]) -> Value:
 
 
 _SPREADS: tuple[tuple[str, str, Callable[[CameraState], RecentSeconds | None]], ...] = (
-    ("sync_error", "From a pulse to the moment its frame was taken.", lambda it: it.metrics.sync_error),
+    ("sync_error", "From a pulse to the capture of its frame.", lambda it: it.metrics.sync_error),
     (
         "tracking_delay",
         "From the pulse of a window's last frame to its solution.",

@@ -1,4 +1,4 @@
-"""Measurements of one camera: synchronization error, tracking delay, and certified solutions."""
+"""Measurements of one camera: synchronization error, tracking delay, and optimal solutions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.service.metrics.stage_timers import SECONDS_BUCKETS
 _FRAMES = 250
 """Recent frames that are measured: ten seconds at 25 a second."""
 _WINDOWS = 120
-_CERTIFIED_GAP = 1e-6
+_OPTIMAL_GAP = 1e-6
 """The largest gap of a solution that counts as none: rounding errors."""
 
 
@@ -43,13 +43,13 @@ class StageTotals:
     All times are differences of the camera's own clock.
 
     Attributes:
-        take: from a pulse to its picture.
-        encode: from the picture to its access unit.
+        take: from a pulse to the capture of its frame.
+        encode: from capture to the access unit.
         search: detection in a frame, the mean of each window.
         solve: tracking to the end of a window, solver included.
         track: from the pulse of a window's last frame to its tracks, waiting included.
         windows: solved windows.
-        certified: those of them whose solution is proven optimal.
+        optimal: those of them whose solution is proven optimal.
         gap: sum of the gaps of the others.
         corrected: windows that revised final frames after an operator's correction.
     """
@@ -57,7 +57,7 @@ class StageTotals:
     def __init__(self) -> None:
         self.take, self.encode = _histogram(), _histogram()
         self.search, self.solve, self.track = _histogram(), _histogram(), _histogram()
-        self.windows = self.certified = self.corrected = 0
+        self.windows = self.optimal = self.corrected = 0
         self.gap = 0.0
 
     @property
@@ -70,15 +70,15 @@ class StageTotals:
         self.take.observe(head.taken - head.due)
         self.encode.observe(head.encoded - head.taken)
 
-    def window(self, tracks: CameraTracks, due: float | None, *, certified: bool) -> None:
+    def window(self, tracks: CameraTracks, due: float | None, *, optimal: bool) -> None:
         """Count a window; ``due`` is when its last frame was due, None: unknown."""
         self.corrected += tracks.revised_from is not None
         if tracks.detection_s is not None:
             self.search.observe(tracks.detection_s)
         if tracks.solve is not None:
             self.windows += 1
-            self.certified += certified
-            self.gap += 0.0 if certified else tracks.solve.gap
+            self.optimal += optimal
+            self.gap += 0.0 if optimal else tracks.solve.gap
             if tracks.solve_s is not None:
                 self.solve.observe(tracks.solve_s)
         if due is not None and tracks.solved_at > 0:
@@ -100,17 +100,17 @@ class CameraMetrics:
         self._errors: deque[float] = deque(maxlen=_FRAMES)
         self._due: OrderedDict[int, float] = OrderedDict()
         self._delays: deque[float] = deque(maxlen=_WINDOWS)
-        self._certified: deque[bool] = deque(maxlen=_WINDOWS)
+        self._optimal: deque[bool] = deque(maxlen=_WINDOWS)
         self.totals = StageTotals()
         """Totals since the start of the service, over all runs of the camera."""
         self.last_error: CameraProblem | None = None
         """The last problem; it stays when the camera has recovered."""
         self.size: tuple[int, int] | None = None
-        """Width and height of the camera's own picture; None: unknown."""
+        """Width and height of the camera's image; None: unknown."""
 
     def reset_recent(self) -> None:
         """Discard the recent measurements, which are of an earlier run of the camera."""
-        for measured in (self._errors, self._due, self._delays, self._certified):
+        for measured in (self._errors, self._due, self._delays, self._optimal):
             measured.clear()
 
     def frame(self, head: FrameHeader) -> None:
@@ -124,11 +124,11 @@ class CameraMetrics:
     def window(self, tracks: CameraTracks) -> None:
         """Measure a solved window."""
         self.size = tracks.size
-        certified = tracks.solve is not None and tracks.solve.gap <= _CERTIFIED_GAP
+        optimal = tracks.solve is not None and tracks.solve.gap <= _OPTIMAL_GAP
         if tracks.solve is not None:
-            self._certified.append(certified)
+            self._optimal.append(optimal)
         due = self._due.get(tracks.last)
-        self.totals.window(tracks, due, certified=certified)
+        self.totals.window(tracks, due, optimal=optimal)
         if due is not None and tracks.solved_at > 0:
             self._delays.append(tracks.solved_at - due)
 
@@ -138,23 +138,23 @@ class CameraMetrics:
 
     @property
     def sync_error(self) -> RecentSeconds | None:
-        """Seconds from a pulse to the moment its frame was taken; None: no frame has arrived."""
+        """Seconds from a pulse to the capture of its frame; None: no frame has arrived."""
         return _spread(self._errors)
 
     @property
     def tracking_delay(self) -> RecentSeconds | None:
-        """Seconds from the pulse of a window's last frame to its solution; None: no window has."""
+        """Seconds from the pulse of a window's last frame to its solution; None: no window has arrived."""
         return _spread(self._delays)
 
     @property
-    def windows(self) -> int:
-        """The number of windows behind :attr:`certified`."""
-        return len(self._certified)
+    def solved_windows(self) -> int:
+        """The number of windows behind :attr:`optimal`."""
+        return len(self._optimal)
 
     @property
-    def certified(self) -> float | None:
+    def optimal(self) -> float | None:
         """Share of the recent windows whose solution is proven optimal; None: there are none."""
-        return sum(self._certified) / len(self._certified) if self._certified else None
+        return sum(self._optimal) / len(self._optimal) if self._optimal else None
 
 
 def _spread(values: Collection[float]) -> RecentSeconds | None:

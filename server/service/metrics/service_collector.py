@@ -33,7 +33,7 @@ class ServiceCollector(Collector):
         yield CounterMetricFamily("myview_cuts", "Changes of view.", value=pipeline.decision_state.cuts)
         yield CounterMetricFamily(
             "myview_late_epochs",
-            "Windows of connected cameras that came too late for their epoch.",
+            "Windows of connected cameras that arrived too late for their epoch.",
             value=pipeline.loss_recorder.late_epochs,
         )
         yield CounterMetricFamily(
@@ -66,7 +66,7 @@ class ServiceCollector(Collector):
         yield waiting
         yield CounterMetricFamily(
             "myview_lost_messages",
-            "Bus messages lost because they came faster than they could be handled.",
+            "Bus messages lost because they arrived faster than they could be handled.",
             value=sum(inbox.lost for inbox in pipeline.bus.inboxes),
         )
 
@@ -120,7 +120,7 @@ class RenderingCollector(Collector):
             "myview_pictures_restarts", "Render workers that died.", value=rendering.restarts
         )
         yield CounterMetricFamily(
-            "myview_pictures_lost_gops", "GOPs that came too fast to be rendered.", value=rendering.lost
+            "myview_pictures_lost_gops", "GOPs that arrived too fast to be rendered.", value=rendering.lost
         )
 
 

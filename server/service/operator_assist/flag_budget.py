@@ -29,15 +29,15 @@ class _RecentRisk:
 class FlagBudget:
     """Spends a limited number of flags on the likeliest failures. It has no clock: callers pass the pulse.
 
-    A risk grows over time: a higher threshold (``risk`` of the settings) avoids flags without a failure, but
-    may come too late. If more risks pass the threshold than may be flagged, one is worth a flag if it is
+    A risk grows over time: a higher threshold (``risk`` of the settings) avoids false flags, but raises flags
+    later. If more risks pass the threshold than may be flagged, one is worth a flag if it is
     among the ``per_minute`` times T highest of the last T minutes. Failures come in bursts, so unused flags
     are saved for three minutes. One failure may be reported with several people, since a lost person is
-    similar to everybody nearby: for some seconds no person has two flags.
+    similar to everyone nearby: for some seconds no person has two flags.
     """
 
     def __init__(self, settings: FlagSettings, fps: float) -> None:
-        self._per_minute, self._least, self._fps = settings.per_minute, settings.risk, fps
+        self._per_minute, self._min_risk, self._fps = settings.per_minute, settings.risk, fps
         self._first: int | None = None
         self._risks: dict[frozenset[int], _RecentRisk] = {}
         self._history: list[_RecentRisk] = []
@@ -49,22 +49,22 @@ class FlagBudget:
     def record_risk(self, now: int, people: frozenset[int], risk: float) -> None:
         """Record a risk of these people, whether or not it is worth a flag."""
         self._advance(now)
-        known = self._risks.get(people)
-        if known is None:
-            known = self._risks[people] = _RecentRisk(now, risk)
-            self._history.append(known)
-        known.pulse, known.risk = now, max(known.risk, risk)
+        current = self._risks.get(people)
+        if current is None:
+            current = self._risks[people] = _RecentRisk(now, risk)
+            self._history.append(current)
+        current.pulse, current.risk = now, max(current.risk, risk)
 
     def is_worth_flag(self, now: int, people: frozenset[int], risk: float) -> bool:
         """Return whether a risk of these people is worth a flag now."""
         self._advance(now)
-        if any(people & others for _, others in self._raised):
+        if any(people & flagged for _, flagged in self._raised):
             return False
-        if self._left < 1.0 or risk < self._least:
+        if self._left < 1.0 or risk < self._min_risk:
             return False
         history = min(now - self._first if self._first is not None else 0, _HISTORY_S * self._fps)
         minutes = max(history / (_MINUTE_S * self._fps), 1.0)
-        return sum(it.risk > risk for it in self._history) < self._per_minute * minutes
+        return sum(recorded.risk > risk for recorded in self._history) < self._per_minute * minutes
 
     def record_flag(self, now: int, people: frozenset[int]) -> None:
         """Record that a flag is raised."""

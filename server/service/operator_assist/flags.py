@@ -16,7 +16,7 @@ from tracking.types import RiskReason
 FlagState = Literal["raised", "followed", "answered", "expired"]
 
 _ANSWER_MARGIN_S = 0.4
-"""How long after the expected failure the person must be pointed at for the flag to be answered."""
+"""Seconds after the expected failure until which the person must be marked to answer the flag."""
 _MIN_SHIFT_S = 0.2
 """A shift of the expected time by less is not published."""
 _MAX_ENDED = 100
@@ -42,7 +42,8 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
     risk: float
     """The probability of the failure without help, in [0, 1]."""
     state: FlagState
-    """raised; followed: the operator points at them; answered: until after the failure; expired: not so."""
+    """raised; followed: the operator marks positions; answered: until after the failure; expired: not
+    answered."""
 
     @property
     def over(self) -> bool:
@@ -85,7 +86,7 @@ class FlagQueue:
     @property
     def open(self) -> list[Flag]:
         """Flags that can be answered, the most urgent first."""
-        return sorted(self._open.values(), key=lambda it: (it.pulse, it.margin, it.id))
+        return sorted(self._open.values(), key=lambda flag: (flag.pulse, flag.margin, flag.id))
 
     @property
     def ended(self) -> list[Flag]:
@@ -96,19 +97,21 @@ class FlagQueue:
         """Process the risk events at a pulse; ``resolve`` maps a merged number to its current one."""
         for flag in list(self._open.values()):
             self._put(self._resolved(flag, resolve))
-        relevant = [it for it in events if it.reason in self._settings.reasons]
-        for it in relevant:
-            self._budget.record_risk(now, frozenset(it.objects), it.risk)
-        for it in sorted(relevant, key=lambda it: (-it.risk, it.pulse, it.objects, it.camera)):
-            known = self._open_flag_of(it)
-            if known is not None:
-                self._update(known, it)
+        relevant = [event for event in events if event.reason in self._settings.reasons]
+        for event in relevant:
+            self._budget.record_risk(now, frozenset(event.objects), event.risk)
+        for event in sorted(
+            relevant, key=lambda event: (-event.risk, event.pulse, event.objects, event.camera)
+        ):
+            open_flag = self._open_flag_of(event)
+            if open_flag is not None:
+                self._update(open_flag, event)
             elif (
-                it.objects
-                and not self._has_ended(it)
-                and self._budget.is_worth_flag(now, frozenset(it.objects), it.risk)
+                event.objects
+                and not self._has_ended(event)
+                and self._budget.is_worth_flag(now, frozenset(event.objects), event.risk)
             ):
-                self._raise(now, it)
+                self._raise(now, event)
         expiry = now - self._settings.answer_s * self._fps
         for flag in [flag for flag in self._open.values() if flag.pulse < expiry]:
             is_answered = self._pointed.get(flag.id, -1) >= flag.pulse
@@ -117,7 +120,7 @@ class FlagQueue:
 
     def pointed(self, number: int, camera: str, pulses: Collection[int]) -> list[int]:
         """Record that the operator pointed at a person; return the flags that this responds to."""
-        flags = [it for it in self._open.values() if number in it.objects and camera in it.cameras]
+        flags = [flag for flag in self._open.values() if number in flag.objects and camera in flag.cameras]
         for flag in flags:
             last = self._pointed[flag.id] = max(self._pointed.get(flag.id, -1), *pulses)
             if last >= flag.pulse + _ANSWER_MARGIN_S * self._fps:
@@ -127,39 +130,39 @@ class FlagQueue:
         self._publish()
         return [flag.id for flag in flags]
 
-    def _raise(self, now: int, it: RiskEvent) -> None:
+    def _raise(self, now: int, event: RiskEvent) -> None:
         self.counts["raised"] += 1
-        self._budget.record_flag(now, frozenset(it.objects))
+        self._budget.record_flag(now, frozenset(event.objects))
         self._put(
             Flag(
                 id=self.counts["raised"],
-                objects=list(it.objects),
-                cameras=[it.camera],
-                reason=it.reason,
-                pulse=it.pulse,
+                objects=list(event.objects),
+                cameras=[event.camera],
+                reason=event.reason,
+                pulse=event.pulse,
                 raised=now,
-                margin=it.margin,
-                risk=it.risk,
+                margin=event.margin,
+                risk=event.risk,
                 state="raised",
             )
         )
 
-    def _update(self, flag: Flag, it: RiskEvent) -> None:
+    def _update(self, flag: Flag, event: RiskEvent) -> None:
         """Update a flag by a later event of its failure; once the operator points, its time stays."""
-        cameras = flag.cameras if it.camera in flag.cameras else [*flag.cameras, it.camera]
+        cameras = flag.cameras if event.camera in flag.cameras else [*flag.cameras, event.camera]
         flag = msgspec.structs.replace(flag, cameras=cameras)
-        if flag.state == "raised" and it.camera == cameras[0]:
-            flag = msgspec.structs.replace(flag, pulse=it.pulse, margin=it.margin, risk=it.risk)
+        if flag.state == "raised" and event.camera == cameras[0]:
+            flag = msgspec.structs.replace(flag, pulse=event.pulse, margin=event.margin, risk=event.risk)
         self._put(flag)
 
-    def _open_flag_of(self, it: RiskEvent) -> Flag | None:
+    def _open_flag_of(self, event: RiskEvent) -> Flag | None:
         """Return the open flag of the same people."""
-        return next((flag for flag in self.open if set(flag.objects) == set(it.objects)), None)
+        return next((flag for flag in self.open if set(flag.objects) == set(event.objects)), None)
 
-    def _has_ended(self, it: RiskEvent) -> bool:
+    def _has_ended(self, event: RiskEvent) -> bool:
         """Return whether a flag that has ended was about the same event."""
-        earliest = it.pulse - self._settings.answer_s * self._fps
-        return any(set(flag.objects) == set(it.objects) and flag.pulse >= earliest for flag in self._ended)
+        earliest = event.pulse - self._settings.answer_s * self._fps
+        return any(set(flag.objects) == set(event.objects) and flag.pulse >= earliest for flag in self._ended)
 
     def _resolved(self, flag: Flag, resolve: Callable[[int], int]) -> Flag:
         return msgspec.structs.replace(flag, objects=list(dict.fromkeys(map(resolve, flag.objects))))

@@ -3,21 +3,60 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import msgspec
 
 from server.config.site_config import Config
+from server.messaging.operator_messages import CorrectedPosition, PositionCorrections
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.corrections import MarkedPosition, corrections_for_tracker
 from server.service.operator_assist.flags import FlagQueue, RiskEvent
 
 
-class OperatorAssist:
-    """Translates between the cameras' trackers, which know tracks, and the operator, who knows people.
+@dataclass(frozen=True, slots=True)
+class MarkedPosition:
+    """A position in a frame, in pixels of the site's image.
 
-    ``send`` sends a camera a message.
+    Attributes:
+        pulse: the frame.
+        x: from the left.
+        y: from the top.
+        tolerance: how far off it may be.
     """
+
+    pulse: int
+    x: float
+    y: float
+    tolerance: float
+
+
+def corrections_for_tracker(
+    people: PersonTracker, camera: str, number: int, positions: Sequence[MarkedPosition]
+) -> PositionCorrections | None:
+    """Return an operator's clicks on a person as corrections of the camera's track of that person.
+
+    Frames that are no longer kept, and those of an earlier run of the camera, are dropped.
+
+    Returns:
+        None: no position is left, or the camera has not shown this person.
+    """
+    published, numbers = people.published, [number, *people.registry.aliases(number)]
+    known = [it for it in positions if published.covers(it.pulse)]
+    tracks = [(it, published.of(camera, numbers, it.pulse)) for it in known]
+    boots = [track.boot for _, track in tracks if track is not None]
+    if not boots:
+        return None
+    points = [
+        CorrectedPosition(pulse=it.pulse, track=track.track, x=it.x, y=it.y, tolerance=it.tolerance)
+        for it, track in tracks
+        if track is not None and track.boot == max(boots)
+    ]
+    return PositionCorrections(boot=max(boots), corrections=points)
+
+
+class OperatorAssist:
+    """Maps the trackers' tracks to people for the operator, and back; ``send`` sends a camera a message."""
 
     def __init__(self, config: Config, people: PersonTracker, send: Callable[[str, bytes], None]) -> None:
         self.flags = FlagQueue(config.view.flags, config.site.fps)

@@ -1,7 +1,8 @@
 """The age clock of a recording: counts seconds that have certainly passed, and never goes back.
 
-The machine's clock may jump: it is set by hand, its battery is empty, or it is wrong until NTP corrects it.
-Deleting old recordings by it might delete everything. So the age of recordings is counted by
+The machine's clock may jump: it is set manually, its battery is empty, or it is wrong until NTP corrects it.
+If it determined the age of recordings, a jump might delete all of them. So the age of recordings is counted
+by
 
 * the steady clock of the machine, which counts while it sleeps, and across restarts of the service until the
   machine itself starts again (its boot has another id);
@@ -145,7 +146,7 @@ class AgeClock:
         is_right, jumped = self.is_right, abs(difference - self._difference) > _JUMP_S + _DRIFT * passed
         if not is_right or jumped:
             self._right_since = steady
-        if jumped and self._agrees:  # the machine was not off: there is no time to add
+        if jumped and self._agrees:  # the machine was not off: no time is added
             self._origin, self._agrees = None, False
         self._difference, self._compared_at = difference, steady
         off_s = 0.0 if self._origin is None else wall - self._origin - self.now
@@ -154,9 +155,9 @@ class AgeClock:
             if is_right:
                 self._origin, self._agrees, self.anchored = wall - self.now, True, self.now
         elif not is_right:
-            self._warn_once("unkept", off_s)
+            self._warn_once("unsynchronized", off_s)
         elif steady - self._right_since < _STABLE_S:
-            self._warn_once("trial", off_s, wall + _STABLE_S - (steady - self._right_since))
+            self._warn_once("pending", off_s, wall + _STABLE_S - (steady - self._right_since))
         else:
             self._seconds += off_s
             self._last_warning = ""
@@ -171,7 +172,7 @@ class AgeClock:
         """Save the state.
 
         Raises:
-            OSError: it cannot be written; it is as before.
+            OSError: writing fails; the file is unchanged.
         """
         machine = self._machine
         state = AgeClockState(
@@ -195,7 +196,7 @@ class AgeClock:
             return
         self._last_warning = what
         text = f"recording: by its clock this machine was off for {_duration_text(off_s)}"
-        if what == "unkept":
+        if what == "unsynchronized":
             log.warning(
                 "%s; that does not count for record.keep_s, since the clock is not synchronized (NTP): "
                 "if it is right, set record.trust_clock: true",

@@ -73,7 +73,7 @@ class MediaFile:
     first GOP: an init segment alone does not play.
 
     Raises:
-        OSError: the disk does not take it.
+        OSError: writing fails.
     """
 
     def __init__(self, path: Path, header: bytes) -> None:
@@ -93,7 +93,7 @@ class MediaFile:
         """Append a GOP; return offset and length in bytes.
 
         Raises:
-            OSError: the disk does not take it; the file is as before.
+            OSError: writing fails; the file is unchanged.
         """
         data = gop.data
         try:
@@ -141,7 +141,7 @@ def write_at(handle: int, data: bytes, offset: int) -> None:
     """Write all of the data.
 
     Raises:
-        OSError: the disk does not take it; part of it may be there.
+        OSError: writing fails; part of the data may be written.
     """
     view = memoryview(data)
     while view:

@@ -83,7 +83,7 @@ class RecordingPlaylist:
         """Add an entry to the file, then to the index.
 
         Raises:
-            OSError: the disk does not take it; file and memory are as before.
+            OSError: writing fails; file and memory are unchanged.
         """
         lines = self._lines_of(entry, self._end)
         if self._tail is not None and self._append_to_file(lines, self._tail):
@@ -97,7 +97,7 @@ class RecordingPlaylist:
         """Rewrite the file from the index, with joined entries; remove it if there are none.
 
         Raises:
-            OSError: the disk does not take it; the file is as before.
+            OSError: writing fails; the file is unchanged.
         """
         if self.index.all:
             self._write_all()

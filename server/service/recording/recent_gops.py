@@ -11,16 +11,16 @@ from server.service.streaming.frame_buffer import FrameBuffer
 
 
 class RecentGops:
-    """Finds GOPs of cameras and of persons in the frame buffers. ``gop`` is the frames of a GOP."""
+    """Finds GOPs of cameras and of persons in the frame buffers. ``gop`` is the number of frames of a GOP."""
 
     def __init__(self, frame_buffers: Mapping[str, FrameBuffer], gop: int, frames: int) -> None:
-        self._shelves, self._gop, self._frames = frame_buffers, gop, frames
+        self._frame_buffers, self._gop, self._frames = frame_buffers, gop, frames
         self._choices: deque[GopChoices] = deque()
 
     def put(self, choices: GopChoices) -> None:
         """Keep a decision as long as its frames."""
         if self._choices and choices.first < self._choices[-1].first:
-            self._choices.clear()  # the pulses started again
+            self._choices.clear()  # the pulses have restarted
         self._choices.append(choices)
         while self._choices[0].first < choices.first - self._frames:
             self._choices.popleft()
@@ -32,21 +32,23 @@ class RecentGops:
 
     def end_of_camera(self, camera: str) -> int:
         """Return the pulse after a camera's newest frame."""
-        return self._shelves[camera].newest + 1
+        return self._frame_buffers[camera].newest + 1
 
     def choices(self, pulse: int) -> list[GopChoices]:
         """Return the decisions about a pulse and later ones."""
-        return [it for it in self._choices if it.first + it.frames > pulse]
+        return [choices for choices in self._choices if choices.first + choices.frames > pulse]
 
     def of_person(self, number: int, pulse: int) -> RecordedGop | None:
         """Return a person's GOP that holds a pulse, or the next one; None if nothing follows."""
-        later = (it for it in self._choices if it.first + it.frames > pulse)
-        return next((gop for it in later if (gop := self._complete(number, it)) is not None), None)
+        later = (choices for choices in self._choices if choices.first + choices.frames > pulse)
+        gops = (self._complete(number, choices) for choices in later)
+        return next((gop for gop in gops if gop is not None), None)
 
     def of_person_before(self, number: int, pulse: int) -> RecordedGop | None:
         """Return a person's last GOP that ends before a pulse; None if there is none."""
-        before = (it for it in reversed(self._choices) if it.first + it.frames <= pulse)
-        return next((gop for it in before if (gop := self._complete(number, it)) is not None), None)
+        earlier = (choices for choices in reversed(self._choices) if choices.first + choices.frames <= pulse)
+        gops = (self._complete(number, choices) for choices in earlier)
+        return next((gop for gop in gops if gop is not None), None)
 
     def _complete(self, number: int, choices: GopChoices) -> RecordedGop | None:
         camera = choices.choices.get(number)
@@ -55,7 +57,7 @@ class RecentGops:
 
     def of_camera(self, camera: str, pulse: int) -> RecordedGop | None:
         """Return the frames that arrived of a camera's GOP that holds a pulse, or of the next one."""
-        frame_buffer = self._shelves[camera]
+        frame_buffer = self._frame_buffers[camera]
         earliest = max(pulse, frame_buffer.newest - self._frames)
         for first in range(earliest // self._gop * self._gop, frame_buffer.newest + 1, self._gop):
             gop = self.arrived(camera, first, self._gop)
@@ -65,7 +67,7 @@ class RecentGops:
 
     def of_camera_before(self, camera: str, pulse: int) -> RecordedGop | None:
         """Return a camera's last GOP that begins before a pulse, cut there; None if there is none."""
-        newest = self._shelves[camera].newest
+        newest = self._frame_buffers[camera].newest
         begin = (min(pulse, newest + 1) - 1) // self._gop * self._gop
         for first in range(begin, max(-1, newest - self._frames), -self._gop):
             gop = self.arrived(camera, first, self._gop)
@@ -77,7 +79,7 @@ class RecentGops:
         """Return a camera's frames of a GOP up to the first missing one; None if there are none."""
         fragments: list[bytes] = []
         for pulse in range(first, first + frames):
-            frame = self._shelves[camera].get(pulse)
+            frame = self._frame_buffers[camera].get(pulse)
             if frame is None or (not fragments and not frame.key):
                 break
             fragments.append(frame.fragment)

@@ -31,7 +31,7 @@ _PULSE0_TOLERANCE_S = 0.5
 
 
 class Recorder:
-    """Takes in every decision, and finds recorded sessions. ``frames`` is the size of the frame buffers."""
+    """Records every decision, and finds recorded sessions. ``frames`` is the size of the frame buffers."""
 
     def __init__(
         self,
@@ -43,12 +43,12 @@ class Recorder:
     ) -> None:
         self._config, self._stream_format = config, stream_format
         self.audio_buffer = audio_buffer
-        """The newest audio; None at a site without."""
+        """The newest audio; None if the site has none."""
         self.recent = RecentGops(frame_buffers, config.encode.gop, frames)
         self.pulse0: float | None = None
         self.person_numbers_since: float | None = None
         self._pending: deque[GopChoices] = deque()
-        """Decided GOPs that wait for late pictures."""
+        """Decided GOPs that wait for late frames."""
         self._max_late_frames = frames // 2
         self._init_of_parameters: tuple[ParameterSets, InitSegments] | None = None
         """The init segments of these parameters: cached, since every GOP that is played needs them."""
@@ -101,24 +101,24 @@ class Recorder:
             return
         self._pending.append(choices)
         while self._pending and self._is_settled(self._pending[0]):
-            self._hand_over(self.writer)
+            self._queue_oldest(self.writer)
 
     def close(self) -> None:
         """End the recording."""
         if self.writer is not None:
             while self._pending:
-                self._hand_over(self.writer)
+                self._queue_oldest(self.writer)
             self.writer.close()
 
     def _is_settled(self, choices: GopChoices) -> bool:
-        """Return whether no more pictures are expected; a busy camera's may arrive after the decision."""
+        """Return whether no more frames are expected; a busy camera's may arrive after the decision."""
         end = choices.first + choices.frames
         if end <= self.recent.end - self._max_late_frames:
             return True
         newest = [self.recent.end_of_camera(camera) for camera in self._config.camera_ids]
-        return all(it >= end or it < choices.first - self._max_late_frames for it in newest)
+        return all(pulse >= end or pulse < choices.first - self._max_late_frames for pulse in newest)
 
-    def _hand_over(self, writer: WriterThread) -> None:
+    def _queue_oldest(self, writer: WriterThread) -> None:
         choices = self._pending.popleft()
         arrived = {
             camera: self.recent.arrived(camera, choices.first, choices.frames)
@@ -140,8 +140,11 @@ class Recorder:
         if self.folder is None:
             return []
         current = [] if self.folder.session is None else [self.folder.session]
-        own = self._init
-        return [*(session for session in tuple(self.folder.earlier) if self._fits(session, own)), *current]
+        init = self._init
+        return [
+            *(session for session in tuple(self.folder.earlier) if self._is_compatible(session, init)),
+            *current,
+        ]
 
     @property
     def sessions_with_same_persons(self) -> list[RecordingSession]:
@@ -153,9 +156,9 @@ class Recorder:
     @property
     def sessions_with_same_audio(self) -> list[RecordingSession]:
         """Those of :attr:`sessions` with the audio format of this site."""
-        own = self._init
+        init = self._init
         return (
-            [] if own is None else [session for session in self.sessions if session.init.audio == own.audio]
+            [] if init is None else [session for session in self.sessions if session.init.audio == init.audio]
         )
 
     def _has_same_persons(self, session: RecordingSession) -> bool:
@@ -164,15 +167,15 @@ class Recorder:
             and session.info.person_numbers_since == self.person_numbers_since
         )
 
-    def _fits(self, session: RecordingSession, own: InitSegments | None) -> bool:
+    def _is_compatible(self, session: RecordingSession, init: InitSegments | None) -> bool:
         pulse0 = self.pulse0
-        if own is None or pulse0 is None or session.info.pulse0 is None:
+        if init is None or pulse0 is None or session.info.pulse0 is None:
             return False
         same = (
             session.info.fps == self._config.site.fps
             and abs(session.info.pulse0 - pulse0) < _PULSE0_TOLERANCE_S
         )
-        return same and session.init.pictures == own.pictures
+        return same and session.init.video == init.video
 
     @property
     def _init(self) -> InitSegments | None:
@@ -180,15 +183,15 @@ class Recorder:
         parameters, site, audio = self._stream_format.parameters, self._config.site, self._config.sound.format
         if parameters is None:
             return None
-        known_init = self._init_of_parameters
-        if known_init is None or known_init[0] != parameters:
-            pictures = init_segment(parameters, site.width, site.height)
-            known_init = (
+        cached = self._init_of_parameters
+        if cached is None or cached[0] != parameters:
+            video = init_segment(parameters, site.width, site.height)
+            cached = (
                 parameters,
-                InitSegments(pictures, b"" if audio is None else audio_init_segment(audio)),
+                InitSegments(video, b"" if audio is None else audio_init_segment(audio)),
             )
-            self._init_of_parameters = known_init
-        return known_init[1]
+            self._init_of_parameters = cached
+        return cached[1]
 
     def _write(self, record: GopRecord) -> None:
         """Write a GOP; called in the writer thread."""

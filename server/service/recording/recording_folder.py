@@ -31,7 +31,7 @@ from server.system.private_files import make_private_folder, open_private
 log = logging.getLogger(__name__)
 
 _NO_RESOURCES = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
-"""Errors that a new session would meet, too: no space, files or memory. After others, one is created."""
+"""Errors that a new session would not avoid: no space, files or memory. After other errors one is created."""
 _LOCK = ".lock"
 _MEGA = 1_000_000
 _MACHINE = MachineClocks()
@@ -80,7 +80,7 @@ class RecordingFolder:
         folder may have been removed, made unwritable, or be on a disk that is no longer mounted.
 
         Raises:
-            OSError: the disk does not take it; :meth:`abandon` is to be called.
+            OSError: writing fails; the caller must call :meth:`abandon`.
         """
         first = record.choices.first
         self._check_folder()
@@ -106,7 +106,9 @@ class RecordingFolder:
         try:
             if ended is not None:
                 if session is not None and ended.is_empty:
-                    session.segments = [it for it in session.segments if it is not ended.segment]
+                    session.segments = [
+                        segment for segment in session.segments if segment is not ended.segment
+                    ]
                 ended.close()
         finally:
             if session is not None and not session.segments:
@@ -247,7 +249,7 @@ class RecordingFolder:
         return long_enough or segment.bytes * SEGMENTS_PER_DISK_QUOTA >= self._limits.max_mb * _MEGA
 
     def _close_segment(self) -> None:
-        """End the open segment, and rewrite the playlists that it has grown, if the disk takes it."""
+        """End the open segment, and rewrite the playlists that it has grown, if writing succeeds."""
         if self._open is None:
             return
         for playlist in self._open.playlists:
@@ -273,10 +275,10 @@ class RecordingFolder:
     def _update_age_clock(self) -> None:
         """Count the time that the machine was off, once it is known; newer sessions do not age by it."""
         anchored = self._clock.anchored
-        if (away := self._clock.update()) > 0:
+        if (off_s := self._clock.update()) > 0:
             for session in (*self.earlier, *([self.session] if self.session else [])):
                 if session is self.session or session.started >= anchored:
-                    session.make_younger(away)
+                    session.make_younger(off_s)
         with contextlib.suppress(OSError):  # a restart continues from what was written last
             self._clock.save()
 

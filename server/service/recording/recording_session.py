@@ -19,13 +19,13 @@ from server.service.recording.session_files import (
     MISSING,
     InitSegments,
     SessionInfo,
+    SessionInfoFile,
     SessionPaths,
     file_size,
     is_missing,
     media_sizes,
     remove_session_files,
 )
-from server.service.recording.session_info_file import SessionInfoFile
 from server.system.private_files import FOLDER, write_private
 
 
@@ -78,7 +78,7 @@ class RecordingSession:
         folder.mkdir(mode=FOLDER)  # its parent is made elsewhere: it may have been removed since
         for name in ("cameras", "objects", "index"):
             (folder / name).mkdir(mode=FOLDER)
-        write_private(folder / "cameras" / INIT_FILE, init.pictures)
+        write_private(folder / "cameras" / INIT_FILE, init.video)
         if init.audio:
             (folder / AUDIO).mkdir(mode=FOLDER)
             write_private(folder / AUDIO / INIT_FILE, init.audio)
@@ -115,7 +115,7 @@ class RecordingSession:
         """Write when the person numbers began: it may become known after the first GOP.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: writing fails.
         """
         self._info_file.write(msgspec.structs.replace(self.info, person_numbers_since=since))
 
@@ -123,7 +123,7 @@ class RecordingSession:
         """Write which age clock applies, and its seconds at pulse 0.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: writing fails.
         """
         info = msgspec.structs.replace(self.info, age_clock=clock, age_clock_at_pulse0=at_pulse0)
         self._info_file.info = info  # it applies even if it cannot be written
@@ -131,12 +131,12 @@ class RecordingSession:
 
     @property
     def end(self) -> int:
-        """The pulse after the last that is known of; 0 if there is none."""
+        """The pulse after the last known one; 0 if there is none."""
         ends = [it.index.all[-1].end for it in (*self.cameras.values(), self.audio) if it.index.all]
         return max([*ends, *(segment.first for segment in self.segments[-1:])], default=0)
 
     def date_segments(self, now: float) -> None:
-        """Set when segments were written from the age clock at their pulses, at the latest ``now``."""
+        """Set when segments were written from the age clock at their pulses, but not later than ``now``."""
         ends = [*(segment.first for segment in self.segments[1:]), self.end]
         for segment, end in zip(self.segments, ends, strict=True):
             segment.written = min(now, self.info.age_clock_at_pulse0 + end / self.info.fps)
@@ -148,7 +148,7 @@ class RecordingSession:
         return self.info.age_clock_at_pulse0 + first / self.info.fps
 
     def make_younger(self, seconds: float) -> None:
-        """Move the session's times forward by so many seconds of the age clock, if the disk takes it."""
+        """Move the session's times forward by so many seconds of the age clock, if writing succeeds."""
         for segment in self.segments:
             segment.written += seconds
         with contextlib.suppress(OSError):
@@ -178,7 +178,7 @@ class RecordingSession:
         """Write ``session.json`` again: without it a restart would not find the session.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: writing fails.
         """
         self._info_file.write(self.info)
 
@@ -197,7 +197,7 @@ class RecordingSession:
     def forget_missing(self) -> None:
         """Drop playlist entries whose files are not on the disk any more; any thread may call it.
 
-        Segments stay: their files may appear again, and must then be deleted some day.
+        Segments stay: their files may appear again, and must then be deleted later.
 
         Raises:
             OSError: a folder cannot be read.
@@ -272,7 +272,7 @@ class RecordingSession:
             raise failed
 
     def rewrite_playlists(self) -> None:
-        """Rewrite the stale playlists; one that the disk does not take stays stale."""
+        """Rewrite the stale playlists; one that cannot be written stays stale."""
         for playlist in self._playlists:
             if playlist.is_stale:
                 with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The index of one recorded stream: which frames are in which piece of which file, in order of pulses."""
+"""The index of one recorded stream: which frames are where in which file, in order of pulses."""
 
 from __future__ import annotations
 
@@ -115,24 +115,24 @@ class SegmentIndex:
 def merge_camera_ranges(ranges: Iterable[IndexEntry | CameraRange]) -> list[CameraRange]:
     """Join adjacent ranges of one camera; return them in order and without overlap."""
     joined: list[CameraRange] = []
-    for it in sorted(ranges, key=lambda it: it.first):
+    for part in sorted(ranges, key=lambda part: part.first):
         last = joined[-1] if joined else None
-        first = it.first if last is None else max(it.first, last.end)
-        if first >= it.end:
+        first = part.first if last is None else max(part.first, last.end)
+        if first >= part.end:
             continue
-        if last is not None and (last.camera, last.end) == (it.camera, first):
-            joined[-1] = CameraRange(it.camera, last.first, it.end)
+        if last is not None and (last.camera, last.end) == (part.camera, first):
+            joined[-1] = CameraRange(part.camera, last.first, part.end)
         else:
-            joined.append(CameraRange(it.camera, first, it.end))
+            joined.append(CameraRange(part.camera, first, part.end))
     return joined
 
 
 def merge_pulse_ranges(ranges: Iterable[IndexEntry | PulseRange]) -> list[PulseRange]:
     """Join adjacent and overlapping ranges; return them in order."""
     joined: list[PulseRange] = []
-    for it in sorted(ranges, key=lambda it: it.first):
-        if joined and it.first <= joined[-1].end:
-            joined[-1] = PulseRange(joined[-1].first, max(joined[-1].end, it.end))
+    for part in sorted(ranges, key=lambda part: part.first):
+        if joined and part.first <= joined[-1].end:
+            joined[-1] = PulseRange(joined[-1].first, max(joined[-1].end, part.end))
         else:
-            joined.append(PulseRange(it.first, it.end))
+            joined.append(PulseRange(part.first, part.end))
     return joined

@@ -21,10 +21,10 @@ from server.system.private_files import open_private
 
 
 class SegmentWriter:
-    """Appends GOP after GOP. Pictures and audio are written once, however many persons refer to them.
+    """Appends GOP after GOP. Video and audio are written once for all persons' playlists.
 
     Raises:
-        OSError: the disk does not take it; what was written before still plays.
+        OSError: writing fails; earlier data still plays.
     """
 
     def __init__(self, session: RecordingSession, segment: RecordingSegment, init: InitSegments) -> None:
@@ -43,16 +43,16 @@ class SegmentWriter:
 
     @property
     def is_empty(self) -> bool:
-        """Whether it holds nothing that could be played."""
+        """Whether it contains nothing playable."""
         return not self._index_bytes and all(file.is_empty for file in self._files.values())
 
     def write(
         self, choices: GopChoices, cameras: Mapping[str, RecordedGop], audio: AudioChunk | None, now: float
     ) -> None:
-        """Write a GOP: pictures and audio, then the decision, then the entries of persons' playlists.
+        """Write a GOP: video and audio, then the decision, then the entries of persons' playlists.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: writing fails.
         """
         self._check_files_exist()
         self.segment.written = now
@@ -73,7 +73,7 @@ class SegmentWriter:
         """Close the files; an empty segment leaves none.
 
         Raises:
-            OSError: the disk did not take all of it; the files are closed all the same.
+            OSError: writing fails; the files are closed nevertheless.
         """
         with contextlib.ExitStack() as closing:
             if self.is_empty:
@@ -96,7 +96,7 @@ class SegmentWriter:
 
     def _write_camera(self, camera: str, gop: RecordedGop) -> IndexEntry:
         path = self._session.paths.camera_file(camera, self.segment.first)
-        offset, length = self._append(path, self._init.pictures, gop)
+        offset, length = self._append(path, self._init.video, gop)
         return IndexEntry(camera, self.segment.first, offset, length, gop.first, len(gop.fragments))
 
     def _write_audio(self, audio: AudioChunk, choices: GopChoices) -> None:

@@ -27,20 +27,21 @@ from typing import Annotated
 import msgspec
 
 from server.service.recording.playlist_file import CAMERA_PATTERN, file_name
+from server.system.private_files import write_private
 
 INFO_FILE = "session.json"
 INIT_FILE = "init.mp4"
 AUDIO = "sound"
 """The folder of the audio, and what a reference to it has instead of a camera."""
 MISSING = (FileNotFoundError, NotADirectoryError, IsADirectoryError)
-"""The errors of a file that does not exist, or whose name something else has."""
+"""The errors of a file that does not exist, or whose name is not that of a file."""
 _MEDIA_NAME = re.compile(r"[0-9]{1,15}\.mp4")
 _SESSION_NAME = re.compile(
     rf"[0-9]{{1,15}}\.(mp4|jsonl|m3u8|new)|\.?session\.json|init\.mp4|{CAMERA_PATTERN}\.(m3u8|new)"
 )
 """Names of the files in a session's folder."""
 _MAX_AGE_S = 1e12
-"""No clock has counted so far: a larger value is damaged."""
+"""No clock has counted this far: a larger value is damaged."""
 
 CameraName = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA_PATTERN}\Z")]
 """Camera names are part of paths: the pattern keeps a damaged file from leading out of the folder."""
@@ -60,9 +61,10 @@ class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
     started: float
     """When the first GOP was written, unix seconds."""
     pulse0: float | None
-    """When pulse 0 was due, unix seconds; null if not known."""
+    """When pulse 0 was due, unix seconds; null: unknown."""
     person_numbers_since: float | None = None
-    """When the person numbers began, unix seconds: sessions with the same value number persons alike."""
+    """When the person numbers began, unix seconds: sessions with the same value use the same person
+    numbers."""
     age_clock: str = ""
     """The id of the age clock (:mod:`~server.service.recording.age_clock`)."""
     age_clock_at_pulse0: Annotated[float, msgspec.Meta(ge=-_MAX_AGE_S, le=_MAX_AGE_S)] = 0.0
@@ -73,7 +75,7 @@ class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
 class InitSegments:
     """The first bytes of a session's media files: ``ftyp`` and ``moov``."""
 
-    pictures: bytes
+    video: bytes
     audio: bytes = b""
     """Empty at a site without audio."""
 
@@ -124,7 +126,7 @@ class SessionPaths:
 
 
 def remove_session_files(folder: Path) -> None:
-    """Delete a session's files, and its folder if nothing else is in it; errors are passed over."""
+    """Delete a session's files, and its folder if nothing else is in it; errors are ignored."""
     if folder.is_symlink():
         return
     for inside, folders, names in os.walk(folder, topdown=False):
@@ -140,7 +142,7 @@ def remove_session_files(folder: Path) -> None:
 
 
 def has_media(folder: Path) -> bool:
-    """Return whether a folder with the layout of a session holds pictures or audio."""
+    """Return whether a folder with the layout of a session holds video or audio."""
     files = (*folder.glob("cameras/*/*.mp4"), *folder.glob(f"{AUDIO}/*.mp4"))
     return any(path.stem.isdecimal() for path in files)
 
@@ -190,5 +192,69 @@ def file_size(file: Path | os.DirEntry[str]) -> int:
 def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except OSError:  # mostly since the site had no audio
+    except OSError:  # usually because the site had no audio
         return b""
+
+
+class SessionInfoFile:
+    """The ``session.json`` of a session's folder, which makes a restart find the session."""
+
+    def __init__(self, folder: Path, info: SessionInfo) -> None:
+        self.info = info
+        self._folder = folder
+        self._identity = identity_of(folder)
+        self._bytes = file_size(folder / INFO_FILE)
+
+    @classmethod
+    def create(cls, folder: Path, info: SessionInfo) -> SessionInfoFile:
+        """Write the file of a new session.
+
+        Raises:
+            OSError: writing fails.
+        """
+        write_private(folder / INFO_FILE, _encode(info))
+        return cls(folder, info)
+
+    @classmethod
+    def load(cls, folder: Path) -> SessionInfoFile:
+        """Read the file of an existing session.
+
+        Raises:
+            OSError, msgspec.DecodeError: the folder does not hold a session.
+        """
+        return cls(folder, msgspec.json.decode((folder / INFO_FILE).read_bytes(), type=SessionInfo))
+
+    def write(self, info: SessionInfo) -> None:
+        """Replace the file.
+
+        Raises:
+            OSError: writing fails; the file is unchanged.
+        """
+        draft = self._folder / f".{INFO_FILE}"
+        try:
+            write_private(draft, _encode(info))
+            draft.replace(self._folder / INFO_FILE)
+        except OSError:
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise
+        self.info, self._bytes = info, len(_encode(info))
+
+    @property
+    def is_folder_in_place(self) -> bool:
+        """Whether the folder is still the same one; it may be removed, or another disk be mounted."""
+        return self._identity is not None and identity_of(self._folder) == self._identity
+
+    @property
+    def exists(self) -> bool:
+        """Whether the file is there, in the same folder; True if that is not known."""
+        try:
+            return self.is_folder_in_place and (self._folder / INFO_FILE).stat().st_size == self._bytes
+        except MISSING:
+            return False
+        except OSError:
+            return True
+
+
+def _encode(info: SessionInfo) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(info)) + b"\n"

@@ -16,12 +16,12 @@ log = logging.getLogger(__name__)
 _RETRY_S = 10.0
 _SILENT_S = 10.0
 """A disk that takes longer for one GOP counts as not responding."""
-_PATIENCE_S = 1.0
-"""How long the shutdown of the service waits for the disk."""
+_CLOSE_WAIT_S = 1.0
+"""Seconds that the shutdown of the service waits for the disk."""
 
 
 class WriterThread:
-    """Passes GOPs to ``write`` in a thread of its own; at most ``max_queued`` wait, more are lost.
+    """Passes GOPs to ``write`` in a separate thread; at most ``max_queued`` wait, more are lost.
 
     When ``write`` fails, ``abandon`` is called once, and writing is tried again after ``retry_s``. ``where``
     is named in the log.
@@ -49,13 +49,13 @@ class WriterThread:
         self.written = 0
         """GOPs that were recorded."""
         self.lost = 0
-        """GOPs that were not."""
+        """GOPs that were not recorded."""
         self.error_text = ""
         """The last error; empty after a GOP was written."""
 
     @property
     def problem(self) -> str:
-        """Why nothing is being recorded now, including a disk that does not respond; empty if all is well."""
+        """Why nothing is being recorded now, including an unresponsive disk; empty: recording works."""
         since = self._writing_since  # set by the writer thread
         if not self.error_text and since is not None and (silent := time.monotonic() - since) > _SILENT_S:
             return f"the disk has not responded for {silent:.0f} s"
@@ -85,7 +85,7 @@ class WriterThread:
             self._closing = True
             self._condition.notify()
         if self._thread.ident is not None:
-            self._thread.join(_PATIENCE_S)
+            self._thread.join(_CLOSE_WAIT_S)
 
     def _run(self) -> None:
         retry_at = 0.0
@@ -140,7 +140,7 @@ class WriterThread:
         self._count_lost()
         try:
             self._abandon()
-        except Exception as error:  # noqa: BLE001 — whatever it is, it is tried again
+        except Exception as error:  # noqa: BLE001 — writing is tried again after any error
             log.debug("recording: cannot abandon the segment: %r", error)
 
     def _count_lost(self) -> None:

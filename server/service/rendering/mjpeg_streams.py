@@ -37,7 +37,7 @@ PULSE_HEADER = "X-MyView-Pulse"
 
 
 def multipart_part(picture: JpegPicture) -> bytes:
-    """Return one picture with the boundary that ends it: browsers show it only after that."""
+    """Return one picture with the boundary that ends it: browsers display it only after the boundary."""
     head = [
         "Content-Type: image/jpeg",
         f"Content-Length: {len(picture.data)}",

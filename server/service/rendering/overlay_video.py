@@ -20,7 +20,8 @@ from server.service.streaming.media_chunk import TsContinuity
 class OverlayVideo:
     """Publishes encoded frames without gaps, also when the encoding process is replaced.
 
-    ``audio_buffer`` is None at a site without audio; ``mute_gaps``: the audio is muted while a gap is filled.
+    ``audio_buffer`` is None if the site has no audio; ``mute_gaps``: the audio is muted while a gap is
+    filled.
     """
 
     def __init__(
@@ -59,8 +60,8 @@ class OverlayVideo:
                 audio = audio.silenced
             self.broadcaster.publish(self._ts.chunk(gop, audio))
 
-    def note_new_process(self) -> None:
-        """Note that another process encodes the following frames: they do not refer to earlier ones."""
+    def begin_process(self) -> None:
+        """Record that another process encodes the following frames: they do not reference earlier ones."""
         self._process += 1
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ from server.service.rendering.rendered_stream import RenderedStream
 log = logging.getLogger(__name__)
 
 _LINGER_S = 5.0
-"""How long an unused worker stays: a client may return, or poll for still pictures."""
+"""Seconds that an unused worker is kept: a client may return, or poll for stills."""
 _EXTRA_DECISIONS = 2
 """Decisions kept in addition to those whose frames can be queued for a worker."""
 
@@ -62,9 +62,9 @@ class _RunningStream:
 class RenderPool:
     """Starts rendered streams on demand and ends unused ones; at most ``http.pictures_max`` run at once."""
 
-    def __init__(self, service: BestViewPipeline, linger_s: float = _LINGER_S) -> None:
-        self._service, self._linger_s = service, linger_s
-        config = service.config
+    def __init__(self, pipeline: BestViewPipeline, linger_s: float = _LINGER_S) -> None:
+        self._pipeline, self._linger_s = pipeline, linger_s
+        config = pipeline.config
         self._queue_gops = config.http.viewer_queue_gops
         self._max_streams = config.http.pictures_max
         self._settings = RenderSettings(
@@ -79,8 +79,8 @@ class RenderPool:
             jpeg_quality=config.http.jpeg_quality,
         )
         decisions = self._queue_gops + _EXTRA_DECISIONS
-        self._decided = DecidedBoxes(service.decision_state.resolve, config.site.fps, decisions)
-        service.on_decision.append(self._decided.put)
+        self._decided = DecidedBoxes(pipeline.decision_state.resolve, config.site.fps, decisions)
+        pipeline.on_decision.append(self._decided.put)
         self._running: dict[Subject, _RunningStream] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         """The tasks of streams that are running or ending."""
@@ -135,15 +135,15 @@ class RenderPool:
         Raises:
             KeyError: there is no such person or camera.
         """
-        service = self._service
+        pipeline = self._pipeline
         if isinstance(subject, PersonView):
-            standing = service.decision_state.selected_views[subject.number]
-            return None if standing.choice.camera is None else standing.first + standing.frames - 1
-        if service.ingest.states[subject.camera].label not in {"live", "ended"}:
+            view = pipeline.decision_state.selected_views[subject.number]
+            return None if view.choice.camera is None else view.first + view.frames - 1
+        if pipeline.ingest.states[subject.camera].label not in {"live", "ended"}:
             return None
         if subject.decided:
             return self._decided.newest
-        return service.frame_buffers[subject.camera].newest
+        return pipeline.frame_buffers[subject.camera].newest
 
     async def close(self) -> None:
         """End all streams and their workers."""
@@ -176,7 +176,7 @@ class RenderPool:
         raise RenderPoolFullError
 
     def _new_stream(self, subject: Subject) -> RenderedStream:
-        splicer, decided = self._service.splicer, self._decided
+        splicer, decided = self._pipeline.splicer, self._decided
         overlay_of: Callable[[bytes], GopOverlay]
         match subject:
             case PersonView(number, scoped):
@@ -195,7 +195,7 @@ class RenderPool:
             self._settings,
             live=live,
             queue_gops=self._queue_gops,
-            audio_buffer=self._service.audio_buffer,
+            audio_buffer=self._pipeline.audio_buffer,
             # The person may not have been present in a gap.
             mute_gaps=isinstance(subject, PersonView) and subject.scoped,
         )

@@ -25,7 +25,7 @@ from server.service.streaming.subscriber_queue import Chunk, Subscriber
 @dataclass(slots=True)
 class _StillRequest:
     pulse: int
-    answered: asyncio.Event
+    done: asyncio.Event
     picture: JpegPicture | None = None
 
 
@@ -45,7 +45,7 @@ class StillRequests:
             if request is None:
                 request = self._requests[kind] = _StillRequest(pulse, asyncio.Event())
             self.changed.set()
-            await request.answered.wait()
+            await request.done.wait()
             if request.picture is None or request.picture.pulse >= pulse:
                 return request.picture  # an older picture answered an earlier request
         return None
@@ -58,7 +58,7 @@ class StillRequests:
         """Answer all requests of a kind."""
         request = self._requests.pop(kind)
         request.picture = picture
-        request.answered.set()
+        request.done.set()
 
     def close(self) -> None:
         """Answer all pending and later requests with None."""
@@ -193,7 +193,7 @@ class RenderedStream:
                     text = "rendering %s: the worker %s%s; starting another"
                     log.warning(text, self._name, error, more)
                 self.restarts += 1
-                self.video.note_new_process()
+                self.video.begin_process()
                 await asyncio.sleep(backoff.next())
             else:
                 return
@@ -206,7 +206,7 @@ class RenderedStream:
         self._is_ready.set()
 
     def _reset_outputs(self) -> None:
-        """Create new outputs: a later viewer must not receive what earlier ones saw."""
+        """Create new outputs: a later viewer must not receive old content."""
         self.video = OverlayVideo(
             self._settings, self._queue_gops, self._audio_buffer, mute_gaps=self._mute_gaps
         )

@@ -18,12 +18,12 @@ _RESTART_S = 10
 class AudioBuffer:
     """Keeps the last ``seconds`` of a site's audio."""
 
-    def __init__(self, form: AudioFormat, fps: float, seconds: float) -> None:
-        self.format = form
+    def __init__(self, audio_format: AudioFormat, fps: float, seconds: float) -> None:
+        self.format = audio_format
         self.fps = fps
-        self._max_frames = round(seconds * form.rate / form.samples)
+        self._max_frames = round(seconds * audio_format.rate / audio_format.samples)
         self._frames: OrderedDict[int, bytes] = OrderedDict()
-        self._silence = form.silence
+        self._silence = audio_format.silence
 
     def put(self, head: AudioHeader, payload: bytes) -> None:
         """Store consecutive frames.
@@ -43,8 +43,8 @@ class AudioBuffer:
 
     def audio_between(self, first: int, until: int) -> AudioChunk:
         """Return the audio of the pulses ``first … until - 1``; missing frames are silent."""
-        form, fps = self.format, self.fps
-        return self._audio(form.frame_at(first, fps), form.frame_at(until, fps))
+        audio_format, fps = self.format, self.fps
+        return self._audio(audio_format.frame_at(first, fps), audio_format.frame_at(until, fps))
 
     def _audio(self, begin: int, end: int) -> AudioChunk:
         frames = tuple(self._frames.get(number, self._silence) for number in range(begin, end))
@@ -68,7 +68,7 @@ class AudioBuffer:
 
 
 class AudioFollower:
-    """The audio of a stream that shows pictures as they arrive: gapless, and little behind the pictures.
+    """The audio of a stream that shows frames as they arrive: gapless, with little delay.
 
     ``begin`` is the number of its first frame; None: the frame of the first picture.
     """
@@ -80,10 +80,10 @@ class AudioFollower:
     def next_audio(self, first: int, until: int) -> AudioChunk:
         """Return the next audio frames, as the pulses ``first … until - 1`` are shown."""
         buffer = self._buffer
-        form, fps = buffer.format, buffer.fps
-        begin, end = form.frame_at(first, fps), form.frame_at(until, fps)
+        audio_format, fps = buffer.format, buffer.fps
+        begin, end = audio_format.frame_at(first, fps), audio_format.frame_at(until, fps)
         # A gap that the pictures do not fill either, as after suspend, is not filled with hours of silence.
-        second = form.rate / form.samples
+        second = audio_format.rate / audio_format.samples
         if self._next is None or not -_RESTART_S * second <= begin - self._next <= LONGEST_GAP_S * second:
             self._next = begin
         late = end - buffer.max_late_frames

@@ -1,4 +1,4 @@
-"""One camera's newest frames as container fragments, by pulse: every stream is put together from them."""
+"""One camera's newest frames as container fragments, by pulse: every stream is composed of them."""
 
 from __future__ import annotations
 

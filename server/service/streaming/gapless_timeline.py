@@ -1,7 +1,7 @@
-"""One stream's time without gaps: a missing picture is filled by repeating the one before it.
+"""A stream's timeline without gaps: a missing picture is replaced by a repetition of the previous one.
 
-A player that receives nothing for a moment stops there, some for good. So a picture that encodes "the same
-again" takes the place of a missing one (:mod:`server.media.gap_filler`): a decoder sees an ordinary stream.
+A player that receives nothing for a moment stalls, some permanently. So a picture that encodes a repetition
+replaces a missing one (:mod:`server.media.gap_filler`): to a decoder it is an ordinary stream.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from server.media.stream_format import StreamFormat
 _PER_PULSE_S = 2
 """Gaps up to so long get a picture for every pulse, longer ones a single picture of that duration."""
 LONGEST_GAP_S = 3600
-"""A longer gap is not filled: no viewer waits for so long, and MP4 durations have 32 bits."""
+"""A longer gap is not filled: no viewer waits that long, and MP4 durations have 32 bits."""
 _RESTART_S = 10
-"""A keyframe so far back belongs to pulses that started again; it is not a late one."""
+"""A keyframe this far back means that the pulses have restarted; it is not late."""
 
 
 class GaplessTimeline:
@@ -57,7 +57,7 @@ class GaplessTimeline:
         return self._fill_before(picture) + self._show(picture)
 
     def advance_past(self, last: EncodedPicture) -> None:
-        """Note that a complete GOP was shown, of which this is the last picture: there is no gap to fill."""
+        """Record that a complete GOP with this last picture was shown: there is no gap to fill."""
         self._show(last)
 
     def fill(self, until: int) -> list[EncodedPicture]:

@@ -89,7 +89,7 @@ class HlsSegment:
         self.number = number
         self._layout = layout
         self._lead = lead
-        """What the first GOP repeats the last picture of, if it repeats one."""
+        """The chunk whose last picture the first GOP repeats, if it repeats one."""
         self._chunks: list[MediaChunk] = []
 
     def add(self, chunk: MediaChunk) -> None:
@@ -137,7 +137,7 @@ class HlsSegment:
 
 
 class HlsSegmenter:
-    """The last segments of one stream: those in the playlist, and those that left it a moment ago."""
+    """The last segments of one stream: those in the playlist, and those that recently left it."""
 
     def __init__(self, layout: SegmentLayout) -> None:
         self.layout = layout
@@ -145,7 +145,7 @@ class HlsSegmenter:
         self._segments: dict[int, HlsSegment] = {}
         self._lead: MediaChunk | None = None
         self._updated: asyncio.Event | None = None
-        """Set at the next change; None if nothing waits for it."""
+        """Set at the next change; None: nothing waits for it."""
         self.until = 0
         """The first pulse that is not here yet."""
 
@@ -158,7 +158,7 @@ class HlsSegmenter:
         number = chunk.first // self.layout.segment_frames
         is_long = chunk.until > (number + 1) * self.layout.segment_frames
         if chunk.first != self.until or is_long:
-            self._segments.clear()  # the pulses started again, or a long gap: no number may be left out
+            self._segments.clear()  # the pulses have restarted, or a long gap: numbers must not be skipped
         self.until = chunk.until
         if is_long:
             self._notify()

@@ -10,7 +10,7 @@ from server.service.streaming.presence import Presence
 from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 
 PresenceLookup = Callable[[int], Presence]
-"""Returns what the newest GOP shows of a person."""
+"""Returns what the newest GOP may show of a person."""
 
 
 def always_present(number: int) -> Presence:
@@ -28,7 +28,7 @@ class PersonStreams:
         self._new_stream, self._presence = new_stream, presence
         self._streams: dict[int, SplicedStream] = {}
         self._ended: dict[int, SplicedStream] = {}
-        """Streams that ended a moment ago: HLS players still fetch their last segments."""
+        """Recently ended streams: HLS players still fetch their last segments."""
         self.broadcasters: dict[int, Broadcaster] = {}
 
     def show(self, cameras: Mapping[int, str | None], merged: Mapping[int, int], gop: GopAssembler) -> None:
@@ -52,7 +52,7 @@ class PersonStreams:
 
     def forget_ended_before(self, pulse: int) -> None:
         """Drop the segments of streams that ended before a pulse."""
-        for number in [n for n, stream in self._ended.items() if stream.segmenter.until < pulse]:
+        for number in [number for number, stream in self._ended.items() if stream.segmenter.until < pulse]:
             del self._ended[number]
 
     def viewers_of(self, number: int) -> int:

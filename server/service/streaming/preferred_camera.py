@@ -1,7 +1,7 @@
 """Best views in which the viewer prefers a camera: it is shown while it sees the person, else the best one.
 
 The camera counts as seeing the person if it has a box of them in more than half of the frames of a GOP and of
-the GOP before: a glimpse is not worth two cuts. Only published decisions count, so a client that reads the
+the GOP before: a brief view is not worth two cuts. Only published decisions count, so a client that reads the
 events can tell which camera is shown.
 """
 
@@ -36,7 +36,7 @@ class PreferredCameraStreams:
         if stream is None:
             stream = self._streams[number, camera] = self._new_stream()
             if self._newest is not None:
-                self._show(stream, number, camera)  # or there would be nothing to show until the next GOP
+                self._show(stream, number, camera)  # otherwise nothing is shown until the next GOP
         return stream.broadcaster
 
     def show(self, decision: GopDecision, gop: GopAssembler) -> None:

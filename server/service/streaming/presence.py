@@ -1,4 +1,4 @@
-"""Whether a person was seen lately: decides what viewers with access to that person alone are shown.
+"""Whether a person was seen recently: determines what viewers with access to that person alone are shown.
 
 While no camera sees a person, their best view stays with the last camera: it then shows the room, and
 other people in it.
@@ -20,7 +20,7 @@ class Presence(Enum):
     """What a GOP shows to viewers with access to one person alone."""
 
     PRESENT = auto()
-    """The best view: some camera has seen the person lately, or sees them in this GOP."""
+    """The best view: some camera has seen the person recently, or sees them in this GOP."""
     FROZEN = auto()
     """The picture that was shown last, muted."""
     ABSENT = auto()
@@ -42,11 +42,13 @@ class PresenceLog:
         self._merged: Mapping[int, int] = {}
 
     def update(self, decision: GopDecision) -> None:
-        """Take in the boxes of the next GOP."""
+        """Update with the boxes of the next GOP."""
         if decision.first < self._first:
-            self._last_seen.clear()  # the pulses started again
+            self._last_seen.clear()  # the pulses have restarted
         self._first, self._merged = decision.first, decision.merged
-        seen = {n: decision.first + offset for n, offset in last_seen_offsets(decision.boxes).items()}
+        seen = {
+            number: decision.first + offset for number, offset in last_seen_offsets(decision.boxes).items()
+        }
         before, self._last_seen = self._last_seen, {}
         for pulses in (before, seen):
             for number, pulse in pulses.items():

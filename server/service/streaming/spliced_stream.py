@@ -18,7 +18,7 @@ from server.service.streaming.presence import Presence
 
 
 class GopAssembler:
-    """Makes chunks of one GOP, the frames ``first … first + frames - 1`` of any camera.
+    """Builds chunks of one GOP, the frames ``first … first + frames - 1`` of any camera.
 
     A complete GOP becomes one chunk that all streams share. ``tables`` counts GOPs for MPEG-TS.
     """
@@ -54,13 +54,13 @@ class GopAssembler:
     def blank_chunk(self, stream_format: StreamFormat, newest: EncodedPicture | None) -> MediaChunk | None:
         """Return a gray GOP that can follow a picture, shared by all streams of its parameter sets.
 
-        None if there is no gray picture of this format.
+        None: this format has no gray picture.
         """
-        form = None if newest is None else newest.parameters
-        if form not in self._blank:
+        parameters = None if newest is None else newest.parameters
+        if parameters not in self._blank:
             pictures = stream_format.blank(newest, self.first, self.until - self.first, self._fps)
-            self._blank[form] = self.chunk(pictures, is_muted=True) if pictures else None
-        return self._blank[form]
+            self._blank[parameters] = self.chunk(pictures, is_muted=True) if pictures else None
+        return self._blank[parameters]
 
     def chunk(self, pictures: list[EncodedPicture], *, is_muted: bool = False) -> MediaChunk:
         """Return pictures of this GOP as a chunk, with the site's audio or, if muted, with silence."""
@@ -82,7 +82,7 @@ class GopSequencer:
         self._camera: str | None = None
 
     def show(self, camera: str | None, gop: GopAssembler) -> list[MediaChunk]:
-        """Return a camera's GOP, with filler where pictures are missing; None: go on with the last camera."""
+        """Return a camera's GOP, with filler for missing pictures; None: continue with the last camera."""
         before = self._timeline.fill(gop.first)
         chunks = [gop.chunk(before)] if before else []
         complete = None if camera is None else gop.complete_chunk(camera)
@@ -103,7 +103,7 @@ class GopSequencer:
         return chunks if frozen else [*chunks, *self.blank(gop)]
 
     def blank(self, gop: GopAssembler) -> list[MediaChunk]:
-        """Return a gray GOP, muted, behind the filler of a gap before it."""
+        """Return a gray GOP, muted, after the filler of a gap before it."""
         self._camera = None
         before = self._timeline.fill(gop.first)
         chunks = [gop.chunk(before, is_muted=True)] if before else []

@@ -1,4 +1,4 @@
-"""All live streams of a site, one per person and one per camera, made of the cameras' fragments."""
+"""All live streams of a site, one per person and one per camera, composed of the cameras' fragments."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class LiveStream:
 class Splicer:
     """Publishes all live streams; it cuts between cameras by choosing fragments, without decoding.
 
-    Viewers with access to one person alone have streams of their own (``scoped``), in which the person's
-    picture is replaced by gray when no camera has seen them for long. Only a site with tokens has any.
+    Viewers with access to one person alone have separate streams (``scoped``), which turn gray when no camera
+    has seen that person for a while. Only a site with tokens has such streams.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Splicer:
             for camera in frame_buffers
         }
         self._decided = {camera: self._stream() for camera in frame_buffers}
-        """Each camera, as late as the best views."""
+        """Each camera's stream, delayed like the best views."""
         self._presence = PresenceLog(round(config.access.hide_after_s * site.fps))
         self._has_scoped = config.access.tokens is not None
         self._persons = PersonStreams(self._stream)

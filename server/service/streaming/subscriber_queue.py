@@ -22,7 +22,7 @@ class Chunk(Protocol):
 
     @property
     def is_filler(self) -> bool:
-        """Whether it only repeats an earlier picture for a whole GOP: of no use to a new subscriber."""
+        """Whether it only repeats an earlier picture for a whole GOP: useless to a new subscriber."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Subscriber:
         self.direct_send: Callable[[Chunk], bool] | None = None
         """Sends a chunk while the queue is empty, or returns False.
 
-        It saves waking a task, which is most of what a chunk costs.
+        It saves waking a task, which is most of the cost of a chunk.
         """
         self.lost_gops = 0
         """GOPs lost because the subscriber fell behind."""

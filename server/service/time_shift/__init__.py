@@ -1,1 +1,1 @@
-"""Time shift (DVR): playing what was streamed before, from the recording on the disk and from memory."""
+"""Time shift (DVR): playback of past streams, from the recording on the disk and from memory."""

@@ -31,7 +31,7 @@ def available_ranges(source: PlaybackSource, start: int = 0, end: int = sys.maxs
 def available_camera_ranges(
     source: PlaybackSource, start: int = 0, end: int = sys.maxsize
 ) -> list[CameraRange]:
-    """Return which cameras they show: of the entries on the disk, then of the decisions in memory."""
+    """Return the playable ranges by camera shown: entries on the disk, then decisions in memory."""
     in_memory = [it for it in source.ranges_in_memory if it.end > start and it.first < end]
     ranges = merge_camera_ranges([*_recorded(source, start, end), *in_memory])
     return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in ranges]
@@ -40,7 +40,7 @@ def available_camera_ranges(
 def first_available(source: PlaybackSource, pulse: int) -> int | None:
     """Return the first pulse from this one on that can be played; None if there is none.
 
-    Only the ends of indexes are looked at: a recording may be days long.
+    Only the ends of indexes are read: a recording may be days long.
     """
     firsts = [
         it.first for recorded in source.recorded if (it := recorded.index.at_or_after(pulse)) is not None

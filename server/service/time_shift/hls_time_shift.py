@@ -72,7 +72,7 @@ class TimeShift:
     def segments(self, start: int, end: int | None) -> SegmentList | None:
         """Return the segments from the one that holds pulse ``start``, or the first after it, to the end.
 
-        Only complete ones, and the last one of a stream that has ended. No number is left out: in gaps the
+        Only complete ones, and the last one of a stream that has ended. No number is skipped: in gaps the
         last picture is repeated. None if there is no segment.
         """
         frames = self._layout.segment_frames
@@ -98,7 +98,7 @@ class TimeShift:
             if lead is None
             else (await visible_pictures(lead, self._source, stream_format, self._layout.fps)).pictures
         )
-        if lead_pictures:  # as if it were shown just now: a repetition does not show how old it is
+        if lead_pictures:  # with a recent time: a repetition does not depend on its age
             timeline.advance_past(replace(lead_pictures[-1], pulse=first - 1))
         arrived, audible = await self._read(first, until, stream_format)
         chunks: list[MediaChunk] = []

@@ -59,7 +59,7 @@ class PersonPlayback:
     recorder: Recorder
     numbers: tuple[int, ...]
     presence: PresenceHistory | None = None
-    """As of :class:`PlaybackSource`."""
+    """As in :class:`PlaybackSource`."""
 
     @property
     def recorded(self) -> Sequence[SessionEntries]:
@@ -86,7 +86,7 @@ class PersonPlayback:
 
     @property
     def ranges_in_memory(self) -> Sequence[CameraRange]:
-        """The cameras chosen for the person, as far as in memory."""
+        """The cameras selected for the person, as far as in memory."""
         return [
             CameraRange(it.choices[number], it.first, it.first + it.frames)
             for it in self.recorder.recent.choices(0)
@@ -124,7 +124,7 @@ class CameraPlayback:
 
     @property
     def ranges_in_memory(self) -> Sequence[CameraRange]:
-        """What has arrived from it, as far as in memory."""
+        """The ranges that have arrived from it, as far as in memory."""
         candidates = []
         gop = self.gop_in_memory(0)
         while gop is not None:
@@ -155,7 +155,7 @@ async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[Record
         on_disk = _next_on_disk(source, at)
         gop = source.gop_in_memory(at)
         if gop is not None and (on_disk is None or gop.first <= max(at, on_disk[1].first)):
-            yield gop if is_first else _rest_of(gop, at)
+            yield gop if is_first else _remainder_of(gop, at)
             at, is_first = gop.end, False
         elif on_disk is not None:
             session, entry = on_disk
@@ -195,8 +195,8 @@ def _next_on_disk(source: PlaybackSource, pulse: int) -> tuple[RecordingSession,
     return min(candidates, key=lambda it: max(it[1].first, pulse), default=None)
 
 
-def _rest_of(gop: RecordedGop, pulse: int) -> RecordedGop:
-    """Return the rest of a GOP of which the frames before a pulse were yielded already."""
+def _remainder_of(gop: RecordedGop, pulse: int) -> RecordedGop:
+    """Return the frames of a GOP from a pulse on; the earlier ones were yielded already."""
     return RecordedGop(max(gop.first, pulse), gop.fragments[max(0, pulse - gop.first) :])
 
 
@@ -206,8 +206,8 @@ async def _read(
     path = session.paths.camera_file(entry.camera, entry.file)
     reading = read_gops(path, entry.offset, entry.length, session.info.fps, pulse)
     try:
-        while some := await run_in_reader_thread(_read_some, reading, pulse):
-            for gop in some:
+        while gops := await run_in_reader_thread(_read_some, reading, pulse):
+            for gop in gops:
                 yield gop
     finally:
         with contextlib.suppress(ValueError):  # cancelled during a read in the thread: it closes by itself

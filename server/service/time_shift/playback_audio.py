@@ -37,20 +37,24 @@ class PlaybackAudio:
     async def next_audio(self, first: int, until: int) -> AudioChunk:
         """Return the next audio frames, as the pulses ``first … until - 1`` are shown."""
         buffer = self._buffer
-        form = buffer.format
-        begin, end = form.frame_at(first, buffer.fps), form.frame_at(until, buffer.fps)
-        longest = form.frame_at(round(LONGEST_GAP_S * buffer.fps), buffer.fps)
+        audio_format = buffer.format
+        begin, end = audio_format.frame_at(first, buffer.fps), audio_format.frame_at(until, buffer.fps)
+        longest = audio_format.frame_at(round(LONGEST_GAP_S * buffer.fps), buffer.fps)
         if self._next is None or begin > self._next + longest:  # pictures do not fill such a gap either
             self._next = begin
         begin = self._next
-        late = end if self._now is None else form.frame_at(self._now(), buffer.fps) - buffer.max_late_frames
+        late = (
+            end
+            if self._now is None
+            else audio_format.frame_at(self._now(), buffer.fps) - buffer.max_late_frames
+        )
         frames = {number: buffer.get(number) for number in range(begin, end)}
         missing = [number for number, frame in frames.items() if frame is None]
         if missing and (recorded := self._recorded()):
             frames |= await run_in_reader_thread(self._read, recorded, missing[0], missing[-1] + 1)
         self._next = next((it for it in missing if it >= late and frames[it] is None), max(begin, end))
-        audio = (frames[number] or form.silence for number in range(begin, self._next))
-        return AudioChunk(begin, tuple(audio), form)
+        audio = (frames[number] or audio_format.silence for number in range(begin, self._next))
+        return AudioChunk(begin, tuple(audio), audio_format)
 
     def live(self, first: int, until: int) -> AudioChunk:
         """Return the next audio frames of the live stream: nothing is read from the disk any more."""
@@ -59,20 +63,20 @@ class PlaybackAudio:
         return self._follower.next_audio(first, until)
 
     def _read(self, recorded: Sequence[SessionEntries], begin: int, end: int) -> dict[int, bytes]:
-        form, fps = self._buffer.format, self._buffer.fps
+        audio_format, fps = self._buffer.format, self._buffer.fps
         frames: dict[int, bytes] = {}
         for recording in recorded:
-            for it in recording.index.between(*form.pulses(begin, end, fps)):
-                frames |= _frames_of(recording, it, begin, end, form)
+            for entry in recording.index.between(*audio_format.pulses(begin, end, fps)):
+                frames |= _frames_of(recording, entry, begin, end, audio_format)
         return frames
 
 
 def _frames_of(
-    recorded: SessionEntries, entry: IndexEntry, begin: int, end: int, form: AudioFormat
+    recorded: SessionEntries, entry: IndexEntry, begin: int, end: int, audio_format: AudioFormat
 ) -> dict[int, bytes]:
     path = recorded.session.paths.audio_file(entry.file)
     try:
-        return read_audio_frames(path, entry.offset, entry.length, begin, end, form)
+        return read_audio_frames(path, entry.offset, entry.length, begin, end, audio_format)
     except OSError:  # deleted by retention, or not readable: silent
         return {}
 
@@ -82,7 +86,7 @@ _HEAD = 8
 
 
 def read_audio_frames(
-    path: Path, offset: int, length: int, begin: int, end: int, form: AudioFormat
+    path: Path, offset: int, length: int, begin: int, end: int, audio_format: AudioFormat
 ) -> dict[int, bytes]:
     """Read the frames ``begin … end - 1``, as far as they are in a piece of an audio file.
 
@@ -95,7 +99,7 @@ def read_audio_frames(
     frames: dict[int, bytes] = {}
     with path.open("rb") as file:
         for sample, sizes, at in _fragments(file, offset, offset + length):
-            number = sample // form.samples
+            number = sample // audio_format.samples
             if number >= end:
                 break
             if number + len(sizes) <= begin:

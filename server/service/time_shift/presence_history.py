@@ -1,4 +1,4 @@
-"""Whether a person had been seen lately in the past: for viewers with access to that person alone."""
+"""Whether a person had recently been seen at a past time: for viewers with access to that person alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _AHEAD_S = 60.0
 
 
 class PresenceHistory:
-    """Looks up recorded decisions; "lately" is within ``unseen`` frames before."""
+    """Looks up recorded decisions; "recently" is within ``unseen`` frames before."""
 
     def __init__(self, recorder: Recorder, numbers: tuple[int, ...], unseen: int, fps: float) -> None:
         self._recorder, self._numbers, self._unseen = recorder, numbers, unseen
@@ -31,7 +31,7 @@ class PresenceHistory:
         """By known GOP, the last frame in which a camera saw the person, in order."""
 
     async def had_been_seen(self, first: int, end: int) -> bool:
-        """Return whether a camera saw the person in the pulses ``first … end - 1``, or lately before."""
+        """Return whether a camera saw the person in the pulses ``first … end - 1``, or recently before."""
         begin = max(0, first - self._unseen)
         if begin < self._known.start or end > self._known.stop:
             await self._read(begin, end)
@@ -61,7 +61,7 @@ class VisiblePictures:
 async def visible_pictures(
     gop: RecordedGop, source: PlaybackSource, stream_format: StreamFormat, fps: float
 ) -> VisiblePictures:
-    """Return a GOP's pictures; gray ones, if there are any, where the person had not been seen lately."""
+    """Return a GOP's pictures; gray ones, if there are any, where the person had not been seen recently."""
     pictures, presence = pictures_of_gop(gop, stream_format), source.presence
     if presence is None or await presence.had_been_seen(gop.first, gop.end):
         return VisiblePictures(pictures, is_muted=False)

@@ -16,7 +16,7 @@ _TOLERANCE = 1e-3
 
 
 class TimeReferenceError(ValueError):
-    """A text is not a time reference; the message says what one looks like."""
+    """A text is not a time reference; the message describes the valid forms."""
 
 
 def parse_time_reference(text: str, *, now: int, fps: float, pulse0: float | None) -> int:
@@ -45,7 +45,7 @@ def parse_time_reference(text: str, *, now: int, fps: float, pulse0: float | Non
 
 
 def utc_time_of_pulse(pulse: int, fps: float, pulse0: float | None) -> str | None:
-    """Return the time of a pulse in UTC (ISO 8601, milliseconds); None if not known."""
+    """Return the time of a pulse in UTC (ISO 8601, milliseconds); None: unknown."""
     if pulse0 is None:
         return None
     return datetime.fromtimestamp(pulse0 + pulse / fps, UTC).isoformat(timespec="milliseconds")[:-6] + "Z"

@@ -35,8 +35,8 @@ class PlaybackRange:
 class TimeShiftStream:
     """One subscriber's stream, without a gap in its time.
 
-    ``live`` returns the live stream when the present is reached; None: it has ended. ``audio`` is None at a
-    site without audio.
+    ``live`` returns the live stream when the present is reached; None: it has ended. ``audio`` is None if
+    the site has no audio.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class TimeShiftStream:
 
 
 class _RealTimePacer:
-    """Lets ``lead_s`` seconds of media pass at once, the rest in real time."""
+    """Lets ``lead_s`` seconds of media pass at once, and the remainder in real time."""
 
     def __init__(self, lead_s: float) -> None:
         self._clock = asyncio.get_running_loop().time

@@ -19,7 +19,7 @@ from bestview.quality import CameraLayout, QualitySettings, TrackWindow, compute
 from server.config.site_config import Config
 from server.service.view_selection.undetected_views import TestedViews, UndetectedViews
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
-from server.service.view_selection.window_line import WindowTracks
+from server.service.view_selection.window_tracks import WindowTracks
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,11 +28,11 @@ Mask = NDArray[np.bool_]
 _INTERVAL_S = 0.4
 """Seconds between inferences: missed detections last longer."""
 _PRIOR, _FEW_S, _MANY_S = 0.93, 1.5, 4.0
-"""Detection probability of unknown cameras; seconds of people after which places, and cameras, are known."""
+"""Prior detection probability; seconds of observed people after which places, and cameras, are known."""
 _MEMORY_S = 600.0
 """Time constant of forgetting, in seconds: furniture is moved."""
 _NO_BOX_FACTOR = 0.4
-"""Factor on trust where the camera has no box at all there: not even a part of the person seems visible."""
+"""Factor on trust where the camera has no box at all there: not even part of the person seems visible."""
 _MIN_TRUST = 0.25
 """Below this trust no view is inferred."""
 
@@ -174,8 +174,8 @@ def _detection_samples(
     column[cameras] = np.arange(len(cameras))
     sampled = (tracks.frame % interval == 0) & (column[tracks.camera] >= 0)
     can_detect = np.zeros((-(-frames // interval), len(cameras)), dtype=np.bool_)
-    searched = sampled & tracks.searched
-    can_detect[tracks.frame[searched] // interval, column[tracks.camera[searched]]] = True
+    detecting = sampled & tracks.has_detection
+    can_detect[tracks.frame[detecting] // interval, column[tracks.camera[detecting]]] = True
     boxes = np.flatnonzero(sampled[tracks.row] & (tracks.quality >= 0.0))
     row, index = tracks.row[boxes], person[boxes]
     people, place = np.unique(index, return_inverse=True)

@@ -24,7 +24,7 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 Floats = NDArray[np.float64]
 
 _TAIL_DIVISOR = 5
-"""The end of the look-ahead is judged by its last fifth: a single frame would be too uncertain."""
+"""The last fifth of the look-ahead represents its end: a single frame would be too uncertain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class ObjectChoice:
     """None: no camera can be shown."""
     before: str | None
     """The camera of the GOP before."""
-    away: bool
+    departed: bool
     """Whether no camera has seen the person for a while; the stream stays with the last camera."""
 
 
@@ -53,12 +53,12 @@ class GopDecision:
     """All merged numbers so far, with the numbers that were kept."""
     corrections: tuple[Merge | Split, ...]
     """Merges and splits since the last decision."""
-    why: SelectionReasons = field(compare=False, repr=False)
+    reasons: SelectionReasons = field(compare=False, repr=False)
     """The costs behind the choices."""
 
 
 def camera_homographies(config: Config) -> dict[str, Floats | None]:
-    """Return every camera's homography from its own picture to the ground, None where there is none."""
+    """Return every camera's homography from its image to the ground; None if there is none."""
     return {
         camera.id: None if camera.ground is None else np.array(camera.ground, dtype=np.float64)
         for camera in config.cameras
@@ -68,7 +68,7 @@ def camera_homographies(config: Config) -> dict[str, Floats | None]:
 class ViewDecider:
     """Selects views GOP by GOP as epochs arrive. No clock, no network: the same epochs lead to the same cuts.
 
-    Every decision evaluates the whole look-ahead anew, without cameras that have died meanwhile.
+    Every decision evaluates the whole look-ahead again, without cameras that have failed since.
     ``has(camera, pulse)`` returns whether a camera's frame can be shown.
     """
 
@@ -164,7 +164,7 @@ class ViewDecider:
         ]
 
     def _window(self, first: int, last: int) -> LookaheadWindow:
-        """Return the look-ahead window of the frames from `first` to `last`, as known by now."""
+        """Return the look-ahead window of the frames from `first` to `last`, as known now."""
         return LookaheadWindow(
             self._cameras,
             self._quality_buffer,
@@ -202,14 +202,14 @@ class ViewDecider:
         self._quality_buffer.forget_before(self._next_gop)
         people.forget_boxes_before(self._next_gop)
         names = [*self._cameras, None]  # NO_CAMERA, -1, indexes the last one
-        assert NO_CAMERA == -1  # noqa: S101 — as the line above says
+        assert NO_CAMERA == -1  # noqa: S101 — the line above relies on it
         choices = tuple(
-            ObjectChoice(number, names[view], names[last], number in people.registry.away)
+            ObjectChoice(number, names[view], names[last], number in people.registry.departed)
             for number, view, last in zip(
                 part.numbers.tolist(), views.tolist(), before.cameras.tolist(), strict=True
             )
         )
-        why = SelectionReasons(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
+        reasons = SelectionReasons(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
         return GopDecision(
-            first, frames, choices, boxes, dict(people.registry.merged), people.take_corrections(), why
+            first, frames, choices, boxes, dict(people.registry.merged), people.take_corrections(), reasons
         )

@@ -35,7 +35,7 @@ class ViewExplanation:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The costs of one person's views, in frames of not seeing the person at all."""
+    """The costs of one person's views, in frames without the person."""
 
     frames: int
     """Frames of the look-ahead."""
@@ -60,7 +60,7 @@ class SelectionReasons:
         part: the look-ahead.
         before: (K,) the camera of the GOP before, by index; -1: none.
         weight: (N,) of each frame of the look-ahead.
-        switch_cost: what a cut costs, in frames of not seeing the person.
+        switch_cost: the cost of a cut, in frames without the person.
         settings: the weights of the terms.
     """
 
@@ -79,7 +79,7 @@ class SelectionReasons:
         views, cameras = self.part.views(number), self.part.window.cameras
         columns = self.part.window.views.camera[views]
         undetected = self.part.undetected(number)
-        others = self.part.window.undetected.camera[undetected]
+        undetected_columns = self.part.window.undetected.camera[undetected]
         costs = self.part.cost(number)
         cost, mean = (costs * self.weight[:, None]).sum(axis=0), costs.mean(axis=0)
         before = int(self.before[self.part.numbers == number][0])
@@ -90,8 +90,10 @@ class SelectionReasons:
         return Explanation(
             frames=self.part.frames,
             views={
-                name: self._view(views[columns == place], undetected[others == place], mean[place])
-                for place, name in enumerate(cameras)
+                name: self._view(
+                    views[columns == index], undetected[undetected_columns == index], mean[index]
+                )
+                for index, name in enumerate(cameras)
             },
             weights={name: self.settings.weights[name] for name in self.settings.terms},
             stay=_finite(stay),

@@ -15,13 +15,13 @@ from server.service.view_selection.cross_view_inference import CrossViewInferenc
 from server.service.view_selection.recent_views import RecentViews
 from server.service.view_selection.undetected_views import UndetectedViews
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
-from server.service.view_selection.window_line import WindowTracks, find_indices
+from server.service.view_selection.window_tracks import WindowTracks, find_indices
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-NOTHING = RecentViews()
+NO_RECENT_VIEWS = RecentViews()
 
 
 class LookaheadWindow:
@@ -42,7 +42,7 @@ class LookaheadWindow:
         last: int,
         *,
         relative: bool,
-        recent_views: RecentViews = NOTHING,
+        recent_views: RecentViews = NO_RECENT_VIEWS,
         decay_frames: float = 0.0,
         cross_view_inference: CrossViewInference | None = None,
         undetected_weight: float = 0.0,
@@ -56,15 +56,18 @@ class LookaheadWindow:
             [quality_buffer.over(camera, first, last) for camera in cameras], first, undetected
         )
         shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
-        numbers: Ints = np.array(people.registry.everybody, dtype=np.int64)
-        anyone, own = tracks.persons(people, numbers, len(pulses)), find_indices(numbers, self.numbers)
+        numbers: Ints = np.array(people.registry.all_numbers, dtype=np.int64)
+        everyone, own_indices = (
+            tracks.persons(people, numbers, len(pulses)),
+            find_indices(numbers, self.numbers),
+        )
         self.inferred_views = (
             UndetectedViews.empty()
             if cross_view_inference is None
-            else cross_view_inference.infer(tracks, anyone, len(pulses))
+            else cross_view_inference.infer(tracks, everyone, len(pulses))
         )
         """For the people of all shards."""
-        person = np.append(own, -1)[anyone]
+        person = np.append(own_indices, -1)[everyone]
         visible = np.flatnonzero((tracks.quality >= 0.0) & (person >= 0))
         row, person = tracks.row[visible], person[visible]
         cell = (tracks.frame * len(cameras) + tracks.camera)[row]
@@ -76,21 +79,23 @@ class LookaheadWindow:
         row, person = row[counts], person[counts]
         frame, quality = tracks.frame[row], np.minimum(self.quality, 1.0)
         detected = (frame * len(cameras) + tracks.camera[row]) * count + person
-        self.undetected = other = self.inferred_views.of(own, count, shown, detected, undetected_weight)
+        self.undetected = inferred = self.inferred_views.of(
+            own_indices, count, shown, detected, undetected_weight
+        )
         """Inferred views of this shard's people whom the camera does not detect."""
-        inferred_quality = np.minimum(other.quality, 1.0)
+        inferred_quality = np.minimum(inferred.quality, 1.0)
         if relative:
-            moment = np.concatenate([frame * count + person, other.frame * count + other.person])
+            moment = np.concatenate([frame * count + person, inferred.frame * count + inferred.person])
             both = relative_view_quality(
                 np.concatenate([quality, inferred_quality]), moment, len(pulses) * count
             )
             quality, inferred_quality = both[: len(quality)], both[len(quality) :]
         self.views = VisibleViews(frame, tracks.camera[row], person, quality, shown, count)
         self.before = recent_views.of(self.numbers, len(cameras), first)
-        """Everybody's last views before the first frame."""
+        """Each person's last views before the first frame."""
         missed = add_missed_detections(self.views, self.before, decay_frames)
         self.effective_views = add_inferred_views(
-            missed, other.frame, other.camera, other.person, inferred_quality
+            missed, inferred.frame, inferred.camera, inferred.person, inferred_quality
         )
         """Detected views, those assumed after missed detections, and those inferred from other cameras."""
 
@@ -169,7 +174,7 @@ class LookaheadPart:
 
 
 def _first_of_each(values: Ints, count: int) -> Mask:
-    """Return which values, all below `count`, occur for the first time: of two tracks the first counts."""
+    """Return which values, all below `count`, occur for the first time: the first of two tracks counts."""
     places = np.arange(len(values))
     first_place = np.empty(count, dtype=np.intp)
     first_place[values[::-1]] = places[::-1]  # the first one is written last

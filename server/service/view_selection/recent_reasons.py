@@ -34,7 +34,7 @@ class SelectionReason:
     """One object's view in one GOP, and the costs it was selected by."""
 
     view: SelectedView
-    why: Explanation
+    explanation: Explanation
 
 
 class RecentReasons:
@@ -47,18 +47,20 @@ class RecentReasons:
         self._reasons: dict[int, list[SelectionReason]] = {}
         """By object, in order."""
         self._newest = 0
-        self._why: SelectionReasons | None = None
+        self._newest_reasons: SelectionReasons | None = None
 
-    def put(self, selected_views: Mapping[int, SelectedView], first: int, why: SelectionReasons) -> None:
+    def put(self, selected_views: Mapping[int, SelectedView], first: int, reasons: SelectionReasons) -> None:
         """Add the GOP that begins at `first`."""
-        if first < self._newest:  # the pulses started again
+        if first < self._newest:  # the pulses have restarted
             self._queried, self._reasons = {}, {}
-        self._newest, self._why = first, why
-        self._queried = {it: at for it, at in self._queried.items() if at >= first - self._query_expiry}
-        self._reasons = {it: reasons for it, reasons in self._reasons.items() if it in self._queried}
+        self._newest, self._newest_reasons = first, reasons
+        self._queried = {
+            number: pulse for number, pulse in self._queried.items() if pulse >= first - self._query_expiry
+        }
+        self._reasons = {number: kept for number, kept in self._reasons.items() if number in self._queried}
         for number in self._queried:
             if number in selected_views:
-                self._keep(selected_views[number], why)
+                self._keep(selected_views[number], reasons)
 
     def newest(self, view: SelectedView) -> SelectionReason:
         """Explain an object's newest view; from now on its reasons are kept.
@@ -71,9 +73,9 @@ class RecentReasons:
         reasons = self._reasons.get(number, [])
         if reasons and reasons[-1].view.first == view.first:
             return reasons[-1]
-        if self._why is None:
+        if self._newest_reasons is None:
             raise KeyError(number)
-        return self._keep(view, self._why)
+        return self._keep(view, self._newest_reasons)
 
     def at(self, number: int, pulse: int) -> SelectionReason | None:
         """Explain the view of an object at a pulse; None: its reasons are not kept."""
@@ -84,8 +86,8 @@ class RecentReasons:
         view = reasons[place].view
         return reasons[place] if pulse < view.first + view.frames else None
 
-    def _keep(self, view: SelectedView, why: SelectionReasons) -> SelectionReason:
-        reason = SelectionReason(view, why.of(view.choice.number))
+    def _keep(self, view: SelectedView, reasons: SelectionReasons) -> SelectionReason:
+        reason = SelectionReason(view, reasons.of(view.choice.number))
         oldest = view.first - self._keep_frames
         recent = [it for it in self._reasons.get(view.choice.number, []) if it.view.first >= oldest]
         self._reasons[view.choice.number] = [*recent, reason]

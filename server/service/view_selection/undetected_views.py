@@ -68,8 +68,8 @@ class UndetectedViews:
             return self
         person, cell = people[self.person], self.frame * shown.shape[1] + self.camera
         rows = np.flatnonzero((person >= 0) & shown.reshape(-1)[cell] & (factor * self.quality > 0.0))
-        taken = np.zeros(shown.size * count, dtype=np.bool_)
-        taken[found] = True
-        rows = rows[~taken[cell[rows] * count + person[rows]]]
+        is_detected = np.zeros(shown.size * count, dtype=np.bool_)
+        is_detected[found] = True
+        rows = rows[~is_detected[cell[rows] * count + person[rows]]]
         quality = factor * self.quality[rows]
         return UndetectedViews(self.frame[rows], self.camera[rows], person[rows], quality, self.tested)

@@ -38,7 +38,7 @@ class ViewQualityBuffer:
     """Computes the view quality of every window, and keeps the newest of each frame.
 
     A window's quality depends neither on person numbers nor on other cameras, so it is computed once.
-    ``homographies`` map each camera's own picture to the ground.
+    ``homographies`` map each camera's image to the ground.
     """
 
     def __init__(
@@ -105,23 +105,23 @@ class ViewQualityBuffer:
         )
 
     def layout(self, cameras: Sequence[str]) -> CameraLayout:
-        """Return the layout of cameras whose picture size is known."""
+        """Return the layout of cameras whose image size is known."""
         pictures = np.array([self._picture(camera) for camera in cameras]).reshape(-1, 4)
         return CameraLayout(self._size, pictures, [self._ground(camera) for camera in cameras], self._fps)
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
-        """Return the rectangle of a camera's own picture, centered in the site's."""
+        """Return the rectangle of a camera's image, centered in the site's."""
         left, top = (float(side) for side in self.letterboxes[camera].to_site(np.zeros(2)))
         return left, top, self._size[0] - left, self._size[1] - top
 
     def _ground(self, camera: str) -> Floats | None:
-        """Return the homography from the site's picture; None for overhead cameras: none can face them."""
-        own = self._homographies[camera]
-        if own is None or camera in self._overhead:
+        """Return the homography from the site's image; None for overhead cameras: no one can face them."""
+        homography = self._homographies[camera]
+        if homography is None or camera in self._overhead:
             return None
         (left, top), scale = self.letterboxes[camera].to_site(np.zeros(2)), self.letterboxes[camera].scale
         to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
-        return np.asarray(own @ to_camera)
+        return np.asarray(homography @ to_camera)
 
 
 def _stacked_boxes(windows: Sequence[CameraWindow], start: int) -> Floats:
@@ -132,7 +132,7 @@ def _stacked_boxes(windows: Sequence[CameraWindow], start: int) -> Floats:
     boxes = np.full((sum(len(window.keys) for window in windows), frames, 4), np.nan)
     end = 0
     for window in windows:
-        count, own = window.boxes.shape[:2]
-        boxes[end : end + count, window.first - start : window.first - start + own] = window.boxes
+        count, frames_here = window.boxes.shape[:2]
+        boxes[end : end + count, window.first - start : window.first - start + frames_here] = window.boxes
         end += count
     return boxes

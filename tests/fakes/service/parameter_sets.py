@@ -66,5 +66,5 @@ def put(frame_buffers: dict[str, FrameBuffer]) -> None:
 
 
 def decision(gop: int) -> GopDecision:
-    choice = ObjectChoice(1, (A, B)[gop % 2], None, away=False)
+    choice = ObjectChoice(1, (A, B)[gop % 2], None, departed=False)
     return GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON)

@@ -123,7 +123,7 @@ async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
         assert it.service.ingest.states[camera].bad_messages == 0
     assert sum(gop.frames for gop in gops) == FRAMES
     written = in_folder(tmp_path / "out")
-    assert written["late.csv"] == b"frame,camera,what\n"
+    assert written["late.csv"] == b"frame,camera,reason\n"
     assert written["choices.csv"].count(b"\n") > 1, "somebody is shown"
     assert written == rendered(config, tmp_path / "offline"), "live as offline, to the byte"
 
@@ -286,7 +286,7 @@ async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_windo
         it for it in range(FRAMES) if it % 5 != 4
     ], "all but the last of every window, and it is told"
     assert sum(gop.frames for gop in gops) == FRAMES
-    assert b"not searched" in in_folder(tmp_path / "out")["late.csv"]
+    assert b"no detection" in in_folder(tmp_path / "out")["late.csv"]
     statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
     assert statuses[-1].load_level == 4
     assert "detecting in every 5th frame" in statuses[-1].load

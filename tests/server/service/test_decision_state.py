@@ -25,7 +25,7 @@ class Counted:
 
 
 def test_a_decision_is_published_with_its_cuts_and_corrections() -> None:
-    choices = (ObjectChoice(1, "c1", "c0", away=False), ObjectChoice(2, "c0", "c0", away=False))
+    choices = (ObjectChoice(1, "c1", "c0", departed=False), ObjectChoice(2, "c0", "c0", departed=False))
     turned_out = (Merge(kept=1, lost=5), Split(kept=2, split_off=3, camera="c1"))
     message = DecisionState(25.0).put(
         GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD)
@@ -38,7 +38,7 @@ def test_a_decision_is_published_with_its_cuts_and_corrections() -> None:
 
 def decided(state: DecisionState, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
     """Put a GOP of ten frames; give what explains it."""
-    choices = tuple(ObjectChoice(number, "c0", "c0", away=False) for number in numbers)
+    choices = tuple(ObjectChoice(number, "c0", "c0", departed=False) for number in numbers)
     why = Counted()
     state.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("SelectionReasons", why)))
     return why

@@ -31,8 +31,8 @@ log = logging.getLogger(__name__)
 
 
 @dataclass
-class DecodedPicture:
-    """One decoded frame; its pictures are made when first needed."""
+class DecodedFrame:
+    """One decoded frame; its images are converted when first needed."""
 
     pulse: int
     duration: int
@@ -42,12 +42,12 @@ class DecodedPicture:
 
     @cached_property
     def plain(self) -> Image:
-        """The picture, ``(height, width, 3)`` BGR."""
+        """The image, ``(height, width, 3)`` BGR."""
         return to_bgr(self.frame)
 
     @cached_property
     def boxed(self) -> Image:
-        """The picture with its boxes."""
+        """The image with boxes."""
         image = self.plain.copy()
         draw_boxes(image, self.boxes, self.chosen)
         return image
@@ -64,7 +64,7 @@ class StreamRenderer:
         self._has_warned = False
         self._encoder: Encoder | None = None
         self._encoded_last = -1
-        self._last: DecodedPicture | None = None
+        self._last: DecodedFrame | None = None
 
     def render(self, request: RenderRequest) -> RenderResult:
         """Decode the frames and return the requested outputs."""
@@ -89,7 +89,7 @@ class StreamRenderer:
         image = self._last.boxed if request.still == "boxed" else self._last.plain
         return self._jpeg(self._last.pulse, image)
 
-    def _decode(self, request: RenderRequest) -> Iterator[DecodedPicture]:
+    def _decode(self, request: RenderRequest) -> Iterator[DecodedFrame]:
         demux = demux_webm if self._settings.codec == "vp8" else demux_mp4
         for demuxed in demux(request.fragments, self._settings.fps):
             is_valid = bool(demuxed.data) and demuxed.pulse <= PULSE_MAX  # an empty packet would flush
@@ -111,10 +111,10 @@ class StreamRenderer:
                 pulse = demuxed.pulse if frame.pts is None else frame.pts
                 place = pulse - request.first
                 boxes = request.boxes[place] if 0 <= place < len(request.boxes) else []
-                yield DecodedPicture(pulse, demuxed.duration, frame, boxes, request.chosen)
+                yield DecodedFrame(pulse, demuxed.duration, frame, boxes, request.chosen)
 
-    def _encode(self, picture: DecodedPicture) -> EncodedFrame:
-        if self._encoder is None or picture.pulse <= self._encoded_last:  # the pulses started again
+    def _encode(self, picture: DecodedFrame) -> EncodedFrame:
+        if self._encoder is None or picture.pulse <= self._encoded_last:  # the pulses have restarted
             self._encoder = Encoder(self._settings, self._settings)
         self._encoded_last = picture.pulse
         unit = self._encoder.encode(picture.pulse, picture.boxed)

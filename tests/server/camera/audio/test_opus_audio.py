@@ -164,7 +164,7 @@ async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
 
 def decide(hall: Hall, gops: range) -> None:
     for gop in gops:
-        choice = ObjectChoice(1, CAMERAS[gop % 2], None, away=False)
+        choice = ObjectChoice(1, CAMERAS[gop % 2], None, departed=False)
         decision = GopDecision(gop * GOP, GOP, (choice,), {A: []}, {}, (), NO_REASON)
         hall.service.recorder.put(hall.service.decision_state.put(decision), None)
         hall.service.splicer.publish_decision(decision)

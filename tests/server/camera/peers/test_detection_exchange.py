@@ -106,7 +106,7 @@ async def test_live_equals_offline_whichever_way_words_go(
     told = await live(config, tmp_path / "live", running)
     here = by_itself(config, tmp_path / "here")
     assert told == here
-    assert told["late.csv"] == b"frame,camera,what\n"
+    assert told["late.csv"] == b"frame,camera,reason\n"
 
 
 def test_what_others_see_counts_and_workers_that_are_in_step_by_pipes_say_the_same(recording: Path) -> None:
@@ -146,7 +146,7 @@ async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others
     assert asyncio.get_running_loop().time() - began < FRAMES * 0.5, "not a wait for every frame"
     with (tmp_path / "out" / "late.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert {row["camera"] for row in rows if row["what"] == "no peer detections"} <= {"c0", "c1"}
+    assert {row["camera"] for row in rows if row["reason"] == "no peer detections"} <= {"c0", "c1"}
 
 
 @pytest.fixture

@@ -61,8 +61,8 @@ def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
         b"2,2,40.00,8.00,32.00,80.00,1.00,-1,-1,-1\n",
         "tracks/c1.txt": b"6,2,20.00,4.00,16.00,40.00,1.00,-1,-1,-1\n",
         "choices.csv": b"frame,object,camera\n1,1,c0\n2,1,c0\n6,1,c1\n6,2,c0\n",
-        "corrections.csv": b"frame,what,object,other,camera\n6,merged,1,3,\n6,split,1,2,c1\n",
-        "late.csv": b"frame,camera,what\n4,c1,tracks late\n5,c1,tracks late\n",
+        "corrections.csv": b"frame,correction,object,other,camera\n6,merged,1,3,\n6,split,1,2,c1\n",
+        "late.csv": b"frame,camera,reason\n4,c1,tracks late\n5,c1,tracks late\n",
     }
 
 

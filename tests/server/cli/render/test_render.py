@@ -65,7 +65,7 @@ def test_two_views_become_films_tracks_choices_and_plots_with_one_warning_of_len
         "tracks/c1.txt",
         "tracks/c1.png",
     }
-    assert (out / "late.csv").read_text() == "frame,camera,what\n"
+    assert (out / "late.csv").read_text() == "frame,camera,reason\n"
     with (out / "choices.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {f"best/object-{row['object']}.mp4" for row in rows} <= films

@@ -51,8 +51,8 @@ async def test_a_sites_status_is_shown(busy: Hall) -> None:
     assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)
     one, two = now.cameras
     assert (one.camera, one.state, one.fps, one.missed, one.shed, one.waiting) == (A, "live", 24.5, 3, 2, 7)
-    assert (one.certified, one.tracking_delay_s, one.synchronized) == (1.0, 0.25, False)
-    assert (two.camera, two.certified, two.waiting) == (B, None, None)
+    assert (one.optimal, one.tracking_delay_s, one.synchronized) == (1.0, 0.25, False)
+    assert (two.camera, two.optimal, two.waiting) == (B, None, None)
     ann, other = now.people
     assert (ann.name, ann.camera, ann.cameras, ann.since_s) == ("Ann", B, (A, B), 10 / FPS)
     assert other.camera == A
@@ -88,7 +88,7 @@ async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Pat
         see(hall)
         now = await client.status(url(hall), client.HttpSettings(token=token_of("door")))
         assert (now.service, now.pulse, now.ready) == (None, None, True)
-        assert [(it.camera, it.certified) for it in now.cameras] == [(A, None)]
+        assert [(it.camera, it.optimal) for it in now.cameras] == [(A, None)]
         assert "viewers" not in printed(now)
         assert (
             await client.status(url(hall), client.HttpSettings(token=token_of("desk")))

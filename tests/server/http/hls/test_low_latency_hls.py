@@ -45,7 +45,7 @@ def shows(hall: Hall, gops: range, nobody: frozenset[int] = frozenset()) -> None
         for seed, camera in enumerate(CAMERAS if gop not in nobody else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
                 hall.service.ingest.video(video(camera, unit))
-        choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, away=False)
+        choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, departed=False)
         hall.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
@@ -277,7 +277,7 @@ async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> 
         for camera in CAMERAS:
             for unit in encoded(0, 100, gop=2)[: 2 * gops]:
                 hall.service.ingest.video(video(camera, unit))
-        choice = ObjectChoice(1, A, None, away=False)
+        choice = ObjectChoice(1, A, None, departed=False)
         decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
         for decision in decisions[: gops // 2]:
             hall.service.splicer.publish_decision(decision)

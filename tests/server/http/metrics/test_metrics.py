@@ -51,7 +51,7 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(hall: Hall) -
     assert metrics["myview_stage_seconds_sum", A, "solve"] == pytest.approx(0.2)
     assert metrics["myview_stage_seconds_count", B, "solve"] == 0
     assert metrics["myview_camera_windows_total", A] == 1
-    assert metrics["myview_camera_certified_windows_total", A] == 0
+    assert metrics["myview_camera_optimal_windows_total", A] == 0
     assert metrics["myview_camera_gap_total", A] == pytest.approx(0.2)
 
 
@@ -102,8 +102,8 @@ async def test_missing_pictures_are_counted(hall: Hall) -> None:
     del frame_buffer._pictures[7]
     hall.service.feed(2, {A: {1: SMALL}, B: {1: LARGE}})
     metrics = await samples(hall)
-    assert metrics["myview_camera_lost_pictures_total", A] == 1
-    assert metrics["myview_camera_lost_pictures_total", B] == 0
+    assert metrics["myview_camera_lost_frames_total", A] == 1
+    assert metrics["myview_camera_lost_frames_total", B] == 0
 
 
 async def test_viewers_are_counted_by_kind_and_sent_bytes_are_counted(busy: Hall) -> None:

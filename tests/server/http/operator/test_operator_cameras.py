@@ -24,7 +24,7 @@ async def test_every_camera_is_listed_with_its_measurements(busy: Hall) -> None:
     assert (first["clock_offset"], answer[1]["clock_offset"]) == (0.25, None)
     assert first["sync_error"] == {"median": 0.0, "worst": 0.0}
     assert first["picture"] == {"width": 64, "height": 48, "scale": 1.0, "left": 0.0, "top": 0.0}
-    assert (first["certified"], first["windows"], first["last_error"]) == (None, 0, None)
+    assert (first["optimal"], first["solved_windows"], first["last_error"]) == (None, 0, None)
 
 
 async def test_the_last_error_is_shown_until_the_next_one(busy: Hall) -> None:
@@ -36,9 +36,9 @@ async def test_the_last_error_is_shown_until_the_next_one(busy: Hall) -> None:
     ingest.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
     assert "invalid message: " in await trouble()
     ingest.status(status(A, state="away"))
-    assert await trouble() == "its source delivers no pictures; retrying"
+    assert await trouble() == "its source delivers no frames; retrying"
     ingest.status(status(A, state="live"))
-    assert await trouble() == "its source delivers no pictures; retrying"
+    assert await trouble() == "its source delivers no frames; retrying"
     ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
     assert await trouble() == "its process disconnected"
 

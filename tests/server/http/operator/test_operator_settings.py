@@ -61,7 +61,7 @@ def test_settings_tuned_while_running_apply_from_the_next_gop_on_to_buffered_vie
     so = config.model_copy(update={"view": TRIED.model_copy(update={"identity": config.view.identity})})
     for mine, theirs in zip(tuned[done:], decided(so)[done:], strict=True):
         for person in (1, 2):
-            seen, meant = mine.why.of(person), theirs.why.of(person)
+            seen, meant = mine.reasons.of(person), theirs.reasons.of(person)
             assert seen.weights == meant.weights
             assert seen.switch_cost == meant.switch_cost
             for camera in CAMERAS:

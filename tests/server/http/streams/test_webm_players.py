@@ -103,7 +103,9 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(free: Hall) -> Non
 
     def show(gop: int) -> None:
         camera = (A, B)[gop % 2]
-        choice = ObjectChoice(7, camera if frame_buffers[camera].has(gop * GOP) else None, None, away=False)
+        choice = ObjectChoice(
+            7, camera if frame_buffers[camera].has(gop * GOP) else None, None, departed=False
+        )
         splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)

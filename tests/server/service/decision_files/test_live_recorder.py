@@ -30,19 +30,19 @@ def test_skipped_decisions_are_listed_once_there_is_room(
     before = written(tmp_path)
     with files_of_at_most(max(map(len, before.values()))):
         for gop in (1, 2, 3):
-            writer.note_late(B, [gop * GOP], "tracks late")
-            writer.note_late(B, [4 * GOP], "no picture")
+            writer.add_late(B, [gop * GOP], "tracks late")
+            writer.add_late(B, [4 * GOP], "no frame")
             writer.write(decision(gop, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
             assert written(tmp_path) == before
     writer.write(decision(4, choice(1, B), c0=[[(1, *SMALL)]] * GOP))
-    writer.note_late(A, [5 * GOP], "tracks late")
+    writer.add_late(A, [5 * GOP], "tracks late")
     writer.close()
     after = written(tmp_path)
     frames = [*range(1, GOP + 1), *range(4 * GOP + 1, 5 * GOP + 1)]
     assert [int(it.split(",")[0]) for it in after["choices.csv"].splitlines()[1:]] == frames
     assert [int(it.split(",")[0]) for it in after["c0.txt"].splitlines()] == frames
     assert after["late.csv"].splitlines()[1:] == [
-        *[f"{4 * GOP + 1},{B},no picture"] * 3,
+        *[f"{4 * GOP + 1},{B},no frame"] * 3,
         f"{GOP + 1},,not written up to {4 * GOP}",
         f"{5 * GOP + 1},{A},tracks late",
     ]
@@ -58,7 +58,7 @@ def test_a_full_disk_at_the_end_is_logged_and_all_files_are_intact(
     writer = LiveDecisionWriter(tmp_path, CAMERAS, LETTERBOXES)
     writer.write(decision(0, choice(1, A)))
     before = written(tmp_path)
-    writer.note_late(B, [7], "tracks late")
+    writer.add_late(B, [7], "tracks late")
     with files_of_at_most(0):
         writer.close()
     assert written(tmp_path) == before

@@ -81,7 +81,7 @@ def test_a_manual_merge_follows_later_automatic_merges() -> None:
     it.merge(1, 2)
     seen(it, 1)
     it.update(epoch_of(2, word("c0", 2, {2: SMALL})))
-    assert it.registry.everybody == [3]
+    assert it.registry.all_numbers == [3]
     assert it.registry.merged == {1: 3, 2: 3}
     assert boxes(it, "c0", 2 * STRIDE) == {3: SMALL}
 
@@ -92,7 +92,7 @@ def test_a_manually_merged_person_is_away_when_both_parts_are() -> None:
     it.merge(1, 2)
     for epoch, away in ((1, set()), (2, {1}), (3, set())):
         seen(it, epoch)
-        assert it.registry.away == away
+        assert it.registry.departed == away
 
 
 def test_of_two_names_the_kept_persons_remains() -> None:

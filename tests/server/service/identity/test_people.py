@@ -243,10 +243,10 @@ def test_people_not_seen_for_long_are_forgotten_entirely() -> None:
     for epoch in range(1, 4):
         it.update(epoch_of(epoch, word("c0", epoch, {})))
     assert it.known == [number]
-    assert it.registry.away == {number}
+    assert it.registry.departed == {number}
     it.update(epoch_of(9, word("c0", 9, {})))
     assert it.known == []
-    assert it.registry.away == set()
+    assert it.registry.departed == set()
     assert it.person_of("c0", 1, 1, 0) is None
     assert not it._parts
     assert not it._last_reported

@@ -40,7 +40,7 @@ from server.service.identity.state_recovery import (
     StateRecovery,
     trusted_first_free,
 )
-from server.service.identity.state_replication import PATIENCE_S, StateReplication
+from server.service.identity.state_replication import SNAPSHOT_WAIT_S, StateReplication
 from server.service.service import BestViewService
 
 A, B = CAMERAS
@@ -120,7 +120,7 @@ def test_a_person_tracked_through_a_restart_keeps_number_and_name() -> None:
         "numbers are not used twice, not of those who have left either"
     )
     assert site.service.decider.people.registry.names == {before[1]: "Ann"}
-    assert site.service.decider.people.merged_by_hand == {}
+    assert site.service.decider.people.manual_merges == {}
 
 
 def test_numbers_survive_any_number_of_restarts() -> None:
@@ -208,7 +208,7 @@ LONG_AGO = 6 + int(MAX_DOWNTIME_S * FPS / STRIDE)
 )
 def test_no_number_or_name_is_assigned_that_may_be_another_persons(epochs: range, boot: int) -> None:
     site = tracked_site()
-    used = max(site.service.decider.people.registry.everybody)
+    used = max(site.service.decider.people.registry.all_numbers)
     site.start()
     site.track_epochs(epochs, boot=boot)
     people = site.service.decider.people
@@ -219,7 +219,7 @@ def test_no_number_or_name_is_assigned_that_may_be_another_persons(epochs: range
 
 def test_a_late_snapshot_prevents_numbers_from_being_used_twice() -> None:
     site = tracked_site()
-    used = max(site.service.decider.people.registry.everybody)
+    used = max(site.service.decider.people.registry.all_numbers)
     site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {}, B: {}})
@@ -319,7 +319,7 @@ def test_decisions_wait_for_the_snapshots_of_connected_cameras() -> None:
     it.alive(KEYS.camera(B, "alive"), is_present=False)
     assert not it.is_waiting, "a camera's token may come after its word"
     it.alive(KEYS.camera(B, "alive"), is_present=True)
-    clock.now += PATIENCE_S
+    clock.now += SNAPSHOT_WAIT_S
     assert not it.is_waiting, "one that is frozen keeps nobody waiting for longer"
     it.begin(9)
     it.alive(KEYS.camera(A, "alive"), is_present=True)
@@ -412,7 +412,7 @@ def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, othe
     site.track_epochs(range(7, 10))
     people = site.service.decider.people
     assert people.known
-    assert set(people.registry.merged).isdisjoint(people.registry.everybody)
+    assert set(people.registry.merged).isdisjoint(people.registry.all_numbers)
 
 
 def lying(site: Site, camera: str, **changes: object) -> None:
@@ -488,5 +488,5 @@ def test_a_flapping_camera_without_a_snapshot_is_waited_for_once() -> None:
     for _ in range(4):
         it.alive(KEYS.camera(B, "alive"), is_present=False)
         it.alive(KEYS.camera(B, "alive"), is_present=True)
-        clock.now += PATIENCE_S / 2
+        clock.now += SNAPSHOT_WAIT_S / 2
     assert not it.is_waiting

@@ -30,7 +30,7 @@ class LossyEpochs:
             messages = [word(camera, number, {}) for camera in CAMERAS if camera != late]
             epoch = epoch_of(number, *messages)
             late_ones = () if late is None else (late,)
-            self.loss_recorder.epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
+            self.loss_recorder.record_epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
 
 
 def test_a_spell_of_late_tracks_is_logged_when_it_begins_and_when_it_ends(
@@ -64,5 +64,5 @@ def test_a_camera_that_has_disconnected_is_not_logged_as_in_time(caplog: pytest.
     lossy = LossyEpochs()
     lossy.epochs(range(3), late=B)
     lossy.now += 1000.0
-    lossy.loss_recorder.epoch(epoch_of(9, word(A, 9, {})))
+    lossy.loss_recorder.record_epoch(epoch_of(9, word(A, 9, {})))
     assert len(caplog.messages) == 1

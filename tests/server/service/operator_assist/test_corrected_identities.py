@@ -13,7 +13,7 @@ from server.camera.track_messages import TrackMessageBuilder
 from server.messaging.messages import CameraTracks
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.corrections import MarkedPosition, corrections_for_tracker
+from server.service.operator_assist.operator_assist import MarkedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
 

@@ -75,7 +75,7 @@ def shows(hall: Hall, recording: Path, gops: range, choices: Mapping[int, str | 
             first=gop * GOP, frames=GOP, choices={} if camera is None else {1: camera}, boxes={}, cuts=[]
         )
         service.recorder.put(choices_of_gop, PULSE0)
-        choice = ObjectChoice(1, camera, None, away=False)
+        choice = ObjectChoice(1, camera, None, departed=False)
         service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 

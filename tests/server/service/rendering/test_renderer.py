@@ -70,7 +70,7 @@ def test_a_video_has_no_gap_and_never_goes_back_when_its_worker_is_replaced() ->
     assert video.head is None
     viewer = video.broadcaster.subscribe()
     video.put(frames(0, 2 * GOP))
-    video.note_new_process()
+    video.begin_process()
     video.put(frames(GOP, GOP))  # shown already
     video.put(frames(2 * GOP + 1, GOP - 1))  # refers to frames of the other worker
     video.put(frames(3 * GOP, GOP))

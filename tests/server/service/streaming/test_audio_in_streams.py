@@ -61,7 +61,7 @@ async def loud(recording: Path) -> AsyncIterator[Hall]:
 
 
 def decide(service: FedService, gop: int, camera: str | None) -> None:
-    choice = ObjectChoice(1, camera, None, away=False)
+    choice = ObjectChoice(1, camera, None, departed=False)
     service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
@@ -159,7 +159,7 @@ async def test_all_streams_share_the_bytes_of_the_audio(loud: Hall, recording: P
     for camera in CAMERAS:
         for unit in encoded(0):
             service.ingest.video(video(camera, unit))
-    both = (ObjectChoice(1, A, None, away=False), ObjectChoice(2, B, None, away=False))
+    both = (ObjectChoice(1, A, None, departed=False), ObjectChoice(2, B, None, departed=False))
     service.splicer.publish_decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
     segmenters = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
     one, two = [segmenter._segments[0]._chunks[0] for segmenter in segmenters if segmenter is not None]
@@ -212,7 +212,7 @@ async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: Hall, recordi
     service.come(*CAMERAS)
     for unit in flashing(recording):
         service.ingest.video(video(A, unit))
-    choice = ObjectChoice(1, A, None, away=False)
+    choice = ObjectChoice(1, A, None, departed=False)
     decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
     service.decision_state.put(decisions[0])
     service.splicer.publish_decision(decisions[0])

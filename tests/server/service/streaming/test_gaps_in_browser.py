@@ -35,7 +35,7 @@ async def test_media_source_extensions_play_over_missing_pictures_to_the_end(hal
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
 
     def show(gop: int) -> None:
-        choice = ObjectChoice(1, A if frame_buffer.has(gop * GOP) else None, None, away=False)
+        choice = ObjectChoice(1, A if frame_buffer.has(gop * GOP) else None, None, departed=False)
         splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)

@@ -38,7 +38,7 @@ class Site:
                     self.frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
 
     def show(self, gop: int, camera: str | None) -> None:
-        choice = ObjectChoice(1, camera, None, away=False)
+        choice = ObjectChoice(1, camera, None, departed=False)
         self.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     @property
@@ -126,7 +126,7 @@ def test_a_segment_stays_available_for_a_playlists_duration_after_it_left() -> N
 
 def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_camera() -> None:
     site = Site()
-    choices = tuple(ObjectChoice(number, CAMERAS[0], None, away=False) for number in (1, 2))
+    choices = tuple(ObjectChoice(number, CAMERAS[0], None, departed=False) for number in (1, 2))
     site.splicer.publish_decision(GopDecision(0, GOP, choices, {}, {}, (), NO_REASON))
     reels = [
         site.splicer.segmenter_of_person(1),

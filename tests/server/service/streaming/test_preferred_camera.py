@@ -36,8 +36,8 @@ class Site:
         seen: list[list[NumberedBox]] = [
             [(number, 1.0, 1.0, 9.0, 9.0)] if frame < frames_seen else [] for frame in range(GOP)
         ]
-        choices = () if merged and 1 in merged else (ObjectChoice(1, B, B, away=False),)
-        choices += (ObjectChoice(2, B, B, away=False),)
+        choices = () if merged and 1 in merged else (ObjectChoice(1, B, B, departed=False),)
+        choices += (ObjectChoice(2, B, B, departed=False),)
         boxes = {A: seen, B: [[] for _ in seen]}
         decision = GopDecision(self.gops * GOP, GOP, choices, boxes, merged or {}, (), NO_REASON)
         self.splicer.publish_decision(decision)

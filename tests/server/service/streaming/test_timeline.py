@@ -105,7 +105,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
         whole = wish and all(
             frame_buffers[wish].has(pulse) for pulse in range(number * GOP, (number + 1) * GOP)
         )
-        choice = ObjectChoice(1, wish if whole else None, None, away=False)
+        choice = ObjectChoice(1, wish if whole else None, None, departed=False)
         splicer.publish_decision(GopDecision(number * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
         best = best or splicer.persons[1].subscribe()
     assert best is not None
@@ -139,7 +139,7 @@ def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
 
 
 def decide(splicer: Splicer, gop: int, camera: str | None) -> None:
-    choice = ObjectChoice(1, camera, None, away=False)
+    choice = ObjectChoice(1, camera, None, departed=False)
     splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 

@@ -52,7 +52,7 @@ def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
 
 
 def reason_of(decision: GopDecision) -> str:
-    return reason(decision.choices[0], decision.why.of(decision.choices[0].number))
+    return reason(decision.choices[0], decision.reasons.of(decision.choices[0].number))
 
 
 def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
@@ -65,7 +65,7 @@ def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
 def test_the_camera_with_the_bigger_box_shows_the_person() -> None:
     decisions = decide(decider(), [{A: {1: SMALL}, B: {1: LARGE}}] * 4)
     assert shown(decisions) == [B, B, B]
-    views = decisions[-1].why.of(1).views
+    views = decisions[-1].reasons.of(1).views
     assert views[B].cost == 0.0
     assert views[A].cost == pytest.approx(1 - (views[A].quality or 0.0) / (views[B].quality or 0.0))
 
@@ -99,7 +99,7 @@ def test_a_camera_with_a_missing_frame_is_not_selected_for_the_gop() -> None:
     it = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, B, A, A, A]
-    assert decisions[1].why.of(1).views[A].cost is None
+    assert decisions[1].reasons.of(1).views[A].cost is None
 
 
 def test_no_camera_is_selected_while_none_can_be_shown() -> None:
@@ -207,7 +207,7 @@ def test_a_camera_that_dies_within_the_look_ahead_is_left_at_that_gop() -> None:
         after += it.step(epoch_of(number, word(B, number, story[number][B])))
     assert shown(before) == [A, A]
     assert shown(after) == [B, B, B, B, B], "no hole, and one cut"
-    assert after[0].why.of(1).views[A].cost is None
+    assert after[0].reasons.of(1).views[A].cost is None
 
 
 def test_the_look_ahead_is_evaluated_again_without_a_dead_camera() -> None:
@@ -215,7 +215,7 @@ def test_the_look_ahead_is_evaluated_again_without_a_dead_camera() -> None:
     late = decider(has=lambda camera, pulse: camera == B or pulse < 2 * GOP, view={"lookahead": 4 * GOP})
     early = decide(late, [*story, *[{B: {1: SMALL}}] * 4])
     assert shown(early) == [A, A, B, B]
-    sum_ahead = early[0].why.of(1)
+    sum_ahead = early[0].reasons.of(1)
     assert sum_ahead.stay is None
     assert sum_ahead.views[A].cost is None, "it cannot be shown to the end of the look-ahead"
     assert reason_of(early[0]) == "c0 is shown for as long as it can be: some of its next frames are missing."
@@ -225,7 +225,7 @@ def test_the_reason_announces_a_planned_cut() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3 + [{A: {1: SMALL}, B: {1: LARGE}}] * 7
     decisions = decide(decider(view={"lookahead": 4 * GOP, "switch_cost_s": 0.04}), story)
     last = shown(decisions).index(B) - 1
-    why = decisions[last].why.of(1)
+    why = decisions[last].reasons.of(1)
     assert why.stay is not None
     assert why.cut is not None
     assert why.stay > why.cut, "for the whole look-ahead the other one would be better"
@@ -261,7 +261,7 @@ def test_a_track_that_changes_person_within_the_window_counts_for_each_in_their_
     )[None].repeat(len(keys), axis=0)
     decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 4)
     assert [[number for number, *_ in frame] for frame in decisions[1].boxes[A]] == [[1], [1], [2], [2], [2]]
-    assert decisions[1].why.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
+    assert decisions[1].reasons.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
 
 
 def test_with_relative_quality_distance_makes_no_difference() -> None:

@@ -56,7 +56,7 @@ def test_every_gop_is_decided_once_in_order_with_known_frames(
         new = decider.step(epoch)
         assert len(new) <= -(-STRIDE // gop) + 1, "who watches is not overrun"
         for decision in new:
-            assert decision.why.of(1).frames == decider.view.lookahead
+            assert decision.reasons.of(1).frames == decider.view.lookahead
             assert decision.first + decider.view.lookahead - 1 <= epoch.last
         decided += new
     assert [it.first for it in decided] == [gop * n for n in range(len(decided))]

@@ -102,12 +102,12 @@ def test_a_person_outside_the_picture_is_not_expected_in_it() -> None:
     there = {A: {1: at(*PLACE), 2: at(60.0, 40.0)}, B: {1: at(*PLACE, B)}}
     decisions = decide(decider(), [there] * 20)
     assert shown(decisions, 2) == [A] * 19
-    assert decisions[-1].why.of(2).views[B].undetected == 0.0
+    assert decisions[-1].reasons.of(2).views[B].undetected == 0.0
 
 
 def test_the_explanation_includes_undetected_views_and_their_quality() -> None:
     decisions = decide(decider(), [FOUND] * 20 + [COVERED] * 6)
-    why = decisions[-1].why.of(1)
+    why = decisions[-1].reasons.of(1)
     assert (why.views[A].seen, why.views[A].undetected) == (1.0, 0.0)
     assert (why.views[B].seen, why.views[B].undetected) == (0.0, 1.0)
     assert why.views[B].quality is None
@@ -134,7 +134,9 @@ def test_a_test_counts_for_the_decided_frames_up_to_the_next_test(
 
 def test_the_weight_scales_the_quality_of_undetected_views() -> None:
     story = [FOUND] * 20 + [COVERED] * 6
-    whole, half = (decide(decider(undetected_weight=it), story)[-1].why.of(1).views[B] for it in (1.0, 0.5))
+    whole, half = (
+        decide(decider(undetected_weight=it), story)[-1].reasons.of(1).views[B] for it in (1.0, 0.5)
+    )
     assert half.undetected_quality == pytest.approx(0.5 * (whole.undetected_quality or 0.0))
 
 
@@ -166,4 +168,4 @@ def test_shards_select_views_as_a_single_service(
             expected = [choice for choice in one.choices if choice.number % 2 == index]
             assert list(mine.choices) == expected
             for choice in mine.choices:
-                assert mine.why.of(choice.number) == one.why.of(choice.number)
+                assert mine.reasons.of(choice.number) == one.reasons.of(choice.number)

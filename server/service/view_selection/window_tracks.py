@@ -27,7 +27,7 @@ class WindowTracks:
         row: (L,) index of the row.
         frame: of each row, counted from `first`.
         camera: of each row, by index.
-        searched: of each row, whether detection ran.
+        has_detection: of each row, whether detection ran.
     """
 
     def __init__(
@@ -35,13 +35,13 @@ class WindowTracks:
     ) -> None:
         self._spans = list(chain.from_iterable(spans))
         self._first = first
-        camera = np.repeat(np.arange(len(spans)), [len(own) for own in spans])
+        camera = np.repeat(np.arange(len(spans)), [len(camera_spans) for camera_spans in spans])
         lengths = np.array([it.last - it.first + 1 for it in self._spans], dtype=np.int64)
         self._tracks = np.array([len(it.window.window.keys) for it in self._spans], dtype=np.int64)
         self._camera = camera
         self.camera: Ints = np.repeat(camera, lengths)
         self.frame = _joined([np.arange(it.first - first, it.last - first + 1) for it in self._spans])
-        self.searched = ~undetected[self.camera, self.frame]
+        self.has_detection = ~undetected[self.camera, self.frame]
         self.row: Ints = np.repeat(np.arange(len(self.frame)), np.repeat(self._tracks, lengths))
         self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._spans)])
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
@@ -54,8 +54,8 @@ class WindowTracks:
         if not len(self.quality) or not len(numbers):
             return np.full(len(self.quality), -1)
         windows = [it.window.window for it in self._spans]
-        locals_ = np.concatenate([it.locals for it in windows])
-        tracks = np.repeat(self._camera, self._tracks) * (locals_.max() + 1) + locals_
+        local_ids = np.concatenate([it.local_ids for it in windows])
+        tracks = np.repeat(self._camera, self._tracks) * (local_ids.max() + 1) + local_ids
         _, once, back = np.unique(tracks, return_index=True, return_inverse=True)
         keys = list(chain.from_iterable(it.keys for it in windows))
         track_numbers = people.numbers([keys[at] for at in once.tolist()], self._first, frames)
@@ -63,21 +63,21 @@ class WindowTracks:
         each = np.split(back, np.cumsum(self._tracks)[:-1])
         return _joined(
             [
-                persons[it.first - self._first : it.last - self._first + 1, own].reshape(-1)
-                for it, own in zip(self._spans, each, strict=True)
+                persons[it.first - self._first : it.last - self._first + 1, columns].reshape(-1)
+                for it, columns in zip(self._spans, each, strict=True)
             ]
         )
 
     def boxes(self, places: Ints) -> Floats:
-        """Return the boxes at flat indices (P,), rising: (P, 4) pixels of the site's picture."""
+        """Return the boxes at flat indices (P,), rising: (P, 4) pixels of the site's image."""
         boxes = np.empty((len(places), 4))
         ends = np.searchsorted(places, self._begins)
         for span, begin, start, end in zip(
             self._spans, self._begins.tolist(), ends.tolist(), ends[1:].tolist(), strict=False
         ):
-            own = span.window.window
-            frame, track = np.divmod(places[start:end] - begin, max(len(own.keys), 1))
-            boxes[start:end] = own.boxes[track, frame + span.first - own.first]
+            window = span.window.window
+            frame, track = np.divmod(places[start:end] - begin, max(len(window.keys), 1))
+            boxes[start:end] = window.boxes[track, frame + span.first - window.first]
         return boxes
 
     def terms(self, place: int) -> Floats:

@@ -11,7 +11,7 @@ from bestview import TrackKey
 from fakes.service.scripted_cameras import HEIGHT, WIDTH, word
 from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
-from server.service.identity.id_switches import IdSwitch, find_id_switches
+from server.service.identity.id_switch_repair import IdSwitch, find_id_switches
 from server.service.ingest.window_history import HistorySpan
 
 FRAMES, FIRST = 20, 100
