@@ -128,7 +128,7 @@ class PeerDetectionExchange:
     def _log_late(self, camera: str, pulse: int) -> None:
         more = self._late_log[camera].record()
         if more is not None:
-            text = "camera %s: detections of camera %s in frame %d came too late%s"
+            text = "camera %s: detections of camera %s in frame %d arrived too late%s"
             log.info(text, self._camera, camera, pulse, more)
 
     def _log_in_time(self, camera: str) -> None:

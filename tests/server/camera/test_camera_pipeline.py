@@ -133,7 +133,7 @@ def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_the
     assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
 
 
-def test_of_a_hole_of_days_its_end_is_told(recording: Path) -> None:
+def test_only_the_end_of_a_very_long_gap_is_reported(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     late = 100_000 * STRIDE
     words = [pipeline.track(pulse, None) for pulse in (*range(STRIDE), *range(late, late + STRIDE))]
@@ -155,7 +155,7 @@ def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -
     assert word.shed == word.without_detection == [3]
 
 
-def test_a_camera_that_starts_after_its_recording_is_over_says_that_it_is_over(recording: Path) -> None:
+def test_a_camera_started_after_its_recording_reports_the_end(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     with pytest.raises(SourceEndedError):
         pipeline.take(1000)
@@ -165,7 +165,7 @@ def test_a_camera_that_starts_after_its_recording_is_over_says_that_it_is_over(r
     assert (word.epoch, word.last, word.tracks) == (1000 // STRIDE, 999, [])
 
 
-def test_pictures_of_another_size_are_fitted_and_boxes_say_whose_size(tmp_path: Path) -> None:
+def test_images_of_another_size_are_letterboxed_and_messages_have_the_size(tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 6)
     [*_, last] = offline(config_of(tmp_path))
     assert last.tracks is not None

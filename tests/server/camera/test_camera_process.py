@@ -101,7 +101,7 @@ def rendered(config: Config, folder: Path) -> dict[str, bytes]:
     return in_folder(folder)
 
 
-async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
+async def test_recordings_run_to_their_end_without_losses(
     recording: Path, tmp_path: Path, running: list[Running]
 ) -> None:
     config = site(recording, c0="c0.mp4", c1="c1.mp4")
@@ -141,7 +141,7 @@ async def test_recordings_run_to_their_end_and_every_frame_and_word_is_there(
     assert statuses[-1].missed == 0
 
 
-async def test_a_camera_that_goes_is_seen_to_be_gone_and_the_others_go_on(
+async def test_a_disconnected_camera_is_detected_and_others_continue(
     tmp_path: Path, running: list[Running]
 ) -> None:
     config = site(tmp_path, c0="scene:room?camera=0&objects=1", c1="scene:room?camera=1&objects=1")
@@ -187,7 +187,7 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
         assert abs(spread.worst) < PATIENCE
 
 
-async def test_a_camera_and_a_service_prove_who_they_are_to_pulses_that_ask(
+async def test_cameras_and_services_authenticate_to_the_pulse_server(
     tmp_path: Path, running: list[Running]
 ) -> None:
     (tmp_path / "users").write_text("".join(f"{name}:{name * 8}\n" for name in ("c0", "bestview")))
@@ -259,7 +259,7 @@ class Overloaded(LoadMonitor):
         return 4
 
 
-async def test_a_camera_on_the_topmost_rung_shows_every_gop_and_ends_every_window_in_time(
+async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
     recording: Path, tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.camera.process.LoadMonitor", Overloaded)

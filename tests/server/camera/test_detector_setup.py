@@ -27,7 +27,7 @@ def observer(folder: Path, detect: dict[str, Any], **camera: Any) -> Any:
     return make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
 
 
-def test_the_kind_says_which_detector(tmp_path: Path) -> None:
+def test_the_kind_selects_the_detector(tmp_path: Path) -> None:
     assert isinstance(observer(tmp_path, {}), BackgroundDetector)
     hog = observer(
         tmp_path,
@@ -37,7 +37,7 @@ def test_the_kind_says_which_detector(tmp_path: Path) -> None:
     assert (hog.settings.max_detections, hog.bins) == (3, 16)
 
 
-def test_boxes_are_the_papers_whatever_else_is_set(tmp_path: Path) -> None:
+def test_kind_boxes_always_has_the_settings_of_the_paper(tmp_path: Path) -> None:
     boxes = observer(tmp_path, {"kind": "boxes", "height_model": {"enabled": True}})
     assert isinstance(boxes, BackgroundDetector)
     for part in ("appearance", "shadows", "box_filter", "height_model", "foreground_fit"):
@@ -48,7 +48,7 @@ def test_boxes_are_the_papers_whatever_else_is_set(tmp_path: Path) -> None:
     ("row", "unit", "slope"),
     [(-10.0, "m", 0.5), (8.0, "cm", 0.5), (8.0, "grid", None), (8.0, "mm", None), (30.0, "m", None)],
 )
-def test_metres_of_ground_that_ends_above_the_middle_say_how_tall_people_are(
+def test_a_metric_homography_gives_the_height_of_people(
     tmp_path: Path, row: float, unit: str, slope: float | None
 ) -> None:
     high = 3.4 * {"cm": 100.0}.get(unit, 1.0)
@@ -96,7 +96,7 @@ def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:
         ({}, {"detections": "none.txt"}, "camera c0: detections: "),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(
+def test_errors_are_reported_in_one_line(
     tmp_path: Path, detect: dict[str, Any], camera: dict[str, Any], expected: str
 ) -> None:
     with pytest.raises(UserError) as caught:

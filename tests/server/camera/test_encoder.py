@@ -1,4 +1,4 @@
-"""What an encoder keeps to: the key pictures' places, the same bytes each time, and a cap on the rate."""
+"""The encoder: positions of keyframes, reproducible bytes, and the bit rate limit."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_of_vp8_too_a_pulse_is_a_frame_and_less_is_better() -> None:
     assert most_kbps(fine) > 1.5 * most_kbps(coarse)
 
 
-def test_what_a_capped_camera_sees_does_not_shape_its_parameter_sets() -> None:
+def test_parameter_sets_do_not_depend_on_the_images() -> None:
     settings = EncodeSettings(gop=10, max_kbps=CAP)
     sets = {parameter_sets(nal_units(unit.data)) for unit in encoded(settings) if unit.key}
     assert len(sets) == 1

@@ -1,4 +1,4 @@
-"""Cameras that look straight down: people are found in them, and are the same in two of them."""
+"""Overhead cameras: people are detected, and are the same in two of them."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_people_are_the_same_in_two_cameras_that_look_straight_down(
     assert _stream_format(seen_by_two, ()) < 0.9
 
 
-def test_who_stands_upright_and_who_is_seen_from_above_do_not_vouch_for_each_other() -> None:
+def test_upright_and_overhead_cameras_are_not_peers() -> None:
     assert _config("upright").peers_of("c0") == ("c1",)
     assert not _config("overhead").peers_of("c0")
     assert _config("overhead").overhead == {"c0", "c1"}

@@ -1,4 +1,4 @@
-"""A person out of focus is less sharp, however large or bright; who is hidden is as sharp as they were."""
+"""A person out of focus is less sharp at any size and brightness; a hidden one keeps their sharpness."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def test_light_and_size_make_little_difference_and_blur_makes_much() -> None:
 
 
 @pytest.mark.parametrize("box", [(0.0, 0.0, 3.0, 90.0), (-40.0, 10.0, 2.0, 90.0), (300.0, 10.0, 340.0, 90.0)])
-def test_of_next_to_nothing_nothing_is_said(box: Box) -> None:
+def test_tiny_boxes_have_no_sharpness(box: Box) -> None:
     assert sharpness(picture(), box) is None
 
 
-def test_who_is_hidden_is_as_sharp_as_they_were_and_who_went_is_forgotten() -> None:
+def test_a_hidden_track_keeps_its_sharpness_and_an_ended_one_is_forgotten() -> None:
     it = SharpnessMemory()
     [seen] = it.measure(word("c0", 0, {1: BOX}), picture()).tracks
     assert seen.sharpness == sharpness(picture(), BOX)

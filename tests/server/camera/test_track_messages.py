@@ -1,4 +1,4 @@
-"""What a camera says of a window."""
+"""Track messages of a window."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracking import WindowResult, WindowTrack
 SEEN: Box = (10.0, 20.0, 40.0, 110.0)
 
 
-def test_moments_of_hiding_are_told_where_the_tracker_bridges_them() -> None:
+def test_bridged_occlusions_have_interpolated_boxes() -> None:
     boxes = np.array([SEEN, (np.nan,) * 4, SEEN, (np.nan,) * 4])
     bridged = boxes.copy()
     bridged[1] = SEEN
@@ -23,7 +23,7 @@ def test_moments_of_hiding_are_told_where_the_tracker_bridges_them() -> None:
     assert [it.boxes for it in message.tracks] == [[SEEN, SEEN, SEEN, None]]
 
 
-def test_a_box_beyond_all_pictures_can_still_be_told() -> None:
+def test_a_box_far_outside_the_image_can_be_encoded() -> None:
     boxes = np.array([(-4e9, 20.0, 3e9, 110.0)])
     track = WindowTrack(7, boxes, boxes, np.full(1, 0.25), 0.5)
     message = TrackMessageBuilder("c0", 1, (640, 360), stride=1).regular(

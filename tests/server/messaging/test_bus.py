@@ -1,4 +1,4 @@
-"""zenoh for asyncio: who comes first does not matter, routers may come and go, closing ends everything."""
+"""zenoh for asyncio: any order of connecting, restarts of the router, and closing of sessions."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ async def test_two_clients_exchange_messages_through_the_router_until_one_unsubs
         bus.close()
 
 
-async def test_a_session_that_hears_other_clients_needs_the_router(
+async def test_a_listener_session_needs_the_router(
     settings: ZenohSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)

@@ -89,7 +89,7 @@ def test_reasons_are_discarded_when_pulses_start_again() -> None:
     assert state.explain(1, 5) is not None
 
 
-def test_a_person_who_is_gone_has_no_explanation() -> None:
+def test_a_departed_person_has_no_explanation() -> None:
     state = DecisionState(25.0)
     decided(state, 0)
     state.explain(2)

@@ -57,8 +57,8 @@ async def test_repeated_late_messages_are_logged_rarely_and_when_they_end(
     clock[0] = 120.0
     exchange._log_in_time("c1")
     assert caplog.messages == [
-        "camera c0: detections of camera c1 in frame 0 came too late",
-        "camera c0: detections of camera c1 in frame 1500 came too late, and 2 times before",
+        "camera c0: detections of camera c1 in frame 0 arrived too late",
+        "camera c0: detections of camera c1 in frame 1500 arrived too late, and 2 times before",
         "camera c0: detections of camera c1 arrive in time again",
     ]
 

@@ -53,11 +53,15 @@ def test_a_line_has_time_level_process_and_event() -> None:
 @pytest.mark.parametrize(
     ("message", "values", "about"),
     [
-        ("camera %s: detections of camera %s in frame %d came too late", ("c0", "c1", 7), {"camera": "c0"}),
+        (
+            "camera %s: detections of camera %s in frame %d arrived too late",
+            ("c0", "c1", 7),
+            {"camera": "c0"},
+        ),
         ("drawing object %d on camera %s", (3, "c1"), {"object": 3, "camera": "c1"}),
         ("100 %% of camera %s after %.1f s", ("c2", 0.5), {"camera": "c2"}),
         ("%d frames of %-5s camera %s", (4, "the", "c2"), {"camera": "c2"}),
-        ("every camera's recording is over", (), {}),
+        ("every camera's recording has ended", (), {}),
         ("camera %s went to camera %s", ("a", "b"), {"camera": "a"}),
     ],
 )

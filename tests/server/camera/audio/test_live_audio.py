@@ -1,4 +1,4 @@
-"""A network camera's sound comes out in step with its pictures, by the camera's own clock."""
+"""Audio of a network camera is in sync with its video, by the camera's own clock."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def camera(tmp_path: Path) -> Iterator[str]:
     server.server_close()
 
 
-def test_a_camera_is_heard_beside_its_pictures(camera: str) -> None:
+def test_the_audio_of_a_camera_is_received_with_its_video(camera: str) -> None:
     sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
     source = LiveStream(camera, {"probesize": "20000", "analyzeduration": "200000"}, sound)
     frames: list[EncodedAudioFrame] = []
@@ -111,7 +111,7 @@ def handed_over(path: Path, sound: LiveAudioSource, first: int) -> list[EncodedA
 @pytest.mark.parametrize(
     ("codec", "sends"), [("aac", "aac"), ("aac", "libopus"), ("opus", "libopus"), ("opus", "aac")]
 )
-def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew(
+def test_audio_is_in_sync_with_video_also_after_a_restart_of_the_camera(
     tmp_path: Path, codec: Coding, sends: str
 ) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
@@ -128,9 +128,7 @@ def test_a_beep_is_where_the_flash_is_shown_also_after_the_camera_has_begun_anew
 
 
 @pytest.mark.parametrize(("rate", "channels"), [(48_000, 1), (44_100, 2), (32_000, 1)])
-def test_a_camera_is_heard_on_when_its_sound_changes_while_it_sends(
-    tmp_path: Path, rate: int, channels: int
-) -> None:
+def test_audio_continues_when_its_format_changes(tmp_path: Path, rate: int, channels: int) -> None:
     before = write_flashes(tmp_path / "before.aac", FRAMES, rate=rate, channels=channels, pictures=False)
     after = write_flashes(tmp_path / "after.aac", FRAMES, pictures=False)
     both = tmp_path / "both.aac"
@@ -155,7 +153,7 @@ def shifted(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:
 
 @pytest.mark.parametrize("sends", ["aac", "libopus"], ids=["passed on", "encoded"])
 @pytest.mark.parametrize("lag", [0.0, 0.1, 0.3, -0.1])
-def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_connected_anew(
+def test_audio_continues_after_a_time_step_and_after_a_reconnect(
     tmp_path: Path, sends: str, lag: float
 ) -> None:
     """As that of MPEG-TS does once in 26.5 hours; the sound's steps ``lag`` after the pictures'."""
@@ -189,7 +187,7 @@ def test_when_a_cameras_time_steps_back_it_is_heard_on_and_so_it_is_when_it_is_c
     assert numbers[-1] < 3 * FRAMES / FPS * FORM.rate / FRAME
 
 
-def test_a_camera_without_sound_is_no_mistake(tmp_path: Path) -> None:
+def test_a_camera_without_audio_is_valid(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", 10)
     sound = LiveAudioSource(SoundSettings(source="c0"), FPS)
     sound.opened(None)

@@ -1,4 +1,4 @@
-"""Opus where the site says so: passed on byte for byte, or what all else is encoded to, in step to 40 ms."""
+"""Opus audio: passed through byte for byte, other audio encoded to it, in sync within 40 ms."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_silence_decodes_to_nothing_at_all(channels: int) -> None:
 
 @pytest.mark.parametrize("lasts", ["2.5", "5", "10", "20", "40", "60"])
 @pytest.mark.parametrize("purpose", ["audio", "voip", "lowdelay"])
-def test_a_packet_says_how_long_it_is(lasts: str, purpose: str) -> None:
+def test_the_length_of_a_packet_is_parsed(lasts: str, purpose: str) -> None:
     encoder = av.CodecContext.create("libopus", "w")
     encoder.sample_rate, encoder.layout, encoder.format = 48_000, "mono", "s16"
     encoder.options = {"frame_duration": lasts, "application": purpose}
@@ -129,7 +129,7 @@ def test_a_packet_says_how_long_it_is(lasts: str, purpose: str) -> None:
 
 
 @given(st.binary(max_size=8))
-def test_any_bytes_say_some_length_or_none(data: bytes) -> None:
+def test_arbitrary_bytes_have_some_length_or_none(data: bytes) -> None:
     assert 0 <= packet_samples(data) <= 63 * 2880
 
 
@@ -205,7 +205,7 @@ async def test_streams_live_and_past_have_it_in_step_and_transport_streams_none(
 
 
 @needs_ffprobe
-async def test_ffprobe_has_nothing_to_say(hall: Hall, recording: Path, tmp_path: Path) -> None:
+async def test_ffprobe_reports_no_audio_errors(hall: Hall, recording: Path, tmp_path: Path) -> None:
     sends(hall.service, recording)
     live, ts = await watched(hall, "/objects/1/best.mp4", "/objects/1/best.ts")
     (tmp_path / "live.mp4").write_bytes(live)
@@ -216,7 +216,7 @@ async def test_ffprobe_has_nothing_to_say(hall: Hall, recording: Path, tmp_path:
 
 
 @needs_ffprobe
-async def test_what_somebody_keeps_has_it_too(hall: Hall, recording: Path, tmp_path: Path) -> None:
+async def test_a_download_contains_opus_audio(hall: Hall, recording: Path, tmp_path: Path) -> None:
     sends(hall.service, recording)
     decide(hall, range(GOPS))
     out, url = tmp_path / "one.mp4", f"http://127.0.0.1:{hall.port}/"

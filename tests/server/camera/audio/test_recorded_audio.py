@@ -1,4 +1,4 @@
-"""A recording's sound comes out as numbered AAC, in step with its pictures: as it is where it fits."""
+"""Audio of a recording: numbered AAC frames in sync with the video, passed through where compatible."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def numbers_grow(frames: list[EncodedAudioFrame]) -> bool:
     return all(a.number < b.number for a, b in pairwise(frames))
 
 
-def test_what_fits_is_passed_on_byte_for_byte(tmp_path: Path) -> None:
+def test_compatible_audio_is_passed_through_byte_for_byte(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     with av.open(str(path)) as container:
@@ -113,7 +113,7 @@ def test_a_recording_with_no_sound_beside_its_pictures_is_silent_and_is_not_read
 
 
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
-def test_whoever_begins_late_hears_the_same_moments(tmp_path: Path, codec: str) -> None:
+def test_a_late_start_gives_the_same_audio_frames(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "late.mkv", FRAMES, codec=codec)
     late = 10 * FRAMES
     frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
@@ -156,7 +156,7 @@ def test_one_packet_with_a_time_far_ahead_silences_nothing_behind_it() -> None:
     assert times(0, 3600, 7200, 1, 2) == [0, 3600, 1, 2]
 
 
-def test_sound_that_cannot_be_converted_is_silence_and_said_once(
+def test_audio_that_cannot_be_converted_is_silent_and_logged_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "nine.wav"
@@ -184,7 +184,7 @@ def test_sound_is_in_step_with_pictures_of_another_rate_than_the_site_s(
     assert beeps(as_adts(frames, FORM), "aac") == pytest.approx(expected, abs=0.03)
 
 
-def test_what_has_no_sound_is_refused(tmp_path: Path) -> None:
+def test_sources_without_audio_are_refused(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
     cameras = [{"id": "c0", "source": str(path)}, {"id": "c1", "source": "scene:room"}]
 

@@ -1,4 +1,4 @@
-"""The load shedder goes up at once, down slowly, and does not oscillate."""
+"""The load shedder raises its level at once, lowers it slowly, and does not oscillate."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_camera_that_keeps_up_leaves_nothing_out() -> None:
 
 
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.6, 0.5, 0.4])
-def test_whatever_the_machine_carries_the_camera_is_soon_where_it_keeps_up(share: float) -> None:
+def test_the_level_settles_where_the_camera_keeps_up(share: float) -> None:
     levels = simulated(600.0, lambda _: share)
     level = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
@@ -81,7 +81,7 @@ def test_no_level_skips_the_end_of_a_window_or_the_beginning_of_a_gop(
 
 
 @given(stride=st.integers(1, 20), live=st.booleans())
-def test_every_rung_leaves_out_more_and_a_recording_is_always_shown_whole(stride: int, *, live: bool) -> None:
+def test_every_level_sheds_more_and_a_recording_is_always_complete(stride: int, *, live: bool) -> None:
     levels = shed_levels(stride, live=live)
     assert levels[0] == ShedLevel()
     frames = range(stride * 60)
@@ -103,7 +103,7 @@ def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> No
         assert load.level == 0
 
 
-def test_the_rungs_are_told_in_words() -> None:
+def test_levels_have_a_description() -> None:
     assert [it.description for it in shed_levels(5, live=True)] == [
         "",
         "detecting in every 2nd frame: the machine is too busy",

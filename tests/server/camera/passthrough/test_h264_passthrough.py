@@ -1,4 +1,4 @@
-"""A camera's own H.264 passes through byte for byte where it fits; otherwise the reason is logged."""
+"""A camera's own H.264 is passed through byte for byte if compatible; otherwise the reason is logged."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None
     pipeline.close()
 
 
-def test_it_can_be_cut_with_what_another_camera_encodes(tmp_path: Path) -> None:
+def test_passthrough_can_be_spliced_with_encoded_video(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
     stream_format = StreamFormat()
     frame_buffers = [FrameBuffer(FPS, FRAMES, stream_format) for _ in range(2)]
@@ -133,7 +133,7 @@ def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
 
 
 @needs_ffmpeg
-def test_what_the_manual_tells_to_do_fits(tmp_path: Path) -> None:
+def test_the_documented_camera_settings_are_compatible(tmp_path: Path) -> None:
     """A camera that is set up as docs/how-to/run.md says passes through."""
     manual = (DOCS / "how-to" / "run.md").read_text(encoding="utf-8")
     (told,) = re.findall(r"^ffmpeg .* (-c:v libx264 .*?) \S+$", manual, re.MULTILINE)
@@ -159,7 +159,7 @@ def test_what_the_manual_tells_to_do_fits(tmp_path: Path) -> None:
         ({"camera": {"offset": 1}}, "frame 0 begins a GOP, but none of the site"),
     ],
 )
-def test_what_does_not_fit_is_encoded_or_refused_with_the_reason(
+def test_incompatible_video_is_encoded_or_refused_with_the_reason(
     tmp_path: Path, changes: dict[str, Any], reason: str
 ) -> None:
     path = written(tmp_path, "mp4")
@@ -192,7 +192,7 @@ def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames
         ("encode", GOP, ""),
     ],
 )
-def test_the_cameras_process_says_once_whether_it_passes(
+def test_the_process_logs_once_whether_it_passes_through(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, h264: str, gop: int, said: str
 ) -> None:
     caplog.set_level("INFO", "server.camera.process")

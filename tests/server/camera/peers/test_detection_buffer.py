@@ -1,4 +1,4 @@
-"""The buffer waits for each peer that is in time, and not twice in vain for one that is late."""
+"""The buffer waits for punctual peers, and only once for a late one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def pulses(it: PeerDetectionBuffer, pulse: int) -> list[tuple[str, int]]:
     return [(message.camera, message.pulse) for message in it.detections_at(pulse).messages]
 
 
-def test_words_that_came_before_are_there_in_the_order_of_the_configuration() -> None:
+def test_detections_are_returned_in_configuration_order() -> None:
     it = buffer("c1", "c2")
     it.put(word(7, "c2"), 0.0)
     it.put(word(7, "c1"), 0.0)
@@ -61,7 +61,7 @@ def test_a_camera_that_was_late_is_waited_for_once_it_would_have_been_in_time() 
     assert pulses(it, 3) == [("c1", 3)]
 
 
-def test_a_word_that_was_lost_is_not_waited_for_when_a_later_one_is_there() -> None:
+def test_a_lost_message_is_not_waited_for_after_a_later_one() -> None:
     it = buffer()
     it.put(word(4), 0.0)
     it.expect(3, 0.0)
@@ -71,7 +71,7 @@ def test_a_word_that_was_lost_is_not_waited_for_when_a_later_one_is_there() -> N
     assert pulses(it, 4) == [("c1", 4)]
 
 
-def test_a_recording_that_is_over_has_nothing_more_to_say_and_nothing_is_missing() -> None:
+def test_nothing_is_expected_of_a_recording_that_has_ended() -> None:
     it = buffer()
     it.put(word(4), 0.0)
     it.put(word(5, ended=True), 0.0)
@@ -93,7 +93,7 @@ def test_a_camera_that_was_started_again_is_waited_for_again() -> None:
     assert it.is_missing(10)
 
 
-def test_a_camera_that_looks_elsewhere_is_never_waited_for_and_its_words_are_not_needed() -> None:
+def test_a_camera_without_common_ground_is_not_waited_for() -> None:
     it = buffer(near=False)
     assert not it.put(word(0), 0.0)
     for pulse in range(3):
@@ -103,7 +103,7 @@ def test_a_camera_that_looks_elsewhere_is_never_waited_for_and_its_words_are_not
         assert not it.detections_at(pulse).is_incomplete
 
 
-def test_no_more_words_are_kept_than_may_be_needed() -> None:
+def test_buffered_messages_are_bounded() -> None:
     it = buffer()
     for pulse in range(10 * MOST):
         it.put(word(pulse), 0.0)
@@ -116,7 +116,7 @@ def test_no_more_words_are_kept_than_may_be_needed() -> None:
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 3), st.floats(0, 0.5)), max_size=40))
-def test_two_waits_in_vain_have_a_word_in_time_between_them(steps: list[tuple[bool, int, float]]) -> None:
+def test_between_two_timeouts_a_message_arrives_in_time(steps: list[tuple[bool, int, float]]) -> None:
     """However words and questions come: ``steps`` are a word of so many pulses later, or a question."""
     it = buffer()
     it.put(word(0), 0.0)

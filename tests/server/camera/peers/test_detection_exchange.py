@@ -1,4 +1,4 @@
-"""Cameras of one ground tell each other what they find, live as offline; who is away costs next to none."""
+"""Cameras of the same ground exchange detections, live as offline; an absent one costs almost no delay."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ async def live(config: Config, out: Path, running: list[Running]) -> dict[str, b
 
 
 @pytest.mark.slow
-async def test_live_equals_offline_whichever_way_words_go(
+async def test_live_equals_offline_for_any_message_order(
     recording: Path, tmp_path: Path, running: list[Running]
 ) -> None:
     config = config_of(recording, 2, c1=7)
@@ -109,7 +109,7 @@ async def test_live_equals_offline_whichever_way_words_go(
     assert told["late.csv"] == b"frame,camera,reason\n"
 
 
-def test_what_others_see_counts_and_workers_that_are_in_step_by_pipes_say_the_same(recording: Path) -> None:
+def test_peer_detections_change_scores_and_piped_workers_agree(recording: Path) -> None:
     config = config_of(recording, 2, c1=7)
     workers = CameraWorkers(config)
     workers.start()
@@ -130,7 +130,7 @@ def _order(batch: EpochBatch) -> tuple[str, int]:
     return batch.camera, batch.tracks.epoch if batch.tracks else -1
 
 
-async def test_a_camera_that_never_comes_is_told_and_does_not_hold_up_the_others(
+async def test_a_camera_that_never_connects_is_logged_and_does_not_delay_others(
     recording: Path, tmp_path: Path, running: list[Running]
 ) -> None:
     config = config_of(recording, wait=0.5)
@@ -189,7 +189,7 @@ async def both(
     )
 
 
-async def test_words_go_both_ways_from_the_first_one_on(
+async def test_detections_are_exchanged_from_the_first_frame(
     pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
 ) -> None:
     _, one, two = pair
@@ -199,7 +199,7 @@ async def test_words_go_both_ways_from_the_first_one_on(
         assert second.messages == (word("c0", pulse),)
 
 
-async def test_a_camera_that_cannot_join_for_a_reason_nobody_foresaw_does_not_go_on_by_itself(
+async def test_an_unexpected_error_on_joining_ends_the_camera(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def hearing(*_: object) -> Bus:
@@ -226,7 +226,7 @@ async def test_a_camera_that_is_gone_is_waited_for_once(
     assert asyncio.get_running_loop().time() - began < 50 * WAIT
 
 
-async def test_what_is_no_word_is_counted_and_left(
+async def test_invalid_messages_are_counted_and_ignored(
     pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
 ) -> None:
     _, one, two = pair
@@ -252,7 +252,7 @@ ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
     ),
     st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4, st.floats(0, 1)), max_size=FRAME_DETECTIONS_MAX),
 )
-def test_whatever_is_read_as_a_word_can_be_gone_by(message: dict[str, Any], boxes: list[Any]) -> None:
+def test_every_decoded_message_can_be_used_for_scoring(message: dict[str, Any], boxes: list[Any]) -> None:
     config = _room()
     cross_view = CrossViewScorer(config, "c0", (640, 360), 1)
     seen = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
@@ -278,7 +278,7 @@ def _room() -> Config:
     return build_config({"cameras": cameras}, where="room", folder=Path())
 
 
-def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
+def test_only_the_most_confident_boxes_are_sent_in_order() -> None:
     config = _room()
     boxes = np.arange(4 * 150, dtype=np.float64).reshape(150, 4)
     scores = np.arange(150) % 101 / 100
@@ -292,7 +292,7 @@ def test_only_the_surest_boxes_are_told_and_in_their_order() -> None:
     assert sorted(scores) == sorted([*(row[4] for row in said.boxes), *left_out])
 
 
-def test_what_cannot_be_searched_is_no_word_that_nobody_is_there(recording: Path) -> None:
+def test_frames_without_detection_are_not_sent_as_empty(recording: Path) -> None:
     config = config_of(recording, ahead=False)
     pipeline = CameraPipeline(config, "c0")
     said = []
@@ -307,7 +307,7 @@ def test_what_cannot_be_searched_is_no_word_that_nobody_is_there(recording: Path
     assert [pulse for pulse, looked in enumerate(said) if not looked] == [*range(first), 35]
 
 
-def test_a_frame_without_a_needed_word_is_told(recording: Path) -> None:
+def test_frames_without_peer_detections_are_reported(recording: Path) -> None:
     config = config_of(recording)
     pipeline = CameraPipeline(config, "c0")
     asked, told = [], []
@@ -323,7 +323,7 @@ def test_a_frame_without_a_needed_word_is_told(recording: Path) -> None:
     assert told == asked
 
 
-def test_a_site_with_one_homography_or_none_has_nobody_to_ask(recording: Path) -> None:
+def test_a_site_with_fewer_than_two_homographies_has_no_peers(recording: Path) -> None:
     config = config_of(recording)
     plain = [camera.model_copy(update={"ground": None}) for camera in config.cameras]
     for cameras in (plain, [config.cameras[0], *plain[1:]]):

@@ -1,4 +1,4 @@
-"""A camera over the network: its newest picture at every pulse, and a new connection when it was away."""
+"""A network camera: its newest image at every pulse, and a new connection after an absence."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
         source.close()
 
 
-def test_a_camera_that_is_away_for_long_is_told_of_once_and_when_it_is_back(
+def test_a_long_absence_is_logged_once_and_so_is_the_return(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO", "server.camera.sources.live_stream")
@@ -274,7 +274,7 @@ def test_a_picture_that_cannot_be_decoded_cuts_no_connection(
         source.close()
 
 
-def test_a_mistake_while_reading_ends_the_connection_and_not_the_camera(
+def test_a_read_error_ends_the_connection_but_not_the_camera(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
@@ -328,7 +328,7 @@ def test_options_are_passed_on(camera: MotionJpeg) -> None:
     source.close()
 
 
-def test_a_host_that_nobody_knows_is_told_from_a_camera_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_host_is_distinguished_from_a_failing_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     """FFmpeg says the same of both."""
 
     def refused(*_: object, **__: object) -> None:

@@ -1,4 +1,4 @@
-"""Pictures are shown as they are meant: upright, with square pixels, and all of one size."""
+"""Images are upright, with square pixels, and all of one size."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def film(path: Path, turn: int = 0, *, flip: bool = False, frames: int = 20, asp
 
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
 @pytest.mark.parametrize(("turn", "flip"), WAYS)
-def test_a_recording_is_shown_as_its_display_matrix_says(
+def test_the_display_matrix_is_applied_to_a_recording(
     tmp_path: Path, suffix: str, turn: int, flip: bool
 ) -> None:
     path = film(tmp_path / f"phone.{suffix}", turn, flip=flip, frames=3)
@@ -118,7 +118,7 @@ def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> 
         (0, "4:3", r"it is shown stretched \(its pixels are 1.33 times as wide as high\)"),
     ],
 )
-def test_what_is_turned_or_stretched_does_not_pass_through(
+def test_rotated_or_stretched_video_is_not_passed_through(
     tmp_path: Path, served: str, turn: int, aspect: str, why: str
 ) -> None:
     path = film(tmp_path / "own.mkv", turn, aspect=aspect, frames=40)
@@ -128,7 +128,7 @@ def test_what_is_turned_or_stretched_does_not_pass_through(
         PassthroughStream(f"{served}/own.mkv", {}, None, SITE)
 
 
-def test_what_lies_as_it_is_passes_through(tmp_path: Path) -> None:
+def test_upright_video_is_passed_through(tmp_path: Path) -> None:
     PassthroughRecording(str(film(tmp_path / "own.mp4")), 0, "stop", SITE).close()
 
 
@@ -161,9 +161,7 @@ def test_a_stream_is_shown_upright_from_its_first_picture_on(tmp_path: Path, ser
         source.close()
 
 
-def test_a_size_that_changes_midway_is_fitted_into_the_first_and_said(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_change_of_size_is_letterboxed_and_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "changes.mjpeg"
     sizes = [(HIGH, WIDE), (HIGH, WIDE), (WIDE, HIGH), (2 * HIGH, 2 * WIDE)]
     greys = [np.full((*size, 3), 200, np.uint8) for size in sizes]
@@ -206,7 +204,7 @@ def test_a_cover_is_no_video_and_of_several_videos_the_first_is_taken(
     assert caplog.messages == [f"{path} contains {3 - covers} video streams: the first is used"]
 
 
-def test_what_h264_crops_is_not_shown(tmp_path: Path) -> None:
+def test_h264_cropping_is_applied(tmp_path: Path) -> None:
     pictures = 3 * [np.full((38, 50, 3), 100, np.uint8)]  # stored as 64x48
     recording = Recording(str(write_timed(tmp_path / "odd.mp4", [0, 0.04, 0.08], pictures=pictures)))
     image = recording.take(0)
@@ -217,7 +215,7 @@ def test_what_h264_crops_is_not_shown(tmp_path: Path) -> None:
     assert abs(float(image.mean()) - 100) < 4
 
 
-def test_interlaced_pictures_are_said_to_be(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_interlaced_video_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     def interlaced(stream: VideoStream) -> None:
         stream.options = {"x264-params": "tff=1"}
 
@@ -229,7 +227,7 @@ def test_interlaced_pictures_are_said_to_be(tmp_path: Path, caplog: pytest.LogCa
 
 @pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])
 @pytest.mark.parametrize("orientation", [1, 3, 6, 8])
-def test_an_image_is_upright_as_exif_says(tmp_path: Path, suffix: str, orientation: int) -> None:
+def test_the_exif_orientation_of_an_image_is_applied(tmp_path: Path, suffix: str, orientation: int) -> None:
     exif = Pillow.Exif()
     exif[274] = orientation
     Pillow.fromarray(corners()).save(tmp_path / f"0.{suffix}", exif=exif)
@@ -255,7 +253,7 @@ def test_images_of_any_depth_and_kind_are_pictures(tmp_path: Path) -> None:
         assert same(folder.take(number), np.dstack([grey, grey, grey]))
 
 
-def test_images_of_several_sizes_are_fitted_into_the_first_and_it_is_said(
+def test_images_of_several_sizes_are_letterboxed_and_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     for number, (high, wide) in enumerate([(HIGH, WIDE), (WIDE, HIGH), (HIGH, WIDE)]):

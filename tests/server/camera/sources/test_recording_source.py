@@ -1,4 +1,4 @@
-"""A recording shows its frame n - offset at pulse n, whatever happens to the file or to the pulses."""
+"""A recording shows its frame n - offset at pulse n, despite damage and missed pulses."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_an_offset_shows_nothing_before_and_then_the_first_frame(video: str) -> 
     steps=st.lists(st.integers(1, 40), min_size=1, max_size=12),
     offset=st.integers(-30, 30),
 )
-def test_a_repeated_recording_shows_the_very_frame_whatever_pulses_were_missed(
+def test_a_looped_recording_returns_the_exact_frame_despite_missed_pulses(
     video: str, steps: list[int], offset: int
 ) -> None:
     recording = Recording(video, offset, "loop")
@@ -88,7 +88,7 @@ def test_looking_ahead_shows_the_recording_s_own_frames_and_moves_nothing(
     source.close()
 
 
-def test_looking_ahead_in_a_folder_leaves_out_what_cannot_be_read(folder: Path, tmp_path: Path) -> None:
+def test_ahead_skips_unreadable_images(folder: Path, tmp_path: Path) -> None:
     for file in folder.iterdir():
         (tmp_path / file.name).write_bytes(file.read_bytes())
     (tmp_path / "002.png").write_text("no image")
@@ -145,7 +145,7 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00" * 5000, b"Dear diary,\n" * 50, bytes(range(256)) * 40])
-def test_what_is_no_video_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_files_without_video_are_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "broken.mp4"
     path.write_bytes(content)
     assert "cannot open this video" in refusal(str(path))

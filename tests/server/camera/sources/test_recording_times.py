@@ -1,4 +1,4 @@
-"""Frame n of the site's clock is what a recording shows n / fps seconds after its first picture."""
+"""Frame n at the site's rate is what a recording shows n / fps seconds after its first frame."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ def test_pictures_at_uneven_times_are_shown_when_they_were_taken(
     assert len(frames) >= times[-1] * fps
 
 
-def test_a_recording_begins_with_its_first_picture_whatever_time_that_has(tmp_path: Path) -> None:
+def test_a_recording_begins_with_its_first_frame_at_any_time_stamp(tmp_path: Path) -> None:
     late = write_timed(tmp_path / "late.ts", [3.2 + n / 25 for n in range(10)])
     assert shown(late, 25) == list(range(10))
 
 
-def test_films_that_were_joined_go_on_where_their_times_begin_again(
+def test_joined_files_continue_across_restarting_time_stamps(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     parts = [
@@ -112,7 +112,7 @@ def lost(path: Path, frames: range, into: Path) -> Path:
     return into
 
 
-def test_frames_that_are_missing_shift_none_after_them_and_are_told_of(
+def test_missing_frames_do_not_shift_later_ones_and_are_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     whole = write_video(tmp_path / "whole.ts", 25)
@@ -138,7 +138,7 @@ def test_damaged_frames_are_counted_and_named_once(
     ]
 
 
-def test_another_rate_is_said_once_with_both(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_different_frame_rate_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = write_video(tmp_path / "view.mp4", 10, fps=30)
     recording = Recording(str(path), 0, "stop", 25.0)
     list(recording.ahead(range(5)))
@@ -148,14 +148,14 @@ def test_another_rate_is_said_once_with_both(tmp_path: Path, caplog: pytest.LogC
     ]
 
 
-def test_uneven_times_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_uneven_frame_rate_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = write_timed(tmp_path / "phone.mp4", [0, 0.04, 0.2, 0.24, 0.4, 0.44, 0.6, 0.64])
     shown(path)
     (line,) = caplog.messages
     assert "its frame rate is uneven" in line
 
 
-def test_what_is_not_one_picture_a_pulse_does_not_pass_through(tmp_path: Path) -> None:
+def test_video_without_one_frame_per_pulse_is_not_passed_through(tmp_path: Path) -> None:
     def of_the_site(stream: VideoStream) -> None:
         stream.options = {**stream.options, "g": "10", "sc_threshold": "0"}
 

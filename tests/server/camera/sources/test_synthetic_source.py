@@ -1,4 +1,4 @@
-"""The synthetic scene as a camera, and what is wrong with a scene's address."""
+"""The synthetic scene as a camera, and errors in its address."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from synthetic import Scene
 SITE = SiteSettings(width=128, height=72)
 
 
-def test_the_address_says_which_camera_of_which_scene() -> None:
+def test_the_address_selects_scene_and_camera() -> None:
     stage = SyntheticSource("scene:room?camera=1&cameras=2&objects=3&seed=5", SITE)
     scene = Scene("room", 2, 3, 5, 128, 72, 25.0)
     assert stage.size == (128, 72)

@@ -166,7 +166,7 @@ async def test_a_site_is_ready_when_pulses_and_frames_arrive_and_decisions_keep_
     code, words = await ready(hall)
     assert code == 503
     assert words.split("; ") == [
-        "no pulse has come from the pulse server",
+        "no pulse received from the pulse server",
         "no camera delivers frames",
         "nothing has been decided yet",
     ]
@@ -187,7 +187,7 @@ async def test_a_site_whose_decisions_fall_behind_is_not_ready(busy: Hall) -> No
 
 async def test_a_site_without_pulses_or_live_cameras_is_not_ready(busy: Hall) -> None:
     busy.service._pulse_received_at = time.monotonic() - 60.0
-    assert await ready(busy) == (503, "no pulse has come for 60 s")
+    assert await ready(busy) == (503, "no pulse received for 60 s")
     busy.service._pulse_received_at = time.monotonic()
     for camera in CAMERAS:
         busy.service.ingest.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=False)

@@ -90,7 +90,7 @@ async def test_corrections_that_are_too_old_are_counted_and_not_sent(assisted: H
         ({"corrections": [at(1)] * 257}, 400, "length <= 256"),
         ({"corrections": [at(1, x=WIDTH + 1)]}, 400, f"is not in a picture of {WIDTH}x{HEIGHT}"),
         ({"corrections": [at(1, y=-1)]}, 400, "is not in a picture"),
-        ({"corrections": [at(999)]}, 400, "pulse 999 has not come yet"),
+        ({"corrections": [at(999)]}, 400, "pulse 999 is in the future"),
         ({"corrections": [at(1, tolerance=0)]}, 400, "> 0"),
         ({"corrections": [{"pulse": -1, "x": 1, "y": 1}]}, 400, ">= 0"),
         ({"who": 1}, 400, "unknown field"),
@@ -116,7 +116,7 @@ async def test_a_page_of_another_origin_cannot_send_corrections(assisted: Hall) 
 
 async def test_without_assistance_corrections_are_refused_with_the_reason(busy: Hall) -> None:
     status, answer = await post_corrections(busy, at(7))
-    assert (status, answer["error"]) == (409, "cameras take no corrections: track.assist.enabled is off")
+    assert (status, answer["error"]) == (409, "cameras accept no corrections: track.assist.enabled is off")
     assert (await busy.get_json(CORRECTIONS))["unavailable"] == answer["error"]
 
 

@@ -389,7 +389,7 @@ remembered = st.builds(
 
 @settings(max_examples=40)
 @given(remembered, remembered)
-def test_two_simultaneous_tracks_of_a_camera_are_two_people_whatever_snapshots_say(
+def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
     one: IdentitySnapshot, other: IdentitySnapshot
 ) -> None:
     site = Site()

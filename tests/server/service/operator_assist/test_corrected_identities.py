@@ -130,7 +130,7 @@ def test_numbers_follow_a_correction_in_later_frames(corrected_at: int, *, late:
 
 
 @pytest.mark.parametrize("corrected_at", [249, 299])
-def test_numbers_follow_a_correction_of_a_meeting_long_ago(corrected_at: int) -> None:
+def test_numbers_follow_a_correction_of_the_distant_past(corrected_at: int) -> None:
     """Of that time nobody is asked any more who was who; what was seen in it is remembered for as long."""
     frames = corrected_at + 51
     people, positions = played(corrected_at, range(MET + 8, MET + 14), frames=frames)
