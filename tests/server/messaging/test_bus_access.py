@@ -1,4 +1,4 @@
-"""The bus with users and encryption: unknown clients are excluded, and a camera cannot impersonate another."""
+"""The bus with users and encryption: unknown clients are excluded; a camera cannot impersonate another."""
 
 from __future__ import annotations
 
