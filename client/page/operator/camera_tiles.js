@@ -21,7 +21,7 @@ const ROWS = [
   ['Pulses', 'Whether pulses come from the server', (camera) => (camera.synchronized ? 'synchronized' : 'not synchronized')],
   ['Clock', "The pulse server's clock minus the camera's", (camera) => formatSeconds(camera.clock_offset)],
   ['Tracking', 'From a pulse to its tracks: median, worst', (camera) => formatSpread(camera.tracking_delay)],
-  ['Certified', 'Windows whose solution is proven optimal', formatCertified],
+  ['Optimal', 'Windows whose solution is proven optimal', formatOptimal],
   ['Missed', 'Pulses without a frame, since the start', ({ missed }) => String(missed)],
   ['Not searched', 'Frames not searched for people, since the start', ({ shed }) => String(shed)],
   ['Late', 'Windows that came after their views were decided', ({ late }) => String(late)],
@@ -123,9 +123,9 @@ function formatSeconds(seconds) {
 }
 
 /** @param {CameraDiagnostics} camera */
-function formatCertified({ certified, windows }) {
-  if (certified === null) return NO_VALUE;
-  return `${Math.floor(certified * 1000) / 10} % of ${windows}`; // rounded down: 100 % only if all are
+function formatOptimal({ optimal, solved_windows: windows }) {
+  if (optimal === null) return NO_VALUE;
+  return `${Math.floor(optimal * 1000) / 10} % of ${windows}`; // rounded down: 100 % only if all are
 }
 
 /** @param {Pulses} pulses */

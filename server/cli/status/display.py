@@ -74,19 +74,13 @@ def _service(service: ServiceNow, rates: Rates) -> Text:
 
 
 def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
-<<<<<<< HEAD
     headings = ("camera", "state", "fps", "pulse", "tracks", "missed", "shed", "late", "waiting", "optimal")
     table = Table(*headings, box=None, header_style="dim", pad_edge=False)
-=======
-    heads = ("camera", "state", "fps", "pulse", "tracks", "missed", "shed", "late", "waiting", "optimal")
-    table = Table(*heads, box=None, header_style="dim", pad_edge=False)
->>>>>>> eb655be7 (The best-view service in plain terms: optimal windows, lost frames, departed people; small modules merged)
     for column in table.columns:
         column.no_wrap = True
     notices = []
     for camera in cameras:
         table.add_row(
-<<<<<<< HEAD
             escape(printable(camera.camera)),
             Text(printable(camera.state), style=_STATES.get(camera.state, "red")),
             f"{camera.fps:.1f}",
@@ -97,18 +91,6 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
             str(camera.late),
             "-" if camera.waiting is None else str(camera.waiting),
             "-" if camera.optimal is None else f"{100 * camera.optimal:.0f} %",
-=======
-            escape(printable(it.camera)),
-            Text(printable(it.state), style=_STATES.get(it.state, "red")),
-            f"{it.fps:.1f}",
-            _ms(it.sync_error_s),
-            _ms(it.tracking_delay_s),
-            str(it.missed),
-            str(it.shed),
-            str(it.late),
-            "-" if it.waiting is None else str(it.waiting),
-            "-" if it.optimal is None else f"{100 * it.optimal:.0f} %",
->>>>>>> eb655be7 (The best-view service in plain terms: optimal windows, lost frames, departed people; small modules merged)
         )
         unsynchronized = "" if camera.synchronized or camera.state != "live" else "not synchronized"
         notices += [

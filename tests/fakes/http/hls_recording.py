@@ -25,19 +25,12 @@ def shows(hall: Hall, gops: range, choices: dict[int, str | None] | None = None)
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
         for seed, source in enumerate(CAMERAS if camera is not None else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-<<<<<<< HEAD
                 service.ingest.video(video(source, unit))
         shown = {} if camera is None else {1: camera}
         service.recorder.put(
             GopChoices(first=gop * GOP, frames=GOP, choices=shown, boxes={}, cuts=[]), PULSE0
         )
         choice = ObjectChoice(1, camera, None, departed=False)
-=======
-                service.ingest.video(video(own, unit))
-        told = {} if camera is None else {1: camera}
-        service.recorder.put(GopChoices(first=gop * GOP, frames=GOP, choices=told, boxes={}, cuts=[]), PULSE0)
-        choice = ObjectChoice(1, camera, None, departed=False)
->>>>>>> eb655be7 (The best-view service in plain terms: optimal windows, lost frames, departed people; small modules merged)
         service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 

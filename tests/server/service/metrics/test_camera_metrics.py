@@ -41,7 +41,7 @@ def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
 
 
 @pytest.mark.parametrize(("gaps", "share"), [([], None), ([0.0], 1.0), ([0.0, 0.1, 1e-12, 0.0], 0.75)])
-def test_a_window_is_certified_if_its_gap_is_zero(gaps: list[float], share: float | None) -> None:
+def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float | None) -> None:
     measured = CameraMetrics()
     for gap in gaps:
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
