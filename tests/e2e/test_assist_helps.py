@@ -53,13 +53,14 @@ async def point(site: RunningSite, page: Page) -> None:
     await page.keyboard.press("h")
     await page.wait_for_function(f"myview.pointing.object === {first}")
     # They stand: the pointer stays on the person from the left, whose id is now the other one.
-    taken = "myview.pointing.taken >= 1"
-    while not await page.evaluate(taken):
-        pulse = await page.evaluate("myview.pulse")
-        place = await page.evaluate(PLACE, second)
-        if place is not None:
-            await page.mouse.move(*place)
-        await page.wait_for_function(f"myview.pulse !== {pulse} || {taken}")
+    accepted = "myview.pointing.accepted >= 1"
+    async with asyncio.timeout(PATIENCE_MS / 1000):
+        while not await page.evaluate(accepted):
+            pulse = await page.evaluate("myview.pulse")
+            place = await page.evaluate(PLACE, second)
+            if place is not None:
+                await page.mouse.move(*place)
+            await page.wait_for_function(f"myview.pulse !== {pulse} || {accepted}")
     exchanged = {Split(first, second, ALIKE), Split(second, first, ALIKE)}
     async with asyncio.timeout(PATIENCE_MS / 1000):
         await site.until(

@@ -66,7 +66,7 @@ async def test_a_scripted_pointer_answers_a_flag_without_interrupting_the_stream
     assert (await page.locator("#flag-text").inner_text()).strip()
     await point.click()
     await page.wait_for_function("myview.pointing.object !== null")
-    await point_until(page, "myview.pointing.taken >= 20")
+    await point_until(page, "myview.pointing.accepted >= 20")
     sent = await metric(site, "myview_position_corrections_total")
     assert sent >= 20
     async with asyncio.timeout(PATIENCE_MS / 1000):  # the camera reports once a second

@@ -374,7 +374,7 @@ async def test_lost_recordings_are_not_offered(hall: Hall, harm: Harm) -> None:
         ("/api/objects/1/past", 404, "nothing is recorded of object 1"),
         ("/objects/1/best.mp4?from=p0&to=p10", 404, "there is no object 1"),
         ("/objects/1/hls/index.m3u8?from=p0&to=p10", 416, NOTHING),
-        ("/objects/1/hls/0.m4s", 404, "no segment 0: expired, or not there yet"),
+        ("/objects/1/hls/0.m4s", 404, "no segment 0: expired, or not available yet"),
     ],
 )  # fmt: skip
 async def test_a_person_known_only_from_lost_recordings_is_gone_with_them(
