@@ -33,7 +33,9 @@ class DecisionState:
                 cuts.append(cut)
             self._select(decision, choice, tuple(seen_by.get(choice.number, ())))
         numbers = {choice.number for choice in decision.choices}
-        self.selected_views = {number: it for number, it in self.selected_views.items() if number in numbers}
+        self.selected_views = {
+            number: view for number, view in self.selected_views.items() if number in numbers
+        }
         self.merged = decision.merged
         self._reasons.put(self.selected_views, decision.first, decision.reasons)
         self.cuts += len(cuts)
@@ -45,14 +47,14 @@ class DecisionState:
             boxes=decision.boxes,
             cuts=cuts,
             merged=[
-                PersonMerge(kept=it.kept, lost=it.lost)
-                for it in decision.corrections
-                if isinstance(it, Merge)
+                PersonMerge(kept=split.kept, lost=split.lost)
+                for split in decision.corrections
+                if isinstance(split, Merge)
             ],
             split=[
-                PersonSplit(kept=it.kept, new_object=it.split_off, camera=it.camera)
-                for it in decision.corrections
-                if isinstance(it, Split)
+                PersonSplit(kept=split.kept, new_object=split.split_off, camera=split.camera)
+                for split in decision.corrections
+                if isinstance(split, Split)
             ],
         )
 

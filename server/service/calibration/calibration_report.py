@@ -88,13 +88,15 @@ def calibrate_walk(recorded: RecordedWalk, settings: WalkSettings, person: float
     """
     calibration = calibrate_from_walks(recorded.walks, settings, person)
     missing = [
-        line for it in calibration.cameras for line in coverage_gaps(it.camera, it.thirds, it.depth_ratio)
+        line
+        for camera in calibration.cameras
+        for line in coverage_gaps(camera.camera, camera.thirds, camera.depth_ratio)
     ]
-    homographies = {it.camera: it.homography for it in calibration.cameras}
+    homographies = {camera.camera: camera.homography for camera in calibration.cameras}
     return CalibrationReport(
         calibration,
-        (*report_lines(recorded, calibration, settings), *(it.text for it in missing)),
-        next((it.text for it in missing if it.serious), ""),
+        (*report_lines(recorded, calibration, settings), *(gap.text for gap in missing)),
+        next((gap.text for gap in missing if gap.serious), ""),
         offset_lines(recorded, calibration) if settings.maximum_offset else "",
         ground_file_text("m", homographies, details(recorded, calibration, person)),
     )
@@ -137,17 +139,17 @@ def report_lines(recorded: RecordedWalk, calibration: WalkCalibration, settings:
     """Return the lines about errors, coverage and offsets."""
     on_floor, in_pictures = _heights(calibration.heights), _shares(calibration.picture)
     lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
-    for it in calibration.cameras:
-        left, middle, right = (f"{100 * share:.0f}" for share in it.thirds)
+    for camera in calibration.cameras:
+        left, middle, right = (f"{100 * share:.0f}" for share in camera.thirds)
         lines.append(
-            f"{it.camera}: {_heights(it.heights)}, {_shares(it.picture)}; of the walk {left} % in the left, "
-            f"{middle} % in the middle and {right} % in the right third, the nearest {it.depth_ratio:.1f} "
-            "times as tall as the farthest"
+            f"{camera.camera}: {_heights(camera.heights)}, {_shares(camera.picture)}; "
+            f"of the walk {left} % in the left, {middle} % in the middle and {right} % in the right third, "
+            f"the nearest {camera.depth_ratio:.1f} times as tall as the farthest"
         )
-    lines += [f"{it.camera}: left out: {it.reason}" for it in calibration.uncalibrated]
+    lines += [f"{camera.camera}: left out: {camera.reason}" for camera in calibration.uncalibrated]
     lines += _floors(calibration)
     if recorded.guessed:
-        sizes = ", ".join(f"{it.camera} {it.size[0]}x{it.size[1]}" for it in recorded.walks)
+        sizes = ", ".join(f"{walk.camera} {walk.size[0]}x{walk.size[1]}" for walk in recorded.walks)
         lines.append(f"picture sizes are estimated from the boxes ({sizes}); set them with --size")
     if recorded.rate_guessed:
         lines.append(f"{recorded.fps:g} frames a second are assumed; set the rate with --fps")
@@ -160,21 +162,24 @@ def details(recorded: RecordedWalk, calibration: WalkCalibration, person: float)
     """Return the content of the ground file besides the homographies."""
     return {
         "person": person,
-        "offset": {it.camera: _offset(recorded, it) for it in calibration.cameras},
-        "floor": {it.camera: it.floor for it in calibration.cameras},
+        "offset": {camera.camera: _offset(recorded, camera) for camera in calibration.cameras},
+        "floor": {camera.camera: camera.floor for camera in calibration.cameras},
         "residuals": {
-            it.camera: {"heights": _numbers(it.heights), "picture": _numbers(it.picture)}
-            for it in calibration.cameras
+            camera.camera: {"heights": _numbers(camera.heights), "picture": _numbers(camera.picture)}
+            for camera in calibration.cameras
         },
-        "left_out": {it.camera: it.reason for it in calibration.uncalibrated},
+        "left_out": {camera.camera: camera.reason for camera in calibration.uncalibrated},
     }
 
 
 def _floors(calibration: WalkCalibration) -> list[str]:
-    floors = sorted({it.floor for it in calibration.cameras})
+    floors = sorted({camera.floor for camera in calibration.cameras})
     if len(floors) == 1:
         return []
-    groups = (", ".join(it.camera for it in calibration.cameras if it.floor == floor) for floor in floors)
+    groups = (
+        ", ".join(camera.camera for camera in calibration.cameras if camera.floor == floor)
+        for floor in floors
+    )
     text = f"there are {len(floors)} floors: {'; '.join(groups)}; no camera sees two of them"
     return [f"{text}; they are placed far apart in the file, and offsets hold within each"]
 
@@ -183,23 +188,27 @@ def _offsets(recorded: RecordedWalk, calibration: WalkCalibration) -> list[str]:
     """Return the report about the cameras' time offsets."""
     first, fps = calibration.cameras[0].camera, recorded.fps
     lines = []
-    for it in calibration.cameras:
-        if it.offset or it.offset_error:
-            how = "out of sync" if _is_out_of_sync(it) else "in sync, within the error"
-            if _is_out_of_sync(it) and abs(it.offset) / fps < _DOUBTFUL_S:
+    for camera in calibration.cameras:
+        if camera.offset or camera.offset_error:
+            how = "out of sync" if _is_out_of_sync(camera) else "in sync, within the error"
+            if _is_out_of_sync(camera) and abs(camera.offset) / fps < _DOUBTFUL_S:
                 how = "perhaps out of sync; late foot points look alike: compare two frames first"
-            if _is_out_of_sync(it) and it.camera in recorded.live:
+            if _is_out_of_sync(camera) and camera.camera in recorded.live:
                 how += "; a live camera has no configurable offset"
-            frames = f"{it.offset:+.1f} frames ({it.offset / fps:+.2f} s)"
-            margin = f"± {_SIGNIFICANT * it.offset_error:.1f}"
-            lines.append(f"{it.camera}: {frames} later than {first}, {margin}: {how}")
+            frames = f"{camera.offset:+.1f} frames ({camera.offset / fps:+.2f} s)"
+            margin = f"± {_SIGNIFICANT * camera.offset_error:.1f}"
+            lines.append(f"{camera.camera}: {frames} later than {first}, {margin}: {how}")
     return lines
 
 
 def offset_lines(recorded: RecordedWalk, calibration: WalkCalibration) -> str:
     """Return configuration lines that synchronize the cameras; empty if they are synchronized."""
-    moved = [it for it in calibration.cameras if _is_out_of_sync(it) and it.camera not in recorded.live]
-    lines = [f"  - id: {it.camera}\n    offset: {_use(recorded, it)}\n" for it in moved]
+    moved = [
+        camera
+        for camera in calibration.cameras
+        if _is_out_of_sync(camera) and camera.camera not in recorded.live
+    ]
+    lines = [f"  - id: {camera.camera}\n    offset: {_use(recorded, camera)}\n" for camera in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""
 
 

@@ -51,13 +51,13 @@ class WalkCoverage:
 
 def walk_coverage(walks: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
     """Return what a walk has covered; compared moments are ``seconds`` apart."""
-    samples = [it.samples for it in walks]
-    moments = 1 + max((int(it.moment.max()) for it in samples if it.moment.size), default=-1)
+    samples = [walk.samples for walk in walks]
+    moments = 1 + max((int(sample.moment.max()) for sample in samples if sample.moment.size), default=-1)
     is_present = np.zeros((len(samples), moments), dtype=np.bool_)
-    for row, it in zip(is_present, samples, strict=True):
-        row[it.moment] = True
+    for row, sample in zip(is_present, samples, strict=True):
+        row[sample.moment] = True
     count = is_present.sum(axis=0)
-    cameras = [_camera(walk.camera, it, count) for walk, it in zip(walks, samples, strict=True)]
+    cameras = [_camera(walk.camera, sample, count) for walk, sample in zip(walks, samples, strict=True)]
     both = is_present.astype(np.int64) @ is_present.T.astype(np.int64)
     pairs = [
         PairCoverage(walks[one].camera, walks[other].camera, seconds * int(both[one, other]))
@@ -70,7 +70,7 @@ def _camera(name: str, samples: WalkSamples, count: NDArray[np.int64]) -> Camera
     """Return one camera's coverage; ``count`` (M,) is how many cameras saw a person at each moment."""
     shared = count[samples.moment] > 1
     third, height = samples.third[shared], samples.height[shared]
-    left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
+    left, middle, right = (float(share) for share in np.bincount(third, minlength=3) / max(1, len(third)))
     small, large = np.quantile(height, (0.05, 0.95)) if len(height) >= _MIN_FEET else (0.0, 0.0)
     depth_ratio = float(large / small) if small > 0 else None
     return CameraCoverage(name, len(third), (left, middle, right), depth_ratio)

@@ -46,8 +46,8 @@ class FloorPlanCamera:
 def floor_plan_cameras(calibration: WalkCalibration) -> list[FloorPlanCamera]:
     """Return the cameras of a calibration for the floor plan."""
     return [
-        FloorPlanCamera(it.camera, it.homography, it.image, it.position, it.floor)
-        for it in calibration.cameras
+        FloorPlanCamera(camera.camera, camera.homography, camera.image, camera.position, camera.floor)
+        for camera in calibration.cameras
     ]
 
 

@@ -66,8 +66,8 @@ class CameraWalk:
         boxes = boxes[:, first - message.first : last + 1 - message.first]
         track, frame = np.nonzero(~np.isnan(boxes[:, :, 0]))
         indices = [
-            self._track_indices.setdefault((message.boot, it.id), len(self._track_indices))
-            for it in message.tracks
+            self._track_indices.setdefault((message.boot, track.id), len(self._track_indices))
+            for track in message.tracks
         ]
         camera_boxes = Letterbox(message.size, self._site).boxes_to_camera(boxes[track, frame])
         self._frames.append(frame + first - start)

@@ -87,7 +87,13 @@ class WalkSession:
             for camera in self._config.cameras
             if source_kind(camera.source) in (SourceKind.FILE, SourceKind.FOLDER)
         }
-        task = CalibrationTask([it for it in boxes if it is not None], self._fps, _SHIFT_S, person, offsets)
+        task = CalibrationTask(
+            [camera_boxes for camera_boxes in boxes if camera_boxes is not None],
+            self._fps,
+            _SHIFT_S,
+            person,
+            offsets,
+        )
         self.result, self.state = None, WalkState.WORKING
         self._task = asyncio.create_task(self._calibrate(task), name="calibration")
 

@@ -77,9 +77,10 @@ class CalibrationService:
             seconds=walk.seconds,
             max_seconds=MAX_WALK_S,
             cameras=[
-                WalkCamera(it.camera, it.feet, list(it.thirds), it.depth_ratio) for it in covered.cameras
+                WalkCamera(camera.camera, camera.feet, list(camera.thirds), camera.depth_ratio)
+                for camera in covered.cameras
             ],
-            pairs=[WalkPair(it.one, it.other, it.seconds) for it in covered.pairs],
+            pairs=[WalkPair(pair.one, pair.other, pair.seconds) for pair in covered.pairs],
             uncovered=uncovered,
             error=result.error,
             lines=result.lines,

@@ -72,9 +72,9 @@ class OperationsService:
             )
         except SyncError as error:
             return Pulses(address, str(error), [], [])
-        listeners = [PulseListener(it.name, it.name in expected, it.behind) for it in clients]
-        connected = {it.name for it in clients}
-        return Pulses(address, "", listeners, [it for it in expected if it not in connected])
+        listeners = [PulseListener(client.name, client.name in expected, client.behind) for client in clients]
+        connected = {client.name for client in clients}
+        return Pulses(address, "", listeners, [name for name in expected if name not in connected])
 
     @property
     def view_settings(self) -> ViewSettings:

@@ -114,7 +114,10 @@ class StreamService:
     def viewers(self) -> ViewerCounts:
         """How many streams are watched over a connection of their own."""
         splicer = self._splicer
-        cameras = sum(it.viewers for it in (*splicer.cameras.values(), *splicer.decided_cameras.values()))
+        cameras = sum(
+            broadcaster.viewers
+            for broadcaster in (*splicer.cameras.values(), *splicer.decided_cameras.values())
+        )
         return ViewerCounts(splicer.person_viewers, cameras, splicer.preferred_camera_viewers)
 
     def close(self) -> None:

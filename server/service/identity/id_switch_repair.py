@@ -43,7 +43,9 @@ class IdSwitchRepair:
         """
         splits: list[Split] = []
         for one, two, frame in find_id_switches(window, before):
-            first, second = (_person_at(parts.get(it, UNKNOWN), frame - 1, needed_from) for it in (one, two))
+            first, second = (
+                _person_at(parts.get(key, UNKNOWN), frame - 1, needed_from) for key in (one, two)
+            )
             self._reader.local_numbers.exchange(one, two)
             splits += self._registry.swap_tracks(one, two, frame, (first, second))
             if first and second and first != second:
@@ -56,21 +58,22 @@ class IdSwitchRepair:
         for key, since in self._switches.items():
             if key not in parts:
                 continue
-            later = [it for it in parts[key] if it.first > since.first]
-            parts[key] = [*(it for it in parts[key] if it.first < since.first), since, *later]
+            later = [part for part in parts[key] if part.first > since.first]
+            parts[key] = [*(part for part in parts[key] if part.first < since.first), since, *later]
 
     def merge(self, merged: Mapping[int, int]) -> None:
         """Replace merged numbers."""
         self._switches = {
-            key: TrackPart(it.first, merged.get(it.number, it.number)) for key, it in self._switches.items()
+            key: TrackPart(part.first, merged.get(part.number, part.number))
+            for key, part in self._switches.items()
         }
 
     def keep_only(self, parts: Parts, needed_from: int) -> None:
         """Drop switches before the frames that are still needed."""
         self._switches = {
-            key: it
-            for key, it in self._switches.items()
-            if key in parts and not any(it.first < part.first <= needed_from for part in parts[key])
+            key: since
+            for key, since in self._switches.items()
+            if key in parts and not any(since.first < part.first <= needed_from for part in parts[key])
         }
 
 
@@ -152,7 +155,7 @@ def _overlap(one: Floats, two: Floats) -> Floats:
     wide = np.minimum(one[..., 2], two[..., 2]) - np.maximum(one[..., 0], two[..., 0])
     high = np.minimum(one[..., 3], two[..., 3]) - np.maximum(one[..., 1], two[..., 1])
     intersection = np.maximum(wide, 0.0) * np.maximum(high, 0.0)
-    areas = [(it[..., 2] - it[..., 0]) * (it[..., 3] - it[..., 1]) for it in (one, two)]
+    areas = [(boxes[..., 2] - boxes[..., 0]) * (boxes[..., 3] - boxes[..., 1]) for boxes in (one, two)]
     union = areas[0] + areas[1] - intersection
     return np.asarray(
         np.divide(

@@ -64,8 +64,10 @@ class ManualOverrides:
 
     def apply_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
         """Return splits with mapped numbers; a split within one manually merged person is dropped."""
-        mapped = {Split(self.current(it.kept), self.current(it.split_off), it.camera) for it in splits}
-        return tuple(sorted(it for it in mapped if it.kept != it.split_off))
+        mapped = {
+            Split(self.current(split.kept), self.current(split.split_off), split.camera) for split in splits
+        }
+        return tuple(sorted(split for split in mapped if split.kept != split.split_off))
 
     @property
     def _involved(self) -> set[int]:
@@ -73,9 +75,9 @@ class ManualOverrides:
 
     def _merged(self, merged: Iterable[Merge]) -> Iterable[Merge]:
         """Yield merges with mapped numbers; they extend the manual merges they touch."""
-        for it in merged:
-            self._departed.discard(it.lost)
-            kept, lost = self.current(it.kept), self.current(it.lost)
+        for merge in merged:
+            self._departed.discard(merge.lost)
+            kept, lost = self.current(merge.kept), self.current(merge.lost)
             if kept != lost:
                 if lost in self._involved:
                     self.merge(kept, lost)

@@ -177,7 +177,9 @@ class PersonTracker:
             since = max(self._needed_from, self._parts[key][-1].first)
             self._parts[key] = [*self._parts[key], TrackPart(since, new)]
             self.registry.record_visible([TrackPart(since, new)], since, max(since, self._newest))
-        self._corrections += [Split(number, new, camera) for camera in sorted({it.camera for it in tracks})]
+        self._corrections += [
+            Split(number, new, camera) for camera in sorted({track.camera for track in tracks})
+        ]
         return new
 
     def number(self, camera: str, local: int, pulse: int) -> int | None:
@@ -220,9 +222,9 @@ class PersonTracker:
     def forget_boxes_before(self, pulse: int) -> None:
         """Forget the boxes and person numbers before a pulse."""
         if self.published.frames:
-            spans = [it for history in self._histories.values() for it in history.over(0, pulse - 1)]
-            for it in sorted(spans, key=lambda it: it.last):
-                self.published.record(it, self.numbers(it.window.keys, it.last, 1)[:, 0])
+            spans = [span for history in self._histories.values() for span in history.over(0, pulse - 1)]
+            for span in sorted(spans, key=lambda span: span.last):
+                self.published.record(span, self.numbers(span.window.keys, span.last, 1)[:, 0])
         self._needed_from = max(self._needed_from, pulse)
         self.undetected.forget_before(pulse)
         self._id_switch_repair.keep_only(self._parts, self._needed_from)
@@ -234,9 +236,9 @@ class PersonTracker:
     ) -> dict[str, tuple[int, int]]:
         """Return the image sizes of the cameras that ran detection in any of these frames."""
         return {
-            it.message.camera: it.message.size
-            for it in windows
-            if not self.undetected.over(it.message.camera, first, last + 1 - first).all()
+            window.message.camera: window.message.size
+            for window in windows
+            if not self.undetected.over(window.message.camera, first, last + 1 - first).all()
         }
 
     def _store(self, window: CameraWindow) -> CameraWindow:
@@ -252,7 +254,7 @@ class PersonTracker:
 
     def _recall(self, windows: Iterable[CameraWindow]) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
-        for key in chain.from_iterable(it.keys for it in windows) if self._expected else ():
+        for key in chain.from_iterable(window.keys for window in windows) if self._expected else ():
             number, pulse = self._expected.pop(self._reader.local_numbers.origin(key), (0, 0))
             if number:
                 self._registry.recall(key, self.registry.current(number), pulse)

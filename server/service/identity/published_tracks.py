@@ -49,7 +49,7 @@ class PublishedTracks:
         """
         for first, _, tracks in reversed(self._published):
             if first <= pulse:
-                candidates = [tracks[camera, it] for it in numbers if (camera, it) in tracks]
+                candidates = [tracks[camera, number] for number in numbers if (camera, number) in tracks]
                 if candidates:
                     return candidates[0]
         return None

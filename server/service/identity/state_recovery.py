@@ -30,8 +30,8 @@ def state_for_cameras(
     """Build the snapshot for each camera: the people it tracked recently, and the first free number."""
     tracks_by_number = people.tracks_of(people.registry.all_numbers, pulse - recent)
     boots: dict[str, int] = {}
-    for it in chain.from_iterable(tracks_by_number.values()):
-        boots[it.camera] = max(it.boot, boots.get(it.camera, 0))
+    for track in chain.from_iterable(tracks_by_number.values()):
+        boots[track.camera] = max(track.boot, boots.get(track.camera, 0))
     former: dict[int, list[int]] = {}
     for old, number in people.registry.merged.items():
         if old <= PERSON_NUMBER_MAX:
@@ -42,9 +42,9 @@ def state_for_cameras(
         if number > PERSON_NUMBER_MAX:
             continue
         camera_tracks: dict[str, list[int]] = {}
-        for it in tracks:
-            if it.boot == boots[it.camera]:  # tracks of an earlier run of the camera have ended
-                camera_tracks.setdefault(it.camera, []).append(it.track)
+        for track in tracks:
+            if track.boot == boots[track.camera]:  # tracks of an earlier run of the camera have ended
+                camera_tracks.setdefault(track.camera, []).append(track.track)
         for camera, local_ids in camera_tracks.items():
             known[camera].append(
                 PersonSnapshot(
@@ -95,23 +95,25 @@ class StateRecovery:
         self._pending: list[_PendingPerson] = []
         self._reappeared_at: dict[TrackName, int] = {}
         """The pulse at which each track reappeared."""
-        self.next_number = max((first_free_number(it) for it in snapshots.values()), default=1)
+        self.next_number = max((first_free_number(snapshot) for snapshot in snapshots.values()), default=1)
         """The first number to assign in this run, whatever the downtime."""
         recent = {
-            camera: it for camera, it in snapshots.items() if it.pulse < pulse <= it.pulse + max_downtime
+            camera: snapshot
+            for camera, snapshot in snapshots.items()
+            if snapshot.pulse < pulse <= snapshot.pulse + max_downtime
         }
         # Recent snapshots agree; the median keeps a single deviating camera from deciding.
-        since = sorted(it.numbered_since for it in recent.values())
+        since = sorted(snapshot.numbered_since for snapshot in recent.values())
         self.numbered_since = (
             since[len(since) // 2]
             if since
-            else max((it.numbered_since for it in snapshots.values()), default=inf)
+            else max((snapshot.numbered_since for snapshot in snapshots.values()), default=inf)
         )
         """When numbering began, unix seconds; infinite: unknown."""
         if recent:
-            self._until = max(it.pulse for it in recent.values()) + max_downtime
+            self._until = max(snapshot.pulse for snapshot in recent.values()) + max_downtime
             self._pending = _combine_snapshots(recent)
-            self._tracks = {track: it.number for it in self._pending for track in it.tracks}
+            self._tracks = {track: person.number for person in self._pending for track in person.tracks}
 
     @property
     def has_ended(self) -> bool:
@@ -121,7 +123,7 @@ class StateRecovery:
     @property
     def numbers(self) -> Collection[int]:
         """The numbers of the people still to be recovered, merged ones included."""
-        return {number for it in self._pending for number in (it.number, *it.former)}
+        return {number for person in self._pending for number in (person.number, *person.former)}
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
         """Assign the pending tracks to their people before any of them is reported."""
@@ -133,12 +135,12 @@ class StateRecovery:
         if pulse > self._until:
             self._pending, self._has_ended = [], True
             people.cancel_expected(self._tracks)
-        self._pending = [it for it in self._pending if not self._restore(it, people, pulse)]
+        self._pending = [person for person in self._pending if not self._restore(person, people, pulse)]
 
     def _restore(self, pending: _PendingPerson, people: PersonTracker, pulse: int) -> bool:
         """Restore a reappeared person's name and merges; return whether nothing is left to restore."""
-        found_numbers = [self._number(it, people, pulse) for it in pending.tracks]
-        numbers = sorted({it for it in found_numbers if it is not None})
+        found_numbers = [self._number(track, people, pulse) for track in pending.tracks]
+        numbers = sorted({number for number in found_numbers if number is not None})
         if not numbers:
             return False
         kept = pending.number if pending.number in numbers else numbers[0]
@@ -161,7 +163,10 @@ class StateRecovery:
 def first_free_number(snapshot: IdentitySnapshot) -> int:
     """Return the first unused number of a snapshot, which may contradict itself."""
     return max(
-        [snapshot.next_number, *(number + 1 for it in snapshot.people for number in (it.number, *it.aliases))]
+        [
+            snapshot.next_number,
+            *(number + 1 for person in snapshot.people for number in (person.number, *person.aliases)),
+        ]
     )
 
 
@@ -183,12 +188,12 @@ def _combine_snapshots(snapshots: dict[str, IdentitySnapshot]) -> list[_PendingP
     tracks: dict[int, set[TrackName]] = {}
     kept_number: dict[int, int] = {}
     """By merged number: the number that was kept."""
-    for camera, it in sorted(snapshots.items(), key=lambda named: (named[1].pulse, named[0])):
-        for known in it.people:
+    for camera, snapshot in sorted(snapshots.items(), key=lambda named: (named[1].pulse, named[0])):
+        for known in snapshot.people:
             newest[known.number] = known
             kept_number |= dict.fromkeys(known.aliases, known.number)
             person_tracks = tracks.setdefault(known.number, set())
-            person_tracks |= {TrackName(camera, it.boot, track) for track in known.tracks}
+            person_tracks |= {TrackName(camera, snapshot.boot, track) for track in known.tracks}
     for old in sorted(kept_number.keys() & newest.keys()):  # a camera's snapshot was older than a merge
         kept = kept_number[old]
         if kept != old and kept in newest:
@@ -197,7 +202,7 @@ def _combine_snapshots(snapshots: dict[str, IdentitySnapshot]) -> list[_PendingP
     return [
         _PendingPerson(
             number=number,
-            tracks=tuple(sorted(tracks[number], key=lambda it: (it.camera, it.boot, it.track))),
+            tracks=tuple(sorted(tracks[number], key=lambda track: (track.camera, track.boot, track.track))),
             former=tuple(old for old in known.aliases if kept_number[old] == number and old not in newest),
             name=known.name,
             manual=known.manual,

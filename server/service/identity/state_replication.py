@@ -130,7 +130,9 @@ class StateReplication:
         ):
             return True
         may_connect = self._reported < set(self._cameras) and self._clock() < self._started_at + _JOIN_S
-        return (may_connect and number < self._free) or any(number in it.numbers for it in self._recoveries)
+        return (may_connect and number < self._free) or any(
+            number in recovery.numbers for recovery in self._recoveries
+        )
 
     @property
     def numbers_since(self) -> float:
@@ -145,10 +147,12 @@ class StateReplication:
         if not self._any_camera or (self._started_at is not None and not self._snapshots):
             return
         most = trusted_first_free(self._first_free.values())
-        for camera in [camera for camera, it in self._snapshots.items() if first_free_number(it) > most]:
+        for camera in [
+            camera for camera, snapshot in self._snapshots.items() if first_free_number(snapshot) > most
+        ]:
             log.warning("camera %s: snapshot ignored: it alone has person numbers beyond %d", camera, most)
             del self._snapshots[camera]
-        snapshot = {camera: _below(self._free, it) for camera, it in self._snapshots.items()}
+        snapshot = {camera: _below(self._free, snapshot) for camera, snapshot in self._snapshots.items()}
         self._snapshots = {}
         recovery = StateRecovery(snapshot, pulse, round(MAX_DOWNTIME_S * self._fps))
         recovery.begin(self._people, pulse)
@@ -165,7 +169,7 @@ class StateReplication:
         """Continue recovery, and send snapshots, after the epoch that ends with a pulse was processed."""
         for recovery in self._recoveries:
             recovery.advance(self._people, pulse)
-        self._recoveries = [it for it in self._recoveries if not it.has_ended]
+        self._recoveries = [recovery for recovery in self._recoveries if not recovery.has_ended]
         if self._started_at is not None and self._sends:
             self._send_state(pulse)
 
@@ -185,7 +189,7 @@ class StateReplication:
 
 def _below(free: float, snapshot: IdentitySnapshot) -> IdentitySnapshot:
     """Remove people whose number this run may have assigned to another person."""
-    known = [it for it in snapshot.people if max([it.number, *it.aliases]) < free]
+    known = [person for person in snapshot.people if max([person.number, *person.aliases]) < free]
     return msgspec.structs.replace(snapshot, people=known)
 
 

@@ -117,7 +117,9 @@ class EpochAligner:
         Returns:
             The number of skipped epochs.
         """
-        to = max((it for it in self._waiting_epochs() if end_of_epoch(it, self.stride) <= now), default=0)
+        to = max(
+            (epoch for epoch in self._waiting_epochs() if end_of_epoch(epoch, self.stride) <= now), default=0
+        )
         if self._next is None or to <= self._next:
             return 0
         return self._skip(self._next, to)
@@ -173,7 +175,7 @@ class EpochAligner:
         self._drop(lambda epoch: not self._is_near(epoch, now))
         epochs = [
             *self._waiting_epochs(),
-            *(it for it in self._first_frames.values() if self._is_near(it, now)),
+            *(epoch for epoch in self._first_frames.values() if self._is_near(epoch, now)),
         ]
         self._next = min(epochs, default=None)
         self._first_frames.clear()
@@ -186,7 +188,10 @@ class EpochAligner:
             or number in self._waiting_epochs()
         ):
             return number
-        to = min((it for it in self._waiting_epochs() if self._is_near(it, now)), default=now // self.stride)
+        to = min(
+            (epoch for epoch in self._waiting_epochs() if self._is_near(epoch, now)),
+            default=now // self.stride,
+        )
         self._skip(number, to)
         return to
 

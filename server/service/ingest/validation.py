@@ -21,14 +21,14 @@ def is_plausible(message: CameraTracks, stride: int) -> bool:
         0 <= frames <= _WINDOW_MAX
         and message.final_to <= message.last <= end
         and all(
-            _are_valid_frames(it, end)
-            for it in (message.shed, message.without_detection, message.without_peers)
+            _are_valid_frames(pulses, end)
+            for pulses in (message.shed, message.without_detection, message.without_peers)
         )
         and len(ids) == len(dict.fromkeys(ids))
         and all(count == bins[0] > 0 for count in bins)
         and all(len(track.boxes) == frames for track in message.tracks)
         and (message.revised_from is None or message.first <= message.revised_from <= message.final_to)
-        and all(message.first <= it.first <= it.last <= message.final_to for it in samples)
+        and all(message.first <= sample.first <= sample.last <= message.final_to for sample in samples)
     )
 
 

@@ -34,9 +34,9 @@ class WindowHistory(Generic[Window]):
     def over(self, first: int, last: int) -> list[HistorySpan[Window]]:
         """Return the spans in the frames from `first` to `last`, in order; frames may be missing."""
         return [
-            HistorySpan(it.window, max(it.first, first), min(it.last, last))
-            for it in self._spans
-            if it.first <= last and it.last >= first
+            HistorySpan(span.window, max(span.first, first), min(span.last, last))
+            for span in self._spans
+            if span.first <= last and span.last >= first
         ]
 
     def forget_before(self, pulse: int) -> None:

@@ -27,45 +27,47 @@ class CameraCollector(Collector):
         """Return all metrics as they are now."""
         yield from self._cameras()
         yield self._stages()
-        yield self._gauge("fps", "Frames captured per second.", _of_status(lambda it: it.fps))
+        yield self._gauge("fps", "Frames captured per second.", _of_status(lambda status: status.fps))
         yield self._gauge(
             "synchronized",
             "Pulses come from the server; otherwise the camera counts by itself.",
-            _of_status(lambda it: float(it.synchronized)),
+            _of_status(lambda status: float(status.synchronized)),
         )
         yield self._gauge(
-            "waiting_frames", "Frames that wait for detection.", _of_status(lambda it: it.waiting)
+            "waiting_frames", "Frames that wait for detection.", _of_status(lambda status: status.waiting)
         )
         yield self._gauge(
             "load_level",
             "Load-shedding level of the camera; 0: none.",
-            _of_status(lambda it: it.load_level),
+            _of_status(lambda status: status.load_level),
         )
         for what, description, spread in _SPREADS:
             yield self._spread(what, description, spread)
         late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_frames
-        yield self._counter("late_windows", "Windows that arrived too late to count.", lambda it, _: late[it])
         yield self._counter(
-            "lost_frames", "Frames missing when their GOP was decided.", lambda it, _: lost[it]
+            "late_windows", "Windows that arrived too late to count.", lambda camera, _: late[camera]
         )
-        yield self._counter("windows", "Windows solved.", lambda _, it: it.metrics.totals.windows)
+        yield self._counter(
+            "lost_frames", "Frames missing when their GOP was decided.", lambda camera, _: lost[camera]
+        )
+        yield self._counter("windows", "Windows solved.", lambda _, state: state.metrics.totals.windows)
         yield self._counter(
             "optimal_windows",
             "Windows whose solution is proven optimal.",
-            lambda _, it: it.metrics.totals.optimal,
+            lambda _, state: state.metrics.totals.optimal,
         )
         yield self._counter(
             "position_corrections",
             "Position corrections that the tracker received since its start.",
-            _of_status(lambda it: it.position_corrections),
+            _of_status(lambda status: status.position_corrections),
         )
         yield self._counter(
             "corrected_windows",
             "Windows that revised final frames after an operator's correction.",
-            lambda _, it: it.metrics.totals.corrected,
+            lambda _, state: state.metrics.totals.corrected,
         )
         yield self._counter(
-            "gap", "Sum of the gaps of all other windows.", lambda _, it: it.metrics.totals.gap
+            "gap", "Sum of the gaps of all other windows.", lambda _, state: state.metrics.totals.gap
         )
 
     def _cameras(self) -> Iterable[Metric]:
@@ -108,8 +110,12 @@ class CameraCollector(Collector):
         for camera, state in self._pipeline.ingest.states.items():
             for stage, histogram in state.metrics.totals.stages.items():
                 samples = [sample for metric in histogram.collect() for sample in metric.samples]
-                buckets = [(it.labels["le"], it.value) for it in samples if it.name.endswith("_bucket")]
-                seconds = next(it.value for it in samples if it.name.endswith("_sum"))
+                buckets = [
+                    (sample.labels["le"], sample.value)
+                    for sample in samples
+                    if sample.name.endswith("_bucket")
+                ]
+                seconds = next(sample.value for sample in samples if sample.name.endswith("_sum"))
                 family.add_metric([camera, stage], buckets, seconds)
         return family
 
@@ -147,10 +153,10 @@ def _of_status(value: Callable[[CameraStatus], float]) -> Value:
 
 
 _SPREADS: tuple[tuple[str, str, Callable[[CameraState], RecentSeconds | None]], ...] = (
-    ("sync_error", "From a pulse to the capture of its frame.", lambda it: it.metrics.sync_error),
+    ("sync_error", "From a pulse to the capture of its frame.", lambda state: state.metrics.sync_error),
     (
         "tracking_delay",
         "From the pulse of a window's last frame to its solution.",
-        lambda it: it.metrics.tracking_delay,
+        lambda state: state.metrics.tracking_delay,
     ),
 )

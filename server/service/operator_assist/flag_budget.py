@@ -81,7 +81,11 @@ class FlagBudget:
         passed = (now - (now if self._last is None else self._last)) / (_MINUTE_S * self._fps)
         self._left = min(self._left + self._per_minute * passed, self._per_minute * _SAVED_MINUTES)
         self._last = now
-        for people in [it for it, risk in self._risks.items() if risk.pulse < now - _SAME_S * self._fps]:
+        for people in [
+            people for people, risk in self._risks.items() if risk.pulse < now - _SAME_S * self._fps
+        ]:
             del self._risks[people]
         # Not in order of expiry: an ongoing risk is reported again and again.
-        self._history = [it for it in self._history if it.pulse >= now - _HISTORY_S * self._fps]
+        self._history = [
+            earlier for earlier in self._history if earlier.pulse >= now - _HISTORY_S * self._fps
+        ]

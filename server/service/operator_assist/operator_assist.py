@@ -42,14 +42,16 @@ def corrections_for_tracker(
         None: no position is left, or the camera has not shown this person.
     """
     published, numbers = people.published, [number, *people.registry.aliases(number)]
-    known = [it for it in positions if published.covers(it.pulse)]
-    tracks = [(it, published.of(camera, numbers, it.pulse)) for it in known]
+    known = [position for position in positions if published.covers(position.pulse)]
+    tracks = [(position, published.of(camera, numbers, position.pulse)) for position in known]
     boots = [track.boot for _, track in tracks if track is not None]
     if not boots:
         return None
     points = [
-        CorrectedPosition(pulse=it.pulse, track=track.track, x=it.x, y=it.y, tolerance=it.tolerance)
-        for it, track in tracks
+        CorrectedPosition(
+            pulse=position.pulse, track=track.track, x=position.x, y=position.y, tolerance=position.tolerance
+        )
+        for position, track in tracks
         if track is not None and track.boot == max(boots)
     ]
     return PositionCorrections(boot=max(boots), corrections=points)
@@ -83,7 +85,7 @@ class OperatorAssist:
         self._send(camera, msgspec.json.encode(corrections))
         self.corrections_sent += len(corrections.corrections)
         return len(corrections.corrections), self.flags.pointed(
-            number, camera, [it.pulse for it in corrections.corrections]
+            number, camera, [correction.pulse for correction in corrections.corrections]
         )
 
     def _risk_events(self, epoch: Epoch) -> Iterator[RiskEvent]:
@@ -91,7 +93,8 @@ class OperatorAssist:
         for camera, message in epoch.tracks.items():
             for event in message.risk_events:
                 numbers = [
-                    self._people.person_of(camera, message.boot, it, message.last) for it in event.tracks
+                    self._people.person_of(camera, message.boot, track, message.last)
+                    for track in event.tracks
                 ]
                 known = tuple(dict.fromkeys(number for number in numbers if number is not None))
                 if known and len(known) == len(numbers):

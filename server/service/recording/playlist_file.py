@@ -125,7 +125,7 @@ class RecordingPlaylist:
     def _write_all(self, *added: IndexEntry) -> None:
         self.is_stale = False  # before the index is read: another thread may drop entries meanwhile
         entries = [*self.index.all, *added]
-        longest = max([self._longest_s, *(it.frames / self._fps for it in entries)])
+        longest = max([self._longest_s, *(entry.frames / self._fps for entry in entries)])
         text = (
             "#EXTM3U\n#EXT-X-VERSION:7\n"
             f"#EXT-X-TARGETDURATION:{math.ceil(longest)}\n"

@@ -224,10 +224,12 @@ class RecordingFolder:
 
     def _begin_session(self, info: SessionInfo, init: InitSegments, first: int) -> None:
         name = datetime.fromtimestamp(info.started, UTC).strftime("%Y%m%dT%H%M%SZ")
-        existing = {it.name for it in self.folder.glob(f"{name}*")}
+        existing = {path.name for path in self.folder.glob(f"{name}*")}
         if name in existing:
             name = next(
-                it for number in range(1, len(existing) + 2) if (it := f"{name}-{number}") not in existing
+                candidate
+                for number in range(1, len(existing) + 2)
+                if (candidate := f"{name}-{number}") not in existing
             )
         folder = self.folder / name
         try:

@@ -132,7 +132,11 @@ class RecordingSession:
     @property
     def end(self) -> int:
         """The pulse after the last known one; 0 if there is none."""
-        ends = [it.index.all[-1].end for it in (*self.cameras.values(), self.audio) if it.index.all]
+        ends = [
+            playlist.index.all[-1].end
+            for playlist in (*self.cameras.values(), self.audio)
+            if playlist.index.all
+        ]
         return max([*ends, *(segment.first for segment in self.segments[-1:])], default=0)
 
     def date_segments(self, now: float) -> None:
@@ -219,7 +223,9 @@ class RecordingSession:
     @property
     def size(self) -> int:
         """Bytes on the disk."""
-        return sum(it.bytes for it in self.segments) + sum(it.bytes for it in self._playlists)
+        return sum(segment.bytes for segment in self.segments) + sum(
+            playlist.bytes for playlist in self._playlists
+        )
 
     @property
     def _playlists(self) -> list[RecordingPlaylist]:
@@ -264,7 +270,9 @@ class RecordingSession:
             except OSError as error:
                 stuck.add(first)
                 failed = error
-        self.segments = [it for it in self.segments if it.first not in firsts or it.first in stuck]
+        self.segments = [
+            segment for segment in self.segments if segment.first not in firsts or segment.first in stuck
+        ]
         for segment in self.segments:
             segment.is_stuck = segment.first in stuck or segment.is_stuck
         self.rewrite_playlists()
@@ -277,7 +285,11 @@ class RecordingSession:
             if playlist.is_stale:
                 with contextlib.suppress(OSError):
                     playlist.rewrite()
-        self.objects = {number: it for number, it in self.objects.items() if it.index.all or it.is_stale}
+        self.objects = {
+            number: playlist
+            for number, playlist in self.objects.items()
+            if playlist.index.all or playlist.is_stale
+        }
 
     def remove(self) -> None:
         """Remove the session's files, and its folder if nothing else is in it; only if it is in place."""

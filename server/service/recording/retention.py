@@ -88,7 +88,11 @@ class RetentionPolicy:
         oldest = self._now() - self._limits.keep_s
         max_bytes = self._limits.max_mb * _MEGA
         excess = sum(session.size for session in sessions) - (max_bytes - max_bytes / SEGMENTS_PER_DISK_QUOTA)
-        old = sum(it.written < oldest and not it.is_stuck for session in sessions for it in session.segments)
+        old = sum(
+            segment.written < oldest and not segment.is_stuck
+            for session in sessions
+            for segment in session.segments
+        )
         quota = self._quota(old)
         expired = ExpiredSegments()
         for session in sessions:

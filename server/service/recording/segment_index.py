@@ -84,7 +84,7 @@ class SegmentIndex:
         """Remove the entries of files, by camera and first pulse; return whether there were any."""
         with self._lock:
             before = len(self._entries)
-            self._entries = [it for it in self._entries if (it.camera, it.file) not in missing]
+            self._entries = [entry for entry in self._entries if (entry.camera, entry.file) not in missing]
             return len(self._entries) < before
 
     def at_or_after(self, pulse: int) -> IndexEntry | None:

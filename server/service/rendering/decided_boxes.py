@@ -78,4 +78,11 @@ class DecidedBoxes:
 
     def _decision_of(self, fragments: bytes) -> GopChoices | None:
         pulse = first_pulse(fragments, self._fps)
-        return next((it for it in self._decisions if it.first <= pulse < it.first + it.frames), None)
+        return next(
+            (
+                decision
+                for decision in self._decisions
+                if decision.first <= pulse < decision.first + decision.frames
+            ),
+            None,
+        )

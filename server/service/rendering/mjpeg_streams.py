@@ -107,8 +107,10 @@ class MjpegStreams:
 
     def put(self, result: RenderResult, now: float) -> None:
         """Schedule the pictures of a result; ``now`` is in seconds of a monotonic clock."""
-        pictures = [(it, False) for it in result.plain] + [(it, True) for it in result.boxed]
-        for picture, boxed in sorted(pictures, key=lambda it: it[0].pulse):
+        pictures = [(picture, False) for picture in result.plain] + [
+            (picture, True) for picture in result.boxed
+        ]
+        for picture, boxed in sorted(pictures, key=lambda pair: pair[0].pulse):
             if picture.pulse > self._newest:
                 at = now if self._live else self._pacer.due(picture.pulse, now)
                 self._scheduled.append(_ScheduledPicture(at, picture, boxed))

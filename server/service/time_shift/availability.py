@@ -24,7 +24,8 @@ def available_ranges(source: PlaybackSource, start: int = 0, end: int = sys.maxs
         ranges.append(PulseRange(gop.first, gop.end))
         gop = source.gop_in_memory(gop.end)
     return [
-        replace(it, first=max(it.first, start), end=min(it.end, end)) for it in merge_pulse_ranges(ranges)
+        replace(span, first=max(span.first, start), end=min(span.end, end))
+        for span in merge_pulse_ranges(ranges)
     ]
 
 
@@ -32,9 +33,9 @@ def available_camera_ranges(
     source: PlaybackSource, start: int = 0, end: int = sys.maxsize
 ) -> list[CameraRange]:
     """Return the playable ranges by camera shown: entries on the disk, then decisions in memory."""
-    in_memory = [it for it in source.ranges_in_memory if it.end > start and it.first < end]
+    in_memory = [span for span in source.ranges_in_memory if span.end > start and span.first < end]
     ranges = merge_camera_ranges([*_recorded(source, start, end), *in_memory])
-    return [replace(it, first=max(it.first, start), end=min(it.end, end)) for it in ranges]
+    return [replace(span, first=max(span.first, start), end=min(span.end, end)) for span in ranges]
 
 
 def first_available(source: PlaybackSource, pulse: int) -> int | None:
@@ -43,7 +44,9 @@ def first_available(source: PlaybackSource, pulse: int) -> int | None:
     Only the ends of indexes are read: a recording may be days long.
     """
     firsts = [
-        it.first for recorded in source.recorded if (it := recorded.index.at_or_after(pulse)) is not None
+        entry.first
+        for recorded in source.recorded
+        if (entry := recorded.index.at_or_after(pulse)) is not None
     ]
     gop = source.gop_in_memory(pulse)
     first = min([*firsts, *([] if gop is None else [gop.first])], default=None)
@@ -53,7 +56,7 @@ def first_available(source: PlaybackSource, pulse: int) -> int | None:
 def end_of_available(source: PlaybackSource) -> int:
     """Return the pulse after the last that can be played; 0 if there is none."""
     firsts = [
-        it.end for recorded in source.recorded if (it := recorded.index.before(sys.maxsize)) is not None
+        entry.end for recorded in source.recorded if (entry := recorded.index.before(sys.maxsize)) is not None
     ]
     gop = source.gop_in_memory_before(sys.maxsize)
     return max([*firsts, *([] if gop is None else [gop.end])], default=0)
@@ -74,7 +77,7 @@ def forget_missing_ends(source: PlaybackSource, start: int, end: int | None = No
     """
     for recorded in source.recorded:
         ends = recorded.index.at_or_after(start), recorded.index.before(sys.maxsize if end is None else end)
-        _check(recorded, {it for it in ends if it is not None})
+        _check(recorded, {entry for entry in ends if entry is not None})
 
 
 def forget_missing(source: PlaybackSource, start: int, end: int) -> None:
@@ -84,7 +87,10 @@ def forget_missing(source: PlaybackSource, start: int, end: int) -> None:
         OSError: it cannot be determined.
     """
     for recorded in source.recorded:
-        _check(recorded, {(it.camera, it.file): it for it in recorded.index.between(start, end)}.values())
+        _check(
+            recorded,
+            {(entry.camera, entry.file): entry for entry in recorded.index.between(start, end)}.values(),
+        )
 
 
 def _check(recorded: SessionEntries, entries: Iterable[IndexEntry]) -> None:

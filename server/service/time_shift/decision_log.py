@@ -46,8 +46,8 @@ async def read_decision_lines(recorder: Recorder, start: int, end: int) -> Async
 
     Lines of an earlier session whose numbers mean other persons carry that session's name as ``run``.
     """
-    async for it in read_decisions(recorder, start, end):
-        yield msgspec.json.encode(it.choices) + b"\n" if it.line is None else it.line
+    async for decision in read_decisions(recorder, start, end):
+        yield msgspec.json.encode(decision.choices) + b"\n" if decision.line is None else decision.line
 
 
 def _lines(path: Path, start: int, end: int) -> list[tuple[bytes, GopChoices]]:

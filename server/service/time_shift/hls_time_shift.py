@@ -104,7 +104,9 @@ class TimeShift:
         chunks: list[MediaChunk] = []
         for begin in range(first, until, self._gop):
             end = min(begin + self._gop, until)
-            pictures = [it for one in arrived if begin <= one.pulse < end for it in timeline.push(one)]
+            pictures = [
+                picture for one in arrived if begin <= one.pulse < end for picture in timeline.push(one)
+            ]
             pictures += timeline.fill(end)
             if pictures:
                 audio = None if playback_audio is None else await playback_audio.next_audio(begin, end)
@@ -116,8 +118,8 @@ class TimeShift:
         fps = self._layout.fps
         lead_chunk = MediaChunk(lead_pictures, fps, ContinuityCounters()) if lead_pictures else chunks[0]
         segment = HlsSegment(number, self._layout, lead_chunk)
-        for it in chunks:
-            segment.add(it)
+        for chunk in chunks:
+            segment.add(chunk)
         return segment
 
     async def _read(

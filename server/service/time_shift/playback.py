@@ -74,24 +74,28 @@ class PersonPlayback:
     def gop_in_memory(self, pulse: int) -> RecordedGop | None:
         """Return the person's GOP in memory that holds a pulse, or the next one."""
         candidates = [
-            gop for it in self.numbers if (gop := self.recorder.recent.of_person(it, pulse)) is not None
+            gop
+            for number in self.numbers
+            if (gop := self.recorder.recent.of_person(number, pulse)) is not None
         ]
         return min(candidates, key=lambda gop: gop.first, default=None)
 
     def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
         """Return the person's last GOP in memory that ends before a pulse."""
         recent = self.recorder.recent
-        candidates = [gop for it in self.numbers if (gop := recent.of_person_before(it, pulse)) is not None]
+        candidates = [
+            gop for number in self.numbers if (gop := recent.of_person_before(number, pulse)) is not None
+        ]
         return max(candidates, key=lambda gop: gop.first, default=None)
 
     @property
     def ranges_in_memory(self) -> Sequence[CameraRange]:
         """The cameras selected for the person, as far as in memory."""
         return [
-            CameraRange(it.choices[number], it.first, it.first + it.frames)
-            for it in self.recorder.recent.choices(0)
+            CameraRange(choices.choices[number], choices.first, choices.first + choices.frames)
+            for choices in self.recorder.recent.choices(0)
             for number in self.numbers
-            if number in it.choices
+            if number in choices.choices
         ]
 
     @property
@@ -171,11 +175,11 @@ async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[Record
 async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | None:
     """Return the last GOP that begins before a pulse, cut there; None if there is none."""
     candidates = [
-        (recorded.session, it)
+        (recorded.session, previous)
         for recorded in source.recorded
-        if (it := recorded.index.before(pulse)) is not None
+        if (previous := recorded.index.before(pulse)) is not None
     ]
-    session, entry = max(candidates, key=lambda it: it[1].first, default=(None, None))
+    session, entry = max(candidates, key=lambda candidate: candidate[1].first, default=(None, None))
     gop = source.gop_in_memory_before(pulse)
     if session is None or entry is None or (gop is not None and gop.end >= min(entry.end, pulse)):
         return gop
@@ -188,11 +192,11 @@ async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | N
 
 def _next_on_disk(source: PlaybackSource, pulse: int) -> tuple[RecordingSession, IndexEntry] | None:
     candidates = [
-        (recorded.session, it)
+        (recorded.session, entry)
         for recorded in source.recorded
-        if (it := recorded.index.at_or_after(pulse)) is not None
+        if (entry := recorded.index.at_or_after(pulse)) is not None
     ]
-    return min(candidates, key=lambda it: max(it[1].first, pulse), default=None)
+    return min(candidates, key=lambda candidate: max(candidate[1].first, pulse), default=None)
 
 
 def _remainder_of(gop: RecordedGop, pulse: int) -> RecordedGop:

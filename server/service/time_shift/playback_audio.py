@@ -52,7 +52,9 @@ class PlaybackAudio:
         missing = [number for number, frame in frames.items() if frame is None]
         if missing and (recorded := self._recorded()):
             frames |= await run_in_reader_thread(self._read, recorded, missing[0], missing[-1] + 1)
-        self._next = next((it for it in missing if it >= late and frames[it] is None), max(begin, end))
+        self._next = next(
+            (number for number in missing if number >= late and frames[number] is None), max(begin, end)
+        )
         audio = (frames[number] or audio_format.silence for number in range(begin, self._next))
         return AudioChunk(begin, tuple(audio), audio_format)
 

@@ -42,10 +42,10 @@ class PresenceHistory:
         decided = self._recorder.recent.end
         until = max(end, min(end + self._ahead, decided))
         seen: list[int] = []
-        async for it in read_decisions(self._recorder, begin, until):
-            if it.is_numbered:
-                last = last_seen_offsets(it.choices.boxes)
-                seen += [it.choices.first + last[number] for number in self._numbers if number in last]
+        async for decision in read_decisions(self._recorder, begin, until):
+            if decision.is_numbered:
+                last = last_seen_offsets(decision.choices.boxes)
+                seen += [decision.choices.first + last[number] for number in self._numbers if number in last]
         self._known, self._seen = range(begin, until), sorted(seen)
 
 

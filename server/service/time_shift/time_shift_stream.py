@@ -60,7 +60,9 @@ class TimeShiftStream:
                     return
                 visible = await visible_pictures(gop, self._source, self._timeline.stream_format, self._fps)
                 pictures = [
-                    it for it in visible.pictures if requested.end is None or it.pulse < requested.end
+                    picture
+                    for picture in visible.pictures
+                    if requested.end is None or picture.pulse < requested.end
                 ]
                 for shown in self._decodable(VisiblePictures(pictures, visible.is_muted)):
                     chunk = await self._recorded_chunk(shown)
@@ -84,11 +86,11 @@ class TimeShiftStream:
         try:
             async for chunk in subscriber.chunks():
                 visible = chunk.pictures if isinstance(chunk, MediaChunk) else ()
-                pictures = [it for it in visible if has_started or it.pulse >= at]
+                pictures = [picture for picture in visible if has_started or picture.pulse >= at]
                 if not pictures:
                     continue
                 is_last = end is not None and pictures[-1].until >= end
-                pictures = [it for it in pictures if end is None or it.pulse < end]
+                pictures = [picture for picture in pictures if end is None or picture.pulse < end]
                 if not has_started and pictures:
                     for shown in self._filler(pictures[0].pulse):
                         yield await self._recorded_chunk(shown)
@@ -107,7 +109,7 @@ class TimeShiftStream:
         if not gop.pictures:
             return
         yield from self._filler(gop.pictures[0].pulse)
-        shown = [it for picture in gop.pictures for it in self._timeline.push(picture)]
+        shown = [shown_picture for picture in gop.pictures for shown_picture in self._timeline.push(picture)]
         if shown:
             yield VisiblePictures(shown, gop.is_muted)
 

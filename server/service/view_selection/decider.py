@@ -188,7 +188,7 @@ class ViewDecider:
     def _decide(self, window: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:
         people, lookahead = self.people, len(weight)
         numbers, first_seen = window.numbers, people.registry.first_seen
-        since = np.fromiter((first_seen[it] for it in numbers.tolist()), np.int64, len(numbers))
+        since = np.fromiter((first_seen[number] for number in numbers.tolist()), np.int64, len(numbers))
         part = window.part(first, lookahead, since < first + frames)
         before = self._shots.of(part.numbers)
         starts = np.arange(lookahead) % self._config.encode.gop == 0

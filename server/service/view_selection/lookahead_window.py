@@ -55,7 +55,7 @@ class LookaheadWindow:
         tracks = WindowTracks(
             [quality_buffer.over(camera, first, last) for camera in cameras], first, undetected
         )
-        shown = np.array([[has(camera, it) for camera in cameras] for it in pulses], dtype=np.bool_)
+        shown = np.array([[has(camera, pulse) for camera in cameras] for pulse in pulses], dtype=np.bool_)
         numbers: Ints = np.array(people.registry.all_numbers, dtype=np.int64)
         everyone, own_indices = (
             tracks.persons(people, numbers, len(pulses)),

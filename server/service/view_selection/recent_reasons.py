@@ -80,7 +80,7 @@ class RecentReasons:
     def at(self, number: int, pulse: int) -> SelectionReason | None:
         """Explain the view of an object at a pulse; None: its reasons are not kept."""
         reasons = self._reasons.get(number, [])
-        place = bisect_right(reasons, pulse, key=lambda it: it.view.first) - 1
+        place = bisect_right(reasons, pulse, key=lambda reason: reason.view.first) - 1
         if place < 0:
             return None
         view = reasons[place].view
@@ -89,6 +89,8 @@ class RecentReasons:
     def _keep(self, view: SelectedView, reasons: SelectionReasons) -> SelectionReason:
         reason = SelectionReason(view, reasons.of(view.choice.number))
         oldest = view.first - self._keep_frames
-        recent = [it for it in self._reasons.get(view.choice.number, []) if it.view.first >= oldest]
+        recent = [
+            reason for reason in self._reasons.get(view.choice.number, []) if reason.view.first >= oldest
+        ]
         self._reasons[view.choice.number] = [*recent, reason]
         return reason

@@ -96,9 +96,9 @@ class ViewQualityBuffer:
             TrackWindow(
                 _stacked_boxes(windows, start),
                 np.repeat(np.arange(len(windows)), [len(window.keys) for window in windows]),
-                np.clip(np.array([it.confidence for it in tracks], dtype=np.float64), 0.0, 1.0),
+                np.clip(np.array([track.confidence for track in tracks], dtype=np.float64), 0.0, 1.0),
                 # None, not measured, becomes NaN.
-                np.array([it.sharpness for it in tracks], dtype=np.float64),
+                np.array([track.sharpness for track in tracks], dtype=np.float64),
             ),
             self.layout([window.message.camera for window in windows]),
             self.settings,

@@ -36,14 +36,14 @@ class WindowTracks:
         self._spans = list(chain.from_iterable(spans))
         self._first = first
         camera = np.repeat(np.arange(len(spans)), [len(camera_spans) for camera_spans in spans])
-        lengths = np.array([it.last - it.first + 1 for it in self._spans], dtype=np.int64)
-        self._tracks = np.array([len(it.window.window.keys) for it in self._spans], dtype=np.int64)
+        lengths = np.array([span.last - span.first + 1 for span in self._spans], dtype=np.int64)
+        self._tracks = np.array([len(span.window.window.keys) for span in self._spans], dtype=np.int64)
         self._camera = camera
         self.camera: Ints = np.repeat(camera, lengths)
-        self.frame = _joined([np.arange(it.first - first, it.last - first + 1) for it in self._spans])
+        self.frame = _joined([np.arange(span.first - first, span.last - first + 1) for span in self._spans])
         self.has_detection = ~undetected[self.camera, self.frame]
         self.row: Ints = np.repeat(np.arange(len(self.frame)), np.repeat(self._tracks, lengths))
-        self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(it) for it in self._spans)])
+        self.quality: Floats = np.concatenate([np.zeros(0), *(_quality(span) for span in self._spans)])
         self._begins = np.cumsum(np.concatenate([[0], lengths * self._tracks]))
 
     def persons(self, people: PersonTracker, numbers: Ints, frames: int) -> Ints:
@@ -53,18 +53,18 @@ class WindowTracks:
         """
         if not len(self.quality) or not len(numbers):
             return np.full(len(self.quality), -1)
-        windows = [it.window.window for it in self._spans]
-        local_ids = np.concatenate([it.local_ids for it in windows])
+        windows = [span.window.window for span in self._spans]
+        local_ids = np.concatenate([window.local_ids for window in windows])
         tracks = np.repeat(self._camera, self._tracks) * (local_ids.max() + 1) + local_ids
         _, once, back = np.unique(tracks, return_index=True, return_inverse=True)
-        keys = list(chain.from_iterable(it.keys for it in windows))
+        keys = list(chain.from_iterable(window.keys for window in windows))
         track_numbers = people.numbers([keys[at] for at in once.tolist()], self._first, frames)
         persons = np.ascontiguousarray(_indices_over_frames(track_numbers, numbers).T)
         each = np.split(back, np.cumsum(self._tracks)[:-1])
         return _joined(
             [
-                persons[it.first - self._first : it.last - self._first + 1, columns].reshape(-1)
-                for it, columns in zip(self._spans, each, strict=True)
+                persons[span.first - self._first : span.last - self._first + 1, columns].reshape(-1)
+                for span, columns in zip(self._spans, each, strict=True)
             ]
         )
 

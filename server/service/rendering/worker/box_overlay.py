@@ -31,7 +31,7 @@ def draw_boxes(
     A box is (object, left, top, right, bottom); right and bottom are exclusive.
     """
     line = max(1, round(image.shape[0] / _LINE_AT))
-    for number, *box in sorted(boxes, key=lambda it: (it[0] == chosen, it[0])):
+    for number, *box in sorted(boxes, key=lambda numbered: (numbered[0] == chosen, numbered[0])):
         width, color = (2 * line, CHOSEN_COLOR) if number == chosen else (line, OTHER_COLOR)
         left, top, right, bottom = (round(edge) for edge in np.clip(box, -COORDINATE_MAX, COORDINATE_MAX))
         cv2.rectangle(image, (left, top), (right - 1, bottom - 1), color, width)
