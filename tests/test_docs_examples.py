@@ -81,7 +81,7 @@ async def site(cameras_module: Any) -> AsyncIterator[str]:
     service = cameras_module.FedService(cameras_module.small_config())
     service.decider.people._registry = cameras_module.TrackNumbers()
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
-        service.come(*cameras_module.CAMERAS)
+        service.connect_cameras(*cameras_module.CAMERAS)
         for epoch in range(3):
             service.feed(
                 epoch,

@@ -11,7 +11,7 @@ from aiohttp.test_utils import TestServer
 from playwright.async_api import Browser
 
 from benchmarks.common.browser import chromium
-from fakes.http.handmade_server import HandMadeSite
+from fakes.http.scripted_server import ScriptedSite
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
@@ -22,19 +22,19 @@ async def browser() -> AsyncIterator[Browser]:
 
 
 @pytest.fixture
-def hand_made_site() -> HandMadeSite:
-    return HandMadeSite()
+def scripted_site() -> ScriptedSite:
+    return ScriptedSite()
 
 
 @pytest.fixture
-async def site_url(hand_made_site: HandMadeSite) -> AsyncIterator[str]:
+async def site_url(scripted_site: ScriptedSite) -> AsyncIterator[str]:
     """Serve the hand-made site over real HTTP; give its address."""
-    async with _served(hand_made_site) as url:
+    async with _served(scripted_site) as url:
         yield url
 
 
 @asynccontextmanager
-async def _served(site: HandMadeSite) -> AsyncIterator[str]:
+async def _served(site: ScriptedSite) -> AsyncIterator[str]:
     server = TestServer(site.app())
     await server.start_server(shutdown_timeout=0.1)
     try:

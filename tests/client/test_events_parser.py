@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import client
 from client.sse_parser import MAX_EVENT, EventStreamError, SentEvent, SseParser
-from fakes.http.handmade_server import CAMERAS, OBJECTS, SITE, HandMadeSite, gop, nothing_more, sent
+from fakes.http.scripted_server import CAMERAS, OBJECTS, SITE, ScriptedSite, gop, send_nothing, sse_event
 from fakes.timeouts import PATIENCE
 
 FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "crossing", "pulse": 80} | {
@@ -79,15 +79,17 @@ async def take(url: str, count: int) -> list[client.Event]:
         await stream.aclose()  # type: ignore[attr-defined]
 
 
-async def test_events_are_decoded_to_their_types(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_events_are_decoded_to_their_types(scripted_site: ScriptedSite, site_url: str) -> None:
     async def tell(response: web.StreamResponse) -> None:
-        stream = sent("site", SITE) + sent("objects", OBJECTS) + sent("cameras", CAMERAS)
-        stream += sent("weather", {"rain": True}) + sent("flag", FLAG) + sent("gop", gop(50, "c1"))
+        stream = sse_event("site", SITE) + sse_event("objects", OBJECTS) + sse_event("cameras", CAMERAS)
+        stream += (
+            sse_event("weather", {"rain": True}) + sse_event("flag", FLAG) + sse_event("gop", gop(50, "c1"))
+        )
         for at in range(0, len(stream), 100):
             await response.write(stream[at : at + 100])
-        await nothing_more(response)
+        await send_nothing(response)
 
-    hand_made_site.tells.append(tell)
+    scripted_site.event_scripts.append(tell)
     site, objects, cameras, flag, last = await take(site_url, 5)
     assert isinstance(site, client.Site)
     assert isinstance(objects, client.Objects)
@@ -100,32 +102,32 @@ async def test_events_are_decoded_to_their_types(hand_made_site: HandMadeSite, s
     assert last.cuts == (client.Cut(1, "c0", "c1", 50),)
 
 
-async def test_events_continue_after_an_interruption(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_events_continue_after_an_interruption(scripted_site: ScriptedSite, site_url: str) -> None:
     async def one(response: web.StreamResponse) -> None:
-        await response.write(sent("gop", gop(50, "c0")) + b"event: gop\ndata: {")
+        await response.write(sse_event("gop", gop(50, "c0")) + b"event: gop\ndata: {")
 
     async def another(response: web.StreamResponse) -> None:
-        await response.write(sent("gop", gop(60, "c1")))
-        await nothing_more(response)
+        await response.write(sse_event("gop", gop(60, "c1")))
+        await send_nothing(response)
 
-    hand_made_site.tells.extend([one, another])
+    scripted_site.event_scripts.extend([one, another])
     gops = await take(site_url, 2)
     assert [event.first for event in gops if isinstance(event, client.Gop)] == [50, 60]
 
 
-async def test_a_server_that_stays_away_ends_the_events(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_a_server_that_stays_away_ends_the_events(scripted_site: ScriptedSite, site_url: str) -> None:
     async def one(response: web.StreamResponse) -> None:
-        await response.write(sent("gop", gop(50, "c0")))
+        await response.write(sse_event("gop", gop(50, "c0")))
 
-    hand_made_site.tells.append(one)
+    scripted_site.event_scripts.append(one)
     with pytest.raises(client.AwayError):
         await take(site_url, 2)
 
 
-async def test_an_invalid_event_is_an_error(hand_made_site: HandMadeSite, site_url: str) -> None:
+async def test_an_invalid_event_is_an_error(scripted_site: ScriptedSite, site_url: str) -> None:
     async def wrong(response: web.StreamResponse) -> None:
-        await response.write(sent("gop", {"first": "now"}))
+        await response.write(sse_event("gop", {"first": "now"}))
 
-    hand_made_site.tells.append(wrong)
+    scripted_site.event_scripts.append(wrong)
     with pytest.raises(client.ContractError, match="event gop"):
         await take(site_url, 1)

@@ -13,25 +13,25 @@ from hypothesis import strategies as st
 import client
 from client.fmp4 import BoxReader
 from client.media_stream import MediaStreamError
-from fakes.http.handmade_server import (
+from fakes.http.scripted_server import (
     FPS,
     GOP,
     SITE,
-    HandMadeSite,
-    Play,
+    ScriptedSite,
+    StreamScript,
     box,
     fragment,
     gop,
     header,
-    nothing_more,
-    sent,
+    send_nothing,
+    sse_event,
 )
 from fakes.timeouts import PATIENCE
 
 HASTY = client.HttpSettings(retries=2, backoff_first=0.01, backoff_most=0.01)
 
 
-def plays(*pieces: bytes, stays: bool = False, step: int = 1000) -> Play:
+def plays(*pieces: bytes, stays: bool = False, step: int = 1000) -> StreamScript:
     """Send the pieces; then hang up, or stay silent."""
 
     async def play(response: web.StreamResponse) -> None:
@@ -39,7 +39,7 @@ def plays(*pieces: bytes, stays: bool = False, step: int = 1000) -> Play:
         for at in range(0, len(stream), step):
             await response.write(stream[at : at + step])
         if stays:
-            await nothing_more(response)
+            await send_nothing(response)
 
     return play
 
@@ -53,9 +53,9 @@ def only(folder: Path) -> list[str]:
 
 
 async def test_the_requested_seconds_are_recorded_unchanged(
-    hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
+    scripted_site: ScriptedSite, site_url: str, tmp_path: Path
 ) -> None:
-    hand_made_site.plays.append(plays(header(), frames(5000, 100), stays=True))
+    scripted_site.video_scripts.append(plays(header(), frames(5000, 100), stays=True))
     out = tmp_path / "one.mp4"
     done = await client.record(site_url, 1, out, seconds=2.0)
     assert out.read_bytes() == header() + frames(5000, 50)
@@ -65,16 +65,16 @@ async def test_the_requested_seconds_are_recorded_unchanged(
 
 
 async def test_progress_names_the_camera_and_counts_the_cuts(
-    hand_made_site: HandMadeSite, site_url: str
+    scripted_site: ScriptedSite, site_url: str
 ) -> None:
     told = asyncio.Event()
 
     async def tell(response: web.StreamResponse) -> None:
         cameras = ("c0", "c1", "c1", "c0")
-        stream = b"".join(sent("gop", gop(100 + GOP * i, camera)) for i, camera in enumerate(cameras))
-        await response.write(sent("site", SITE) + stream)
+        stream = b"".join(sse_event("gop", gop(100 + GOP * i, camera)) for i, camera in enumerate(cameras))
+        await response.write(sse_event("site", SITE) + stream)
         told.set()
-        await nothing_more(response)
+        await send_nothing(response)
 
     async def play(response: web.StreamResponse) -> None:
         await told.wait()
@@ -82,10 +82,10 @@ async def test_progress_names_the_camera_and_counts_the_cuts(
         for pulse in range(100, 121):
             await response.write(fragment(pulse))
             await reported.acquire()
-        await nothing_more(response)
+        await send_nothing(response)
 
-    hand_made_site.tells.append(tell)
-    hand_made_site.plays.append(play)
+    scripted_site.event_scripts.append(tell)
+    scripted_site.video_scripts.append(play)
     reported = asyncio.Semaphore(0)
     reports: list[client.Progress] = []
 
@@ -102,10 +102,10 @@ async def test_progress_names_the_camera_and_counts_the_cuts(
 
 
 async def test_a_recording_continues_after_an_interruption(
-    hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
+    scripted_site: ScriptedSite, site_url: str, tmp_path: Path
 ) -> None:
     half = fragment(110)[:30]
-    hand_made_site.plays.extend(
+    scripted_site.video_scripts.extend(
         [plays(header(), frames(100, 10), half), plays(header(), frames(105, 45), stays=True)]
     )
     out = tmp_path / "one.mp4"
@@ -115,29 +115,29 @@ async def test_a_recording_continues_after_an_interruption(
 
 
 async def test_a_server_that_stays_away_leaves_the_recording_so_far(
-    hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
+    scripted_site: ScriptedSite, site_url: str, tmp_path: Path
 ) -> None:
-    hand_made_site.plays.append(plays(header(), frames(100, 10)))
+    scripted_site.video_scripts.append(plays(header(), frames(100, 10)))
     done = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
     assert not done.complete
     assert (tmp_path / "one.mp4").read_bytes() == header() + frames(100, 10)
-    assert hand_made_site.opened == 1 + HASTY.retries
+    assert scripted_site.opened == 1 + HASTY.retries
 
 
 async def test_a_stream_of_another_format_ends_the_recording(
-    hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
+    scripted_site: ScriptedSite, site_url: str, tmp_path: Path
 ) -> None:
     other = header(picture=b"640x480")
-    hand_made_site.plays.extend([plays(header(), frames(100, 10)), plays(other, frames(110, 10))])
+    scripted_site.video_scripts.extend([plays(header(), frames(100, 10)), plays(other, frames(110, 10))])
     done = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
     assert not done.complete
     assert (tmp_path / "one.mp4").read_bytes() == header() + frames(100, 10)
 
 
 async def test_cancelling_keeps_the_recording_so_far(
-    hand_made_site: HandMadeSite, site_url: str, tmp_path: Path
+    scripted_site: ScriptedSite, site_url: str, tmp_path: Path
 ) -> None:
-    hand_made_site.plays.append(plays(header(), frames(100, 10), stays=True))
+    scripted_site.video_scripts.append(plays(header(), frames(100, 10), stays=True))
     enough = asyncio.Event()
 
     def report(progress: client.Progress) -> None:
@@ -180,9 +180,9 @@ async def test_a_failed_recording_leaves_an_older_file_alone(site_url: str, tmp_
     ],
 )
 async def test_an_invalid_stream_is_an_error(
-    hand_made_site: HandMadeSite, site_url: str, tmp_path: Path, noise: bytes
+    scripted_site: ScriptedSite, site_url: str, tmp_path: Path, noise: bytes
 ) -> None:
-    hand_made_site.plays.append(plays(noise, stays=True))
+    scripted_site.video_scripts.append(plays(noise, stays=True))
     with pytest.raises(client.ContractError, match=r"best\.mp4"):
         await client.record(site_url, 1, tmp_path / "one.mp4", settings=HASTY)
     assert only(tmp_path) == []

@@ -9,7 +9,7 @@ import pytest
 
 from client.media_stream import MediaStreamError
 from client.remux import remux
-from fakes.media.audio import flashing, heard, packets, write_flashes
+from fakes.media.audio import access_units, decode_audio, packets, write_flashes
 from fakes.system.full_disk import files_of_at_most
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
@@ -31,7 +31,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def write_stream(part: Path, source: Path, lost: range = range(0), early: int = 0, late: int = 0) -> Path:
     """Write a stream whose sound begins so many frames before the pictures, and ends so many after them."""
     stream_format, sound = StreamFormat(), AudioFormat(RATE, 2)
-    units = flashing(source)
+    units = access_units(source)
     stream_format.accept(units[0].data)
     frames = packets(source.read_bytes())
     count = PICTURES * RATE // FPS // SAMPLES
@@ -71,7 +71,7 @@ def test_sound_stays_with_its_pictures(source: Path, tmp_path: Path, early: int,
     with av.open(str(out)) as film:
         assert film.streams.video[0].start_time == 0
         assert film.duration == PICTURES * av.time_base // FPS, "sound after the last picture is left out"
-    times, _ = heard(out.read_bytes())
+    times, _ = decode_audio(out.read_bytes())
     assert times[0] == pytest.approx(max(0, -early) * SAMPLES / RATE, abs=0.001)
     assert times[-1] <= PICTURES / FPS + SAMPLES / RATE
 

@@ -17,7 +17,7 @@ from client.fmp4 import MAX_BOX, BoxReader, Mp4Reader
 from client.media_stream import MediaStreamError
 from client.sse_parser import EventStreamError, SseParser
 from client.webm import MAX_ELEMENT, WebmReader
-from fakes.http.handmade_server import OBJECTS, box, fragment, header
+from fakes.http.scripted_server import OBJECTS, box, fragment, header
 from fakes.timeouts import PATIENCE
 
 PIECE = bytes(1 << 16)

@@ -11,8 +11,8 @@ from playwright.async_api import Page
 from client import Gop
 from client.model import Split
 from fakes.programs import needs_chromium
-from fakes.running.assist_page import PLACE, assisted_site, every_gop_once, open_page
-from fakes.running.lookalikes import FRAMES, MET, STAND, camera
+from fakes.running.assist_page import PERSON_POSITION_JS, assisted_site, every_gop_once, open_page
+from fakes.running.lookalikes import FRAMES, MEETING, STANDING, write_camera
 from fakes.running.site import RunningSite
 from fakes.timeouts import PATIENCE_MS
 
@@ -33,23 +33,27 @@ def left_to_right(gop: Gop) -> list[int]:
 async def test_pointing_at_a_person_restores_their_id_without_interrupting_the_stream(tmp_path: Path) -> None:
     """The person from the left turns back; the tracker assumes that the two pass each other."""
     # One camera with given detections, so that a busy machine keeps up.
-    cameras = [camera(ALIKE, tmp_path)]
+    cameras = [write_camera(ALIKE, tmp_path)]
     async with assisted_site(tmp_path, cameras, memory_frames=FRAMES) as site, open_page(site) as page:
         await point(site, page)
 
 
 async def point(site: RunningSite, page: Page) -> None:
     gops = site.gops
-    await site.until(lambda: gops[-1].first > MET, "they have met")
-    before = [gop for gop in gops if gop.first + gop.frames <= MET and len(left_to_right(gop)) == len("LR")]
+    await site.until(lambda: gops[-1].first > MEETING, "they have met")
+    before = [
+        gop for gop in gops if gop.first + gop.frames <= MEETING and len(left_to_right(gop)) == len("LR")
+    ]
     first, second = left_to_right(before[-1])
     await site.until(lambda: left_to_right(gops[-1]) == [second, first], "the tracker exchanges them")
     await page.goto(f"{site.url}?object={first}")
     await page.wait_for_function(f"myview.state === 'playing' && myview.camera === '{ALIKE}'")
     await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
-    await page.wait_for_function(f"!document.querySelector('#point').hidden && ({PLACE})({second})")
+    await page.wait_for_function(
+        f"!document.querySelector('#point').hidden && ({PERSON_POSITION_JS})({second})"
+    )
     # While they walk, the pointer of a busy machine lags behind them.
-    await page.wait_for_function(f"myview.pulse >= {STAND}")
+    await page.wait_for_function(f"myview.pulse >= {STANDING}")
     await page.keyboard.press("h")
     await page.wait_for_function(f"myview.pointing.object === {first}")
     # They stand: the pointer stays on the person from the left, whose id is now the other one.
@@ -57,7 +61,7 @@ async def point(site: RunningSite, page: Page) -> None:
     async with asyncio.timeout(PATIENCE_MS / 1000):
         while not await page.evaluate(accepted):
             pulse = await page.evaluate("myview.pulse")
-            place = await page.evaluate(PLACE, second)
+            place = await page.evaluate(PERSON_POSITION_JS, second)
             if place is not None:
                 await page.mouse.move(*place)
             await page.wait_for_function(f"myview.pulse !== {pulse} || {accepted}")

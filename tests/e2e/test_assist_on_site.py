@@ -11,7 +11,7 @@ import pytest_asyncio
 from playwright.async_api import Page
 
 from fakes.programs import needs_chromium
-from fakes.running.assist_page import PLACE, assisted_site, every_gop_once, open_page
+from fakes.running.assist_page import PERSON_POSITION_JS, assisted_site, every_gop_once, open_page
 from fakes.running.site import RunningSite
 from fakes.timeouts import PATIENCE_MS
 from server.cli.generated_config import DEMO
@@ -43,7 +43,7 @@ async def point_until(page: Page, condition: str) -> None:
         while not await page.evaluate(condition):
             if await page.evaluate("myview.pointing.object === null && myview.flags.length > 0"):
                 await page.keyboard.press("h")
-            place = await page.evaluate(PLACE)
+            place = await page.evaluate(PERSON_POSITION_JS)
             if place is not None:
                 await page.mouse.move(*place)
             pulse = await page.evaluate("myview.pulse")

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from client import Gop
-from fakes.running.site import RunningSite, bounded, running
+from fakes.running.site import RunningSite, running, with_timeout
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import DEMO, free_port
 from server.config.sections import ZenohSettings
@@ -110,7 +110,7 @@ async def kill_and_check(site: RunningSite, messages: list[CameraTracks]) -> Non
     def resumed() -> bool:
         return site.pulse > died + 50 and len(site.gops) > count + 3 and len(surviving_tracks()) > 1
 
-    await bounded(site.until(resumed, "the site and tracks continue"))
+    await with_timeout(site.until(resumed, "the site and tracks continue"))
     assert site.children()["bestview"] != before
     for track, numbers_now in surviving_tracks().items():
         assert numbers_now & before_ids[track], f"{track}: {before_ids[track]} {numbers_now}"

@@ -10,7 +10,7 @@ from pathlib import Path
 import aiohttp
 import pytest
 
-from fakes.running.site import bounded, configuration, running
+from fakes.running.site import configuration, running, with_timeout
 
 pytestmark = [pytest.mark.live, pytest.mark.slow]
 
@@ -30,7 +30,7 @@ async def test_render_workers_exit_within_two_seconds_of_sigterm(tmp_path: Path)
         ):
             for answer in (plain, boxed):
                 assert answer.status == 200
-                await bounded(answer.content.readexactly(10_000))
+                await with_timeout(answer.content.readexactly(10_000))
             workers = processes("server.service.rendering.worker", started.children()["bestview"])
             assert len(workers) == 2
             started.process.send_signal(signal.SIGTERM)
@@ -38,7 +38,7 @@ async def test_render_workers_exit_within_two_seconds_of_sigterm(tmp_path: Path)
             while any(Path(f"/proc/{pid}").exists() for pid in workers):
                 await asyncio.sleep(0.01)
                 assert time.monotonic() < terminated_at + EXIT_S
-            assert await started.ended() == 0
+            assert await started.wait_for_exit() == 0
 
 
 def processes(module: str, parent: int) -> list[int]:

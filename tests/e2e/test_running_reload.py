@@ -13,7 +13,7 @@ import aiohttp
 import pytest
 import yaml
 
-from fakes.running.site import RunningSite, bounded, configuration, running
+from fakes.running.site import RunningSite, configuration, running, with_timeout
 from fakes.running.stream_frames import pictures, record
 
 pytestmark = [pytest.mark.live, pytest.mark.slow]
@@ -26,7 +26,7 @@ async def wait_for_log(site: RunningSite, text: str) -> None:
         while not any(text in line for line in site.lines):  # noqa: ASYNC110 — another process: there is no event
             await asyncio.sleep(0.05)
 
-    await bounded(look())
+    await with_timeout(look())
 
 
 async def reload(running_site: RunningSite, config: Path, **changes: Any) -> None:
@@ -65,7 +65,7 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         await wait_for_log(site, "c1: configuration reloaded: this camera restarts")
         assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
         assert (await ask("api/operator/config"))["pending_restart"] == ["encode.crf"]
-        await bounded(viewer)
+        await with_timeout(viewer)
         await wait_for_log(site, "waits for a restart of all processes: encode.crf")
         now = site.children()
         assert {process: now[process] for process in processes if process != "c2"} == {
@@ -73,7 +73,7 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         }
         await site.until(lambda: site.state("c1") == "live", "c1 has restarted")
         site.process.send_signal(signal.SIGTERM)
-        assert await site.ended() == 0
+        assert await site.wait_for_exit() == 0
     shown = sorted(pictures(tmp_path / "viewer"))
     assert len(shown) > 80
     assert all(after == before + 1 for before, after in pairwise(shown)), "the stream has no gap"

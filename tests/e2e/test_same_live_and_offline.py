@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fakes.running.site import CAMERAS, MYVIEW, bounded, configuration, running
+from fakes.running.site import CAMERAS, MYVIEW, configuration, running, with_timeout
 
 WRITTEN = ("choices.csv", "corrections.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
 
@@ -24,7 +24,7 @@ async def rendered(config: Path, recording: Path, out: Path) -> None:
         "--out",
         str(out),
     )
-    assert await bounded(process.wait()) == 0
+    assert await with_timeout(process.wait()) == 0
 
 
 async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) 
     )
     await rendered(config, recording, tmp_path / "offline")
     async with running(config, "--out", str(tmp_path / "live"), listen=False) as site:
-        assert await site.ended() == 0, "\n".join(site.lines)
+        assert await site.wait_for_exit() == 0, "\n".join(site.lines)
     for name in WRITTEN:
         live, offline = (tmp_path / way / name for way in ("live", "offline"))
         assert live.read_bytes() == offline.read_bytes(), f"{name} differs\n" + "\n".join(site.lines)

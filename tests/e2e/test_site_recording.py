@@ -14,7 +14,7 @@ import pytest
 
 from fakes.media.decoding import decodes_without_errors
 from fakes.running.beeps import sample_and_beep_times, write_beeps
-from fakes.running.site import CAMERAS, RunningSite, bounded, configuration, running
+from fakes.running.site import CAMERAS, RunningSite, configuration, running, with_timeout
 from fakes.running.stream_frames import FPS, pictures
 from fakes.timeouts import PATIENCE
 
@@ -89,7 +89,7 @@ def it_beeps_every_second_without_a_hole(film: Path) -> None:
 async def downloaded(session: aiohttp.ClientSession, path: str, folder: Path) -> dict[int, np.ndarray]:
     async with session.get(path) as answer:
         assert answer.status == 200, await answer.text()
-        data = await bounded(answer.read())
+        data = await with_timeout(answer.read())
     out = folder / "downloaded.mp4"
     out.write_bytes(data + b"\0\0\0\0moof")  # whole to its end, and `pictures` leaves the last one out
     return await asyncio.to_thread(pictures, out)

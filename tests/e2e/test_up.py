@@ -21,11 +21,11 @@ from playwright.async_api import Browser, Page
 
 from benchmarks.common.browser import chromium
 from fakes.programs import needs_chromium
-from fakes.prometheus.monitoring_files import ASKED, OF_PROMETHEUS
-from fakes.prometheus.promql_series import Printed, given, selectors
+from fakes.prometheus.monitoring_files import BUILT_IN_METRICS, EXPRESSIONS
+from fakes.prometheus.promql_series import ExportedMetrics, select_series, selectors
 from fakes.running.beeps import sample_and_beep_times, write_beeps
-from fakes.running.site import CAMERAS, RunningSite, bounded, configuration, running
-from fakes.running.stream_frames import FPS, pictures, record, shown_from_to
+from fakes.running.site import CAMERAS, RunningSite, configuration, running, with_timeout
+from fakes.running.stream_frames import FPS, display_intervals, pictures, record
 from fakes.timeouts import PATIENCE
 
 pytestmark = [
@@ -101,12 +101,12 @@ async def test_pulses_are_readable_with_nc(site: RunningSite) -> None:
             program, "127.0.0.1", port, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
         )
         assert listener.stdout is not None
-        lines = [(await bounded(listener.stdout.readline())).decode() for _ in range(6)]
+        lines = [(await with_timeout(listener.stdout.readline())).decode() for _ in range(6)]
         listener.kill()
         await listener.wait()
     else:  # as nc does
         reader, writer = await asyncio.open_connection("127.0.0.1", int(port))
-        lines = [(await bounded(reader.readline())).decode() for _ in range(6)]
+        lines = [(await with_timeout(reader.readline())).decode() for _ in range(6)]
         writer.close()
         await writer.wait_closed()
     assert lines[0].startswith("MYVIEW-SYNC 1 ")
@@ -130,7 +130,7 @@ async def test_metadata_is_readable_by_a_plain_zenoh_subscriber(site: RunningSit
     subscriber = session.declare_subscriber("myview/e2e/**/tracks", receive)
     waiting = set(CAMERAS)
     while waiting:
-        key, tracks = await bounded(found.get())
+        key, tracks = await with_timeout(found.get())
         assert key == f"myview/e2e/camera/{tracks['camera']}/tracks"
         assert all(len(track["boxes"]) == tracks["last"] - tracks["first"] + 1 for track in tracks["tracks"])
         waiting.discard(tracks["camera"])
@@ -140,7 +140,7 @@ async def test_metadata_is_readable_by_a_plain_zenoh_subscriber(site: RunningSit
 
 async def test_every_panel_and_every_alert_uses_metrics_of_the_site(site: RunningSite) -> None:
     async with aiohttp.ClientSession(site.url) as session:
-        while lacking := missing_metrics(Printed.of(await text(session, "metrics"))):
+        while lacking := missing_metrics(ExportedMetrics.of(await text(session, "metrics"))):
             now = site.pulse
             await site.until(lambda: site.pulse > now, f"metrics for {lacking}")  # noqa: B023
 
@@ -150,12 +150,12 @@ async def text(session: aiohttp.ClientSession, path: str) -> str:
         return await answer.text()
 
 
-def missing_metrics(printed: Printed) -> list[str]:
+def missing_metrics(printed: ExportedMetrics) -> list[str]:
     """List the panels and alerts whose metrics are not exported yet."""
     lacking = []
-    for asked in ASKED:
-        if not {selector.name for selector in selectors(asked.expression)} <= OF_PROMETHEUS:
-            series = given(asked.expression, printed)
+    for asked in EXPRESSIONS:
+        if not {selector.name for selector in selectors(asked.expression)} <= BUILT_IN_METRICS:
+            series = select_series(asked.expression, printed)
             if not series:
                 lacking.append(asked.place)
             assert all(asked.shown <= dict(one_series).keys() for one_series in series), asked.place
@@ -170,7 +170,7 @@ async def test_every_frame_equals_the_selected_cameras_across_cuts(site: Running
     paths = {f"object-{number}": f"objects/{number}/best.mp4" for number in numbers}
     paths |= {camera: f"cameras/{camera}/live.mp4" for camera in CAMERAS}
     async with aiohttp.ClientSession() as session:
-        files = await bounded(
+        files = await with_timeout(
             asyncio.gather(
                 *(record(session, site.url + path, end, tmp_path / name) for name, path in paths.items())
             )
@@ -232,7 +232,7 @@ async def test_a_killed_camera_is_replaced_and_comes_back(site: RunningSite, tmp
         await site.until(
             lambda: any(victim in gop.choices.values() for gop in site.gops[-3:]), "it is selected again"
         )
-        await bounded(viewer)
+        await with_timeout(viewer)
     # Buffered video is shown first; a busy machine takes longer, also in pulses.
     assert first_without - decided < 10 * (LOOKAHEAD + GOP)
     pulses = sorted(pictures(tmp_path / "viewer"))
@@ -259,10 +259,10 @@ async def test_streams_freeze_while_all_cameras_are_down_and_then_continue(
             lambda: {site.state(camera) for camera in CAMERAS} == {"gone"}, "the loss is noticed"
         )
         await site.until(lambda: site.gops[-1].choices.get(number) is None, "no person can be shown")
-        files = [await bounded(viewer) for viewer in viewers]
+        files = [await with_timeout(viewer) for viewer in viewers]
         await site.until(lambda: {site.state(camera) for camera in CAMERAS} == {"live"}, "all are back")
     for file in files:
-        moments = shown_from_to(file)
+        moments = display_intervals(file)
         assert len(moments) > 50
         gaps = [(a, b) for a, b in pairwise(moments) if round(b[0] - a[1])]
         assert not gaps, f"{file.name}: {gaps}"
@@ -303,7 +303,7 @@ async def test_sound_continues_in_sync_across_cuts_and_selections(
     number = await page.evaluate("myview.object")
     async with aiohttp.ClientSession() as session:
         url = f"{site.url}objects/{number}/best.mp4"
-        film = await bounded(record(session, url, site.pulse + 4 * FPS, tmp_path / "film"))
+        film = await with_timeout(record(session, url, site.pulse + 4 * FPS, tmp_path / "film"))
     times, begins = await asyncio.to_thread(sample_and_beep_times, film)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a gap"
     assert len(begins) >= 3

@@ -7,10 +7,10 @@ import os
 import pytest
 
 from fakes.cli.command_line import myview
-from fakes.service.fed_site import busy, hall
-from fakes.service.vp8_site import free
+from fakes.service.fed_site import served, site_with_people
+from fakes.service.vp8_site import vp8_site
 
-__all__ = ["busy", "free", "hall", "myview"]
+__all__ = ["myview", "served", "site_with_people", "vp8_site"]
 
 
 @pytest.fixture(autouse=True)

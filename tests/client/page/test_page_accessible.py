@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from playwright.async_api import Browser
 
-from fakes.page.accessibility import faults
+from fakes.page.accessibility import violations
 from fakes.page.browser import visiting
 from fakes.page.site import FakeSite
 from fakes.paths import AXE
@@ -25,7 +25,7 @@ async def test_a_page_with_a_selected_person_has_no_faults(browser: Browser, wid
         await visit.page.get_by_text("More", exact=True).click()
         await visit.page.keyboard.press("w")
         await visit.until("document.querySelector('#why table')")
-        assert await faults(visit) == []
+        assert await violations(visit) == []
 
 
 async def test_the_cost_table_is_focused_and_scrolled_by_keyboard(browser: Browser) -> None:
@@ -47,4 +47,4 @@ async def test_a_page_without_a_visible_person_has_no_faults(
 ) -> None:
     async with visiting(browser, FakeSite(people=people), query) as visit:
         await visit.until("['empty', 'away', 'unknown'].includes(myview.state)")
-        assert await faults(visit) == []
+        assert await violations(visit) == []

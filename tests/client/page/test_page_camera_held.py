@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from playwright.async_api import Browser, expect
 
-from fakes.page.browser import Visit, camera_on_the_stage, visiting
+from fakes.page.browser import Visit, displayed_camera, visiting
 from fakes.page.site import HOLD
 from fakes.page.video_pattern import CAMERAS, GOP
 from fakes.programs import needs_chromium
@@ -20,7 +20,7 @@ async def check_held(visit: Visit, camera: str) -> None:
     cuts = await visit.get("myview.cuts.length")
     for later in range(HOLD, len(CAMERAS) * HOLD + 1, HOLD):
         await visit.until(f"myview.pulse > {pulse + later}")
-        assert await camera_on_the_stage(visit) == camera
+        assert await displayed_camera(visit) == camera
     assert await visit.get("myview.cuts.length") == cuts
 
 
@@ -59,20 +59,20 @@ async def test_a_preferred_camera_is_replaced_while_it_does_not_see_the_person(b
         await visit.page.get_by_role("button", name="Prefer").click()
         assert visit.page.url.endswith("?object=2&prefer=c0")
         await visit.until("myview.camera === 'c0' && myview.delays.length")
-        assert await camera_on_the_stage(visit) == "c0"
+        assert await displayed_camera(visit) == "c0"
         await expect(visit.page.locator("#reason")).to_have_text("Preferred. The best view now is c2.")
         site = visit.server.site
         first = site.edge - site.edge % GOP + 3 * GOP
-        site.blind = range(first, first + 10_000 * GOP)  # longer than the test
+        site.blind_pulses = range(first, first + 10_000 * GOP)  # longer than the test
         await visit.until(f"myview.pulse > {first + GOP}")
         assert await visit.get("myview.camera") == "c2"
-        assert await camera_on_the_stage(visit) == "c2"
+        assert await displayed_camera(visit) == "c2"
         await expect(visit.page.locator("#reason")).to_contain_text("does not see this person")
-        site.blind = range(first, site.edge - site.edge % GOP + 3 * GOP)
-        await visit.until(f"myview.pulse > {site.blind.stop + GOP}")
+        site.blind_pulses = range(first, site.edge - site.edge % GOP + 3 * GOP)
+        await visit.until(f"myview.pulse > {site.blind_pulses.stop + GOP}")
         cuts = await visit.get("myview.cuts.slice(-2)")
         assert [cut["to"] for cut in cuts] == ["c2", "c0"]
-        for cut, since in zip(cuts, (first, site.blind.stop + GOP), strict=True):
+        for cut, since in zip(cuts, (first, site.blind_pulses.stop + GOP), strict=True):
             assert 0 <= cut["pulse"] - since < GOP, "a slow machine may skip the first frame"
         await visit.page.get_by_role("button", name="Prefer").click()
         await visit.until("new URL(location).searchParams.get('camera') === 'c0'")

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser, expect
 
-from fakes.page.accessibility import faults
-from fakes.page.browser import Visit, seconds_of_playing, visiting
+from fakes.page.accessibility import violations
+from fakes.page.browser import Visit, play_for, visiting
 from fakes.page.site import FakeSite
 from fakes.page.video_pattern import CAMERAS, HEIGHT, WIDTH
 from fakes.paths import AXE
@@ -83,7 +83,7 @@ async def test_a_past_flag_is_answered_in_the_past_and_playback_returns_to_live(
     site = FakeSite(operates=True)
     async with visiting(browser, site) as visit:
         await visit.playing(1)
-        await seconds_of_playing(visit, 6)
+        await play_for(visit, 6)
         past = flag(site, -5.0)
         site.flags.append(past)
         await visit.until("/ [0-9] s ago/.test(document.querySelector('#flag-time').textContent)")
@@ -202,7 +202,7 @@ async def test_a_flag_causes_no_accessibility_faults(browser: Browser, width: in
     async with visiting(browser, site, width=width) as visit:
         await visit.playing(1)
         await expect(visit.page.locator("#flag-point")).to_be_visible()
-        assert await faults(visit) == []
+        assert await violations(visit) == []
         await visit.page.locator("#flag-point").click()
         await visit.until("myview.pointing.object === 2")
-        assert await faults(visit) == []
+        assert await violations(visit) == []

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 import pytest
 from playwright.async_api import Browser, expect
 
-from fakes.page.browser import Visit, camera_on_the_stage, visiting
+from fakes.page.browser import Visit, displayed_camera, visiting
 from fakes.page.site import SEGMENT, FakeSite
 from fakes.page.video_pattern import FPS
 from fakes.programs import needs_chromium
@@ -63,7 +63,7 @@ async def test_with_a_start_date_frames_are_mapped_to_pulses(browser: Browser) -
             assert shown[1] == "c" + str(visit.server.site.camera(1, shown[0]))
         await visit.page.keyboard.press("3")
         await visit.until("myview.camera === 'c2'")
-        assert await camera_on_the_stage(visit) == "c2"
+        assert await displayed_camera(visit) == "c2"
         await visit.page.keyboard.press("0")
         await visit.playing(1)
         await visit.page.keyboard.press(",")

@@ -9,13 +9,13 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page
 
-from fakes.page.site import STARTS_AT, FakeSite, SiteServer, serving
+from fakes.page.site import FIRST_PULSE, FakeSite, SiteServer, serving
 from fakes.page.video_pattern import FPS, GOP
 from fakes.programs import needs_chromium
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="session")]
 
-FIRST = STARTS_AT - STARTS_AT % GOP
+FIRST = FIRST_PULSE - FIRST_PULSE % GOP
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")

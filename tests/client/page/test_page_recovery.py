@@ -6,7 +6,7 @@ import pytest
 from playwright.async_api import Browser, expect
 
 from fakes.page.browser import visiting
-from fakes.page.site import STARTS_AT, FakeSite
+from fakes.page.site import FIRST_PULSE, FakeSite
 from fakes.page.video_pattern import FPS
 from fakes.programs import needs_chromium
 
@@ -29,7 +29,7 @@ async def test_a_lost_connection_is_reported_under_the_last_frame_and_restored(b
         assert await visit.get("window.visit") == "the same"
 
 
-@pytest.mark.parametrize("first", [500, STARTS_AT + 900_000], ids=["earlier", "later"])
+@pytest.mark.parametrize("first", [500, FIRST_PULSE + 900_000], ids=["earlier", "later"])
 async def test_a_site_whose_pulses_restart_plays_on(browser: Browser, first: int) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)

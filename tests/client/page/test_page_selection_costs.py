@@ -8,7 +8,7 @@ import pytest
 from playwright.async_api import Browser, Route, expect
 
 from fakes.page.browser import visiting
-from fakes.page.site import STARTS_AT, FakeSite
+from fakes.page.site import FIRST_PULSE, FakeSite
 from fakes.page.video_pattern import FPS
 from fakes.programs import needs_chromium
 
@@ -80,7 +80,7 @@ async def test_with_slow_answers_the_costs_are_of_the_last_mouse_position(browse
 
 
 async def test_a_moment_without_recorded_reasons_says_so(browser: Browser) -> None:
-    async with visiting(browser, FakeSite(kept_from=STARTS_AT + 100_000)) as visit:
+    async with visiting(browser, FakeSite(replayable_from=FIRST_PULSE + 100_000)) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("w")
         await expect(visit.page.locator("#why")).to_contain_text("not known")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from playwright.async_api import Browser, expect
 
-from fakes.page.browser import Visit, seconds_of_playing, visiting
-from fakes.page.site import STARTS_AT, FakeSite
+from fakes.page.browser import Visit, play_for, visiting
+from fakes.page.site import FIRST_PULSE, FakeSite
 from fakes.page.video_pattern import CAMERAS, FPS, GOP
 from fakes.programs import needs_chromium
 
@@ -29,7 +29,7 @@ async def first_after(visit: Visit, paused_at: int) -> int:
 async def test_a_press_on_the_timeline_plays_from_that_moment(browser: Browser) -> None:
     async with visiting(browser) as visit:
         await visit.playing(1)
-        await seconds_of_playing(visit, 6)
+        await play_for(visit, 6)
         newest = await visit.get("myview.pulse")
         strip = visit.page.locator("#strip")
         box = await strip.bounding_box()
@@ -65,7 +65,7 @@ async def test_playback_resumes_where_it_was_paused(browser: Browser) -> None:
 async def play_five_seconds_back(visit: Visit) -> int:
     """Go back five seconds; return the displayed pulse."""
     await visit.playing(1)
-    await seconds_of_playing(visit, 6)
+    await play_for(visit, 6)
     await visit.page.keyboard.press(",")
     await visit.until("myview.delays.at(-1).delayMs > 4000")
     return int(await visit.get("myview.pulse"))
@@ -116,7 +116,7 @@ async def test_a_video_paused_by_the_browser_on_a_hidden_page_resumes_live(
 
 async def test_a_slowly_arriving_past_is_displayed(browser: Browser) -> None:
     rest_arrives = asyncio.Event()
-    async with visiting(browser, FakeSite(recorded=1800, past_comes=rest_arrives)) as visit:
+    async with visiting(browser, FakeSite(recorded=1800, past_released=rest_arrives)) as visit:
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
         await visit.until("video.paused && myview.state === 'paused'")
@@ -202,7 +202,7 @@ async def test_a_pause_of_a_person_who_has_left_resumes_live_without_a_notice(br
         await visit.playing(1)
         await visit.page.keyboard.press("Space")
         visit.server.site.people = {1: False, 2: True}
-        visit.server.site.kept_from = STARTS_AT + 100_000
+        visit.server.site.replayable_from = FIRST_PULSE + 100_000
         await pause_until_suspended(visit)
         await visit.page.keyboard.press("Space")
         await visit.until(f"!video.paused && {LIVE}")
@@ -210,9 +210,9 @@ async def test_a_pause_of_a_person_who_has_left_resumes_live_without_a_notice(br
 
 
 async def test_an_unrecorded_moment_is_reported_and_playback_is_live(browser: Browser) -> None:
-    async with visiting(browser, FakeSite(kept_from=STARTS_AT + 10_000)) as visit:
+    async with visiting(browser, FakeSite(replayable_from=FIRST_PULSE + 10_000)) as visit:
         await visit.playing(1)
-        await seconds_of_playing(visit, 3)
+        await play_for(visit, 3)
         await visit.page.keyboard.press(",")
         await expect(visit.page.locator("#notice")).to_contain_text("There is no recording of that time")
         pulse = await visit.get("myview.pulse")

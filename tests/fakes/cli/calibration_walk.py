@@ -29,7 +29,7 @@ def walk_config(**changes: Any) -> Config:
     return small_config(**{**SITE, **changes})
 
 
-def curved(frames: int, wide: float = 0.3) -> Floats:
+def curved_path(frames: int, wide: float = 0.3) -> Floats:
     """Return a curved path through the middle of the scene's floor, `(frames, 2)` meters."""
     width, depth = Scene("room", 2, 1).floor
     time = np.arange(frames)
@@ -41,7 +41,7 @@ def curved(frames: int, wide: float = 0.3) -> Floats:
     )
 
 
-def words(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -> Iterator[Epoch]:
+def walk_epochs(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -> Iterator[Epoch]:
     """Yield the cameras' track messages of a walking person, from an epoch on; only complete windows."""
     ids = config.camera_ids
     scene = Scene("room", len(ids), 1, width=WIDTH, height=HEIGHT)

@@ -14,7 +14,7 @@ from server.cli.main import main
 BAD_INPUT = 2
 
 
-class Ended(NamedTuple):
+class CommandResult(NamedTuple):
     """The exit code and output of a command."""
 
     code: int
@@ -22,7 +22,7 @@ class Ended(NamedTuple):
     err: str
 
 
-def refusal(ended: Ended) -> str:
+def input_error(ended: CommandResult) -> str:
     """Return the single error line about the input."""
     assert (ended.code, ended.out) == (BAD_INPUT, ""), ended.err
     (line,) = ended.err.splitlines()
@@ -30,15 +30,15 @@ def refusal(ended: Ended) -> str:
     return line
 
 
-Run = Callable[..., Ended]
+RunCommand = Callable[..., CommandResult]
 
 
 @pytest.fixture
-def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Run]:
+def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[RunCommand]:
     """Yield a function that runs `myview` with some arguments."""
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
 
-    def command(*arguments: object) -> Ended:
+    def command(*arguments: object) -> CommandResult:
         monkeypatch.setattr(sys, "argv", ["myview", *map(str, arguments)])
         capsys.readouterr()
         code = 0
@@ -47,7 +47,7 @@ def myview(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
         except SystemExit as end:
             code = int(end.code or 0)
         output = capsys.readouterr()
-        return Ended(code, output.out, output.err)
+        return CommandResult(code, output.out, output.err)
 
     yield command
     for number, handler in before.items():

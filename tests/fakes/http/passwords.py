@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 HOST = "192.0.2.11"
 PASSWORDS = st.text("QXZJKVWqxzjkvw /@#?&=:;%+|\\'\"<>{}[]$!~^()*,", min_size=4, max_size=24)
 """Characters that occur in no message of MyView, and all delimiters of addresses."""
-PLACES = (
+ADDRESSES = (
     "rtsp://user:{}@192.0.2.11/x",
     "rtsp://user:{}@192.0.2.11:554",
     "rtsp://{}@192.0.2.11/x",
@@ -39,7 +39,7 @@ PLACES = (
 _PIECE = 4
 
 
-def tells(text: str, password: str, without: str) -> bool:
+def leaks(text: str, password: str, without: str) -> bool:
     """Return whether a text contains four characters of a password that are not in the text without it."""
     pieces = {password[at : at + _PIECE] for at in range(len(password) - _PIECE + 1)}
     return any(piece in text and piece not in without for piece in pieces)

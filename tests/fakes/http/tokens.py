@@ -9,21 +9,21 @@ from typing import Any
 
 import yaml
 
-from fakes.service.fed_site import Hall, opened
+from fakes.service.fed_site import ServedSite, serve_site
 from server.config.tokens_file import token_digest
 
-LATER = "2100-01-01T00:00:00Z"
+IN_FUTURE = "2100-01-01T00:00:00Z"
 """Creation time of a token that is newer than any service of a test."""
-EVERYBODY: dict[str, dict[str, Any]] = {
+TOKEN_ENTRIES: dict[str, dict[str, Any]] = {
     "lead": {"role": "operate"},
     "desk": {"role": "watch"},
-    "family": {"role": "watch", "object": 1, "made": LATER},
+    "family": {"role": "watch", "object": 1, "made": IN_FUTURE},
     "door": {"role": "watch", "camera": "c0"},
 }
 
 
 def token_of(name: str) -> str:
-    return f"what-{name}-was-given"
+    return f"token-of-{name}"
 
 
 def bearer(name: str) -> dict[str, str]:
@@ -31,9 +31,9 @@ def bearer(name: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {token_of(name)}"}
 
 
-def line_of(name: str, **what: Any) -> dict[str, Any]:
+def token_entry(name: str, **what: Any) -> dict[str, Any]:
     """Return an entry of the token file."""
-    return {"name": name, "sha256": token_digest(token_of(name)), **(what or EVERYBODY[name])}
+    return {"name": name, "sha256": token_digest(token_of(name)), **(what or TOKEN_ENTRIES[name])}
 
 
 def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:
@@ -42,9 +42,9 @@ def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:
 
 
 @asynccontextmanager
-async def locked(folder: Path, *names: str, **changes: Any) -> AsyncIterator[Hall]:
+async def serve_with_tokens(folder: Path, *names: str, **changes: Any) -> AsyncIterator[ServedSite]:
     """Serve a site that requires tokens; they are in `tokens.yaml` in the folder."""
-    path = write_tokens(folder / "tokens.yaml", *map(line_of, names or EVERYBODY))
+    path = write_tokens(folder / "tokens.yaml", *map(token_entry, names or TOKEN_ENTRIES))
     access = {"tokens": str(path), **changes.pop("access", {})}
-    async with aclosing(opened(access=access, **changes)) as halls:
+    async with aclosing(serve_site(access=access, **changes)) as halls:
         yield await anext(halls)

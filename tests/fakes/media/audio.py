@@ -23,16 +23,16 @@ from server.messaging.inbox import Message
 from server.messaging.messages import AudioHeader, ZenohKeys
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
-EVERY = 20
+FLASH_INTERVAL = 20
 """Pictures from one flash to the next: 0.8 s."""
 _FLASH_FRAMES = 2
 """Duration of a flash, frames."""
 
 GOPS = 24
 FRAMES = GOPS * GOP
-STEP = 0.04
+MAX_AV_OFFSET_S = 0.04
 """Maximum offset between sound and picture, seconds."""
-BEEPS = [number / FPS for number in range(EVERY, FRAMES, EVERY)]
+BEEP_TIMES = [number / FPS for number in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)]
 
 
 def write_flashes(
@@ -67,7 +67,7 @@ def write_flashes(
 
 
 def _is_flash(number: int) -> bool:
-    return number >= EVERY and number % EVERY < _FLASH_FRAMES
+    return number >= FLASH_INTERVAL and number % FLASH_INTERVAL < _FLASH_FRAMES
 
 
 def _audio_frame(number: int, rate: int, layout: str) -> av.AudioFrame:
@@ -82,7 +82,7 @@ def _audio_frame(number: int, rate: int, layout: str) -> av.AudioFrame:
 
 
 @cache
-def flashing(recording: Path) -> tuple[AccessUnit, ...]:
+def access_units(recording: Path) -> tuple[AccessUnit, ...]:
     """Return the recording's pictures as access units of a camera."""
     encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
     with av.open(str(recording)) as container:
@@ -90,16 +90,16 @@ def flashing(recording: Path) -> tuple[AccessUnit, ...]:
     return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))
 
 
-def sends(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
+def send_audio(service: FedService, recording: Path, silent: range = range(0)) -> list[bytes]:
     """Send the recording's audio frames except the `silent` ones; return all frames."""
     sound = RecordedAudioSource(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
-    for message in messages([frame for frame in frames if frame.number not in silent]):
+    for message in audio_messages([frame for frame in frames if frame.number not in silent]):
         service.ingest.audio(message)
     return [frame.data for frame in frames]
 
 
-def messages(frames: list[EncodedAudioFrame]) -> list[Message]:
+def audio_messages(frames: list[EncodedAudioFrame]) -> list[Message]:
     """Return audio frames as received from the bus."""
     return [
         Message(
@@ -117,7 +117,7 @@ def packets(stream: bytes) -> list[bytes]:
         return [bytes(packet) for packet in container.demux(audio=0) if packet.size]
 
 
-def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def decode_audio(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Decode the audio of a stream: times of all samples (seconds), and the samples of one channel."""
     with av.open(io.BytesIO(stream), format=kind) as container:
         frames = list(container.decode(audio=0))
@@ -127,7 +127,7 @@ def heard(stream: bytes, kind: str | None = None) -> tuple[NDArray[np.float64], 
 
 def beeps(stream: bytes, kind: str | None = None) -> list[float]:
     """Return the start times of beeps in a stream, seconds."""
-    times, samples = heard(stream, kind)
+    times, samples = decode_audio(stream, kind)
     return _group_starts(times[np.abs(samples) > 0.1])
 
 

@@ -10,7 +10,7 @@ from benchmarks.common.browser import chromium
 from fakes.timeouts import PATIENCE
 from server.service.streaming.splicer import Splicer
 
-READ = """
+READ_JS = """
   const video = document.createElement('video');
   const source = new MediaSource();
   video.muted = true;
@@ -23,9 +23,9 @@ READ = """
 """
 """JavaScript that reads all of ``url``, of MIME type ``type``, into ``buffer``, which ``video`` shows."""
 
-PLAY = (
+PLAY_JS = (
     "async ([url, type, rate]) => {"
-    + READ
+    + READ_JS
     + """
   const ended = new Promise((done) => video.addEventListener('ended', done, { once: true }));
   const range = [buffer.buffered.start(0), buffer.buffered.end(0)];
@@ -43,7 +43,7 @@ PLAY = (
 """Plays a stream to the end; returns buffered ranges, media times of frames, and decoded tracks."""
 
 
-async def seen_in_chromium(
+async def play_in_chromium(
     port: int, splicer: Splicer, gops: int, show: Callable[[int], None], script: str, *arguments: Any
 ) -> dict[str, Any]:
     """Run a script that reads a stream, and publish GOPs once it is connected; return its result."""
@@ -62,7 +62,7 @@ async def seen_in_chromium(
     return found
 
 
-HLS_BY_ITSELF = """async (url) => {
+NATIVE_HLS_JS = """async (url) => {
   const video = document.createElement('video');
   if (!video.canPlayType('application/vnd.apple.mpegurl')) return null;
   const end = new Promise((done) => {

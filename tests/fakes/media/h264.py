@@ -22,7 +22,7 @@ def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> li
     return [encoder.encode(pulse, np.asarray(picture // 4 * 2)) for pulse, picture in enumerate(noise)]
 
 
-def how(unit: AccessUnit) -> SliceHeaderFormat:
+def slice_header_format(unit: AccessUnit) -> SliceHeaderFormat:
     found = parameter_sets(nal_units(unit.data))
     assert found is not None
     return parse_repeatable(found)

@@ -19,12 +19,12 @@ class Packet:
     key: bool
 
 
-def taken_apart(data: bytes) -> list[Packet]:
+def parse_packets(data: bytes) -> list[Packet]:
     assert len(data) % PACKET_BYTES == 0
-    return [one(data[at : at + PACKET_BYTES]) for at in range(0, len(data), PACKET_BYTES)]
+    return [parse_packet(data[at : at + PACKET_BYTES]) for at in range(0, len(data), PACKET_BYTES)]
 
 
-def one(packet: bytes) -> Packet:
+def parse_packet(packet: bytes) -> Packet:
     assert packet[0] == 0x47
     assert not packet[1] & 0x80, "no error"
     assert not packet[3] & 0xC0, "not scrambled"

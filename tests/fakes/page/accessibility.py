@@ -10,7 +10,7 @@ from fakes.paths import AXE
 SERIOUS = ("serious", "critical")
 
 
-async def faults(visit: Visit) -> list[Any]:
+async def violations(visit: Visit) -> list[Any]:
     """Return the serious violations: rule, help and elements."""
     await visit.page.add_script_tag(path=AXE)
     found = await visit.get("axe.run()")

@@ -74,12 +74,12 @@ async def visiting(
     assert not failures
 
 
-async def seconds_of_playing(visit: Visit, seconds: float) -> None:
+async def play_for(visit: Visit, seconds: float) -> None:
     seen = await visit.get("myview.pulse")
     await visit.until(f"myview.pulse >= {seen + round(seconds * FPS)}")
 
 
-async def camera_on_the_stage(visit: Visit) -> str:
+async def displayed_camera(visit: Visit) -> str:
     """Return the shown camera, by the tint of the picture."""
     ground = np.median((await visit.screenshot()).reshape(-1, 3), axis=0)
     return CAMERAS[int(np.abs(np.array(GROUNDS) - ground).sum(axis=1).argmin())]

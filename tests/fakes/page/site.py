@@ -32,7 +32,7 @@ from fakes.paths import PAGE
 LOOKAHEAD = 10  # frames between the current pulse and the served one
 SEGMENT = 2 * GOP  # frames of a segment of HLS
 HOLD = 3 * GOP  # frames for which person 1 is shown by one camera
-STARTS_AT = 12_345_678  # first pulse: far from zero, as on a site that has run for days
+FIRST_PULSE = 12_345_678  # first pulse: far from zero, as on a site that has run for days
 
 REASON = "Another camera sees this person a little better, but not by enough to be worth a cut so soon."
 # As strict as a server may be: no foreign origins, no inline scripts or styles.
@@ -71,17 +71,17 @@ class FakeSite:
     people: dict[int, bool] = field(default_factory=lambda: {1: True, 2: True})
     aliases: dict[int, list[int]] = field(default_factory=dict)
     split: list[dict[str, Any]] = field(default_factory=list)
-    first_pulse: int = STARTS_AT
+    first_pulse: int = FIRST_PULSE
     skipped: range = range(0)
     codec: str | None = "avc1.42C01F"
     opened: list[int] = field(default_factory=list)
     listed: list[str] = field(default_factory=list)
     fetched: list[int] = field(default_factory=list)
-    kept_from: int = 0
+    replayable_from: int = 0
     recorded: int = 0
-    past_comes: asyncio.Event | None = None
+    past_released: asyncio.Event | None = None
     ahead: float = 0.0
-    blind: range = range(0)
+    blind_pulses: range = range(0)
     undetected: float = 0.0
     operates: bool = False
     flags: list[dict[str, Any]] = field(default_factory=list)
@@ -105,7 +105,7 @@ class FakeSite:
         if held is not None:
             return CAMERAS.index(held)
         if preferred is not None:
-            seen = [CAMERAS.index(preferred) or at not in self.blind for at in (pulse, pulse - GOP)]
+            seen = [CAMERAS.index(preferred) or at not in self.blind_pulses for at in (pulse, pulse - GOP)]
             return CAMERAS.index(preferred) if all(seen) else self.camera(person, pulse)
         return self.camera(person, pulse)
 
@@ -170,7 +170,7 @@ class FakeSite:
         return [
             [k, left, top, left + SQUARE, top + SQUARE]
             for k, (left, top) in corners.items()
-            if self.people.get(k) and (camera or pulse not in self.blind)
+            if self.people.get(k) and (camera or pulse not in self.blind_pulses)
         ]
 
     def choice(self, person: int, first: int) -> dict[str, Any]:
@@ -311,7 +311,7 @@ class SiteServer:
 
     async def _choice(self, request: web.Request) -> web.Response:
         k, pulse = int(request.match_info["k"]), int(request.query.get("at", f"p{self.site.edge}")[1:])
-        if pulse < self.site.kept_from:
+        if pulse < self.site.replayable_from:
             return web.json_response({"error": "nothing is kept of that"}, status=404)
         return web.json_response(self.site.choice(k, pulse - pulse % GOP))
 
@@ -334,10 +334,10 @@ class SiteServer:
             return web.json_response({"error": f"no object {k}"}, status=404)
         held = request.match_info.get("camera", request.query.get("camera"))
         first = int(request.query.get("from", f"p{site.boundary()}")[1:])
-        if "from" in request.query and first < site.kept_from:
+        if "from" in request.query and first < site.replayable_from:
             return web.json_response({"error": "nothing is kept there"}, status=416)
         first -= first % GOP
-        waits = site.past_comes if "from" in request.query else None
+        waits = site.past_released if "from" in request.query else None
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
         await response.prepare(request)
         transport = request.transport

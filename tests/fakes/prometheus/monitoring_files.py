@@ -19,12 +19,12 @@ DASHBOARD: Any = json.loads((CONFIGS / "grafana" / "myview.json").read_text(enco
 ALERTS: list[dict[str, Any]] = [rule for group in RULES["groups"] for rule in group["rules"]]
 PANELS: list[dict[str, Any]] = [panel for panel in DASHBOARD["panels"] if panel["type"] != "row"]
 VARIABLES: list[dict[str, Any]] = DASHBOARD["templating"]["list"]
-OF_PROMETHEUS = {"up"}
+BUILT_IN_METRICS = {"up"}
 """Metrics that Prometheus itself adds."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class MonitoringExpression:
     """An expression of the dashboard or of an alert."""
 
     place: str
@@ -34,26 +34,26 @@ class Asked:
     """The labels shown in its legend or summary."""
 
 
-def filled(expression: str) -> str:
+def replace_variables(expression: str) -> str:
     """Replace the dashboard's variables."""
     return expression.replace("$__rate_interval", "1m").replace("$job", "myview")
 
 
-def _all() -> Iterator[Asked]:
+def _all() -> Iterator[MonitoringExpression]:
     for alert in ALERTS:
         shown = set(re.findall(r"\$labels\.(\w+)", alert["annotations"]["summary"]))
         place = f"alert {alert['alert']}"
-        yield Asked(place, alert["expr"], frozenset(shown - ADDED_BY_PROMETHEUS))
+        yield MonitoringExpression(place, alert["expr"], frozenset(shown - ADDED_BY_PROMETHEUS))
     for panel in PANELS:
         for target in panel["targets"]:
             shown = set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]))
             place = f"panel {panel['title']} {target['refId']}"
-            yield Asked(place, filled(target["expr"]), frozenset(shown))
+            yield MonitoringExpression(place, replace_variables(target["expr"]), frozenset(shown))
     for variable in VARIABLES:
         if variable["type"] == "query":
             (metric,) = re.findall(r"^label_values\((\w+), \w+\)$", variable["query"]["query"])
-            yield Asked(f"variable {variable['name']}", metric, frozenset())
+            yield MonitoringExpression(f"variable {variable['name']}", metric, frozenset())
 
 
-ASKED = tuple(_all())
+EXPRESSIONS = tuple(_all())
 """All expressions of the dashboard and of the alerts."""

@@ -19,7 +19,7 @@ _KIND_OF = {"rate": "counter", "increase": "counter", "delta": "gauge"}
 
 
 @dataclass(frozen=True)
-class Printed:
+class ExportedMetrics:
     """The metrics of one answer of /metrics."""
 
     samples: dict[str, set[Series]]
@@ -28,7 +28,7 @@ class Printed:
     """Counter or gauge, by metric name."""
 
     @classmethod
-    def of(cls, text: str) -> Printed:
+    def of(cls, text: str) -> ExportedMetrics:
         samples: dict[str, set[Series]] = {}
         kinds: dict[str, str] = {}
         for family in text_string_to_metric_families(text):
@@ -48,36 +48,36 @@ def selectors(expression: str) -> list[promql.VectorSelector]:
     return found
 
 
-def given(expression: str, printed: Printed) -> set[Series]:
+def select_series(expression: str, printed: ExportedMetrics) -> set[Series]:
     """Return the series of an expression.
 
     Raises:
         ValueError: it is not supported PromQL, or does not fit the kinds of metrics.
     """
-    return _given(promql.parse(expression), printed)
+    return _series_of(promql.parse(expression), printed)
 
 
-def _given(node: promql.Expr, printed: Printed) -> set[Series]:
+def _series_of(node: promql.Expr, printed: ExportedMetrics) -> set[Series]:
     match node:
         case promql.ParenExpr():
-            return _given(node.expr, printed)
+            return _series_of(node.expr, printed)
         case promql.VectorSelector():
-            return _selected(node, printed)
+            return _series_of_selector(node, printed)
         case promql.MatrixSelector():
-            return _selected(node.vector_selector, printed)
+            return _series_of_selector(node.vector_selector, printed)
         case promql.Call():
-            return _called(node, printed)
+            return _series_of_call(node, printed)
         case promql.AggregateExpr():
-            return _summed(node, printed)
+            return _series_of_aggregate(node, printed)
         case promql.BinaryExpr():
             sides = [side for side in (node.lhs, node.rhs) if not isinstance(side, promql.NumberLiteral)]
             if node.modifier is not None and node.modifier.matching is not None:
                 raise ValueError(f"not supported: {node.modifier}")
-            return set.intersection(*(_given(side, printed) for side in sides))
+            return set.intersection(*(_series_of(side, printed) for side in sides))
     raise ValueError(f"not supported: {type(node).__name__}")
 
 
-def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
+def _series_of_selector(node: promql.VectorSelector, printed: ExportedMetrics) -> set[Series]:
     wanted = {
         matcher.name: matcher.value
         for matcher in node.matchers.matchers
@@ -92,10 +92,10 @@ def _selected(node: promql.VectorSelector, printed: Printed) -> set[Series]:
     }
 
 
-def _called(node: promql.Call, printed: Printed) -> set[Series]:
+def _series_of_call(node: promql.Call, printed: ExportedMetrics) -> set[Series]:
     name = node.func.name
     if name == "histogram_quantile":
-        buckets = _given(node.args[1], printed)
+        buckets = _series_of(node.args[1], printed)
         if not all("le" in dict(bucket) for bucket in buckets):
             raise ValueError(f"quantile of a metric without buckets: {node.prettify()}")
         return {frozenset((label, value) for label, value in bucket if label != "le") for bucket in buckets}
@@ -106,11 +106,11 @@ def _called(node: promql.Call, printed: Printed) -> set[Series]:
     kind = printed.kinds.get(metric, _KIND_OF[name])
     if kind != _KIND_OF[name]:
         raise ValueError(f"{name} of {metric}, which is a {kind}")
-    return _given(over, printed)
+    return _series_of(over, printed)
 
 
-def _summed(node: promql.AggregateExpr, printed: Printed) -> set[Series]:
-    series = _given(node.expr, printed)
+def _series_of_aggregate(node: promql.AggregateExpr, printed: ExportedMetrics) -> set[Series]:
+    series = _series_of(node.expr, printed)
     by = set(node.modifier.labels) if node.modifier is not None else set()
     if node.modifier is not None and node.modifier.type != promql.AggModifierType.By:
         raise ValueError(f"not supported: {node.modifier}")

@@ -17,7 +17,7 @@ from fakes.timeouts import PATIENCE_MS
 from server.cli.generated_config import DEMO, free_port
 
 GOP = 10
-PLACE = """(wanted) => {
+PERSON_POSITION_JS = """(wanted) => {
   const box = myview.boxes.find(([object]) => object === (wanted ?? myview.pointing.object));
   if (!box) return null;
   const { left, top, width } = document.querySelector('#boxes').getBoundingClientRect();

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.faults.video.stamped_views import write_film
 from fakes.running.stream_frames import FPS
 
-MET = 80
+MEETING = 80
 """The pulse at which they meet."""
 FRAMES = 6000
 """Ten minutes, as long as a test may take on a busy machine."""
@@ -23,14 +23,14 @@ _SIZE = 180, 320
 _WIDTH, _HEIGHT, _TOP = 20, 60, 60
 _FAR, _STEP = 100, 2
 """Pixels from the meeting point to where they stand, and per frame."""
-STAND = MET + _FAR // _STEP
+STANDING = MEETING + _FAR // _STEP
 """The pulse from which they stand still."""
 _OCCLUDED = 6
 """Frames before and after the meeting in which one occludes the other."""
 _GRAY, _GREEN = 110, (60, 200, 60)
 
 
-def camera(name: str, folder: Path) -> dict[str, Any]:
+def write_camera(name: str, folder: Path) -> dict[str, Any]:
     """Write the film, 320x180 pixels, and its detections; return the camera's configuration."""
     film, found = folder / f"{name}.mp4", folder / f"{name}.txt"
     sides = [_sides(pulse) for pulse in range(FRAMES)]
@@ -39,7 +39,7 @@ def camera(name: str, folder: Path) -> dict[str, Any]:
     lines = [
         f"{pulse + 1},-1,{left},{_TOP},{_WIDTH},{_HEIGHT},1,-1,-1,-1"
         for pulse, both in enumerate(sides)
-        for left in both[: 1 if abs(pulse - MET) < _OCCLUDED else 2]
+        for left in both[: 1 if abs(pulse - MEETING) < _OCCLUDED else 2]
     ]
     found.write_text("\n".join(lines), encoding="ascii")
     return {"id": name, "source": str(film), "detections": str(found)}
@@ -47,7 +47,7 @@ def camera(name: str, folder: Path) -> dict[str, Any]:
 
 def _sides(pulse: int) -> tuple[int, int]:
     """Return the left edges of the two boxes."""
-    off = min(_STEP * abs(pulse - MET), _FAR)
+    off = min(_STEP * abs(pulse - MEETING), _FAR)
     return (_SIZE[1] - _WIDTH) // 2 - off, (_SIZE[1] - _WIDTH) // 2 + off
 
 

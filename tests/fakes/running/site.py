@@ -97,7 +97,7 @@ class RunningSite:
         except TimeoutError:
             raise AssertionError(f"{what}: not within {PATIENCE} s\n" + "\n".join(self.lines[-40:])) from None
 
-    async def ended(self) -> int:
+    async def wait_for_exit(self) -> int:
         """Wait until `myview up` exits; return the exit code."""
         async with asyncio.timeout(PATIENCE):
             return await self.process.wait()
@@ -164,7 +164,7 @@ async def _wait_until_listening(site: RunningSite) -> None:
             await asyncio.sleep(0.05)
 
 
-async def bounded(work: Awaitable[Any]) -> Any:
+async def with_timeout(work: Awaitable[Any]) -> Any:
     """Await something with a timeout."""
     async with asyncio.timeout(PATIENCE):
         return await work

@@ -46,7 +46,7 @@ def pictures(path: Path) -> dict[int, NDArray[np.uint8]]:
         }
 
 
-def shown_from_to(path: Path) -> list[tuple[float, float]]:
+def display_intervals(path: Path) -> list[tuple[float, float]]:
     """Return the start and end of each picture of a stream, in pulses."""
     data = path.read_bytes()
     with av.open(io.BytesIO(data[: data.rfind(b"moof") - 4])) as container:

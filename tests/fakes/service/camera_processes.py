@@ -15,7 +15,7 @@ from server.service.pipeline import BestViewPipeline
 FPS = 50
 
 
-class Running:
+class SiteInOneLoop:
     """A whole site in this event loop: pulses, cameras, best view."""
 
     def __init__(self, config: Config, out: Path | None = None) -> None:
@@ -57,7 +57,7 @@ class Running:
         await self.pulses.stop()
 
 
-def in_folder(folder: Path) -> dict[str, bytes]:
+def written_files(folder: Path) -> dict[str, bytes]:
     """Return the written files of tracks and choices."""
     files = [*folder.rglob("*.txt"), *folder.rglob("*.csv")]
     return {str(file.relative_to(folder)): file.read_bytes() for file in files}

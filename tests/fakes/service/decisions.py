@@ -11,11 +11,11 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     FedService,
+    camera_tracks,
     encoded,
     small_config,
     tracks,
     video,
-    word,
 )
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import NumberedBox
@@ -24,21 +24,21 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 EPOCHS = 8
 
 
-def behind() -> FedService:
+def service_with_backlog() -> FedService:
     """Return a service that has received all epochs, and decided none."""
     service = FedService(small_config())
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     for epoch in range(EPOCHS):
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed)[epoch * STRIDE : (epoch + 1) * STRIDE]:
                 service.ingest.video(video(camera, unit))
             boxes = {1: LARGE if (epoch + seed) % 4 < 2 else SMALL}
-            service.ingest.tracks(tracks(word(camera, epoch, boxes)))
+            service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
     service.pulse = end_of_epoch(EPOCHS - 1, STRIDE)
     return service
 
 
-def noted(service: FedService) -> list[GopDecision]:
+def collect_decisions(service: FedService) -> list[GopDecision]:
     """Return a list that collects the decisions of a service."""
     decided: list[GopDecision] = []
     publish = service._publish

@@ -13,16 +13,16 @@ import numpy as np
 from aiohttp import web
 from numpy.typing import NDArray
 
-from fakes.service.fed_site import Hall
+from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import (
     GOP,
     STRIDE,
     FedService,
     TrackNumbers,
+    camera_tracks,
     small_config,
     tracks,
     video,
-    word,
 )
 from fakes.timeouts import PATIENCE
 from server.camera.encoder import AccessUnit, Encoder
@@ -38,7 +38,7 @@ CAMERAS = ("c0", "c1")
 START = 200
 """The scene's frame at pulse 0: people are in view."""
 
-MOST = 150
+FRAMES = 150
 """The number of frames."""
 
 Image = NDArray[np.uint8]
@@ -68,7 +68,7 @@ def boxes(camera: int, first: int, frames: int) -> dict[int, list[Box | None]]:
 
 
 @dataclass
-class Drawn(Hall):
+class DrawnSite(ServedSite):
     """The served room."""
 
     service: FedService
@@ -79,32 +79,32 @@ class Drawn(Hall):
     """Decisions by their first frame."""
     epochs: int = 0
 
-    def go_on(self, epochs: int = 1, cameras: tuple[str, ...] = CAMERAS) -> None:
+    def advance(self, epochs: int = 1, cameras: tuple[str, ...] = CAMERAS) -> None:
         """Let the cameras send and the service decide."""
         for epoch in range(self.epochs, self.epochs + epochs):
             first = epoch * STRIDE
             for number, camera in enumerate(CAMERAS):
                 if camera not in cameras:
                     continue
-                for unit in units(number, MOST)[first : first + STRIDE]:
+                for unit in units(number, FRAMES)[first : first + STRIDE]:
                     self.service.ingest.video(video(camera, unit))
                 seen = [
                     TrackMessage(id=person, boxes=places, confidence=1.0)
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
-                self.service.ingest.tracks(tracks(word(camera, epoch, {}, tracks=seen, size=SIZE)))
+                self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {}, tracks=seen, size=SIZE)))
             self.service.pulse = end_of_epoch(epoch, STRIDE)
             self.service.decide()
         self.epochs += epochs
 
-    async def keep_going(self, period: float) -> None:
+    async def advance_forever(self, period: float) -> None:
         """Let the cameras send without an end, an epoch each ``period`` seconds."""
         while True:
             await asyncio.sleep(period)
-            self.go_on()
+            self.advance()
 
 
-async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
+async def drawn_room(**changes: object) -> AsyncIterator[DrawnSite]:
     service = FedService(small_config(site={"width": SIZE[0], "height": SIZE[1]}, **changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decisions: dict[int, GopChoices] = {}
@@ -115,17 +115,17 @@ async def drawn_room(**changes: object) -> AsyncIterator[Drawn]:
         serving(app, HttpSettings(port=0)) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
-        hall = Drawn(service, session, port, app, decisions)
-        service.come(*CAMERAS)
-        hall.go_on(4)
-        yield hall
+        served = DrawnSite(service, session, port, app, decisions)
+        service.connect_cameras(*CAMERAS)
+        served.advance(4)
+        yield served
     service.close()
 
 
 def decoded(camera: int, frames: int) -> Iterator[Image]:
     """Yield a camera's pictures as a viewer sees them."""
     decoder = av.VideoCodecContext.create("h264", "r")
-    for unit in units(camera, MOST)[:frames]:
+    for unit in units(camera, FRAMES)[:frames]:
         for picture in decoder.decode(av.Packet(unit.data)):
             yield picture.to_ndarray(format="bgr24")
 
@@ -150,14 +150,14 @@ def whole_frames(data: bytes) -> int:
 
 
 @dataclass(frozen=True)
-class Part:
+class JpegPart:
     """One picture of multipart JPEG."""
 
     pulse: int
     jpeg: bytes
 
 
-async def parts(answer: aiohttp.ClientResponse) -> AsyncGenerator[Part, None]:
+async def jpeg_parts(answer: aiohttp.ClientResponse) -> AsyncGenerator[JpegPart, None]:
     """Parse multipart JPEG (RFC 2046) by its boundary and Content-Length."""
     boundary = "--" + answer.headers["Content-Type"].partition("boundary=")[2]
     stream = answer.content
@@ -171,9 +171,19 @@ async def parts(answer: aiohttp.ClientResponse) -> AsyncGenerator[Part, None]:
             return
         assert head["Content-Type"] == "image/jpeg"
         jpeg = await stream.readexactly(int(head["Content-Length"]))
-        yield Part(int(head["X-MyView-Pulse"]), jpeg)
+        yield JpegPart(int(head["X-MyView-Pulse"]), jpeg)
         assert await stream.readline() == b"\r\n"
         assert await stream.readline() == boundary.encode() + b"\r\n"
 
 
-__all__ = ["CAMERAS", "GOP", "SIZE", "Drawn", "Part", "decoded", "drawn_room", "parts", "read_film"]
+__all__ = [
+    "CAMERAS",
+    "GOP",
+    "SIZE",
+    "DrawnSite",
+    "JpegPart",
+    "decoded",
+    "drawn_room",
+    "jpeg_parts",
+    "read_film",
+]

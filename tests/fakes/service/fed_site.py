@@ -18,7 +18,7 @@ from server.service.service import BestViewService
 A, B = CAMERAS
 
 
-class Hall:
+class ServedSite:
     """A served site, an HTTP session for it, and its port."""
 
     def __init__(self, service: FedService, session: aiohttp.ClientSession, port: int) -> None:
@@ -34,7 +34,7 @@ class Hall:
         return content
 
 
-async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator[Hall]:
+async def serve_site(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator[ServedSite]:
     service = FedService(small_config(**changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     async with (
@@ -42,25 +42,25 @@ async def opened(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator
         serving(make_app(BestViewService(service)), HttpSettings(port=0, **changes.get("http", {}))) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
-        yield Hall(service, session, port)
+        yield ServedSite(service, session, port)
     service.close()
 
 
-def see(hall: Hall) -> None:
+def show_people(served: ServedSite) -> None:
     """Show object 1 to both cameras, larger in c1, and object 2 to c0 alone, until two GOPs are decided."""
-    hall.service.come(*CAMERAS)
+    served.service.connect_cameras(*CAMERAS)
     for epoch in range(3):
-        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
-    async for site in opened():
+async def served() -> AsyncIterator[ServedSite]:
+    async for site in serve_site():
         yield site
 
 
 @pytest.fixture
-async def busy(hall: Hall) -> Hall:
-    """Return a hall with people in it."""
-    see(hall)
-    return hall
+async def site_with_people(served: ServedSite) -> ServedSite:
+    """Return a site with people in it."""
+    show_people(served)
+    return served

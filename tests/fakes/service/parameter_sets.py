@@ -17,17 +17,17 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 GOPS = 12
-OWN = {"encode": {"parameters": "own"}}
-MAKES: dict[str, dict[str, Any]] = {A: {"preset": "ultrafast"}, B: {"preset": "medium", "crf": 30}}
+OWN_PARAMETERS = {"encode": {"parameters": "own"}}
+ENCODINGS: dict[str, dict[str, Any]] = {A: {"preset": "ultrafast"}, B: {"preset": "medium", "crf": 30}}
 """CAVLC without and CABAC with the rest of profile High: as different as two brands."""
-MISSING = {(B, 3), (A, 6), (A, 7), (B, 10)}
+LOST_GOPS = {(B, 3), (A, 6), (A, 7), (B, 10)}
 """GOPs that are lost."""
 
 
 @cache
-def sent(camera: str) -> tuple[AccessUnit, ...]:
+def sent_units(camera: str) -> tuple[AccessUnit, ...]:
     encoder = Encoder(
-        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, **MAKES[camera])
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, **ENCODINGS[camera])
     )
     rng = np.random.default_rng(sum(camera.encode()))
     coarse = rng.integers(0, 255, (GOPS * GOP, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
@@ -37,31 +37,31 @@ def sent(camera: str) -> tuple[AccessUnit, ...]:
     )
 
 
-def alone(camera: str) -> list[NDArray[np.uint8]]:
+def decoded_alone(camera: str) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("h264", "r")
-    packets = [*(av.Packet(unit.data) for unit in sent(camera)), None]
+    packets = [*(av.Packet(unit.data) for unit in sent_units(camera)), None]
     return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
 
 
-def shown(gop: int) -> tuple[str, int]:
+def shown_gop(gop: int) -> tuple[str, int]:
     """Return the camera and the GOP whose picture is shown in a GOP."""
     camera = (A, B)[gop % 2]
-    return (camera, gop) if (camera, gop) not in MISSING else shown(gop - 1)
+    return (camera, gop) if (camera, gop) not in LOST_GOPS else shown_gop(gop - 1)
 
 
-def expected() -> list[NDArray[np.uint8]]:
+def expected_pictures() -> list[NDArray[np.uint8]]:
     """Return the expected pictures: in place of a lost GOP, the last picture before it."""
-    own, seen = {camera: alone(camera) for camera in MAKES}, []
+    own, seen = {camera: decoded_alone(camera) for camera in ENCODINGS}, []
     for gop in range(GOPS):
-        camera, real = shown(gop)
+        camera, real = shown_gop(gop)
         seen += [own[camera][gop * GOP + n] if real == gop else seen[-1] for n in range(GOP)]
     return seen
 
 
-def put(frame_buffers: dict[str, FrameBuffer]) -> None:
+def put_frames(frame_buffers: dict[str, FrameBuffer]) -> None:
     for camera, frame_buffer in frame_buffers.items():
-        for unit in sent(camera):
-            if (camera, unit.pulse // GOP) not in MISSING:
+        for unit in sent_units(camera):
+            if (camera, unit.pulse // GOP) not in LOST_GOPS:
                 frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
 
 

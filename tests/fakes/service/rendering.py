@@ -13,7 +13,7 @@ from server.media.h264.annexb import join_sample, nal_units
 from server.media.rendering_messages import RenderSettings
 from server.service.rendering.worker.box_overlay import Image
 
-SETTINGS = RenderSettings(
+RENDER_SETTINGS = RenderSettings(
     width=WIDTH, height=HEIGHT, fps=FPS, gop=GOP, preset="ultrafast", crf=18, max_kbps=None, jpeg_quality=90
 )  # fmt: skip
 
@@ -28,7 +28,7 @@ def fragments(first: int, count: int, seed: int = 0) -> bytes:
 
 
 @cache
-def shown(seed: int) -> list[Image]:
+def decoded_frames(seed: int) -> list[Image]:
     """Return a camera's decoded frames."""
     decoder = av.VideoCodecContext.create("h264", "r")
     pictures = [picture for unit in encoded(seed) for picture in decoder.decode(av.Packet(unit.data))]

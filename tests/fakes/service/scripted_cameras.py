@@ -77,12 +77,12 @@ def encoded(
     )
 
 
-def look(person: int) -> list[float]:
+def color_histogram(person: int) -> list[float]:
     """Return a color histogram that distinguishes a person from others."""
     return [1.0 if place == person % 8 else 0.0 for place in range(8)]
 
 
-def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: Any) -> CameraTracks:
+def camera_tracks(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: Any) -> CameraTracks:
     """Return a camera's track message of an epoch in which each track has one box throughout."""
     last = end_of_epoch(epoch, STRIDE)
     message = CameraTracks(
@@ -102,7 +102,9 @@ def word(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: An
                 confidence=1.0,
                 appearance=[]
                 if box is None
-                else [AppearanceHistogram(first=last - STRIDE + 1, last=last, histogram=look(track))],
+                else [
+                    AppearanceHistogram(first=last - STRIDE + 1, last=last, histogram=color_histogram(track))
+                ],
             )
             for track, box in boxes.items()
         ],
@@ -175,7 +177,7 @@ class FedService(BestViewPipeline):
     frames = 40
     """The number of frames of each camera."""
 
-    def come(self, *cameras: str) -> None:
+    def connect_cameras(self, *cameras: str) -> None:
         """Connect cameras that have no retained identities."""
         for camera in cameras:
             for part in (self.ingest, self.state_replication):
@@ -192,6 +194,6 @@ class FedService(BestViewPipeline):
             units = encoded(seed, self.frames, codec=self.config.encode.codec)
             for unit in units[epoch * STRIDE : (epoch + 1) * STRIDE]:
                 self.ingest.video(video(camera, unit))
-            self.ingest.tracks(tracks(word(camera, epoch, seen[camera])))
+            self.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera])))
         self.pulse = end_of_epoch(epoch, STRIDE)
         self.decide()

@@ -25,7 +25,7 @@ from server.service.streaming.frame_buffer import FrameBuffer
 A, B = CAMERAS
 FRAMES = 200
 PULSE0 = 1_763_700_000.0
-AMPLE = RetentionLimits(keep_s=1e6, max_mb=1e6, segment_s=1.0)
+UNLIMITED = RetentionLimits(keep_s=1e6, max_mb=1e6, segment_s=1.0)
 """Nothing is deleted; five GOPs per segment."""
 
 Picture = NDArray[np.uint8]
@@ -56,7 +56,7 @@ class ManualClocks:
         self.wall += seconds
         self.is_synchronized = False
 
-    def off(self, seconds: float, *, wrong_by: float = 0.0) -> None:
+    def power_off(self, seconds: float, *, wrong_by: float = 0.0) -> None:
         """Switch the machine off for a while; afterwards its wall clock is off by ``wrong_by``."""
         self.wall += seconds + wrong_by
         self.steady = 10.0

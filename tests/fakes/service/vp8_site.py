@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, encoded
 
 EPOCHS = 8
@@ -17,22 +17,22 @@ EPOCHS = 8
 
 
 @pytest.fixture
-async def free() -> AsyncIterator[Hall]:
+async def vp8_site() -> AsyncIterator[ServedSite]:
     """A site of VP8; its person is larger in the other camera every GOP, so there are cuts."""
     changes = {"codec": "vp8"}
-    async for hall in opened(patience=60, encode=changes, http={"viewer_queue_gops": 100}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(patience=60, encode=changes, http={"viewer_queue_gops": 100}):
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            feed(hall, epoch)
-        yield hall
+            feed(served, epoch)
+        yield served
 
 
-def feed(hall: Hall, epoch: int) -> None:
+def feed(served: ServedSite, epoch: int) -> None:
     sizes = (SMALL, LARGE) if epoch % 4 < 2 else (LARGE, SMALL)
-    hall.service.feed(epoch, {camera: {1: size} for camera, size in zip((A, B), sizes, strict=True)})
+    served.service.feed(epoch, {camera: {1: size} for camera, size in zip((A, B), sizes, strict=True)})
 
 
-def own(camera: int) -> list[NDArray[np.uint8]]:
+def decoded_alone(camera: int) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("vp8", "r")
     units = encoded(camera, codec="vp8")
     return [

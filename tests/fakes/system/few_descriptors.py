@@ -13,28 +13,28 @@ from pathlib import Path
 
 import yaml
 
-from fakes.system.ports import free
+from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 
-FEW = 64  # descriptors: hardly more than a process needs
+FEW_DESCRIPTORS = 64  # descriptors: hardly more than a process needs
 MYVIEW = f"{shlex.quote(sys.executable)} -m server.cli.main"
 
 
-def written(folder: Path, port: int) -> Path:
+def write_site(folder: Path, port: int) -> Path:
     path = folder / "site.yaml"
     content = {
         "site": {"name": "hall"},
         "cameras": [{"id": "c0", "source": "c0.mp4"}],
         "sync": {"port": port},
-        "http": {"port": free()},
-        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
+        "http": {"port": free_port()},
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free_port()}"),
     }
     path.write_text(yaml.safe_dump(content))
     return path
 
 
 @contextmanager
-def running(command: str, log: Path, descriptors: int = FEW) -> Iterator[subprocess.Popen[bytes]]:
+def running(command: str, log: Path, descriptors: int = FEW_DESCRIPTORS) -> Iterator[subprocess.Popen[bytes]]:
     """Run a command with few descriptors and its log in a file."""
     with (
         log.open("wb") as out,
@@ -47,7 +47,7 @@ def running(command: str, log: Path, descriptors: int = FEW) -> Iterator[subproc
             process.wait(PATIENCE)
 
 
-def connected(port: int) -> socket.socket:
+def connect(port: int) -> socket.socket:
     """Connect as soon as the port is open."""
     end = time.monotonic() + PATIENCE
     while True:
@@ -58,7 +58,7 @@ def connected(port: int) -> socket.socket:
             time.sleep(0.02)
 
 
-def awaited(log: Path, what: bytes) -> None:
+def wait_for_log(log: Path, what: bytes) -> None:
     end = time.monotonic() + PATIENCE
     while what not in log.read_bytes():
         assert time.monotonic() < end, log.read_bytes()

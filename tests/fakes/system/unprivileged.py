@@ -13,7 +13,7 @@ _NOBODY = 65534
 
 
 @contextlib.contextmanager
-def nobodys_folder() -> Iterator[Path]:
+def unprivileged_folder() -> Iterator[Path]:
     """Yield a folder while running as its unprivileged owner."""
     folder = Path(tempfile.mkdtemp(prefix="myview-nobody-"))
     root = os.geteuid() == 0

@@ -14,7 +14,7 @@ import pytest
 import zenoh
 
 from fakes.media.videos import write_video
-from fakes.service.camera_processes import FPS, Running, in_folder
+from fakes.service.camera_processes import FPS, SiteInOneLoop, written_files
 from fakes.timeouts import PATIENCE
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.load.load_shedder import LevelBounds, LoadShedder, shed_levels
@@ -52,8 +52,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-async def running() -> AsyncIterator[list[Running]]:
-    sites: list[Running] = []
+async def running() -> AsyncIterator[list[SiteInOneLoop]]:
+    sites: list[SiteInOneLoop] = []
     yield sites
     for it in sites:
         await it.stop()
@@ -98,14 +98,14 @@ def rendered(config: Config, folder: Path) -> dict[str, bytes]:
             if batch is not None:
                 renderer.take(batch)
     renderer.finish()
-    return in_folder(folder)
+    return written_files(folder)
 
 
 async def test_recordings_run_to_their_end_without_losses(
-    recording: Path, tmp_path: Path, running: list[Running]
+    recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = site(recording, c0="c0.mp4", c1="c1.mp4")
-    it = Running(config, tmp_path / "out")
+    it = SiteInOneLoop(config, tmp_path / "out")
     running.append(it)
     gops: list[GopChoices] = []
     it.service.on_decision.append(gops.append)
@@ -122,7 +122,7 @@ async def test_recordings_run_to_their_end_without_losses(
         assert it.service.ingest.states[camera].label == "ended"
         assert it.service.ingest.states[camera].bad_messages == 0
     assert sum(gop.frames for gop in gops) == FRAMES
-    written = in_folder(tmp_path / "out")
+    written = written_files(tmp_path / "out")
     assert written["late.csv"] == b"frame,camera,reason\n"
     assert written["choices.csv"].count(b"\n") > 1, "somebody is shown"
     assert written == rendered(config, tmp_path / "offline"), "live as offline, to the byte"
@@ -142,10 +142,10 @@ async def test_recordings_run_to_their_end_without_losses(
 
 
 async def test_a_disconnected_camera_is_detected_and_others_continue(
-    tmp_path: Path, running: list[Running]
+    tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = site(tmp_path, c0="scene:room?camera=0&objects=1", c1="scene:room?camera=1&objects=1")
-    it = Running(config)
+    it = SiteInOneLoop(config)
     running.append(it)
     decided = asyncio.Event()
     it.service.on_decision.append(lambda _: decided.set())
@@ -165,10 +165,10 @@ async def test_a_disconnected_camera_is_detected_and_others_continue(
 
 
 async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
-    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As of a machine that learns the time only when it has been running for a while."""
-    it = Running(site(tmp_path, c0="scene:room?camera=0&objects=1"))
+    it = SiteInOneLoop(site(tmp_path, c0="scene:room?camera=0&objects=1"))
     running.append(it)
     decided = asyncio.Event()
     it.service.on_decision.append(lambda _: decided.set())
@@ -188,12 +188,12 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
 
 
 async def test_cameras_and_services_authenticate_to_the_pulse_server(
-    tmp_path: Path, running: list[Running]
+    tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     (tmp_path / "users").write_text("".join(f"{name}:{name * 8}\n" for name in ("c0", "bestview")))
     config = site(tmp_path, c0="scene:room?objects=1")
     config = config.model_copy(update={"sync": config.sync.model_copy(update={"users": tmp_path / "users"})})
-    it = Running(config)
+    it = SiteInOneLoop(config)
     running.append(it)
     decided = asyncio.Event()
     it.service.on_decision.append(lambda _: decided.set())
@@ -209,10 +209,10 @@ async def test_cameras_and_services_authenticate_to_the_pulse_server(
     "what", ["pipeline.CameraPipeline.track_detections", "status_meter.StatusMeter.status"]
 )
 async def test_a_camera_whose_work_fails_ends_with_that_error(
-    tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch, what: str
+    tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     config = site(tmp_path, c0="scene:room?objects=1")
-    it = Running(config)
+    it = SiteInOneLoop(config)
     running.append(it)
     await it.start()
 
@@ -226,12 +226,12 @@ async def test_a_camera_whose_work_fails_ends_with_that_error(
 
 
 async def test_a_camera_started_after_its_recording_was_over_lets_everything_end(
-    tmp_path: Path, running: list[Running]
+    tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     write_video(tmp_path / "short.mp4", 20)
     write_video(tmp_path / "long.mp4", 25)
     config = site(tmp_path, c0="short.mp4", c1="long.mp4")
-    it = Running(config)
+    it = SiteInOneLoop(config)
     running.append(it)
     over = await it.start()
     first, second = it.camera("c0"), it.camera("c1")
@@ -260,11 +260,11 @@ class Overloaded(LoadMonitor):
 
 
 async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
-    recording: Path, tmp_path: Path, running: list[Running], monkeypatch: pytest.MonkeyPatch
+    recording: Path, tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.camera.process.LoadMonitor", Overloaded)
     config = site(recording, c0="c0.mp4", c1="c1.mp4")
-    it = Running(config, tmp_path / "out")
+    it = SiteInOneLoop(config, tmp_path / "out")
     running.append(it)
     gops: list[GopChoices] = []
     it.service.on_decision.append(gops.append)
@@ -286,7 +286,7 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
         it for it in range(FRAMES) if it % 5 != 4
     ], "all but the last of every window, and it is told"
     assert sum(gop.frames for gop in gops) == FRAMES
-    assert b"no detection" in in_folder(tmp_path / "out")["late.csv"]
+    assert b"no detection" in written_files(tmp_path / "out")["late.csv"]
     statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
     assert statuses[-1].load_level == 4
     assert "detecting in every 5th frame" in statuses[-1].load

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fakes.service.scripted_cameras import word
+from fakes.service.scripted_cameras import camera_tracks
 from server.camera.sharpness import SharpnessMemory, sharpness
 from server.messaging.messages import Box
 
@@ -47,19 +47,19 @@ def test_tiny_boxes_have_no_sharpness(box: Box) -> None:
 
 def test_a_hidden_track_keeps_its_sharpness_and_an_ended_one_is_forgotten() -> None:
     it = SharpnessMemory()
-    [seen] = it.measure(word("c0", 0, {1: BOX}), picture()).tracks
+    [seen] = it.measure(camera_tracks("c0", 0, {1: BOX}), picture()).tracks
     assert seen.sharpness == sharpness(picture(), BOX)
-    hidden = it.measure(word("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
+    hidden = it.measure(camera_tracks("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
     assert [track.sharpness for track in hidden] == [seen.sharpness, None]
-    [ended] = it.measure(word("c0", 2, {1: BOX}), None).tracks
+    [ended] = it.measure(camera_tracks("c0", 2, {1: BOX}), None).tracks
     assert ended.sharpness == seen.sharpness
-    it.measure(word("c0", 3, {}), picture())
-    [again] = it.measure(word("c0", 4, {1: None}), picture()).tracks
+    it.measure(camera_tracks("c0", 3, {}), picture())
+    [again] = it.measure(camera_tracks("c0", 4, {1: None}), picture()).tracks
     assert again.sharpness is None
 
 
 def test_the_rest_of_the_message_stays() -> None:
-    message = word("c0", 0, {1: BOX})
+    message = camera_tracks("c0", 0, {1: BOX})
     measured = SharpnessMemory().measure(message, picture())
     bare = [msgspec.structs.replace(track, sharpness=None) for track in measured.tracks]
     assert msgspec.structs.replace(measured, tracks=bare) == message

@@ -18,16 +18,16 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from fakes.cli.command_line import Run, refusal
+from fakes.cli.command_line import RunCommand, input_error
 from fakes.media.videos import write_video
-from fakes.system.ports import free
+from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.system.errors import UnavailableError
 from synthetic import Scene, scene_names
 
 
 @pytest.fixture
-def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+def run(myview: RunCommand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> RunCommand:
     """Return a function that runs `myview` in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return myview
@@ -42,8 +42,8 @@ def site(folder: Path, **changes: Any) -> Path:
         # In this process, which is to stay as it is.
         "site": {"width": 64, "height": 48, "niceness": 0},
         "cameras": [{"id": "c0", "source": "c0.mp4"}],
-        **{f: {"port": free()} for f in ("sync", "http")},
-        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
+        **{f: {"port": free_port()} for f in ("sync", "http")},
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free_port()}"),
         **changes,
     }
     path = folder / "site.yaml"
@@ -76,31 +76,31 @@ COMMANDS = ["sync", "bestview", "up"]
     ],
 )
 def test_an_invalid_configuration_is_refused(
-    run: Run, tmp_path: Path, command: str, changes: dict[str, Any], why: str
+    run: RunCommand, tmp_path: Path, command: str, changes: dict[str, Any], why: str
 ) -> None:
-    assert why in refusal(run(command, site(tmp_path, **changes)))
+    assert why in input_error(run(command, site(tmp_path, **changes)))
 
 
 @pytest.mark.parametrize("command", [["sync"], ["camera"], ["bestview"], ["up"]])
-def test_a_missing_configuration_is_refused(run: Run, command: list[str]) -> None:
+def test_a_missing_configuration_is_refused(run: RunCommand, command: list[str]) -> None:
     arguments = [*command, "none.yaml", *(["c0"] if command == ["camera"] else [])]
-    assert "none.yaml: cannot read the configuration: No such file" in refusal(run(*arguments))
+    assert "none.yaml: cannot read the configuration: No such file" in input_error(run(*arguments))
 
 
 def test_keys_that_are_no_text_and_invalid_sections_of_the_environment_are_refused(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "odd.yaml").write_text("1: 2\n")
-    assert "mapping of sections" in refusal(run("sync", "odd.yaml"))
+    assert "mapping of sections" in input_error(run("sync", "odd.yaml"))
     monkeypatch.setenv("MYVIEW_CAMERAS", "no json")
-    assert "environment" in refusal(run("sync", site(tmp_path)))
+    assert "environment" in input_error(run("sync", site(tmp_path)))
 
 
 def test_an_unknown_section_is_refused_in_the_environment_too(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_GROUND__X", "1")
-    assert "there is no section 'ground'" in refusal(run("sync", site(tmp_path)))
+    assert "there is no section 'ground'" in input_error(run("sync", site(tmp_path)))
 
 
 DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200))
@@ -125,25 +125,25 @@ DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200
     ids=lambda it: " ".join(it)[:40] if isinstance(it, list) else "",
 )
 def test_inputs_and_special_files_are_not_replaced_and_invalid_options_are_refused(
-    run: Run, tmp_path: Path, words: list[str], why: str
+    run: RunCommand, tmp_path: Path, words: list[str], why: str
 ) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "det.txt").write_text(DETECTIONS)
     (tmp_path / "points.json").write_text('{"cameras": {}}')
     os.mkfifo(tmp_path / "pipe")
     before = written(tmp_path)
-    assert why in refusal(run(*words))
+    assert why in input_error(run(*words))
     assert written(tmp_path) == before
     assert (tmp_path / "det.txt").read_text() == DETECTIONS
 
 
-def test_a_full_disk_is_reported_in_one_line_and_leaves_nothing(run: Run, tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_in_one_line_and_leaves_nothing(run: RunCommand, tmp_path: Path) -> None:
     (tmp_path / "det.txt").write_text(DETECTIONS)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (64, before[1]))
     try:
-        line = refusal(run("track", "--det", "det.txt", "--out", "t.txt"))
+        line = input_error(run("track", "--det", "det.txt", "--out", "t.txt"))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, ignored)
@@ -151,59 +151,61 @@ def test_a_full_disk_is_reported_in_one_line_and_leaves_nothing(run: Run, tmp_pa
     assert written(tmp_path) == {"det.txt"}
 
 
-def test_an_invalid_log_level_is_refused(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_invalid_log_level_is_refused(
+    run: RunCommand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("MYVIEW_LOG", "loud")
-    assert "MYVIEW_LOG" in refusal(run("sync", site(tmp_path)))
+    assert "MYVIEW_LOG" in input_error(run("sync", site(tmp_path)))
 
 
-def test_an_unknown_camera_is_refused_with_the_known_ones(run: Run, tmp_path: Path) -> None:
-    assert "there is no camera 'c9'; there are c0" in refusal(run("camera", site(tmp_path), "c9"))
+def test_an_unknown_camera_is_refused_with_the_known_ones(run: RunCommand, tmp_path: Path) -> None:
+    assert "there is no camera 'c9'; there are c0" in input_error(run("camera", site(tmp_path), "c9"))
 
 
 @pytest.mark.parametrize("command", [["up"], ["camera", "c0"]])
 @pytest.mark.parametrize("content", [None, b"", b"no video at all"])
 def test_a_missing_or_broken_video_is_refused(
-    run: Run, tmp_path: Path, command: list[str], content: bytes | None
+    run: RunCommand, tmp_path: Path, command: list[str], content: bytes | None
 ) -> None:
     if content is not None:
         (tmp_path / "c0.mp4").write_bytes(content)
-    line = refusal(run(command[0], site(tmp_path), *command[1:]))
+    line = input_error(run(command[0], site(tmp_path), *command[1:]))
     assert "camera c0: " in line
     assert "c0.mp4" in line
 
 
 @pytest.mark.parametrize("section", ["http", "sync", "zenoh"])
 def test_a_port_in_use_is_refused_and_nothing_is_written(
-    run: Run, tmp_path: Path, taken: int, section: str
+    run: RunCommand, tmp_path: Path, taken: int, section: str
 ) -> None:
     write_video(tmp_path / "c0.mp4", 3)
     address = dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}")
     path = site(tmp_path, **{section: address if section == "zenoh" else {"port": taken}})
-    assert f"{section}." in refusal(run("up", path, "--out", "out"))
+    assert f"{section}." in input_error(run("up", path, "--out", "out"))
     if section != "sync":
-        assert f"{section}." in refusal(run("bestview", path, "--out", "out"))
+        assert f"{section}." in input_error(run("bestview", path, "--out", "out"))
     else:
-        assert "the port is in use" in refusal(run("sync", path))
+        assert "the port is in use" in input_error(run("sync", path))
     assert written(tmp_path) == {"c0.mp4", "site.yaml"}
 
 
 def test_the_port_on_the_command_line_overrides_the_configuration(
-    run: Run, tmp_path: Path, taken: int, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, tmp_path: Path, taken: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_HTTP__PORT", "1")  # so that what the command sets is undone
-    assert f"127.0.0.1:{taken}" in refusal(run("up", site(tmp_path), "--port", taken))
-    assert f"127.0.0.1:{taken}" in refusal(run("demo", "--port", taken, "--no-browser"))
+    assert f"127.0.0.1:{taken}" in input_error(run("up", site(tmp_path), "--port", taken))
+    assert f"127.0.0.1:{taken}" in input_error(run("demo", "--port", taken, "--no-browser"))
 
 
 @pytest.mark.parametrize("command", ["up", "bestview"])
-def test_an_output_folder_that_is_not_empty_is_refused(run: Run, tmp_path: Path, command: str) -> None:
+def test_an_output_folder_that_is_not_empty_is_refused(run: RunCommand, tmp_path: Path, command: str) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("mine")
-    line = refusal(run(command, site(tmp_path), "--out", "out"))
+    line = input_error(run(command, site(tmp_path), "--out", "out"))
     assert "out: exists and is not an empty folder" in line
 
 
-def test_scene_lists_the_scenes_and_their_default_cameras(run: Run, tmp_path: Path) -> None:
+def test_scene_lists_the_scenes_and_their_default_cameras(run: RunCommand, tmp_path: Path) -> None:
     shown = run("scene", "--help").out
     assert all(f"{name}:" in shown for name in scene_names())
     ended = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
@@ -212,26 +214,26 @@ def test_scene_lists_the_scenes_and_their_default_cameras(run: Run, tmp_path: Pa
     assert written(tmp_path / "fish") == {"c0.mp4", "gt"}
 
 
-def test_scene_writes_a_recording_or_refuses(run: Run, tmp_path: Path) -> None:
+def test_scene_writes_a_recording_or_refuses(run: RunCommand, tmp_path: Path) -> None:
     small = ["--cameras", 1, "--objects", 1, "--size", "128x72"]
     ended = run("scene", "room", "--out", "room", "--seconds", 0.2, *small)
     assert (ended.code, ended.err) == (0, "")
     assert written(tmp_path / "room") == {"c0.mp4", "gt", "ground.json"}
-    assert "not an empty folder" in refusal(run("scene", "room", "--out", "room", *small))
-    assert "there is no scene 'cellar'" in refusal(run("scene", "cellar", "--out", "new", *small))
-    assert "WIDTHxHEIGHT" in refusal(run("scene", "room", "--out", "new", "--size", "big"))
-    assert "must be even" in refusal(run("scene", "room", "--out", "new", "--size", "129x72"))
-    assert "cameras must be" in refusal(run("scene", "room", "--out", "new", "--cameras", 100))
-    assert "cannot write there" in refusal(run("scene", "room", "--out", "room/c0.mp4/x", *small))
-    assert "not an empty folder" in refusal(run("scene", "room", "--out", "room/c0.mp4", *small))
-    assert "at least one frame" in refusal(
+    assert "not an empty folder" in input_error(run("scene", "room", "--out", "room", *small))
+    assert "there is no scene 'cellar'" in input_error(run("scene", "cellar", "--out", "new", *small))
+    assert "WIDTHxHEIGHT" in input_error(run("scene", "room", "--out", "new", "--size", "big"))
+    assert "must be even" in input_error(run("scene", "room", "--out", "new", "--size", "129x72"))
+    assert "cameras must be" in input_error(run("scene", "room", "--out", "new", "--cameras", 100))
+    assert "cannot write there" in input_error(run("scene", "room", "--out", "room/c0.mp4/x", *small))
+    assert "not an empty folder" in input_error(run("scene", "room", "--out", "room/c0.mp4", *small))
+    assert "at least one frame" in input_error(
         run("scene", "room", "--out", "new", "--fps", 1, *small, "--seconds", 0.4)
     )
     assert written(tmp_path) == {"room"}
 
 
 def test_an_interrupted_scene_leaves_no_incomplete_files(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[int] = []
     image = Scene.image
@@ -249,21 +251,21 @@ def test_an_interrupted_scene_leaves_no_incomplete_files(
     assert written(tmp_path) == set()
 
 
-def test_track_writes_a_file_or_refuses(run: Run, tmp_path: Path) -> None:
+def test_track_writes_a_file_or_refuses(run: RunCommand, tmp_path: Path) -> None:
     rows = [f"{frame},-1,10,10,8,20,0.9,-1,-1,-1\n" for frame in range(1, 31)]
     (tmp_path / "det.txt").write_text("".join(rows))
     (tmp_path / "bad.txt").write_text("1,2,three\n")
     write_video(tmp_path / "my view (1).mp4", 12)
     before = written(tmp_path)
-    assert "name a video, or its detections" in refusal(run("track", "--out", "t.txt"))
-    assert "there is no solver 'oracle'" in refusal(
+    assert "name a video, or its detections" in input_error(run("track", "--out", "t.txt"))
+    assert "there is no solver 'oracle'" in input_error(
         run("track", "--det", "det.txt", "--out", "t.txt", "--solver", "oracle")
     )
-    assert "no such file" in refusal(run("track", "none.mp4", "--out", "t.txt"))
-    assert "No such file" in refusal(run("track", "--det", "none.txt", "--out", "t.txt"))
-    assert "bad.txt" in refusal(run("track", "--det", "bad.txt", "--out", "t.txt"))
-    assert "is a folder" in refusal(run("track", "--det", "det.txt", "--out", tmp_path))
-    assert "cannot write there" in refusal(run("track", "--det", "det.txt", "--out", "det.txt/t.txt"))
+    assert "no such file" in input_error(run("track", "none.mp4", "--out", "t.txt"))
+    assert "No such file" in input_error(run("track", "--det", "none.txt", "--out", "t.txt"))
+    assert "bad.txt" in input_error(run("track", "--det", "bad.txt", "--out", "t.txt"))
+    assert "is a folder" in input_error(run("track", "--det", "det.txt", "--out", tmp_path))
+    assert "cannot write there" in input_error(run("track", "--det", "det.txt", "--out", "det.txt/t.txt"))
     assert written(tmp_path) == before
     ended = run("track", "--det", "det.txt", "--out", "t.txt")
     assert (ended.code, ended.out, ended.err) == (0, "t.txt: 1 people\n", "")
@@ -271,26 +273,26 @@ def test_track_writes_a_file_or_refuses(run: Run, tmp_path: Path) -> None:
     assert run("track", "my view (1).mp4", "--out", "v.txt").code == 0
 
 
-def test_track_reads_settings_from_a_configuration_in_any_folder(run: Run, tmp_path: Path) -> None:
+def test_track_reads_settings_from_a_configuration_in_any_folder(run: RunCommand, tmp_path: Path) -> None:
     (tmp_path / "det.txt").write_text("1,-1,10,10,8,20,0.9,-1,-1,-1\n")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "ground.json").write_text('{"homography": {}}')
     path = site(tmp_path / "sub", ground="ground.json", track={"window": {"window": 10, "birth_window": 10}})
     assert run("track", "--det", "det.txt", "--out", "t.txt", "--config", path).code == 0
     path = site(tmp_path / "sub", track={"window": {"widow": 10}})
-    assert "widow" in refusal(run("track", "--det", "det.txt", "--out", "t.txt", "--config", path))
+    assert "widow" in input_error(run("track", "--det", "det.txt", "--out", "t.txt", "--config", path))
 
 
 @pytest.mark.parametrize("seconds", ["nan", "-1"])
 @pytest.mark.parametrize("command", [["demo", "--no-browser"], ["watch", "http://127.0.0.1:1"]], ids=" ".join)
-def test_invalid_seconds_are_refused(run: Run, command: list[str], seconds: str) -> None:
+def test_invalid_seconds_are_refused(run: RunCommand, command: list[str], seconds: str) -> None:
     done = run(*command, "--seconds", seconds)
     assert done.code == 2
     assert "--seconds" in done.err
 
 
-def test_watch_reports_an_unreachable_server_in_one_line(run: Run) -> None:
-    done = run("watch", f"http://127.0.0.1:{free()}")
+def test_watch_reports_an_unreachable_server_in_one_line(run: RunCommand) -> None:
+    done = run("watch", f"http://127.0.0.1:{free_port()}")
     assert (done.code, done.out) == (UnavailableError.code, "")
     (line,) = done.err.splitlines()
     assert line.startswith("myview: watch: ")
@@ -313,25 +315,27 @@ def test_watch_reports_an_unreachable_server_in_one_line(run: Run) -> None:
         (["/dev/null"], "/dev/null: is not a recorded video"),
     ],
 )
-def test_render_refuses_and_leaves_nothing(run: Run, tmp_path: Path, arguments: list[str], why: str) -> None:
+def test_render_refuses_and_leaves_nothing(
+    run: RunCommand, tmp_path: Path, arguments: list[str], why: str
+) -> None:
     write_video(tmp_path / "c0.mp4", 5)
     (tmp_path / "sub").mkdir()
     write_video(tmp_path / "sub" / "c0.mp4", 5)
     (tmp_path / "empty.mp4").write_bytes(b"")
     (tmp_path / "wrong.yaml").write_text("sight: {}\n")
     before = written(tmp_path)
-    assert why in refusal(run("render", "--out", "out", *arguments))
+    assert why in input_error(run("render", "--out", "out", *arguments))
     assert written(tmp_path) == before
 
 
-def test_help_lists_every_command(run: Run) -> None:
+def test_help_lists_every_command(run: RunCommand) -> None:
     ended = run("--help")
     assert ended.code == 0
     for command in ("demo", "up", "sync", "camera", "bestview", "render", "track", "scene", "watch"):
         assert command in ended.out
 
 
-def test_the_version_is_printed(run: Run) -> None:
+def test_the_version_is_printed(run: RunCommand) -> None:
     ended = run("--version")
     assert ended.code == 0
     assert ended.out == f"myview {version('myview')}\n"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import client
-from fakes.cli.command_line import Run, myview
+from fakes.cli.command_line import RunCommand, myview
 from fakes.media.videos import write_video
-from fakes.service.fed_site import Hall, opened
+from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL
 from fakes.service.scripted_recordings import A, B, pictures
 from fakes.system.full_disk import files_of_at_most
@@ -23,62 +23,62 @@ FRAMES = 30
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
-    async for it in opened():
-        it.service.come(*CAMERAS)
+async def served() -> AsyncIterator[ServedSite]:
+    async for it in serve_site():
+        it.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
             it.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: SMALL}})
         yield it
 
 
-async def recorded(hall: Hall, out: Path) -> None:
-    await run_watch(f"http://127.0.0.1:{hall.port}", 1, out, None, "p0", f"p{FRAMES}")
+async def recorded(served: ServedSite, out: Path) -> None:
+    await run_watch(f"http://127.0.0.1:{served.port}", 1, out, None, "p0", f"p{FRAMES}")
 
 
-async def size_of_it(hall: Hall, folder: Path) -> int:
+async def size_of_it(served: ServedSite, folder: Path) -> int:
     """Record it on a disk with room enough; give the bytes of its stream."""
     whole = await client.watch(
-        f"http://127.0.0.1:{hall.port}", 1, folder / "w.mp4", start="p0", end=f"p{FRAMES}"
+        f"http://127.0.0.1:{served.port}", 1, folder / "w.mp4", start="p0", end=f"p{FRAMES}"
     )
     return whole.bytes
 
 
 @pytest.mark.parametrize("most", [0, 1, 500])
 async def test_a_disk_without_room_for_a_picture_is_left_unchanged(
-    hall: Hall, tmp_path: Path, most: int
+    served: ServedSite, tmp_path: Path, most: int
 ) -> None:
     out = tmp_path / "one.mp4"
     with (
         files_of_at_most(most),
         pytest.raises(UserError, match=r"one.mp4: cannot write there: File too large$"),
     ):
-        await recorded(hall, out)
+        await recorded(served, out)
     assert not list(tmp_path.iterdir())
 
 
 async def test_an_older_recording_is_kept_if_there_is_no_room_for_a_new_one(
-    hall: Hall, tmp_path: Path
+    served: ServedSite, tmp_path: Path
 ) -> None:
     out = tmp_path / "one.mp4"
     out.write_bytes(b"older")
     with files_of_at_most(100), pytest.raises(UserError, match=r"File too large$"):
-        await recorded(hall, out)
+        await recorded(served, out)
     assert out.read_bytes() == b"older"
     assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
 
 
 @pytest.mark.parametrize("part", [0.3, 0.6, 0.95])
 async def test_a_disk_that_fills_up_keeps_only_complete_pictures(
-    hall: Hall, tmp_path: Path, part: float
+    served: ServedSite, tmp_path: Path, part: float
 ) -> None:
     (tmp_path / "ample").mkdir()
-    size, out = await size_of_it(hall, tmp_path / "ample"), tmp_path / "small" / "one.mp4"
+    size, out = await size_of_it(served, tmp_path / "ample"), tmp_path / "small" / "one.mp4"
     out.parent.mkdir()
     with (
         files_of_at_most(round(part * size)),
         pytest.raises(UserError, match=r"File too large; the recording up to then is kept$"),
     ):
-        await recorded(hall, out)
+        await recorded(served, out)
     assert all(it.stat().st_size for it in out.parent.iterdir()), "none is empty"
     assert "one.mp4" in {it.name for it in out.parent.iterdir()} <= {"one.mp4", "one.vtt", "one.ass"}
     shown = [place for place, _ in pictures(out)]
@@ -87,12 +87,12 @@ async def test_a_disk_that_fills_up_keeps_only_complete_pictures(
 
 
 async def test_a_recording_without_room_for_sidecar_files_is_kept_without_them(
-    hall: Hall, tmp_path: Path
+    served: ServedSite, tmp_path: Path
 ) -> None:
     out = tmp_path / "one.mp4"
     (tmp_path / "one.ass").mkdir()  # nothing can be written there
     with pytest.raises(UserError, match=r"kept$"):
-        await recorded(hall, out)
+        await recorded(served, out)
     (tmp_path / "one.ass").rmdir()
     assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
     assert [place for place, _ in pictures(out)] == list(range(FRAMES))
@@ -109,7 +109,7 @@ async def test_a_recording_without_room_for_sidecar_files_is_kept_without_them(
     ],
 )
 def test_a_command_without_disk_space_reports_it_in_one_line_and_leaves_nothing(
-    tmp_path: Path, myview: Run, command: str, most: int
+    tmp_path: Path, myview: RunCommand, command: str, most: int
 ) -> None:
     (tmp_path / "given").mkdir()
     video = write_video(tmp_path / "given" / "c0.mp4", 12)

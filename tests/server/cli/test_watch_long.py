@@ -14,7 +14,7 @@ from client.model import Box, Gop, Site
 from client.sidecar import sidecars, write_sidecars
 from client.spool import Spool
 from client.stream_events import Frame, ViewHistory
-from fakes.service.fed_site import Hall, opened
+from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, GOP, LARGE, SMALL
 from fakes.service.scripted_recordings import A, B
 
@@ -123,17 +123,17 @@ def test_without_disk_space_choices_are_kept_without_boxes(tmp_path: Path) -> No
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
+async def served() -> AsyncIterator[ServedSite]:
     """Person 1 in both cameras."""
-    async for it in opened():
-        it.service.come(*CAMERAS)
+    async for it in serve_site():
+        it.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
             it.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
         yield it
 
 
 async def test_the_recording_is_finished_before_the_sidecar_files(
-    hall: Hall, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    served: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "one.mp4"
     names: list[list[str]] = []
@@ -144,13 +144,13 @@ async def test_the_recording_is_finished_before_the_sidecar_files(
 
     monkeypatch.setattr("client.player.write_sidecars", killed)
     with pytest.raises(MemoryError):
-        await client.watch(f"http://127.0.0.1:{hall.port}", 1, out, start="p0", end="p25")
+        await client.watch(f"http://127.0.0.1:{served.port}", 1, out, start="p0", end="p25")
     assert names == [["one.mp4"]]
 
 
-async def test_a_recording_has_sidecar_files_with_boxes(hall: Hall, tmp_path: Path) -> None:
+async def test_a_recording_has_sidecar_files_with_boxes(served: ServedSite, tmp_path: Path) -> None:
     out = tmp_path / "one.mp4"
-    await client.watch(f"http://127.0.0.1:{hall.port}", 1, out, start="p0", end="p25")
+    await client.watch(f"http://127.0.0.1:{served.port}", 1, out, start="p0", end="p25")
     cues = out.with_suffix(".vtt").read_text().strip().split("\n\n")[2:]
     assert [json.loads(it.split("\n")[2])["boxes"] for it in cues] == [[[1, *LARGE]]] * 25
     assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]

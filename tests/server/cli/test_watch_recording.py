@@ -21,7 +21,7 @@ from client.model import Box, Site
 from client.sidecar import write_sidecars
 from client.stream_events import Frame
 from fakes.programs import needs_chromium, needs_ffprobe
-from fakes.service.fed_site import Hall, opened
+from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH
 from fakes.service.scripted_recordings import A, B, own_pictures, pictures
 from server.cli.main import app
@@ -30,38 +30,38 @@ FIRST = 2 * GOP  # of what is watched here
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
+async def served() -> AsyncIterator[ServedSite]:
     """Person 1, three GOPs in c0, then in c1; person 2 in c0."""
-    async for it in opened():
-        it.service.come(*CAMERAS)
+    async for it in serve_site():
+        it.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
             here, there = (LARGE, SMALL) if epoch < 3 else (SMALL, LARGE)
             it.service.feed(epoch, {A: {1: here, 2: SMALL}, B: {1: there}})
         yield it
 
 
-async def watched(hall: Hall, out: Path) -> client.WatchResult:
-    url = f"http://127.0.0.1:{hall.port}"
+async def watched(served: ServedSite, out: Path) -> client.WatchResult:
+    url = f"http://127.0.0.1:{served.port}"
     return await client.watch(url, 1, out, start=f"p{FIRST}", end="p28")
 
 
-def chosen(hall: Hall) -> dict[int, str]:
+def chosen(served: ServedSite) -> dict[int, str]:
     return {
         pulse: choices.choices[1]
-        for choices in hall.service.recorder.recent.choices(0)
+        for choices in served.service.recorder.recent.choices(0)
         for pulse in range(choices.first, choices.first + GOP)
     }
 
 
-async def test_the_recording_begins_at_0_with_unchanged_pictures(hall: Hall, tmp_path: Path) -> None:
+async def test_the_recording_begins_at_0_with_unchanged_pictures(served: ServedSite, tmp_path: Path) -> None:
     out = tmp_path / "one.mp4"
-    done = await watched(hall, out)
+    done = await watched(served, out)
     assert (done.complete, done.cuts, done.fragments) == (True, 1, 28 - FIRST)
     assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]
     shown = list(pictures(out))
     assert [place for place, _ in shown] == list(range(28 - FIRST))
     for place, picture in shown:
-        camera = chosen(hall)[FIRST + place]
+        camera = chosen(served)[FIRST + place]
         np.testing.assert_array_equal(picture, own_pictures(camera)[FIRST + place])
     with av.open(str(out), "r") as film:
         assert film.streams.video[0].frames == 28 - FIRST, "counted in its table"
@@ -71,17 +71,17 @@ async def test_the_recording_begins_at_0_with_unchanged_pictures(hall: Hall, tmp
 
 
 async def test_a_live_stream_is_recorded_like_the_past(tmp_path: Path) -> None:
-    async for hall in opened():
-        hall.service.come(*CAMERAS)
+    async for served in serve_site():
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(4):
-            hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
-        url = f"http://127.0.0.1:{hall.port}"
+            served.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+        url = f"http://127.0.0.1:{served.port}"
         out = tmp_path / "one.mp4"
         watching = asyncio.create_task(client.watch(url, 1, out, 3 * GOP / FPS))
-        while not hall.service.splicer.viewers:  # noqa: ASYNC110
+        while not served.service.splicer.viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         for epoch in range(4, 8):
-            hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+            served.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
         done = await watching
         assert (done.complete, done.fragments) == (True, 3 * GOP)
         assert [place for place, _ in pictures(out)] == list(range(3 * GOP))
@@ -89,8 +89,8 @@ async def test_a_live_stream_is_recorded_like_the_past(tmp_path: Path) -> None:
 
 
 @needs_chromium
-async def test_a_browser_plays_the_recording_with_its_duration(hall: Hall, tmp_path: Path) -> None:
-    await watched(hall, tmp_path / "one.mp4")
+async def test_a_browser_plays_the_recording_with_its_duration(served: ServedSite, tmp_path: Path) -> None:
+    await watched(served, tmp_path / "one.mp4")
     (tmp_path / "page.html").write_text("<video src=one.mp4 muted></video>")
     async with chromium() as browser:
         page = await browser.new_page()
@@ -109,8 +109,8 @@ async def test_a_browser_plays_the_recording_with_its_duration(hall: Hall, tmp_p
 
 
 @needs_ffprobe
-async def test_ffprobe_reports_no_problem_of_the_recording(hall: Hall, tmp_path: Path) -> None:
-    await watched(hall, tmp_path / "one.mp4")
+async def test_ffprobe_reports_no_problem_of_the_recording(served: ServedSite, tmp_path: Path) -> None:
+    await watched(served, tmp_path / "one.mp4")
     options = ["-v", "warning", "-show_entries", "format=start_time,duration", "-of", "csv=p=0"]
     done = subprocess.run(
         ["ffprobe", *options, str(tmp_path / "one.mp4")], capture_output=True, check=True, text=True
@@ -118,8 +118,8 @@ async def test_ffprobe_reports_no_problem_of_the_recording(hall: Hall, tmp_path:
     assert (done.stderr, done.stdout.strip()) == ("", "0.000000,0.720000")
 
 
-async def test_every_frame_has_its_boxes_in_the_sidecar(hall: Hall, tmp_path: Path) -> None:
-    await watched(hall, tmp_path / "one.mp4")
+async def test_every_frame_has_its_boxes_in_the_sidecar(served: ServedSite, tmp_path: Path) -> None:
+    await watched(served, tmp_path / "one.mp4")
     head, note, *cues = (tmp_path / "one.vtt").read_text().strip().split("\n\n")
     assert head == "WEBVTT"
     assert f"{WIDTH}x{HEIGHT}" in note
@@ -130,7 +130,7 @@ async def test_every_frame_has_its_boxes_in_the_sidecar(hall: Hall, tmp_path: Pa
         begin, end = (float(it.rpartition(":")[2]) for it in times.split(" --> "))
         assert (begin, end) == pytest.approx((place / FPS, (place + 1) / FPS))
         content = json.loads(text)
-        assert content["camera"] == chosen(hall)[FIRST + place]
+        assert content["camera"] == chosen(served)[FIRST + place]
         everybody = {number: tuple(box) for number, *box in content["boxes"]}
         assert everybody == {1: LARGE, 2: SMALL} if content["camera"] == A else {1: LARGE}
 
@@ -159,8 +159,8 @@ def _ffmpeg(*arguments: str) -> bytes:
     return subprocess.run(["ffmpeg", *arguments], capture_output=True, check=True).stdout
 
 
-async def test_an_invalid_moment_leaves_no_file(hall: Hall, tmp_path: Path) -> None:
-    url = f"http://127.0.0.1:{hall.port}"
+async def test_an_invalid_moment_leaves_no_file(served: ServedSite, tmp_path: Path) -> None:
+    url = f"http://127.0.0.1:{served.port}"
     with pytest.raises(client.RefusedError, match="'soon' is not a time"):
         await client.watch(url, 1, tmp_path / "one.mp4", start="soon")
     with pytest.raises(
@@ -170,8 +170,8 @@ async def test_an_invalid_moment_leaves_no_file(hall: Hall, tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
-async def test_recorded_spans_and_events_can_be_fetched(hall: Hall) -> None:
-    url = f"http://127.0.0.1:{hall.port}"
+async def test_recorded_spans_and_events_can_be_fetched(served: ServedSite) -> None:
+    url = f"http://127.0.0.1:{served.port}"
     (span,) = await client.spans(url, 1)
     assert (span.first, span.frames) == (0, 30)
     assert [gop.first async for gop in client.past(url, "p7", "p16")] == [5, 10, 15]

@@ -18,21 +18,23 @@ from client.recording import Recording
 from client.remux import remux
 from client.webm import ElementReader
 from fakes.programs import needs_ffmpeg
-from fakes.service.fed_site import Hall
+from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, STRIDE, WIDTH, encoded
-from fakes.service.vp8_site import EPOCHS, feed, own
+from fakes.service.vp8_site import EPOCHS, decoded_alone, feed
 from server.media.containers.webm import cluster, header
 
 
-async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(free: Hall, tmp_path: Path) -> None:
+async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(
+    vp8_site: ServedSite, tmp_path: Path
+) -> None:
     out, seconds = tmp_path / "one.webm", 3 * GOP / FPS
-    watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{free.port}", 1, out, seconds))
-    while not free.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
+    watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{vp8_site.port}", 1, out, seconds))
+    while not vp8_site.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
         await asyncio.sleep(0.01)
     for epoch in range(3, EPOCHS):
-        feed(free, epoch)
+        feed(vp8_site, epoch)
         await asyncio.sleep(0.02)
-    free.service.splicer.close()
+    vp8_site.service.splicer.close()
     done = await watching
     assert (done.complete, done.fragments) == (True, 3 * GOP)
     assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.vtt", "one.webm"]
@@ -40,7 +42,7 @@ async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(free: Hal
         assert film.duration == round(seconds * av.time_base)
         shown = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in film.decode(video=0)]
     assert [time for time, _ in shown] == pytest.approx([n / FPS for n in range(3 * GOP)])
-    alone = [own(camera) for camera in range(2)]
+    alone = [decoded_alone(camera) for camera in range(2)]
     firsts = range(0, EPOCHS * STRIDE, GOP)
     (begun,) = [n for n in firsts if any(np.array_equal(shown[0][1], camera[n]) for camera in alone)]
     for n, (_, picture) in enumerate(shown):
@@ -48,21 +50,21 @@ async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(free: Hal
 
 
 async def test_a_file_name_of_another_container_is_refused_with_one_line(
-    free: Hall, busy: Hall, tmp_path: Path
+    vp8_site: ServedSite, site_with_people: ServedSite, tmp_path: Path
 ) -> None:
     with pytest.raises(client.NotFoundError, match=r"these streams are VP8 .* there is best\.webm"):
-        await client.watch(f"http://127.0.0.1:{free.port}", 1, tmp_path / "one.mp4", 1.0)
+        await client.watch(f"http://127.0.0.1:{vp8_site.port}", 1, tmp_path / "one.mp4", 1.0)
     with pytest.raises(client.NotFoundError, match=r"these streams are H\.264 .* there is best\.mp4"):
-        await client.watch(f"http://127.0.0.1:{busy.port}", 1, tmp_path / "one.webm", 1.0)
+        await client.watch(f"http://127.0.0.1:{site_with_people.port}", 1, tmp_path / "one.webm", 1.0)
     assert not list(tmp_path.iterdir())
 
 
-async def test_watching_without_a_file_uses_the_sites_container(free: Hall) -> None:
-    watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{free.port}", 1, None, GOP / FPS))
-    while not free.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
+async def test_watching_without_a_file_uses_the_sites_container(vp8_site: ServedSite) -> None:
+    watching = asyncio.create_task(client.watch(f"http://127.0.0.1:{vp8_site.port}", 1, None, GOP / FPS))
+    while not vp8_site.service.splicer.viewers:  # noqa: ASYNC110 — it comes when it comes
         await asyncio.sleep(0.01)
     for epoch in range(3, EPOCHS):
-        feed(free, epoch)
+        feed(vp8_site, epoch)
         await asyncio.sleep(0.01)
     assert (await watching).fragments == GOP
 

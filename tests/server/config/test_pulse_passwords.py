@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from camsync import Credentials, PulseClient, query_clients
-from fakes.cli.command_line import Run, refusal
+from fakes.cli.command_line import RunCommand, input_error
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 from server.config.loader import load_config
@@ -75,12 +75,12 @@ def test_every_service_of_a_site_needs_a_line(tmp_path: Path) -> None:
     ],
 )
 def test_a_server_with_missing_or_invalid_passwords_fails_with_one_line(
-    myview: Run, tmp_path: Path, users: str | None, words: str
+    myview: RunCommand, tmp_path: Path, users: str | None, words: str
 ) -> None:
     path = site(tmp_path, users)
     with pytest.raises(UserError, match=words) as caught:
         pulse_users(load_config(path))
-    line = refusal(myview("sync", path))
+    line = input_error(myview("sync", path))
     assert line == f"myview: {caught.value}"
     assert "secret" not in line
 

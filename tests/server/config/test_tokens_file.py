@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from fakes.cli.command_line import Run, refusal
-from fakes.http.tokens import LATER, line_of, write_tokens
+from fakes.cli.command_line import RunCommand, input_error
+from fakes.http.tokens import IN_FUTURE, token_entry, write_tokens
 from server.config.tokens_file import read_tokens, token_digest
 from server.system.errors import UserError
 
@@ -16,7 +16,7 @@ SUM = token_digest("x")
 
 
 def test_tokens_are_read_in_the_order_of_the_file(tmp_path: Path) -> None:
-    path = write_tokens(tmp_path / "tokens.yaml", *map(line_of, ("lead", "desk", "family", "door")))
+    path = write_tokens(tmp_path / "tokens.yaml", *map(token_entry, ("lead", "desk", "family", "door")))
     tokens = read_tokens(path)
     assert [it.name for it in tokens] == ["lead", "desk", "family", "door"]
     assert [(it.role, it.object, it.camera) for it in tokens] == [
@@ -51,7 +51,7 @@ def test_a_file_without_tokens_permits_no_access(tmp_path: Path) -> None:
             "tokens.0: role: an operator sees",
         ),
         (
-            [{"name": "a", "sha256": SUM, "role": "watch", "object": 3, "camera": "c0", "made": LATER}],
+            [{"name": "a", "sha256": SUM, "role": "watch", "object": 3, "camera": "c0", "made": IN_FUTURE}],
             "tokens.0: object, camera: a token is limited to one",
         ),
         ([{"name": "a", "sha256": SUM, "role": "watch"}] * 2, "tokens.0 and tokens.1: have the same name, a"),
@@ -112,7 +112,7 @@ def test_a_missing_token_file_is_reported_in_one_line(tmp_path: Path) -> None:
     ],
 )
 def test_a_new_token_is_printed_with_its_line_for_the_file(
-    myview: Run, tmp_path: Path, options: list[str], limits: tuple[Any, ...]
+    myview: RunCommand, tmp_path: Path, options: list[str], limits: tuple[Any, ...]
 ) -> None:
     done = myview("token", "Ann's parents", *options)
     assert done.code == 0
@@ -129,5 +129,5 @@ def test_a_new_token_is_printed_with_its_line_for_the_file(
 
 
 @pytest.mark.parametrize("options", [["--object", "3", "--camera", "c0"], ["--operate", "--object", "3"]])
-def test_contradictory_options_are_refused(myview: Run, options: list[str]) -> None:
-    assert "token: " in refusal(myview("token", "a", *options))
+def test_contradictory_options_are_refused(myview: RunCommand, options: list[str]) -> None:
+    assert "token: " in input_error(myview("token", "a", *options))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fakes.http.tokens import line_of, write_tokens
+from fakes.http.tokens import token_entry, write_tokens
 from fakes.service.scripted_cameras import FedService, small_config
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import AccessControl
@@ -70,7 +70,7 @@ async def test_tokens_are_checked_after_a_failed_reload_and_expired_requests_end
 ) -> None:
     monkeypatch.setattr("server.http.access.authorization._CHECK_EVERY_S", 0.001)
     failing, over = Failing(RuntimeError("nobody has thought of this")), Failing()
-    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("desk"))
     access = AccessControl(Authenticator(tokens, "hall"), lambda number: number)
     monkeypatch.setattr(access.authenticator.file, "reload_if_changed", failing)
     monkeypatch.setattr(access, "end_expired", over)

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from fakes.service.fed_site import A, B, Hall
-from fakes.service.scripted_cameras import status, tracks, word
+from fakes.service.fed_site import A, B, ServedSite
+from fakes.service.scripted_cameras import camera_tracks, status, tracks
 from server.http.api import openapi
 from server.http.app import make_app
 from server.service.service import BestViewService
@@ -35,8 +35,10 @@ from server.service.streaming.subscriber_queue import Subscriber
         ("/page/none.js", "there is nothing at /page/none.js"),
     ],
 )
-async def test_unknown_addresses_get_404_with_one_line_of_json(busy: Hall, path: str, error: str) -> None:
-    assert await busy.get(path) == (404, {"error": error})
+async def test_unknown_addresses_get_404_with_one_line_of_json(
+    site_with_people: ServedSite, path: str, error: str
+) -> None:
+    assert await site_with_people.get(path) == (404, {"error": error})
 
 
 @pytest.mark.parametrize(
@@ -51,15 +53,17 @@ async def test_unknown_addresses_get_404_with_one_line_of_json(busy: Hall, path:
         ("/cameras/c0/live.mjpeg?to=-5", "to: only .mp4, .ts and HLS can begin in the past"),
     ],
 )
-async def test_unsupported_query_parameters_of_streams_are_refused(busy: Hall, path: str, error: str) -> None:
-    code, content = await busy.get(path)
+async def test_unsupported_query_parameters_of_streams_are_refused(
+    site_with_people: ServedSite, path: str, error: str
+) -> None:
+    code, content = await site_with_people.get(path)
     assert code == 400
     assert content["error"].startswith(error)
     assert "\n" not in content["error"]
 
 
-async def test_overlay_and_time_shift_are_described_where_supported(busy: Hall) -> None:
-    described = await busy.get_json("/api/openapi.json")
+async def test_overlay_and_time_shift_are_described_where_supported(site_with_people: ServedSite) -> None:
+    described = await site_with_people.get_json("/api/openapi.json")
     for path, item in described["paths"].items():
         queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
         if path.startswith(("/objects/", "/cameras/")):
@@ -70,7 +74,7 @@ async def test_overlay_and_time_shift_are_described_where_supported(busy: Hall) 
                 .replace("{part}", "0")
             )
             for query in ("overlay=1", "from=p0", "camera=c0"):
-                async with busy.session.head(f"{asked}?{query}") as answer:
+                async with site_with_people.session.head(f"{asked}?{query}") as answer:
                     assert (answer.status == 400) == (query.split("=")[0] not in queries), asked
 
 
@@ -88,9 +92,9 @@ async def test_overlay_and_time_shift_are_described_where_supported(busy: Hall) 
         "/page/.",
     ],
 )
-async def test_no_file_outside_the_page_is_served(hall: Hall, path: str) -> None:
+async def test_no_file_outside_the_page_is_served(served: ServedSite, path: str) -> None:
     # By hand: a client library would tidy the path up before sending it.
-    reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
+    reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
     writer.write(f"GET {path} HTTP/1.0\r\n\r\n".encode())
     answer = await reader.read()
     assert answer.startswith(b"HTTP/1.0 404")
@@ -99,18 +103,18 @@ async def test_no_file_outside_the_page_is_served(hall: Hall, path: str) -> None
     await writer.wait_closed()
 
 
-async def test_an_unsupported_method_gets_405_with_the_allowed_ones(hall: Hall) -> None:
-    async with hall.session.post("/api/objects") as answer:
+async def test_an_unsupported_method_gets_405_with_the_allowed_ones(served: ServedSite) -> None:
+    async with served.session.post("/api/objects") as answer:
         assert answer.status == 405
         assert answer.headers["Allow"] == "GET,HEAD"
         assert await answer.json() == {"error": "POST is not possible here"}
 
 
 async def test_a_server_error_gets_500_without_a_traceback(
-    hall: Hall, monkeypatch: pytest.MonkeyPatch
+    served: ServedSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hall.service, "frame_buffers", {})
-    assert await hall.get("/api/cameras") == (
+    monkeypatch.setattr(served.service, "frame_buffers", {})
+    assert await served.get("/api/cameras") == (
         500,
         {"error": "internal server error; see the server's log"},
     )
@@ -118,7 +122,7 @@ async def test_a_server_error_gets_500_without_a_traceback(
 
 @pytest.mark.parametrize("version", ["1.0", "1.1"])
 async def test_a_server_error_during_an_answer_resets_the_connection(
-    busy: Hall, monkeypatch: pytest.MonkeyPatch, version: str
+    site_with_people: ServedSite, monkeypatch: pytest.MonkeyPatch, version: str
 ) -> None:
     """After an orderly close a client would take a part of a stream for all of it."""
 
@@ -127,7 +131,7 @@ async def test_a_server_error_during_an_answer_resets_the_connection(
         raise PermissionError(13, "the disk is gone")
 
     monkeypatch.setattr(Subscriber, "chunks", some)
-    reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
+    reader, writer = await asyncio.open_connection("127.0.0.1", site_with_people.port)
     writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: 127.0.0.1\r\n\r\n".encode())
     head = await reader.readuntil(b"\r\n\r\n")
     assert b" 200 OK" in head
@@ -151,19 +155,19 @@ async def test_a_server_error_during_an_answer_resets_the_connection(
         ("/", "text/html"),
     ],
 )
-async def test_head_returns_only_headers(busy: Hall, path: str, kind: str) -> None:
+async def test_head_returns_only_headers(site_with_people: ServedSite, path: str, kind: str) -> None:
     for _ in range(2):  # on one connection, which must stay of use
-        async with busy.session.head(path) as answer:
+        async with site_with_people.session.head(path) as answer:
             assert answer.status == 200
             assert answer.content_type == kind
             assert await answer.read() == b""
-    assert busy.service.splicer.viewers == 0
+    assert site_with_people.service.splicer.viewers == 0
 
 
-async def test_the_description_has_every_route_except_the_page(busy: Hall) -> None:
-    app = make_app(BestViewService(busy.service))
+async def test_the_description_has_every_route_except_the_page(site_with_people: ServedSite) -> None:
+    app = make_app(BestViewService(site_with_people.service))
     routes = {route.resource.canonical for route in app.router.routes() if route.resource is not None}
-    described = await busy.get_json("/api/openapi.json")
+    described = await site_with_people.get_json("/api/openapi.json")
     assert set(described["paths"]) == routes - {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json"}
     for path, item in described["paths"].items():
         assert item["get"]["summary"], path
@@ -173,49 +177,51 @@ async def test_the_description_has_every_route_except_the_page(busy: Hall) -> No
     assert asked == {"from": True, "to": False}
 
 
-async def test_the_description_is_built_once(busy: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = await busy.get_json("/api/openapi.json")
+async def test_the_description_is_built_once(
+    site_with_people: ServedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = await site_with_people.get_json("/api/openapi.json")
     monkeypatch.setattr(openapi, "describe", None)
-    assert await busy.get_json("/api/openapi.json") == first
-    async with busy.session.get("/api") as answer:
+    assert await site_with_people.get_json("/api/openapi.json") == first
+    async with site_with_people.session.get("/api") as answer:
         assert answer.status == 200
 
 
-async def test_every_answer_matches_its_schema(busy: Hall) -> None:
-    described = await busy.get_json("/api/openapi.json")
+async def test_every_answer_matches_its_schema(site_with_people: ServedSite) -> None:
+    described = await site_with_people.get_json("/api/openapi.json")
     schemas = described["components"]["schemas"]
     for path, item in described["paths"].items():
         content = item["get"]["responses"]["200"]["content"]
         if "application/json" not in content:
             continue
-        answer = await busy.get_json(path.replace("{object}", "1").replace("{camera}", A))
+        answer = await site_with_people.get_json(path.replace("{object}", "1").replace("{camera}", A))
         schema = schemas[content["application/json"]["schema"]["$ref"].rsplit("/", 1)[1]]
         assert set(schema["required"]) == set(answer) == set(schema["properties"])
 
 
-async def test_the_description_has_a_readable_page(hall: Hall) -> None:
-    async with hall.session.get("/api") as answer:
+async def test_the_description_has_a_readable_page(served: ServedSite) -> None:
+    async with served.session.get("/api") as answer:
         text = await answer.text()
     assert answer.content_type == "text/html"
     assert "/objects/{object}/best.mp4" in text
 
 
-async def test_the_page_and_its_files_are_served(hall: Hall) -> None:
-    async with hall.session.get("/?object=1") as answer:
+async def test_the_page_and_its_files_are_served(served: ServedSite) -> None:
+    async with served.session.get("/?object=1") as answer:
         page = await answer.text()
         assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
     for file in re.findall(r'(?:src|href)="(/?page/[^"]+)"', page):
-        async with hall.session.get("/" + file.lstrip("/")) as answer:
+        async with served.session.get("/" + file.lstrip("/")) as answer:
             assert answer.status == 200
             assert answer.headers["X-Content-Type-Options"] == "nosniff"
 
 
-async def test_metrics_are_served(busy: Hall) -> None:
-    busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
-    busy.service.ingest.tracks(tracks(word(A, 3, {}, without_peers=[15, 17])))
-    busy.service.ingest.tracks(tracks(word(B, 3, {})))
-    busy.service.decide()
-    async with busy.session.get("/metrics") as answer:
+async def test_metrics_are_served(site_with_people: ServedSite) -> None:
+    site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    site_with_people.service.ingest.tracks(tracks(camera_tracks(A, 3, {}, without_peers=[15, 17])))
+    site_with_people.service.ingest.tracks(tracks(camera_tracks(B, 3, {})))
+    site_with_people.service.decide()
+    async with site_with_people.session.get("/metrics") as answer:
         lines = (await answer.text()).splitlines()
     assert "myview_pulse 14.0" in lines
     assert "myview_objects 2.0" in lines

@@ -16,9 +16,9 @@ import pytest
 from pydantic import ValidationError
 
 from fakes.http.certificates import make_certificate
-from fakes.http.tokens import line_of, token_of, write_tokens
+from fakes.http.tokens import token_entry, token_of, write_tokens
 from fakes.programs import needs_openssl
-from fakes.service.fed_site import A, B, opened
+from fakes.service.fed_site import A, B, serve_site
 from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.config.loader import build_config
 from server.config.sections import TlsSettings
@@ -54,9 +54,9 @@ def trusting(tls: TlsSettings) -> ssl.SSLContext:
 
 
 async def test_https_is_answered_and_plain_http_is_not(tls: TlsSettings, tmp_path: Path) -> None:
-    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("desk"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
-    async with aclosing(opened(**settings)) as halls, aiohttp.ClientSession() as session:
+    async with aclosing(serve_site(**settings)) as halls, aiohttp.ClientSession() as session:
         port = (await anext(halls)).port
         url = f"https://127.0.0.1:{port}"
         async with session.get(f"{url}/healthz", ssl=trusting(tls)) as answer:
@@ -76,20 +76,20 @@ async def test_https_is_answered_and_plain_http_is_not(tls: TlsSettings, tmp_pat
 async def test_watch_trusts_the_authority_of_the_environment_and_sends_its_token(
     tls: TlsSettings, tmp_path: Path
 ) -> None:
-    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("family"))
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("family"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
-    async with aclosing(opened(**settings)) as halls:
-        hall = await anext(halls)
-        hall.service.come(*CAMERAS)
+    async with aclosing(serve_site(**settings)) as halls:
+        served = await anext(halls)
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+            served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
         trusted = {**os.environ, "SSL_CERT_FILE": str(tls.certificate)}
         for environment, said in (
             ({**trusted, "MYVIEW_TOKEN": token_of("family")}, "1       yes"),
             (trusted, "myview: watch: watching needs a token"),
         ):
             process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "server.cli.main", "watch", f"https://127.0.0.1:{hall.port}"),
+                *(sys.executable, "-m", "server.cli.main", "watch", f"https://127.0.0.1:{served.port}"),
                 env=environment,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,

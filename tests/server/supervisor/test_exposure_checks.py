@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from fakes.cli.command_line import Run, refusal
-from fakes.http.tokens import line_of, write_tokens
+from fakes.cli.command_line import RunCommand, input_error
+from fakes.http.tokens import token_entry, write_tokens
 from fakes.paths import CONFIGS
 from fakes.service.scripted_cameras import small_config
 from server.cli.generated_config import DEMO
@@ -52,7 +52,7 @@ def test_viewers_from_elsewhere_need_tokens_or_open_to_all(tmp_path: Path) -> No
     settings = {"http": {"host": OUTSIDE}, "access": {"tokens": str(tokens)}}
     with pytest.raises(UserError, match="cannot read the tokens"):
         check_viewers(small_config(**settings))
-    write_tokens(tokens, line_of("lead"))
+    write_tokens(tokens, token_entry("lead"))
     check_viewers(small_config(**settings))
 
 
@@ -87,11 +87,11 @@ def test_bus_and_pulses_without_passwords_need_a_trusted_network(
     ],
 )
 def test_every_command_that_listens_refuses_with_one_line(
-    myview: Run, tmp_path: Path, command: str, changes: dict[str, Any], setting: str
+    myview: RunCommand, tmp_path: Path, command: str, changes: dict[str, Any], setting: str
 ) -> None:
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump({**DEMO, **changes}), encoding="utf-8")
-    assert refusal(myview(command, str(path))).startswith(f"myview: {setting}: ")
+    assert input_error(myview(command, str(path))).startswith(f"myview: {setting}: ")
 
 
 def test_an_encrypted_bus_with_users_may_be_exposed() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from fakes.cli.command_line import Run
+from fakes.cli.command_line import RunCommand
 from fakes.timeouts import PATIENCE
 from server.cli import site_commands
 from server.cli.generated_config import free_port
@@ -40,7 +40,7 @@ async def turn() -> None:
 
 @pytest.mark.parametrize("command", [("sync",), ("camera", "c0"), ("bestview",), ("up",)])
 def test_a_sighup_between_reading_and_running_is_not_lost(
-    myview: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+    myview: RunCommand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
     bus = f"tcp/127.0.0.1:{free_port()}"
     content = {

@@ -13,7 +13,7 @@ import yaml
 from aiohttp import web
 
 from fakes.media.videos import write_video
-from fakes.system.ports import free
+from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.config.running_config import ActiveConfig
 from server.supervisor.camera_process import camera_process
@@ -64,11 +64,11 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
     begun: list[asyncio.Task[None]] = []
 
     def begin(width: int = 64, h264: str = "encode") -> Site:
-        port, bus = free(), f"tcp/127.0.0.1:{free()}"
+        port, bus = free_port(), f"tcp/127.0.0.1:{free_port()}"
         path = tmp_path / "site.yaml"
         content = {
             "site": {"name": "hall", "width": width, "height": 48},
-            "sync": {"port": free(), "start_timeout_s": 0.1},
+            "sync": {"port": free_port(), "start_timeout_s": 0.1},
             "zenoh": {"connect": bus, "listen": bus},
             "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "h264": h264}],
         }

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fakes.http.passwords import HOST, PASSWORDS, PLACES, tells
+from fakes.http.passwords import ADDRESSES, HOST, PASSWORDS, leaks
 from server.config.source_address import SourceKind, source_kind
 from server.system.address_redaction import redact_address, redact_addresses, redact_endpoint
 
@@ -44,12 +44,12 @@ def test_only_protocol_and_host_of_addresses_are_shown_and_paths_are_unchanged(
     assert redact_address(expected) == expected, "what was shown may be shown again"
 
 
-@given(st.sampled_from(PLACES), PASSWORDS)
-@example(PLACES[0], "ps/w")
-@example(PLACES[0], "pa@q/xz")
+@given(st.sampled_from(ADDRESSES), PASSWORDS)
+@example(ADDRESSES[0], "ps/w")
+@example(ADDRESSES[0], "pa@q/xz")
 def test_no_part_of_a_password_is_shown(place: str, password: str) -> None:
     told = redact_address(place.format(password))
-    assert not tells(told, password, without=place), told
+    assert not leaks(told, password, without=place), told
     assert redact_address(told) == told
 
 
@@ -84,11 +84,11 @@ def test_options_of_bus_endpoints_are_hidden(endpoint: str, expected: str) -> No
     assert redact_endpoint(endpoint) == expected
 
 
-@given(st.sampled_from([it for it in PLACES if not it.startswith(("rtsp//", "user:"))]), PASSWORDS)
+@given(st.sampled_from([it for it in ADDRESSES if not it.startswith(("rtsp//", "user:"))]), PASSWORDS)
 def test_texts_are_cut_where_an_address_begins(place: str, password: str) -> None:
     text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
     told = redact_addresses(text)
-    assert not tells(told, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"), (
+    assert not leaks(told, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"), (
         told
     )
     assert told.startswith("Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: ")

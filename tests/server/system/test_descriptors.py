@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from fakes.cli.command_line import Run
+from fakes.cli.command_line import RunCommand
 from fakes.service.scripted_cameras import small_config
-from fakes.system.few_descriptors import FEW, MYVIEW, awaited, connected, running, written
-from fakes.system.ports import free
+from fakes.system.few_descriptors import FEW_DESCRIPTORS, MYVIEW, connect, running, wait_for_log, write_site
+from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.cli.doctor.findings import Level
 from server.cli.doctor.machine import descriptor_findings
@@ -39,7 +39,7 @@ def test_the_soft_limit_is_raised_to_the_hard_one(low: int) -> None:
     assert descriptor_limit() == min(low, 1 << 20) > 512
 
 
-def test_every_command_raises_the_limit_for_itself_and_its_children(low: int, myview: Run) -> None:
+def test_every_command_raises_the_limit_for_itself_and_its_children(low: int, myview: RunCommand) -> None:
     assert myview("--version").code == 0
     child = [sys.executable, "-c", "import resource; print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])"]
     shown = subprocess.run(child, check=True, capture_output=True, text=True)
@@ -77,21 +77,21 @@ def test_the_doctor_reports_the_connections_that_fit() -> None:
     assert "LimitNOFILE" in found.remedy
 
 
-def test_the_doctor_includes_the_check_of_open_files(myview: Run, tmp_path: Path) -> None:
-    path = written(tmp_path, free())
+def test_the_doctor_includes_the_check_of_open_files(myview: RunCommand, tmp_path: Path) -> None:
+    path = write_site(tmp_path, free_port())
     said = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
     (found,) = [it for it in said["findings"] if it["check"] == "open files"]
     assert str(descriptor_limit()) in found["text"]
 
 
 def test_failures_to_accept_are_logged_once_and_connections_are_accepted_later(tmp_path: Path) -> None:
-    port, log = free(), tmp_path / "log"
-    with running(f"{MYVIEW} sync {written(tmp_path, port)}", log), ExitStack() as silent:
-        for _ in range(FEW + 16):  # and no more than wait in the system
-            silent.enter_context(connected(port))
-        awaited(log, b"Too many open files")
+    port, log = free_port(), tmp_path / "log"
+    with running(f"{MYVIEW} sync {write_site(tmp_path, port)}", log), ExitStack() as silent:
+        for _ in range(FEW_DESCRIPTORS + 16):  # and no more than wait in the system
+            silent.enter_context(connect(port))
+        wait_for_log(log, b"Too many open files")
         silent.close()
-        with connected(port) as late:
+        with connect(port) as late:
             late.settimeout(PATIENCE)
             assert late.recv(12) == b"MYVIEW-SYNC ", "it accepts again"
     told = log.read_bytes()

@@ -13,8 +13,8 @@ import msgspec
 import pytest
 
 from fakes.media.videos import write_video
-from fakes.service.fed_site import Hall
-from fakes.service.rendering import SETTINGS, fragments
+from fakes.service.fed_site import ServedSite
+from fakes.service.rendering import RENDER_SETTINGS, fragments
 from fakes.service.scripted_cameras import GOP, small_config
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, RecordedAudioSource, recorded_source
@@ -164,7 +164,7 @@ def test_frames_that_cannot_be_decoded_are_logged_once_per_stream(
             raise av.error.InvalidDataError(1, "damaged")
 
     monkeypatch.setattr(stream_renderer, "_decoder", lambda _: Damaged())
-    rendering = stream_renderer.StreamRenderer(SETTINGS)
+    rendering = stream_renderer.StreamRenderer(RENDER_SETTINGS)
     for gop in range(3):
         rendering.render(RenderRequest(fragments=fragments(gop * GOP, GOP)))
     assert len(caplog.messages) == 1
@@ -177,7 +177,7 @@ async def test_render_workers_that_die_repeatedly_are_counted_and_logged_once(
     monkeypatch.setattr(stream_source, "_RETRY_FIRST_S", 0.0)
     monkeypatch.setattr(stream_source, "_RETRY_MAX_S", 0.0)
     rendering = stream_source.RenderedStream(
-        "object 1", Broadcaster(), lambda _: NO_OVERLAY, SETTINGS, live=True, queue_gops=4
+        "object 1", Broadcaster(), lambda _: NO_OVERLAY, RENDER_SETTINGS, live=True, queue_gops=4
     )
 
     async def dies() -> None:
@@ -192,12 +192,12 @@ async def test_render_workers_that_die_repeatedly_are_counted_and_logged_once(
 
 
 async def test_a_server_error_is_logged_once_for_many_requests(
-    hall: Hall, caplog: pytest.LogCaptureFixture
+    served: ServedSite, caplog: pytest.LogCaptureFixture
 ) -> None:
-    hall.service.loss_recorder = None  # type: ignore[assignment]
+    served.service.loss_recorder = None  # type: ignore[assignment]
     with caplog.at_level(logging.WARNING):
         for _ in range(5):
-            async with hall.session.get("/metrics") as answer:
+            async with served.session.get("/metrics") as answer:
                 assert answer.status == 500
     assert caplog.messages == ["answering GET /metrics failed"]
     assert caplog.records[0].exc_info

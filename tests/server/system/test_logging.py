@@ -18,7 +18,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.system.ports import free
+from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.system.errors import UserError
 from server.system.log_format import JsonLines, formatter
@@ -108,7 +108,7 @@ def test_an_unknown_format_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def site(folder: Path, **changes: Any) -> Path:
-    ports = [free() for _ in range(3)]
+    ports = [free_port() for _ in range(3)]
     content = {
         "site": {"width": 64, "height": 48},
         "cameras": [{"id": "c0", "source": "scene:room"}],

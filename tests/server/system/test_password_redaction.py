@@ -15,9 +15,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cli.command_line import Run
-from fakes.http.passwords import PASSWORDS, PLACES, tells
-from fakes.system.ports import free
+from fakes.cli.command_line import RunCommand
+from fakes.http.passwords import ADDRESSES, PASSWORDS, leaks
+from fakes.system.ports import free_port
 from server.camera.audio import open_audio
 from server.camera.passthrough.opening import open_passthrough
 from server.camera.sources import open_source
@@ -64,13 +64,13 @@ def door(source: str, **changes: Any) -> dict[str, Any]:
 
 
 @settings(max_examples=30)  # each writes out all settings
-@given(st.sampled_from(PLACES), PASSWORDS)
+@given(st.sampled_from(ADDRESSES), PASSWORDS)
 def test_the_operators_page_shows_no_password_of_a_source(place: str, password: str) -> None:
     def told(secret: str) -> str:
         source = place.format(secret)
         return written(built(cameras=[door(source)], sound={"source": source}))
 
-    assert not tells(told(password), password, without=told(HARMLESS))
+    assert not leaks(told(password), password, without=told(HARMLESS))
 
 
 @settings(max_examples=20)
@@ -87,7 +87,7 @@ def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
             built(cameras=cameras, zenoh=zenoh, record=record, view={"share": {"servers": servers}})
         )
 
-    assert not tells(told(password), password, without=told(HARMLESS))
+    assert not leaks(told(password), password, without=told(HARMLESS))
 
 
 def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
@@ -114,7 +114,7 @@ def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
 
 
 @settings(max_examples=30)
-@given(st.sampled_from(PLACES), PASSWORDS)
+@given(st.sampled_from(ADDRESSES), PASSWORDS)
 def test_no_configuration_error_repeats_a_password(place: str, password: str) -> None:
     address = place.format(password)
     secrets = zip(misplaced(address, password), misplaced(place.format(HARMLESS), HARMLESS), strict=True)
@@ -125,7 +125,7 @@ def test_no_configuration_error_repeats_a_password(place: str, password: str) ->
                 build_config(it, where="site.yaml", folder=Path())
             told.append("".join(traceback.format_exception(refused.value.__cause__ or refused.value)))
             told[-1] += str(refused.value)
-        assert not tells(told[0], password, without=told[1]), told[0]
+        assert not leaks(told[0], password, without=told[1]), told[0]
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_yaml_errors_do_not_repeat_the_content(
     with pytest.raises(UserError, match=r"site\.yaml: ") as refused:
         read_yaml(path, "the configuration")
     said = "".join(traceback.format_exception(refused.value))
-    assert not tells(said, "QXZJKV7", without="")
+    assert not leaks(said, "QXZJKV7", without="")
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -175,10 +175,10 @@ def test_errors_of_opening_a_camera_do_not_have_its_password(source: str, passwo
         with pytest.raises(UserError) as refused:
             attempt()
         said = "".join(traceback.format_exception(refused.value))
-        assert not tells(said, password, without=""), said
+        assert not leaks(said, password, without=""), said
 
 
-def test_the_doctor_shows_no_password(myview: Run, tmp_path: Path) -> None:
+def test_the_doctor_shows_no_password(myview: RunCommand, tmp_path: Path) -> None:
     cameras = [
         {"id": f"c{number}", "source": source.format(NAIVE[number % len(NAIVE)])}
         for number, source in enumerate(SOURCES)
@@ -187,8 +187,8 @@ def test_the_doctor_shows_no_password(myview: Run, tmp_path: Path) -> None:
     content = {
         "cameras": cameras,
         "sound": {"source": "http://127.0.0.1:QXZ/JKV7@127.0.0.1:1/a.aac"},
-        **{section: {"port": free()} for section in ("sync", "http")},
-        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free()}"),
+        **{section: {"port": free_port()} for section in ("sync", "http")},
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{free_port()}"),
     }
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump(content))
@@ -196,18 +196,20 @@ def test_the_doctor_shows_no_password(myview: Run, tmp_path: Path) -> None:
         ended = myview("doctor", path, "--seconds", 1, *how)
         assert ended.code == 1
         for password in NAIVE:
-            assert not tells(ended.out + ended.err, password, without="")
+            assert not leaks(ended.out + ended.err, password, without="")
     said = {it["check"]: it["text"] for it in json.loads(ended.out)["findings"]}
     assert said["camera c1"].startswith("rtsp://127.0.0.1:1/...: cannot open this video: ")
     assert said["camera c9"] == "(not shown): no such file or folder"
 
 
 @pytest.mark.parametrize("command", ["render", "track", "calibrate"])
-def test_an_address_given_as_a_recording_is_not_repeated(command: str, myview: Run, tmp_path: Path) -> None:
+def test_an_address_given_as_a_recording_is_not_repeated(
+    command: str, myview: RunCommand, tmp_path: Path
+) -> None:
     for password in NAIVE:
         ended = myview(command, f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", "--out", tmp_path / "out")
         assert ended.code == 2
-        assert not tells(ended.out + ended.err, password, without="")
+        assert not leaks(ended.out + ended.err, password, without="")
 
 
 @pytest.mark.parametrize("lines", [TextLines(), JsonLines("door")])
@@ -220,4 +222,4 @@ def test_logged_tracebacks_are_cut_where_an_address_begins(lines: logging.Format
         said = lines.format(record)
     assert "it failed" in said
     assert "Traceback" in said
-    assert not tells(said, password, without="")
+    assert not leaks(said, password, without="")

@@ -13,14 +13,14 @@ import pytest
 from fakes.service.decisions import choice, decision
 from fakes.service.scripted_cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH, FedService, small_config
 from fakes.service.scripted_recordings import (
-    AMPLE,
+    UNLIMITED,
     A,
     filled_buffers,
     gop_record,
     session_info,
     written_folder,
 )
-from fakes.system.unprivileged import nobodys_folder
+from fakes.system.unprivileged import unprivileged_folder
 from server.cli.doctor.disk import disk_findings
 from server.cli.doctor.findings import Level
 from server.media.letterbox import Letterbox
@@ -45,7 +45,7 @@ def umask(mask: int) -> Iterator[None]:
 @contextlib.contextmanager
 def folder_of(who: str, tmp_path: Path) -> Iterator[Path]:
     """Yield a folder that is open to all, of the user that the tests run as or of another than root."""
-    with contextlib.nullcontext(tmp_path) if who == "whoever" else nobodys_folder() as folder:
+    with contextlib.nullcontext(tmp_path) if who == "whoever" else unprivileged_folder() as folder:
         folder.chmod(0o755)
         yield folder
 
@@ -63,7 +63,8 @@ def modes(folder: Path) -> dict[bool, set[int]]:
 def test_recordings_are_private(tmp_path: Path, who: str, mask: int) -> None:
     with folder_of(who, tmp_path) as around, umask(mask):
         store = written_folder(
-            RecordingFolder(around / "site" / "kept", AMPLE), [gop_record(gop, {1: A}) for gop in range(7)]
+            RecordingFolder(around / "site" / "kept", UNLIMITED),
+            [gop_record(gop, {1: A}) for gop in range(7)],
         )
         assert modes(around) == {True: {0o700}, False: {0o600}}
         assert store.session is not None
@@ -111,13 +112,13 @@ def test_an_existing_folder_is_unchanged_and_reported(
 
 
 def test_own_runs_of_earlier_versions_become_private(tmp_path: Path) -> None:
-    written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(0, {1: A})]).close()
+    written_folder(RecordingFolder(tmp_path, UNLIMITED), [gop_record(0, {1: A})]).close()
     (run,) = (it for it in tmp_path.iterdir() if it.is_dir())
     run.chmod(0o755)
     other = tmp_path / "holiday"
     other.mkdir()
     other.chmod(0o755)
-    again = RecordingFolder(tmp_path, AMPLE)
+    again = RecordingFolder(tmp_path, UNLIMITED)
     again.open()
     again.write(gop_record(1, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     again.close()

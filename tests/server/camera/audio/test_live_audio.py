@@ -15,7 +15,7 @@ from typing import Any
 import av
 import pytest
 
-from fakes.media.audio import EVERY, FPS, beeps, write_flashes
+from fakes.media.audio import FLASH_INTERVAL, FPS, beeps, write_flashes
 from fakes.timeouts import PATIENCE
 from server.camera.audio import EncodedAudioFrame, LiveAudioSource
 from server.camera.sources.live_stream import LiveStream
@@ -24,7 +24,7 @@ from server.media.audio.aac import SAMPLES as FRAME
 from server.media.audio.audio_format import AudioFormat, Coding
 from server.media.containers.mp4_audio import audio_fragment, audio_init_segment
 
-FRAMES = 3 * EVERY
+FRAMES = 3 * FLASH_INTERVAL
 FORM = AudioFormat(48_000, 2)
 
 
@@ -122,7 +122,9 @@ def test_audio_is_in_sync_with_video_also_after_a_restart_of_the_camera(
     assert numbers == sorted(set(numbers)), "each once, in order"
     assert len(two) > 0.9 * len(one)
     starts = (50, 50 + 2 * FRAMES)
-    expected = [(start + number) / FPS for start in starts for number in range(EVERY, FRAMES, EVERY)]
+    expected = [
+        (start + number) / FPS for start in starts for number in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)
+    ]
     assert settings.format is not None
     assert moments(one + two, settings.format) == pytest.approx(expected, abs=0.04)
 
@@ -141,7 +143,7 @@ def test_audio_continues_when_its_format_changes(tmp_path: Path, rate: int, chan
                 sound.picture(Fraction(packet.pts * packet.time_base))
                 frames += sound.at(round(packet.pts * packet.time_base * FPS))
                 sound.packet(packet)
-    assert len(moments(frames)) == 2 * len(range(EVERY, FRAMES, EVERY))
+    assert len(moments(frames)) == 2 * len(range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL))
 
 
 def shifted(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:

@@ -16,23 +16,23 @@ from hypothesis import strategies as st
 import client
 from benchmarks.common.browser import chromium
 from fakes.media.audio import (
-    BEEPS,
-    EVERY,
+    BEEP_TIMES,
+    FLASH_INTERVAL,
     FRAMES,
     GOPS,
-    STEP,
+    MAX_AV_OFFSET_S,
+    access_units,
     beeps,
+    decode_audio,
     flashes,
-    flashing,
-    heard,
     packets,
-    sends,
+    send_audio,
     write_flashes,
 )
-from fakes.media.browser_playback import PLAY
+from fakes.media.browser_playback import PLAY_JS
 from fakes.media.ffprobe import probed
 from fakes.programs import needs_chromium, needs_ffprobe
-from fakes.service.fed_site import A, Hall, opened
+from fakes.service.fed_site import A, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, video
 from server.camera.audio import EncodedAudioFrame, RecordedAudioSource
 from server.camera.audio.encoder import AudioEncoder
@@ -67,7 +67,7 @@ def test_opus_is_passed_on_byte_for_byte(tmp_path: Path, name: str) -> None:
     first = frames[0].number
     assert first <= 1, "what the encoder looks ahead for is before the first picture"
     assert [frame.number for frame in frames] == list(range(first, first + len(own)))
-    assert beeps(as_mp4(frames)) == pytest.approx(BEEPS, abs=STEP)
+    assert beeps(as_mp4(frames)) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
 
 
 @pytest.mark.parametrize(
@@ -89,11 +89,11 @@ def test_all_else_is_encoded_to_opus(
     way = getattr(sound._framer, "_framer", sound._framer)
     assert isinstance(way, AudioEncoder)
     assert {packet_samples(frame.data) for frame in frames} == {960}
-    assert beeps(as_mp4(frames)) == pytest.approx(BEEPS, abs=0.005), "also for what it looks ahead"
+    assert beeps(as_mp4(frames)) == pytest.approx(BEEP_TIMES, abs=0.005), "also for what it looks ahead"
 
 
 def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
-    path = write_flashes(tmp_path / "own.mkv", 2 * EVERY, codec="libopus")
+    path = write_flashes(tmp_path / "own.mkv", 2 * FLASH_INTERVAL, codec="libopus")
     sound = RecordedAudioSource(str(path), SoundSettings(source="here"), FPS, 0, "stop")
     assert isinstance(sound._framer, AudioEncoder)
     assert not isinstance(
@@ -105,7 +105,7 @@ def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
 def test_silence_decodes_to_nothing_at_all(channels: int) -> None:
     form = AudioFormat(48_000, channels, "opus")
     data = audio_init_segment(form) + audio_fragment(form, [form.silence] * 20, 7)
-    times, samples = heard(data)
+    times, samples = decode_audio(data)
     assert times[0] == pytest.approx(7 * 0.02)
     assert len(samples) == 20 * 960
     assert not samples.any()
@@ -149,65 +149,65 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
+async def served(recording: Path, tmp_path: Path) -> AsyncIterator[ServedSite]:
     """A site that has that recording's sound, whose first GOP is decided."""
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     sound = {"source": str(recording), "codec": "opus"}
-    async for hall in opened(sound=sound, record=record, http={"viewer_queue_gops": 100}):
-        hall.service.recorder.open()
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(sound=sound, record=record, http={"viewer_queue_gops": 100}):
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
         for camera in CAMERAS:
-            for unit in flashing(recording):
-                hall.service.ingest.video(video(camera, unit))
-        yield hall
+            for unit in access_units(recording):
+                served.service.ingest.video(video(camera, unit))
+        yield served
 
 
-def decide(hall: Hall, gops: range) -> None:
+def decide(served: ServedSite, gops: range) -> None:
     for gop in gops:
         choice = ObjectChoice(1, CAMERAS[gop % 2], None, departed=False)
         decision = GopDecision(gop * GOP, GOP, (choice,), {A: []}, {}, (), NO_REASON)
-        hall.service.recorder.put(hall.service.decision_state.put(decision), None)
-        hall.service.splicer.publish_decision(decision)
+        served.service.recorder.put(served.service.decision_state.put(decision), None)
+        served.service.splicer.publish_decision(decision)
 
 
-async def watched(hall: Hall, *ways: str) -> list[bytes]:
-    decide(hall, range(1))
-    answers = [await hall.session.get(way) for way in ways]
+async def watched(served: ServedSite, *ways: str) -> list[bytes]:
+    decide(served, range(1))
+    answers = [await served.session.get(way) for way in ways]
     for gop in range(1, GOPS):
-        decide(hall, range(gop, gop + 1))
+        decide(served, range(gop, gop + 1))
         await asyncio.sleep(0.005)
-    hall.service.splicer.close()
+    served.service.splicer.close()
     return [await answer.read() for answer in answers]
 
 
 async def test_streams_live_and_past_have_it_in_step_and_transport_streams_none(
-    hall: Hall, recording: Path
+    served: ServedSite, recording: Path
 ) -> None:
-    own = sends(hall.service, recording)
-    assert (await hall.get_json("/api/site"))["sound"] == "opus"
-    live, ts = await watched(hall, "/objects/1/best.mp4", "/objects/1/best.ts")
-    while hall.service.recorder.writer is not None and hall.service.recorder.writer.written < GOPS:  # noqa: ASYNC110
+    own = send_audio(served.service, recording)
+    assert (await served.get_json("/api/site"))["sound"] == "opus"
+    live, ts = await watched(served, "/objects/1/best.mp4", "/objects/1/best.ts")
+    while served.service.recorder.writer is not None and served.service.recorder.writer.written < GOPS:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
-    assert hall.service.audio_buffer is not None
-    hall.service.audio_buffer._frames.clear()
-    async with hall.session.get(f"/objects/1/best.mp4?from=p0&to=p{FRAMES}") as answer:
+    assert served.service.audio_buffer is not None
+    served.service.audio_buffer._frames.clear()
+    async with served.session.get(f"/objects/1/best.mp4?from=p0&to=p{FRAMES}") as answer:
         past = await answer.read()
     for data in (live, past):
-        times, _ = heard(data)
+        times, _ = decode_audio(data)
         assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
-        assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
-        assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+        assert flashes(data) == pytest.approx(BEEP_TIMES, abs=0.001)
+        assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
         got = packets(data)
         assert got[1:] == own[: len(got) - 1], "the first is from before the first picture"
-    assert flashes(ts, "mpegts") == pytest.approx(BEEPS, abs=0.001)
+    assert flashes(ts, "mpegts") == pytest.approx(BEEP_TIMES, abs=0.001)
     with av.open(io.BytesIO(ts), format="mpegts") as container:
         assert not container.streams.audio
 
 
 @needs_ffprobe
-async def test_ffprobe_reports_no_audio_errors(hall: Hall, recording: Path, tmp_path: Path) -> None:
-    sends(hall.service, recording)
-    live, ts = await watched(hall, "/objects/1/best.mp4", "/objects/1/best.ts")
+async def test_ffprobe_reports_no_audio_errors(served: ServedSite, recording: Path, tmp_path: Path) -> None:
+    send_audio(served.service, recording)
+    live, ts = await watched(served, "/objects/1/best.mp4", "/objects/1/best.ts")
     (tmp_path / "live.mp4").write_bytes(live)
     (tmp_path / "live.ts").write_bytes(ts)
     found = {it[0]: int(it[1]) for it in probed(tmp_path / "live.mp4", "codec_name,nb_read_frames")}
@@ -216,27 +216,27 @@ async def test_ffprobe_reports_no_audio_errors(hall: Hall, recording: Path, tmp_
 
 
 @needs_ffprobe
-async def test_a_download_contains_opus_audio(hall: Hall, recording: Path, tmp_path: Path) -> None:
-    sends(hall.service, recording)
-    decide(hall, range(GOPS))
-    out, url = tmp_path / "one.mp4", f"http://127.0.0.1:{hall.port}/"
+async def test_a_download_contains_opus_audio(served: ServedSite, recording: Path, tmp_path: Path) -> None:
+    send_audio(served.service, recording)
+    decide(served, range(GOPS))
+    out, url = tmp_path / "one.mp4", f"http://127.0.0.1:{served.port}/"
     await client.watch(url, 1, out, start="p0", end=f"p{FRAMES}")
     data = out.read_bytes()
-    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
-    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert flashes(data) == pytest.approx(BEEP_TIMES, abs=0.001)
+    assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     assert [it[0] for it in probed(out, "codec_name,nb_read_frames")] == ["h264", "opus"]
 
 
 @needs_chromium
-async def test_chromium_plays_it(hall: Hall, recording: Path) -> None:
-    sends(hall.service, recording)
-    decide(hall, range(GOPS))
-    parameters = hall.service.stream_format.parameters
+async def test_chromium_plays_it(served: ServedSite, recording: Path) -> None:
+    send_audio(served.service, recording)
+    decide(served, range(GOPS))
+    parameters = served.service.stream_format.parameters
     assert parameters is not None
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
-        await page.goto(f"http://127.0.0.1:{hall.port}/healthz")
+        await page.goto(f"http://127.0.0.1:{served.port}/healthz")
         url = f"/objects/1/best.mp4?from=p0&to=p{FRAMES}"
-        seen = await page.evaluate(PLAY, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])
+        seen = await page.evaluate(PLAY_JS, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])
     assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
     assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]

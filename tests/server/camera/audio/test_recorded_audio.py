@@ -17,7 +17,7 @@ from av.audio.stream import AudioStream
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.media.audio import EVERY, FPS, beeps, write_flashes
+from fakes.media.audio import FLASH_INTERVAL, FPS, beeps, write_flashes
 from server.camera.audio import (
     EncodedAudioFrame,
     LiveAudioSource,
@@ -87,7 +87,7 @@ def test_beeps_are_where_the_pictures_are(
     assert numbers_grow(frames)
     form = STEREO.format
     assert form is not None
-    expected = [(number + offset) / FPS for number in range(EVERY, FRAMES, EVERY)]
+    expected = [(number + offset) / FPS for number in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)]
     assert beeps(as_adts(frames, form), "aac") == pytest.approx(expected, abs=0.03)
 
 
@@ -99,7 +99,11 @@ def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> N
     assert sum(1 for _ in consecutive_runs(frames)) <= 5, "whole but for the places where it begins again"
     form = STEREO.format
     assert form is not None
-    expected = [(n + m) / FPS for m in range(0, 4 * FRAMES, FRAMES) for n in range(EVERY, FRAMES, EVERY)]
+    expected = [
+        (n + m) / FPS
+        for m in range(0, 4 * FRAMES, FRAMES)
+        for n in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)
+    ]
     assert beeps(as_adts(frames, form), "aac") == pytest.approx(expected, abs=0.03)
 
 
@@ -121,7 +125,7 @@ def test_a_late_start_gives_the_same_audio_frames(tmp_path: Path, codec: str) ->
     assert form is not None
     assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not all that was"
     moments = beeps(as_adts(frames, form), "aac")
-    expected = [(late + n) / FPS for n in range(EVERY, FRAMES, EVERY)]
+    expected = [(late + n) / FPS for n in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)]
     assert [it for it in moments if it > late / FPS] == pytest.approx(expected, abs=0.03)
 
 
@@ -180,7 +184,9 @@ def test_sound_is_in_step_with_pictures_of_another_rate_than_the_site_s(
     passes = 2 if at_end == "loop" else 1
     sound = RecordedAudioSource(str(path), STEREO, fps, 0, at_end)
     frames = all_until(sound, round(passes * FRAMES / FPS * fps))
-    expected = [(m * FRAMES + n) / FPS for m in range(passes) for n in range(EVERY, FRAMES, EVERY)]
+    expected = [
+        (m * FRAMES + n) / FPS for m in range(passes) for n in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)
+    ]
     assert beeps(as_adts(frames, FORM), "aac") == pytest.approx(expected, abs=0.03)
 
 

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.service.camera_processes import Running, in_folder
+from fakes.service.camera_processes import SiteInOneLoop, written_files
 from fakes.timeouts import PATIENCE
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
 from server.camera.peers.detection_exchange import PeerDetectionExchange
@@ -76,31 +76,31 @@ def by_itself(config: Config, folder: Path) -> dict[str, bytes]:
     for batch in run_cameras({camera: CameraPipeline(config, camera) for camera in config.camera_ids}):
         renderer.take(batch)
     renderer.finish()
-    return in_folder(folder)
+    return written_files(folder)
 
 
 @pytest.fixture
-async def running() -> AsyncIterator[list[Running]]:
-    sites: list[Running] = []
+async def running() -> AsyncIterator[list[SiteInOneLoop]]:
+    sites: list[SiteInOneLoop] = []
     yield sites
     for it in sites:
         await it.stop()
 
 
-async def live(config: Config, out: Path, running: list[Running]) -> dict[str, bytes]:
+async def live(config: Config, out: Path, running: list[SiteInOneLoop]) -> dict[str, bytes]:
     """Run a whole site to its end; give what was written."""
-    it = Running(config, out)
+    it = SiteInOneLoop(config, out)
     running.append(it)
     over = await it.start()
     cameras = [it.camera(camera) for camera in config.camera_ids]
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(over, *cameras)
-    return in_folder(out)
+    return written_files(out)
 
 
 @pytest.mark.slow
 async def test_live_equals_offline_for_any_message_order(
-    recording: Path, tmp_path: Path, running: list[Running]
+    recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = config_of(recording, 2, c1=7)
     told = await live(config, tmp_path / "live", running)
@@ -131,10 +131,10 @@ def _order(batch: EpochBatch) -> tuple[str, int]:
 
 
 async def test_a_camera_that_never_connects_is_logged_and_does_not_delay_others(
-    recording: Path, tmp_path: Path, running: list[Running]
+    recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = config_of(recording, wait=0.5)
-    it = Running(config, tmp_path / "out")
+    it = SiteInOneLoop(config, tmp_path / "out")
     it.pulses = type(it.pulses)(
         50, expect={"bestview", "c0", "c1"}, start_timeout=PATIENCE, port=config.sync.port
     )

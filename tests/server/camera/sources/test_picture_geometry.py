@@ -18,7 +18,7 @@ from av.video.stream import VideoStream
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
-from fakes.cli.command_line import Run, myview
+from fakes.cli.command_line import RunCommand, myview
 from fakes.media.videos import frame_in, write_timed, write_video
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording
@@ -89,7 +89,7 @@ def test_a_site_is_as_high_as_its_upright_first_view(tmp_path: Path) -> None:
     assert (site.width, site.height) == (HIGH, WIDE)
 
 
-def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myview: Run) -> None:
+def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myview: RunCommand) -> None:
     """The detections are as a program has found them that turns pictures, too."""
     video = film(tmp_path / "phone.mp4", 90, frames=30)
     write_rows(tmp_path / "det.txt", [MotRow(n + 1, -1, 20.0, 30.0 + n, 20.0, 30.0, 1.0) for n in range(30)])

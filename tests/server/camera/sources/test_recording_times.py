@@ -14,7 +14,7 @@ from av.video.stream import VideoStream
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.cli.command_line import Run, myview
+from fakes.cli.command_line import RunCommand, myview
 from fakes.media.videos import STEP, damage, frame_in, write_timed, write_video
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording
@@ -167,7 +167,7 @@ def test_video_without_one_frame_per_pulse_is_not_passed_through(tmp_path: Path)
         PassthroughRecording(str(hole), 0, "stop", RequiredFormat((64, 48), 25.0, 10, None))
 
 
-def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: Run) -> None:
+def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: RunCommand) -> None:
     write_video(tmp_path / "a.mp4", 25, fps=25)
     write_timed(tmp_path / "b.mp4", [n / 30 for n in range(30)], fps=30)
     done = myview("render", tmp_path / "a.mp4", tmp_path / "b.mp4", "--out", tmp_path / "out")
@@ -175,7 +175,7 @@ def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: R
     assert "the views are of different length" not in done.err
 
 
-def test_detections_go_with_the_pictures_that_they_were_made_of(tmp_path: Path, myview: Run) -> None:
+def test_detections_go_with_the_pictures_that_they_were_made_of(tmp_path: Path, myview: RunCommand) -> None:
     """A detector counts pictures; tracks count frames of the site's clock."""
     times = [(n + 2 * (n // 10)) / 25 for n in range(40)]  # every now and then two are not taken
     video = write_timed(tmp_path / "phone.mp4", times)

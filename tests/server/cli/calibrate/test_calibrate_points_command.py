@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bestview import to_ground
-from fakes.cli.command_line import Run
+from fakes.cli.command_line import RunCommand
 from server.config.loader import build_config
 
 FLOOR = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0], [2.0, 1.0], [1.0, 2.0], [3.0, 2.5]])
@@ -17,7 +17,7 @@ TO_IMAGE = np.array([[90.0, 30.0, 120.0], [-6.0, 20.0, 330.0], [-0.01, 0.12, 1.0
 
 
 @pytest.fixture
-def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+def run(myview: RunCommand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> RunCommand:
     """Return a function that runs `myview calibrate` in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return lambda *arguments: myview("calibrate", *arguments)
@@ -34,7 +34,7 @@ def write_json(path: Path, cameras: dict[str, list[dict[str, list[float]]]]) -> 
     return path
 
 
-def test_json_points_become_a_ground_file_that_a_configuration_loads(run: Run, tmp_path: Path) -> None:
+def test_json_points_become_a_ground_file_that_a_configuration_loads(run: RunCommand, tmp_path: Path) -> None:
     points = write_json(tmp_path / "points.json", {"c0": pairs(), "c1": pairs()[:4]})
     code, out, err = run(points, "--out", "ground.json")
     assert (code, err) == (0, "")
@@ -48,7 +48,7 @@ def test_json_points_become_a_ground_file_that_a_configuration_loads(run: Run, t
         assert np.allclose(to_ground(np.array(camera.ground), image), FLOOR, atol=1e-3)
 
 
-def test_csv_and_json_points_give_the_same_result(run: Run, tmp_path: Path) -> None:
+def test_csv_and_json_points_give_the_same_result(run: RunCommand, tmp_path: Path) -> None:
     write_json(tmp_path / "a.json", {"c0": pairs()})
     lines = [",".join(map(repr, ["c0", *pair["image"], *pair["floor"]])).replace("'", "") for pair in pairs()]
     (tmp_path / "b.csv").write_text("\n".join(["camera,image_x,image_y,floor_x,floor_y", *lines]) + "\n")
@@ -74,7 +74,7 @@ def test_csv_and_json_points_give_the_same_result(run: Run, tmp_path: Path) -> N
     ],
 )
 def test_an_invalid_points_file_is_refused_with_one_line(
-    run: Run, tmp_path: Path, name: str, text: str, words: str
+    run: RunCommand, tmp_path: Path, name: str, text: str, words: str
 ) -> None:
     (tmp_path / name).write_text(text)
     code, out, err = run(name, "--out", "ground.json")
@@ -83,7 +83,7 @@ def test_an_invalid_points_file_is_refused_with_one_line(
     assert sorted(path.name for path in tmp_path.iterdir()) == [name]
 
 
-def test_an_inconsistent_pair_is_named_and_nothing_is_written(run: Run, tmp_path: Path) -> None:
+def test_an_inconsistent_pair_is_named_and_nothing_is_written(run: RunCommand, tmp_path: Path) -> None:
     wrong = pairs()
     wrong[4]["image"][0] += 120.0
     write_json(tmp_path / "points.json", {"c0": wrong})

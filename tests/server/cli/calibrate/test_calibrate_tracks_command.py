@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fakes.cli.command_line import Run, refusal
+from fakes.cli.command_line import RunCommand, input_error
 from fakes.media.videos import write_video
 from server.config.loader import build_config
 from tracking.motchallenge import MotRow, write_rows
@@ -18,7 +18,7 @@ OFFSET = 6
 
 
 @pytest.fixture
-def run(myview: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+def run(myview: RunCommand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> RunCommand:
     """Return a function that runs `myview calibrate` in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return lambda *arguments: myview("calibrate", *arguments)
@@ -56,7 +56,7 @@ def curved(frames: np.ndarray) -> np.ndarray:
     return np.column_stack([1.6 * np.sin(frames / 47.0), 1.6 * np.sin(frames / 31.0 + 1)])
 
 
-def test_tracks_become_a_ground_file_and_an_offset_to_copy(run: Run, tmp_path: Path) -> None:
+def test_tracks_become_a_ground_file_and_an_offset_to_copy(run: RunCommand, tmp_path: Path) -> None:
     write_walk(tmp_path / "tracks", 450, curved)
     code, out, err = run("tracks", "--size", "640x360", "--shift", "0.8", "--out", "ground.json")
     assert (code, err) == (0, "")
@@ -72,7 +72,7 @@ def test_tracks_become_a_ground_file_and_an_offset_to_copy(run: Run, tmp_path: P
     assert content["left_out"] == {}
 
 
-def test_a_walk_in_one_place_is_refused_and_nothing_is_written(run: Run, tmp_path: Path) -> None:
+def test_a_walk_in_one_place_is_refused_and_nothing_is_written(run: RunCommand, tmp_path: Path) -> None:
     write_walk(tmp_path / "tracks", 100, lambda frames: np.zeros((len(frames), 2)))
     code, out, err = run("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
@@ -80,7 +80,7 @@ def test_a_walk_in_one_place_is_refused_and_nothing_is_written(run: Run, tmp_pat
     assert [it.name for it in tmp_path.iterdir()] == ["tracks"]
 
 
-def test_a_walk_only_in_the_middle_is_written_only_with_force(run: Run, tmp_path: Path) -> None:
+def test_a_walk_only_in_the_middle_is_written_only_with_force(run: RunCommand, tmp_path: Path) -> None:
     def near_the_middle(frames: np.ndarray) -> np.ndarray:
         return np.column_stack([0.7 * np.sin(frames / 23.0), 0.7 * np.sin(frames / 15.0 + 1)])
 
@@ -111,7 +111,7 @@ def test_a_walk_only_in_the_middle_is_written_only_with_force(run: Run, tmp_path
     ],
 )
 def test_invalid_walks_are_refused_with_one_line(
-    run: Run, tmp_path: Path, arguments: tuple[str, ...], words: str
+    run: RunCommand, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     for name, text in (
         ("a.txt", "1,1,10,10,20,50,1,-1,-1,-1\n"),
@@ -128,10 +128,10 @@ def test_invalid_walks_are_refused_with_one_line(
     assert not (tmp_path / "ground.json").exists()
 
 
-def test_videos_are_tracked_first_and_must_have_equal_rates(run: Run, tmp_path: Path) -> None:
+def test_videos_are_tracked_first_and_must_have_equal_rates(run: RunCommand, tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 20)
     write_video(tmp_path / "c1.mp4", 20, fps=30)
-    line = refusal(run("c0.mp4", "c1.mp4", "--out", "ground.json"))
+    line = input_error(run("c0.mp4", "c1.mp4", "--out", "ground.json"))
     assert "c1 has 30 frames a second and c0 25" in line
     (tmp_path / "site.yaml").write_text(
         "ground: ground.json\n"  # which is to be made

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
-from fakes.cli.command_line import Run
-from fakes.cli.doctor_configs import SIZE, config, site
+from fakes.cli.command_line import RunCommand
+from fakes.cli.doctor_configs import SIZE, load_site, write_site
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.media.videos import write_video
 from fakes.programs import needs_openssl
-from fakes.service.fed_site import Hall
+from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
-from fakes.system.ports import free
+from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.cli.doctor import machine
 from server.cli.doctor.camera_probe import CameraProbe
@@ -51,9 +51,9 @@ def only(findings: list[Finding], check: str) -> Said:
     return said
 
 
-def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: Run, tmp_path: Path) -> None:
+def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: RunCommand, tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 12)
-    path = site(tmp_path, record={"folder": "kept"})
+    path = write_site(tmp_path, record={"folder": "kept"})
     before = sorted(tmp_path.iterdir())
     ended = myview("doctor", path, "--json", "--seconds", 20)
     said = json.loads(ended.out)
@@ -68,15 +68,17 @@ def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: Run, tmp_path: 
 
 
 async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -> None:
-    there = config(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
+    there = load_site(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
     found = [it async for it in run_checks(there, 1.0)]
     assert only(found, "camera c0").level is Level.BAD
     assert "there is no scene 'nowhere'" in only(found, "camera c0").text
     assert {it.check for it in found if it.level is Level.BAD} == {"camera c0"}
 
 
-def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(myview: Run, tmp_path: Path) -> None:
-    ended = myview("doctor", site(tmp_path))
+def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(
+    myview: RunCommand, tmp_path: Path
+) -> None:
+    ended = myview("doctor", write_site(tmp_path))
     assert (ended.code, ended.err) == (1, "")
     (line,) = [it for it in ended.out.splitlines() if "camera c0" in it]
     assert line.startswith("bad ")
@@ -85,8 +87,8 @@ def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(myview: Run
     assert ended.out.splitlines()[-1].endswith("1 bad")
 
 
-def test_an_invalid_configuration_is_the_only_finding(myview: Run, tmp_path: Path) -> None:
-    ended = myview("doctor", site(tmp_path, htp={"port": 1}), "--json")
+def test_an_invalid_configuration_is_the_only_finding(myview: RunCommand, tmp_path: Path) -> None:
+    ended = myview("doctor", write_site(tmp_path, htp={"port": 1}), "--json")
     said = json.loads(ended.out)
     assert (ended.code, said["ok"]) == (1, False)
     (finding,) = said["findings"]
@@ -102,36 +104,36 @@ def taken() -> Iterator[int]:
 
 
 async def test_a_port_used_by_another_program_is_bad(tmp_path: Path, taken: int) -> None:
-    found, runs = await port_findings(config(tmp_path, sync={"port": taken}))
+    found, runs = await port_findings(load_site(tmp_path, sync={"port": taken}))
     assert not runs
     assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is used by another program")
     assert {only(found, it).level for it in ("http.port", "zenoh.listen")} == {Level.OK}
 
 
 async def test_an_address_of_another_machine_is_bad(tmp_path: Path) -> None:
-    found, _ = await port_findings(config(tmp_path, sync={"bind": "192.0.2.7", "port": 7}))
+    found, _ = await port_findings(load_site(tmp_path, sync={"bind": "192.0.2.7", "port": 7}))
     assert only(found, "sync.port").level is Level.BAD
     assert "192.0.2.7:7" in only(found, "sync.port").text
 
 
-async def test_ports_used_by_this_site_are_ok(hall: Hall, tmp_path: Path, taken: int) -> None:
-    cameras = [{"id": it, "source": "scene:room"} for it in hall.service.config.camera_ids]
+async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path, taken: int) -> None:
+    cameras = [{"id": it, "source": "scene:room"} for it in served.service.config.camera_ids]
     changes: Any = {
-        "http": {"port": hall.port},
+        "http": {"port": served.port},
         "cameras": cameras,
         "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}"),
     }
-    found, runs = await port_findings(config(tmp_path, **changes))
+    found, runs = await port_findings(load_site(tmp_path, **changes))
     assert runs
     assert only(found, "http.port").text.endswith("by this site, which is running")
     assert only(found, "zenoh.listen").level is Level.OK
-    found, runs = await port_findings(config(tmp_path, **changes, site={"name": "another", **SIZE}))
+    found, runs = await port_findings(load_site(tmp_path, **changes, site={"name": "another", **SIZE}))
     assert (runs, only(found, "http.port").level) == (False, Level.BAD)
     assert only(found, "zenoh.listen").level is Level.BAD
 
 
 async def test_the_clock_of_a_running_pulse_server_is_compared(tmp_path: Path) -> None:
-    there = config(tmp_path)
+    there = load_site(tmp_path)
     assert "is not running" in only(await clock_findings(there), "pulse server").text
     async with PulseServer(FPS, port=there.sync.port):
         found = only(await clock_findings(there), "pulse server")
@@ -144,7 +146,7 @@ async def test_a_pulse_server_that_accepts_a_password_of_this_site_is_its_own(
 ) -> None:
     users = {"c0": "0" * 32, "bestview": "1" * 32}
     (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has its own line alone
-    there = config(tmp_path, sync={"port": free(), "users": "users"})
+    there = load_site(tmp_path, sync={"port": free_port(), "users": "users"})
     credentials = Credentials("bestview", users["bestview"])
     async with (
         PulseServer(FPS, port=there.sync.port, users=users) as server,
@@ -164,7 +166,7 @@ async def test_a_server_of_another_protocol_is_not_a_pulse_server(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(machine, "_ANSWER_S", PATIENCE)
-    there, left = config(tmp_path), asyncio.Event()
+    there, left = load_site(tmp_path), asyncio.Event()
 
     async def endless(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         writer.write(b"a" * 100_000)  # no line has so many
@@ -183,7 +185,7 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
     units = encoded(0, 40)
     camera = RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], 12.5)
     cameras = [{"id": "door", "source": camera.url, "options": {"rtsp_transport": "tcp"}}]
-    site_of = config(tmp_path, cameras=cameras, site={"name": "hall", "width": 128, "height": 96})
+    site_of = load_site(tmp_path, cameras=cameras, site={"name": "hall", "width": 128, "height": 96})
     try:
         camera.let = 1000
         found = camera_findings(site_of, probe_cameras(site_of, 4.0), runs=False)
@@ -199,7 +201,7 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
 def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Path, taken: int) -> None:
     write_video(tmp_path / "c0.mp4", 12)
     silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{taken}/live"}
-    both = config(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
+    both = load_site(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
     probes = probe_cameras(both, 1.5)
     assert probes["gate"].problem
     found = camera_findings(both, probes, runs=False)
@@ -226,7 +228,7 @@ def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Pat
 def test_a_camera_that_does_not_fit_the_site_is_a_warning(
     tmp_path: Path, found: CameraProbe, words: str
 ) -> None:
-    small = config(tmp_path, site={"width": 640, "height": 360})
+    small = load_site(tmp_path, site={"width": 640, "height": 360})
     assert len(of(camera_findings(small, {"c0": CameraProbe(size=(640, 360))}, runs=False), "camera c0")) == 1
     fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
     assert (fine.level, doubt.level) == (Level.OK, Level.WARNING)
@@ -237,7 +239,7 @@ def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, taken: in
     cameras = [
         {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{taken}/live", "password": "secret"}
     ]
-    there = config(tmp_path, cameras=cameras)
+    there = load_site(tmp_path, cameras=cameras)
     missing = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
     assert "the file cannot be read: No such file or directory" in missing
     (tmp_path / "secret").write_text("open sesame\n")
@@ -248,16 +250,16 @@ def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, taken: in
 
 
 def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
-    assert sound_findings(config(tmp_path)) == []
+    assert sound_findings(load_site(tmp_path)) == []
     write_video(tmp_path / "silent.mp4", 3)
     for source, words in (("none.wav", "none.wav: is neither"), ("silent.mp4", "sound")):
-        found = only(sound_findings(config(tmp_path, sound={"source": source})), "sound")
+        found = only(sound_findings(load_site(tmp_path, sound={"source": source})), "sound")
         assert found.level is Level.BAD
         assert words in found.text
 
 
 def test_the_password_of_a_sound_source_is_not_shown(tmp_path: Path) -> None:
-    there = config(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
+    there = load_site(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
     said = only(sound_findings(there), "sound").text
     assert "127.0.0.1" in said
     assert "hunter2" not in said
@@ -265,7 +267,7 @@ def test_the_password_of_a_sound_source_is_not_shown(tmp_path: Path) -> None:
 
 def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
     source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
-    there = config(tmp_path, cameras=[{"id": "gate", "source": source}])
+    there = load_site(tmp_path, cameras=[{"id": "gate", "source": source}])
     shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
     assert "rtsp://...: cannot open" in shown
 
@@ -273,18 +275,18 @@ def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
 def test_the_size_of_the_recording_is_compared_with_the_disk(tmp_path: Path) -> None:
     record: dict[str, Any] = {"folder": "kept", "keep_s": 3600.0, "max_mb": 1e6}
     probes = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1000.0)}
-    small = config(tmp_path, record=record)
+    small = load_site(tmp_path, record=record)
     assert needed_mb(small, probes) == pytest.approx((1000 + 8 * 100 * 25 / 1000) * 3600 / 8000)
     assert only(disk_findings(small, probes), "disk").level is Level.OK
     assert not (tmp_path / "kept").exists()
     huge = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1e12)}
     assert (
-        only(disk_findings(config(tmp_path, record={**record, "max_mb": 1e12}), huge), "disk").level
+        only(disk_findings(load_site(tmp_path, record={**record, "max_mb": 1e12}), huge), "disk").level
         is Level.BAD
     )
-    capped = config(tmp_path, record=record, encode={"max_kbps": 500})
+    capped = load_site(tmp_path, record=record, encode={"max_kbps": 500})
     assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
-    less = disk_findings(config(tmp_path, record={**record, "max_mb": 46.0}), probes)
+    less = disk_findings(load_site(tmp_path, record={**record, "max_mb": 46.0}), probes)
     assert "about 6 minutes are kept" in only(less, "record.max_mb").text
 
 
@@ -302,14 +304,14 @@ def test_files_removed_by_a_running_site_are_not_counted(
             yield found
 
     monkeypatch.setattr(os, "walk", walked)
-    findings = disk_findings(config(tmp_path, record={"folder": "kept"}), {})
+    findings = disk_findings(load_site(tmp_path, record={"folder": "kept"}), {})
     assert "and 3 MB are recorded already" in only(findings, "disk").text
 
 
 def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
     (tmp_path / "kept").write_text("a file")
     assert (
-        only(disk_findings(config(tmp_path, record={"folder": "kept"}), {}), "record.folder").level
+        only(disk_findings(load_site(tmp_path, record={"folder": "kept"}), {}), "record.folder").level
         is Level.BAD
     )
 
@@ -322,24 +324,24 @@ def test_files_that_others_can_read_or_write_are_reported(tmp_path: Path) -> Non
     users.chmod(0o644)
     changes: Any = {"access": {"tokens": "tokens.yaml"}}
     bus = {**dict.fromkeys(("connect", "listen"), "tcp/127.0.0.1:7447"), "users": "users"}
-    found = file_findings(config(tmp_path, **changes, zenoh=bus))
+    found = file_findings(load_site(tmp_path, **changes, zenoh=bus))
     words = " ".join(it.text for it in found if it.level is Level.WARNING)
     assert "lets no one in" in words
     assert f"others may write {tokens}" in words
     assert f"others may read {users}" in words
     assert "no line for c0" in words
-    pulses = file_findings(config(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
+    pulses = file_findings(load_site(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
     assert [it.level for it in of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
     assert "passwords of bestview" in of(pulses, "sync.users")[0].text
     users.write_text("bestview:" + "b" * 32 + "\n")
-    pulses = file_findings(config(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
+    pulses = file_findings(load_site(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
     assert "no line for c0" in of(pulses, "sync.users")[0].text
     tokens.write_text("tokens: nonsense\n")
-    assert of(file_findings(config(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
+    assert of(file_findings(load_site(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
 
 
 def test_a_site_exposed_by_accident_is_bad(tmp_path: Path) -> None:
-    found = only(file_findings(config(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
+    found = only(file_findings(load_site(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
     assert found.level is Level.BAD
     assert "http.host" in found.text
 
@@ -347,22 +349,24 @@ def test_a_site_exposed_by_accident_is_bad(tmp_path: Path) -> None:
 def test_a_camera_without_a_homography_among_calibrated_ones_is_a_warning(tmp_path: Path) -> None:
     ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
-    said = only(file_findings(config(tmp_path, cameras=cameras)), "ground")
+    said = only(file_findings(load_site(tmp_path, cameras=cameras)), "ground")
     assert said == (Level.WARNING, "c1: no homography: people are matched by appearance alone there")
 
 
 def test_the_available_processors_are_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "available_processors", lambda: 0.5)
-    said = only(machine_findings(config(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
+    said = only(machine_findings(load_site(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
     assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 
 
 def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
-    small = config(tmp_path)
-    fine, busy = ({"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
+    small = load_site(tmp_path)
+    fine, site_with_people = (
+        {"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0)
+    )
     assert only(machine_findings(small, fine), "processor").level is Level.OK
-    assert only(machine_findings(small, busy), "processor").level is Level.WARNING
-    large = config(tmp_path, track={"backlog_s": 1e7})
+    assert only(machine_findings(small, site_with_people), "processor").level is Level.WARNING
+    large = load_site(tmp_path, track={"backlog_s": 1e7})
     assert only(machine_findings(large, fine), "memory").level is Level.WARNING
 
 

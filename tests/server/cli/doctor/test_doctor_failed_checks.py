@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from fakes.cli.command_line import Run
-from fakes.cli.doctor_configs import config, site
+from fakes.cli.command_line import RunCommand
+from fakes.cli.doctor_configs import load_site, write_site
 from fakes.programs import needs_openssl
-from fakes.system.ports import free
+from fakes.system.ports import free_port
 from server.cli.doctor import command, files, ports
 from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.cameras import camera_findings
@@ -49,7 +49,7 @@ BROKEN = [(Level.BAD, "/closed/door: Permission denied")]
 async def test_a_failed_check_does_not_lose_others_findings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
 ) -> None:
-    there = config(tmp_path)
+    there = load_site(tmp_path)
     before = {it.check async for it in command.run_checks(there, 1.0)}
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
     monkeypatch.setattr(command, check, broken)
@@ -61,7 +61,7 @@ async def test_a_failed_check_does_not_lose_others_findings(
 async def test_a_failed_check_of_one_port_or_file_does_not_lose_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    there = config(tmp_path)
+    there = load_site(tmp_path)
     monkeypatch.setattr(ports, "_is_this_site", broken)
     with socket.create_server(("127.0.0.1", there.http.port)):
         found, _ = await port_findings(there)
@@ -77,7 +77,7 @@ async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch:
         raise RuntimeError("cannot be: rtsp://me:hunter2@door/live")
 
     monkeypatch.setattr(command, "sound_findings", wrong)
-    found = [it async for it in command.run_checks(config(tmp_path), 1.0)]
+    found = [it async for it in command.run_checks(load_site(tmp_path), 1.0)]
     text = "a bug in MyView: RuntimeError: cannot be: ..."
     assert of(found, "sound") == [(Level.BAD, text)]
     assert of(found, "memory")
@@ -93,7 +93,7 @@ async def test_findings_are_printed_as_they_are_found(
         return {"c0": CameraProbe("away")}
 
     monkeypatch.setattr(command, "probe_cameras", probe_all)
-    await command._check_and_report(site(tmp_path), 1.0, as_json=False)
+    await command._check_and_report(write_site(tmp_path), 1.0, as_json=False)
     (before,) = outputs
     after = capsys.readouterr().out
     assert " http.port " in before
@@ -105,7 +105,7 @@ async def test_findings_are_printed_as_they_are_found(
 
 async def test_an_unresolvable_server_is_bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = {"connect": "tcp/bus:7447", "listen": "tcp/127.0.0.1:7447"}
-    there = config(tmp_path, sync={"host": "pulses", "port": 7400}, zenoh=ends)
+    there = load_site(tmp_path, sync={"host": "pulses", "port": 7400}, zenoh=ends)
 
     def unknown(*_: object, **__: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
@@ -119,36 +119,38 @@ async def test_an_unresolvable_server_is_bad(tmp_path: Path, monkeypatch: pytest
 
 
 async def test_an_address_of_this_machine_must_lead_to_a_listener(tmp_path: Path) -> None:
-    port, other = free(), free()
-    fine = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
+    port, other = free_port(), free_port()
+    fine = load_site(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
     assert {it.level for it in await reachability_findings(fine)} == {Level.OK}
-    astray = config(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"})
+    astray = load_site(
+        tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"}
+    )
     text = f"nothing listens at 127.0.0.1:{other}, where cameras connect; zenoh.listen is 127.0.0.1:{port}"
     assert of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
     with socket.create_server(("127.0.0.1", other)):
         answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # something may pass it on
         assert of(await reachability_findings(astray), "zenoh.connect") == answered
-    narrow = config(tmp_path, sync={"host": "127.0.0.2", "port": other})
+    narrow = load_site(tmp_path, sync={"host": "127.0.0.2", "port": other})
     assert of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD
 
 
 async def test_two_services_on_one_port_are_bad(tmp_path: Path) -> None:
-    port = free()
-    found, _ = await port_findings(config(tmp_path, http={"port": port}, sync={"port": port}))
+    port = free_port()
+    found, _ = await port_findings(load_site(tmp_path, http={"port": port}, sync={"port": port}))
     assert of(found, "sync.port") == [(Level.BAD, f"127.0.0.1:{port} is also the address of http.port")]
     assert of(found, "zenoh.listen")[0][0] is Level.OK
 
 
 def test_a_device_shared_by_two_cameras_is_bad(tmp_path: Path) -> None:
     sources = {"c0": "/dev/video9", "c1": "/dev/video9", "c2": "c.mp4", "c3": "c.mp4"}
-    there = config(tmp_path, cameras=[{"id": it, "source": source} for it, source in sources.items()])
+    there = load_site(tmp_path, cameras=[{"id": it, "source": source} for it, source in sources.items()])
     found = camera_findings(there, {}, runs=False)
     text = "/dev/video9 is also used by camera c0, and only one can open it"
     assert [(it.check, it.level, it.text) for it in found] == [("camera c1", Level.BAD, text)]
 
 
-def test_an_invalid_configuration_is_reported_with_a_remedy(myview: Run, tmp_path: Path) -> None:
-    path = site(tmp_path, ground="none.json")
+def test_an_invalid_configuration_is_reported_with_a_remedy(myview: RunCommand, tmp_path: Path) -> None:
+    path = write_site(tmp_path, ground="none.json")
     ended = myview("doctor", path)
     assert (ended.code, ended.err) == (1, "")
     line = ended.out.splitlines()[0]
@@ -157,7 +159,7 @@ def test_an_invalid_configuration_is_reported_with_a_remedy(myview: Run, tmp_pat
 
 
 def test_a_missing_token_file_is_reported_once(tmp_path: Path) -> None:
-    found = file_findings(config(tmp_path, access={"tokens": "none.yaml"}))
+    found = file_findings(load_site(tmp_path, access={"tokens": "none.yaml"}))
     (failed,) = [it for it in found if it.level is Level.BAD]
     assert (failed.check, failed.remedy) == ("access.tokens", "`myview token NAME` prints a line for it")
 
@@ -175,7 +177,7 @@ def test_the_routers_certificate_must_be_for_the_host_of_zenoh_connect(tmp_path:
     def bad(host: str, **files: str) -> list[str]:
         tls = {"authority": "a.pem", "certificate": "r.pem", "key": "r.key", **files}
         ends = {"connect": f"tls/{host}:7447", "listen": "tls/127.0.0.1:7447"}
-        found = file_findings(config(tmp_path, zenoh={**ends, "tls": tls}))
+        found = file_findings(load_site(tmp_path, zenoh={**ends, "tls": tls}))
         return [it.text for it in found if it.check == "zenoh.tls" and it.level is Level.BAD]
 
     assert bad("elsewhere") == []

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from fakes.cli.command_line import Run, refusal
+from fakes.cli.command_line import RunCommand, input_error
 from tracking.motchallenge import MotRow, format_rows
 
 Printed = Callable[..., str]
 
 
 @pytest.fixture
-def run(myview: Run) -> Printed:
+def run(myview: RunCommand) -> Printed:
     """Return a function that runs `myview evaluate` and gives what it prints."""
 
     def command(*arguments: object) -> str:
@@ -29,9 +29,9 @@ def run(myview: Run) -> Printed:
 
 
 @pytest.fixture
-def refused(myview: Run) -> Printed:
+def refused(myview: RunCommand) -> Printed:
     """Return a function that runs `myview evaluate` and returns its one-line error."""
-    return lambda *arguments: refusal(myview("evaluate", *arguments))
+    return lambda *arguments: input_error(myview("evaluate", *arguments))
 
 
 def people(numbers: tuple[int, ...], frames: range = range(1, 6)) -> str:
@@ -111,7 +111,7 @@ def test_files_are_paired_by_name_in_any_order(run: Printed, tmp_path: Path) -> 
     assert rows(run(*each("--gt", there), "--tracks", tmp_path / "seen")) == once
 
 
-def test_a_second_value_without_a_repeated_option_is_refused(myview: Run, tmp_path: Path) -> None:
+def test_a_second_value_without_a_repeated_option_is_refused(myview: RunCommand, tmp_path: Path) -> None:
     a, b = (write(tmp_path / f"{name}.txt", people((1,))) for name in "ab")
     ended = myview("evaluate", "--gt", a, b, "--tracks", a, b)
     assert ended.code == 2

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.cli.command_line import BAD_INPUT, Run, refusal
+from fakes.cli.command_line import BAD_INPUT, RunCommand, input_error
 from fakes.media.videos import write_video
 
 FRAMES = 20
@@ -19,7 +19,7 @@ BIG, SMALL = "10,10,50,50", "10,10,20,20"
 
 
 @pytest.fixture
-def evaluate(myview: Run) -> Run:
+def evaluate(myview: RunCommand) -> RunCommand:
     """Return a function that runs `myview evaluate`."""
     return lambda *arguments: myview("evaluate", *arguments)
 
@@ -43,7 +43,7 @@ def choices(shown: Mapping[int, str], frames: range = range(1, FRAMES + 1)) -> l
 
 
 @pytest.fixture
-def hall(tmp_path: Path) -> Path:
+def served(tmp_path: Path) -> Path:
     """Two people in two cameras: the first is larger in c0, the second in c1."""
     write(tmp_path / "gt" / "c0.txt", boxes({1: BIG, 2: SMALL}))
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL, 2: BIG}))
@@ -55,9 +55,9 @@ def judged(printed: str) -> dict[str, list[str]]:
     return {line.split()[0]: line.split() for line in printed.splitlines()}
 
 
-def test_the_best_choices_agree_with_the_optimum(evaluate: Run, hall: Path) -> None:
-    path = write(hall / "choices.csv", choices({1: "c0", 2: "c1"}))
-    code, out, _ = evaluate("--gt", hall, "--views", path, *SIZE)
+def test_the_best_choices_agree_with_the_optimum(evaluate: RunCommand, served: Path) -> None:
+    path = write(served / "choices.csv", choices({1: "c0", 2: "c1"}))
+    code, out, _ = evaluate("--gt", served, "--views", path, *SIZE)
     assert code == 0
     table = judged(out)
     assert table["person"][3:8] == ["Agree", "Regret", "Visible", "Chosen", "Cuts"]
@@ -65,14 +65,14 @@ def test_the_best_choices_agree_with_the_optimum(evaluate: Run, hall: Path) -> N
     assert table["2"][:4] == ["2", "2", "20", "100.0"]
 
 
-def test_worse_choices_cost_more_and_the_json_file_has_all_scores(evaluate: Run, hall: Path) -> None:
+def test_worse_choices_cost_more_and_the_json_file_has_all_scores(evaluate: RunCommand, served: Path) -> None:
     shown = [
         *choices({1: "c0"}),
         *choices({2: "c1"}, range(1, 11))[1:],
         *choices({2: "c0"}, range(11, 16))[1:],
     ]
-    path, out = write(hall / "choices.csv", shown), hall / "numbers.json"
-    assert evaluate("--gt", hall, "--views", path, *SIZE, "--switch-cost", 0.2, "--json", out)[0] == 0
+    path, out = write(served / "choices.csv", shown), served / "numbers.json"
+    assert evaluate("--gt", served, "--views", path, *SIZE, "--switch-cost", 0.2, "--json", out)[0] == 0
     content = json.loads(out.read_text())["views"]
     assert content["all"]["frames"] == 40
     assert content["all"]["agreement"] == 30 / 40
@@ -87,26 +87,26 @@ def test_worse_choices_cost_more_and_the_json_file_has_all_scores(evaluate: Run,
     assert (content["fps"], content["switch_cost_s"]) == (10.0, 0.2)
 
 
-def test_objects_are_matched_to_people_by_their_tracks(evaluate: Run, hall: Path) -> None:
-    write(hall / "seen" / "tracks" / "c0.txt", boxes({7: BIG, 4: SMALL}, range(1, 16)))
-    write(hall / "seen" / "tracks" / "c1.txt", boxes({7: SMALL, 4: BIG}, range(1, 16)))
-    path = write(hall / "seen" / "choices.csv", choices({7: "c0", 4: "c1", 9: "c1"}, range(1, 16)))
-    code, out, err = evaluate("--gt", hall, "--tracks", hall / "seen", "--views", path, *SIZE)
+def test_objects_are_matched_to_people_by_their_tracks(evaluate: RunCommand, served: Path) -> None:
+    write(served / "seen" / "tracks" / "c0.txt", boxes({7: BIG, 4: SMALL}, range(1, 16)))
+    write(served / "seen" / "tracks" / "c1.txt", boxes({7: SMALL, 4: BIG}, range(1, 16)))
+    path = write(served / "seen" / "choices.csv", choices({7: "c0", 4: "c1", 9: "c1"}, range(1, 16)))
+    code, out, err = evaluate("--gt", served, "--tracks", served / "seen", "--views", path, *SIZE)
     assert (code, err) == (0, "")
     table = judged(out)
     assert table["joint"][0] == "joint"
     assert table["1"][:4] == ["1", "7", "20", "75.0"]
     assert table["2"][:4] == ["2", "4", "20", "75.0"]
     assert table["all"][5] == "75.0", "the last five frames have no choice"
-    assert "none of its objects" in evaluate("--gt", hall, "--views", path, *SIZE)[2]
+    assert "none of its objects" in evaluate("--gt", served, "--views", path, *SIZE)[2]
 
 
-def test_an_object_that_switches_people_matches_one_of_them(evaluate: Run, hall: Path) -> None:
+def test_an_object_that_switches_people_matches_one_of_them(evaluate: RunCommand, served: Path) -> None:
     halves = [*boxes({5: BIG}, range(1, 13)), *boxes({5: SMALL}, range(13, 21))]
-    write(hall / "tracks" / "c0.txt", halves)
-    write(hall / "tracks" / "c1.txt", [])
-    path = write(hall / "choices.csv", choices({5: "c0"}))
-    code, out, _ = evaluate("--gt", hall / "gt", "--tracks", hall / "tracks", "--views", path, *SIZE)
+    write(served / "tracks" / "c0.txt", halves)
+    write(served / "tracks" / "c1.txt", [])
+    path = write(served / "choices.csv", choices({5: "c0"}))
+    code, out, _ = evaluate("--gt", served / "gt", "--tracks", served / "tracks", "--views", path, *SIZE)
     assert code == 0
     table = judged(out)
     assert table["1"][1] == "5"
@@ -114,7 +114,7 @@ def test_an_object_that_switches_people_matches_one_of_them(evaluate: Run, hall:
     assert table["2"][6] == "0.0"
 
 
-def test_a_hidden_person_is_not_visible_by_default(evaluate: Run, tmp_path: Path) -> None:
+def test_a_hidden_person_is_not_visible_by_default(evaluate: RunCommand, tmp_path: Path) -> None:
     write(tmp_path / "gt" / "c0.txt", boxes({1: BIG}, end="1,1,0.1"))
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
     path = write(tmp_path / "choices.csv", choices({1: "c0"}))
@@ -122,30 +122,30 @@ def test_a_hidden_person_is_not_visible_by_default(evaluate: Run, tmp_path: Path
     assert [judged(it)["all"][4] for it in outputs] == ["0.0", "100.0"]
 
 
-def test_rate_and_sizes_are_read_from_a_rendering(evaluate: Run, hall: Path) -> None:
-    path = write(hall / "choices.csv", choices({1: "c1", 2: "c1"}))
-    assert "size of camera c0's picture is not known" in evaluate("--gt", hall, "--views", path)[2]
+def test_rate_and_sizes_are_read_from_a_rendering(evaluate: RunCommand, served: Path) -> None:
+    path = write(served / "choices.csv", choices({1: "c1", 2: "c1"}))
+    assert "size of camera c0's picture is not known" in evaluate("--gt", served, "--views", path)[2]
     site = {"fps": 10.0, "switch_cost_s": 0.3, "sizes": {"c0": [100, 100], "c1": [50, 50]}}
-    (hall / "site.json").write_text(json.dumps(site))
-    out = hall / "numbers.json"
-    assert evaluate("--gt", hall, "--views", path, "--json", out)[0] == 0
+    (served / "site.json").write_text(json.dumps(site))
+    out = served / "numbers.json"
+    assert evaluate("--gt", served, "--views", path, "--json", out)[0] == 0
     content = json.loads(out.read_text())["views"]
     assert content["switch_cost_s"] == 0.3
     # 20 pixels of c1's 50 are four fifths of what 50 of c0's 100 are.
     assert content["people"]["1"]["cost"] == pytest.approx(20 * 0.2)
 
 
-def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: Run, hall: Path) -> None:
+def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: RunCommand, served: Path) -> None:
     for camera in ("c0", "c1"):
-        write_video(hall / f"{camera}.mp4", FRAMES)
+        write_video(served / f"{camera}.mp4", FRAMES)
     path = write(
-        hall / "choices.csv", [*choices({1: "c0"}, range(1, 9)), *choices({1: "c1"}, range(9, 21))[1:]]
+        served / "choices.csv", [*choices({1: "c0"}, range(1, 9)), *choices({1: "c1"}, range(9, 21))[1:]]
     )
-    videos = ("--videos", hall / "c0.mp4", "--videos", hall / "c1.mp4")
-    code, _, err = evaluate("--gt", hall, "--views", path, *videos, *SIZE, "--plots", hall / "plots")
+    videos = ("--videos", served / "c0.mp4", "--videos", served / "c1.mp4")
+    code, _, err = evaluate("--gt", served, "--views", path, *videos, *SIZE, "--plots", served / "plots")
     assert (code, err) == (0, "")
-    assert {it.name for it in (hall / "plots").iterdir()} == {"choices.png", "person-1.png"}
-    assert all(it.stat().st_size > 1000 for it in (hall / "plots").iterdir())
+    assert {it.name for it in (served / "plots").iterdir()} == {"choices.png", "person-1.png"}
+    assert all(it.stat().st_size > 1000 for it in (served / "plots").iterdir())
 
 
 @pytest.mark.parametrize(
@@ -161,19 +161,21 @@ def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: Run, hal
         (["frame,object,camera", "1,1,c9"], "camera 'c9' is not among those that are scored (c0, c1)"),
     ],
 )
-def test_an_invalid_choices_file_is_refused(evaluate: Run, hall: Path, lines: list[str], why: str) -> None:
-    code, out, err = evaluate("--gt", hall, "--views", write(hall / "choices.csv", lines), *SIZE)
+def test_an_invalid_choices_file_is_refused(
+    evaluate: RunCommand, served: Path, lines: list[str], why: str
+) -> None:
+    code, out, err = evaluate("--gt", served, "--views", write(served / "choices.csv", lines), *SIZE)
     assert (code, out) == (BAD_INPUT, "")
     assert why in err
     assert len(err.splitlines()) == 1
 
 
-def test_invalid_options_are_refused(evaluate: Run, hall: Path) -> None:
-    path = write(hall / "choices.csv", choices({1: "c0"}))
+def test_invalid_options_are_refused(evaluate: RunCommand, served: Path) -> None:
+    path = write(served / "choices.csv", choices({1: "c0"}))
     for arguments, why in (
         ([], "give --tracks, --views, or both"),
-        (["--tracks", hall, "--plots", hall / "p"], "--plots and --videos need --views"),
-        (["--views", hall / "none.csv", *SIZE], "none.csv: cannot be read"),
+        (["--tracks", served, "--plots", served / "p"], "--plots and --videos need --views"),
+        (["--views", served / "none.csv", *SIZE], "none.csv: cannot be read"),
         (["--views", path, "--size", "big", "--fps", 10], "--size: 'big' is not WIDTHxHEIGHT"),
         (["--views", path, "--size", "9x9"], "the number of frames a second is not known"),
         (
@@ -181,7 +183,7 @@ def test_invalid_options_are_refused(evaluate: Run, hall: Path) -> None:
             "--videos: give one for each of the cameras",
         ),
     ):
-        code, out, err = evaluate("--gt", hall, *arguments)
+        code, out, err = evaluate("--gt", served, *arguments)
         assert (code, out) == (BAD_INPUT, ""), why
         assert why in err
 
@@ -197,31 +199,31 @@ def test_invalid_options_are_refused(evaluate: Run, hall: Path) -> None:
         ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),
     ],
 )
-def test_an_invalid_site_file_is_refused(evaluate: Run, hall: Path, text: str, why: str) -> None:
-    path = write(hall / "choices.csv", choices({1: "c0"}))
-    (hall / "site.json").write_text(text)
-    assert why in refusal(evaluate("--gt", hall, "--views", path))
+def test_an_invalid_site_file_is_refused(evaluate: RunCommand, served: Path, text: str, why: str) -> None:
+    path = write(served / "choices.csv", choices({1: "c0"}))
+    (served / "site.json").write_text(text)
+    assert why in input_error(evaluate("--gt", served, "--views", path))
 
 
-def test_a_person_twice_in_a_frame_is_refused(evaluate: Run, hall: Path) -> None:
-    write(hall / "gt" / "c1.txt", [*boxes({2: SMALL}), *boxes({2: BIG}, range(7, 9))])
-    path = write(hall / "choices.csv", choices({1: "c0"}))
-    line = refusal(evaluate("--gt", hall, "--views", path, *SIZE))
+def test_a_person_twice_in_a_frame_is_refused(evaluate: RunCommand, served: Path) -> None:
+    write(served / "gt" / "c1.txt", [*boxes({2: SMALL}), *boxes({2: BIG}, range(7, 9))])
+    path = write(served / "choices.csv", choices({1: "c0"}))
+    line = input_error(evaluate("--gt", served, "--views", path, *SIZE))
     assert line.endswith("--gt: camera c1: person 2 is twice in frame 7")
 
 
-def test_all_requested_files_are_written_or_none(evaluate: Run, hall: Path) -> None:
-    path = write(hall / "choices.csv", choices({1: "c0"}))
-    given = ("--gt", hall, "--views", path, *SIZE, "--plots", hall / "plots")
-    assert "cannot write there" in refusal(evaluate(*given, "--json", path / "numbers.json"))
-    assert not (hall / "plots").exists()
+def test_all_requested_files_are_written_or_none(evaluate: RunCommand, served: Path) -> None:
+    path = write(served / "choices.csv", choices({1: "c0"}))
+    given = ("--gt", served, "--views", path, *SIZE, "--plots", served / "plots")
+    assert "cannot write there" in input_error(evaluate(*given, "--json", path / "numbers.json"))
+    assert not (served / "plots").exists()
 
 
-def test_views_may_be_folders_of_images(evaluate: Run, hall: Path) -> None:
+def test_views_may_be_folders_of_images(evaluate: RunCommand, served: Path) -> None:
     for camera in ("c0", "c1"):
-        (hall / "views" / camera).mkdir(parents=True)
-        cv2.imwrite(str(hall / "views" / camera / "1.png"), np.zeros((100, 100, 3), dtype=np.uint8))
-    path = write(hall / "choices.csv", choices({1: "c0", 2: "c1"}))
-    videos = ("--videos", hall / "views" / "c0", "--videos", hall / "views" / "c1")
-    same = evaluate("--gt", hall, "--views", path, *SIZE)
-    assert evaluate("--gt", hall, "--views", path, *videos, "--fps", 10) == same
+        (served / "views" / camera).mkdir(parents=True)
+        cv2.imwrite(str(served / "views" / camera / "1.png"), np.zeros((100, 100, 3), dtype=np.uint8))
+    path = write(served / "choices.csv", choices({1: "c0", 2: "c1"}))
+    videos = ("--videos", served / "views" / "c0", "--videos", served / "views" / "c1")
+    same = evaluate("--gt", served, "--views", path, *SIZE)
+    assert evaluate("--gt", served, "--views", path, *videos, "--fps", 10) == same

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from bestview import Merge, Split
-from fakes.media.audio import BEEPS, STEP, beeps, flashes, flashing, heard, write_flashes
+from fakes.media.audio import (
+    BEEP_TIMES,
+    MAX_AV_OFFSET_S,
+    access_units,
+    beeps,
+    decode_audio,
+    flashes,
+    write_flashes,
+)
 from fakes.media.audio import FRAMES as SOUNDING
 from fakes.service.decisions import choice, decision
 from fakes.service.scripted_cameras import (
@@ -143,7 +151,7 @@ def test_a_film_has_the_sites_sound_in_sync(tmp_path: Path, codec: Literal["aac"
     config = small_config(sound={"source": str(recording), "codec": codec})
     stream_format, track = stream_format_for(config.encode.codec, config.site.size), Soundtrack(config)
     frame_buffers = {camera: FrameBuffer(FPS, SOUNDING, stream_format) for camera in CAMERAS}
-    for unit in flashing(recording):
+    for unit in access_units(recording):
         for frame_buffer in frame_buffers.values():
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     it = FilmWriter(tmp_path / "best", frame_buffers, stream_format, config.site, track.audio_buffer)
@@ -153,10 +161,10 @@ def test_a_film_has_the_sites_sound_in_sync(tmp_path: Path, codec: Literal["aac"
         it.write(decision(gop, choice(1, CAMERAS[gop % 2])))
     it.close()
     data = (tmp_path / "best" / "object-1.mp4").read_bytes()
-    expected = [at - begin * GOP / FPS for at in BEEPS]
+    expected = [at - begin * GOP / FPS for at in BEEP_TIMES]
     assert flashes(data) == pytest.approx(expected, abs=0.001)
-    assert beeps(data) == pytest.approx(expected, abs=STEP)
-    times, _ = heard(data)
+    assert beeps(data) == pytest.approx(expected, abs=MAX_AV_OFFSET_S)
+    times, _ = decode_audio(data)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     assert 0 <= times[0] < 0.022
     assert times[-1] == pytest.approx((SOUNDING - begin * GOP) / FPS, abs=0.03)

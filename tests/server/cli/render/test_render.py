@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.media.audio import EVERY, beeps, write_flashes
+from fakes.media.audio import FLASH_INTERVAL, beeps, write_flashes
 from fakes.media.videos import damage, write_video
 from fakes.paths import ROOT
 from fakes.timeouts import PATIENCE
@@ -90,7 +90,11 @@ def test_every_film_has_the_configured_sound(views: Path, tmp_path: Path) -> Non
     for number in {number for number, _ in rows}:
         frames = [frame for it, frame in rows if it == number]
         data = (out / "best" / f"object-{number}.mp4").read_bytes()
-        expected = [at - frames[0] for at in range(EVERY, 80, EVERY) if frames[0] <= at <= frames[-1]]
+        expected = [
+            at - frames[0]
+            for at in range(FLASH_INTERVAL, 80, FLASH_INTERVAL)
+            if frames[0] <= at <= frames[-1]
+        ]
         assert [25 * at for at in beeps(data)] == pytest.approx(expected, abs=1)
 
 

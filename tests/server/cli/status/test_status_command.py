@@ -15,10 +15,10 @@ from rich.console import Console
 
 import client
 from client.status.prometheus_text import Metrics, service_of
-from fakes.cli.command_line import Run
-from fakes.http.tokens import locked, token_of
-from fakes.service.fed_site import A, B, Hall, see
-from fakes.service.scripted_cameras import CAMERAS, FPS, small_config, status, tracks, word
+from fakes.cli.command_line import RunCommand
+from fakes.http.tokens import serve_with_tokens, token_of
+from fakes.service.fed_site import A, B, ServedSite, show_people
+from fakes.service.scripted_cameras import CAMERAS, FPS, camera_tracks, small_config, status, tracks
 from fakes.timeouts import PATIENCE
 from server.cli.status import command
 from server.cli.status.command import status_live, status_once
@@ -31,8 +31,8 @@ from server.service.service import BestViewService
 from server.system.errors import UnavailableError, UserError
 
 
-def url(hall: Hall) -> str:
-    return f"http://127.0.0.1:{hall.port}"
+def url(served: ServedSite) -> str:
+    return f"http://127.0.0.1:{served.port}"
 
 
 def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> str:  # noqa: B008 — frozen
@@ -42,12 +42,14 @@ def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> st
     return said.get()
 
 
-async def test_a_sites_status_is_shown(busy: Hall) -> None:
+async def test_a_sites_status_is_shown(site_with_people: ServedSite) -> None:
     solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
-    busy.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False))
-    busy.service.ingest.tracks(tracks(word(A, 2, {}, solve=solve, solved_at=0.25)))
-    busy.service.decider.people.registry.names[1] = "Ann"
-    now = await client.status(url(busy))
+    site_with_people.service.ingest.status(
+        status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False)
+    )
+    site_with_people.service.ingest.tracks(tracks(camera_tracks(A, 2, {}, solve=solve, solved_at=0.25)))
+    site_with_people.service.decider.people.registry.names[1] = "Ann"
+    now = await client.status(url(site_with_people))
     assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)
     one, two = now.cameras
     assert (one.camera, one.state, one.fps, one.missed, one.shed, one.waiting) == (A, "live", 24.5, 3, 2, 7)
@@ -58,7 +60,7 @@ async def test_a_sites_status_is_shown(busy: Hall) -> None:
     assert other.camera == A
     assert now.service is not None
     assert now.service.viewers["object"] == 0
-    assert now.service.decided_pulse == busy.service.decision_state.end
+    assert now.service.decided_pulse == site_with_people.service.decision_state.end
     text = printed(now)
     assert "hall  " in text
     assert "ready" in text
@@ -69,36 +71,36 @@ async def test_a_sites_status_is_shown(busy: Hall) -> None:
 
 
 async def test_a_site_that_is_not_ready_exits_with_1_and_the_reason(
-    hall: Hall, capsys: pytest.CaptureFixture[str]
+    served: ServedSite, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert not await status_once(url(hall), None, as_json=False)
+    assert not await status_once(url(served), None, as_json=False)
     said = capsys.readouterr().out
     assert "not ready: " in said
     assert "no camera delivers frames" in said
     assert "no people yet" in said
-    see(hall)
-    assert await status_once(url(hall), None, as_json=True)
+    show_people(served)
+    assert await status_once(url(served), None, as_json=True)
     content = json.loads(capsys.readouterr().out)
     assert msgspec.convert(content, client.SiteNow).ready
     assert [it["camera"] for it in content["cameras"]] == list(CAMERAS)
 
 
 async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Path) -> None:
-    async with locked(tmp_path) as hall:
-        see(hall)
-        now = await client.status(url(hall), client.HttpSettings(token=token_of("door")))
+    async with serve_with_tokens(tmp_path) as served:
+        show_people(served)
+        now = await client.status(url(served), client.HttpSettings(token=token_of("door")))
         assert (now.service, now.pulse, now.ready) == (None, None, True)
         assert [(it.camera, it.optimal) for it in now.cameras] == [(A, None)]
         assert "viewers" not in printed(now)
         assert (
-            await client.status(url(hall), client.HttpSettings(token=token_of("desk")))
+            await client.status(url(served), client.HttpSettings(token=token_of("desk")))
         ).service is not None
         with pytest.raises(UserError, match="MYVIEW_TOKEN"):
-            await status_once(url(hall), None, as_json=False)
+            await status_once(url(served), None, as_json=False)
 
 
-async def test_no_text_of_the_server_controls_the_terminal(busy: Hall) -> None:
-    now = await client.status(url(busy))
+async def test_no_text_of_the_server_controls_the_terminal(site_with_people: ServedSite) -> None:
+    now = await client.status(url(site_with_people))
     evil = "\x1b[2J\x1b]0;owned\x07\nnew [red]line"
     camera = msgspec.structs.replace(now.cameras[0], message=evil, state=evil, camera=evil)
     person = msgspec.structs.replace(now.people[0], name=evil, camera=evil, cameras=(evil,))
@@ -114,8 +116,8 @@ async def test_no_text_of_the_server_controls_the_terminal(busy: Hall) -> None:
     assert all(it.isprintable() or it == "\n" for it in said)
 
 
-async def test_rates_are_between_two_snapshots_of_one_run(busy: Hall) -> None:
-    one = await client.status(url(busy))
+async def test_rates_are_between_two_snapshots_of_one_run(site_with_people: ServedSite) -> None:
+    one = await client.status(url(site_with_people))
     assert one.service is not None
     later = msgspec.structs.replace(
         one.service, cpu_s=one.service.cpu_s + 1.0, sent_bytes=one.service.sent_bytes + 500
@@ -158,9 +160,9 @@ async def test_an_unreachable_server_is_retried(
 
 
 async def test_the_display_shows_an_unreachable_and_a_restarted_server(
-    busy: Hall, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    site_with_people: ServedSite, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    now = await client.status(url(busy))
+    now = await client.status(url(site_with_people))
     assert now.service is not None
     other = msgspec.structs.replace(now, service=msgspec.structs.replace(now.service, began=1.0))
     answers = iter([now, client.AwayError("hall: no answer"), other])
@@ -183,13 +185,13 @@ async def test_the_display_shows_an_unreachable_and_a_restarted_server(
     assert said.index("trying again") < said.index("the service was restarted")
 
 
-async def test_another_or_a_missing_server_is_reported_in_one_line(hall: Hall) -> None:
+async def test_another_or_a_missing_server_is_reported_in_one_line(served: ServedSite) -> None:
     with pytest.raises(UserError, match="is not an address"):
         await status_once("ftp://hall", None, as_json=False)
     with pytest.raises(UnavailableError, match="status: http"):
         await status_once("http://127.0.0.1:9", None, as_json=False)
     with pytest.raises(UserError):
-        await status_once(f"{url(hall)}/api", None, as_json=False)
+        await status_once(f"{url(served)}/api", None, as_json=False)
 
 
 def test_values_that_are_not_finite_are_ignored() -> None:
@@ -199,9 +201,9 @@ def test_values_that_are_not_finite_are_ignored() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"fps": 0.0}, {"now": 1e300}])
-async def test_an_invalid_site_is_reported_in_one_line(hall: Hall, wrong: dict[str, float]) -> None:
+async def test_an_invalid_site_is_reported_in_one_line(served: ServedSite, wrong: dict[str, float]) -> None:
     async def site(_: web.Request) -> web.Response:
-        here = await client.site(url(hall))
+        here = await client.site(url(served))
         return web.json_response({**msgspec.to_builtins(here), **wrong})
 
     app = web.Application()
@@ -211,7 +213,7 @@ async def test_an_invalid_site_is_reported_in_one_line(hall: Hall, wrong: dict[s
             await status_once(str(server.make_url("/")), None, as_json=False)
 
 
-def test_the_command_refuses_in_one_line(myview: Run) -> None:
+def test_the_command_refuses_in_one_line(myview: RunCommand) -> None:
     ended = myview("status", "http://127.0.0.1:9", "--once")
     assert (ended.code, ended.out) == (3, "")
     assert ended.err.startswith("myview: status: http://127.0.0.1:9")

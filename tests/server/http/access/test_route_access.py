@@ -9,8 +9,8 @@ import pytest
 from aiohttp import ClientTimeout, web
 from aiohttp.test_utils import TestClient, TestServer
 
-from fakes.http.tokens import EVERYBODY, bearer, locked
-from fakes.service.fed_site import A, B, Hall, see
+from fakes.http.tokens import TOKEN_ENTRIES, bearer, serve_with_tokens
+from fakes.service.fed_site import A, B, ServedSite, show_people
 from fakes.service.scripted_cameras import LARGE, SMALL
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import ACCESS, AccessControl, authorize
@@ -18,7 +18,7 @@ from server.http.access.csrf import CSRF_HEADER
 from server.http.app import make_app
 from server.service.service import BestViewService
 
-ALL = frozenset(EVERYBODY)
+ALL = frozenset(TOKEN_ENTRIES)
 NOBODY = "nobody"
 ANYBODY = ALL | {NOBODY}
 WATCHERS = frozenset({"lead", "desk"})
@@ -89,16 +89,16 @@ def who_may(method: str, path: str) -> frozenset[str]:
 
 
 @pytest.fixture
-async def site(tmp_path: Path) -> AsyncIterator[Hall]:
-    async with locked(tmp_path) as hall:
-        see(hall)
-        yield hall
+async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
+    async with serve_with_tokens(tmp_path) as served:
+        show_people(served)
+        yield served
 
 
-def all_routes(hall: Hall) -> list[tuple[str, str]]:
+def all_routes(served: ServedSite) -> list[tuple[str, str]]:
     found = {
         (route.method, route.resource.canonical)
-        for route in make_app(BestViewService(hall.service)).router.routes()
+        for route in make_app(BestViewService(served.service)).router.routes()
         if route.resource is not None
     }
     return sorted(found)
@@ -116,10 +116,10 @@ def filled(path: str, number: int = 1, camera: str = A) -> str:
     return path
 
 
-async def status(hall: Hall, method: str, path: str, who: str) -> int:
+async def status(served: ServedSite, method: str, path: str, who: str) -> int:
     """Ask for an answer and do not wait for its body, which may have no end."""
     heads = {CSRF_HEADER: "1", **({} if who == NOBODY else bearer(who))}
-    async with hall.session.request(
+    async with served.session.request(
         method,
         path,
         headers=heads,
@@ -130,7 +130,7 @@ async def status(hall: Hall, method: str, path: str, who: str) -> int:
         return answer.status
 
 
-async def test_every_route_admits_exactly_the_permitted_tokens(site: Hall) -> None:
+async def test_every_route_admits_exactly_the_permitted_tokens(site: ServedSite) -> None:
     routes = all_routes(site)
     assert len(routes) > 60
     wrong = []
@@ -145,7 +145,7 @@ async def test_every_route_admits_exactly_the_permitted_tokens(site: Hall) -> No
     assert wrong == []
 
 
-async def test_a_limited_token_sees_only_its_person_or_camera(site: Hall) -> None:
+async def test_a_limited_token_sees_only_its_person_or_camera(site: ServedSite) -> None:
     for method, path in all_routes(site):
         if "{object}" in path:
             assert await status(site, method, filled(path, number=2), "family") == 403, path
@@ -153,20 +153,20 @@ async def test_a_limited_token_sees_only_its_person_or_camera(site: Hall) -> Non
             assert await status(site, method, filled(path, camera=B), "door") == 403, path
 
 
-async def test_unknown_and_forbidden_people_get_the_same_answer(site: Hall) -> None:
+async def test_unknown_and_forbidden_people_get_the_same_answer(site: ServedSite) -> None:
     assert await status(site, "GET", "/objects/99/best.mp4", "family") == 403
     assert await status(site, "GET", "/cameras/none/live.mp4", "door") == 403
 
 
 async def test_a_token_for_one_person_cannot_fix_the_view_to_a_camera(
-    site: Hall,
+    site: ServedSite,
 ) -> None:
     assert await status(site, "GET", "/objects/1/best.mp4?camera=c0", "family") == 403
     assert await status(site, "GET", "/objects/1/best.mp4?camera=c0", "desk") == 200
     assert await status(site, "GET", "/objects/1/best.mp4?prefer=c0", "family") == 200
 
 
-async def test_a_token_for_a_person_follows_a_merge_of_their_number(site: Hall) -> None:
+async def test_a_token_for_a_person_follows_a_merge_of_their_number(site: ServedSite) -> None:
     assert await status(site, "GET", "/objects/2/best.mp4", "family") == 403
     site.service.decider.people.merge(2, 1)
     site.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
@@ -174,7 +174,7 @@ async def test_a_token_for_a_person_follows_a_merge_of_their_number(site: Hall) 
     assert await status(site, "GET", "/objects/1/best.mp4", "family") == 200
 
 
-async def test_health_checks_need_no_token_and_are_not_rate_limited(site: Hall) -> None:
+async def test_health_checks_need_no_token_and_are_not_rate_limited(site: ServedSite) -> None:
     wrong = {"Authorization": "Bearer nothing-that-was-given"}
     for _ in range(100):
         async with site.session.get("/api/site", headers=wrong) as answer:

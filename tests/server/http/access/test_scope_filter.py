@@ -11,21 +11,21 @@ from typing import Any
 import aiohttp
 import pytest
 
-from fakes.http.tokens import bearer, locked, token_of
-from fakes.service.fed_site import A, B, Hall, see
-from fakes.service.scripted_cameras import LARGE, SMALL, tracks, word
+from fakes.http.tokens import bearer, serve_with_tokens, token_of
+from fakes.service.fed_site import A, B, ServedSite, show_people
+from fakes.service.scripted_cameras import LARGE, SMALL, camera_tracks, tracks
 from server.messaging.operator_messages import RiskEvent
 
 
 @pytest.fixture
-async def site(tmp_path: Path) -> AsyncIterator[Hall]:
-    async with locked(tmp_path) as hall:
-        see(hall)
-        yield hall
+async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
+    async with serve_with_tokens(tmp_path) as served:
+        show_people(served)
+        yield served
 
 
-async def get(hall: Hall, path: str, who: str) -> Any:
-    async with hall.session.get(path, headers=bearer(who)) as answer:
+async def get(served: ServedSite, path: str, who: str) -> Any:
+    async with served.session.get(path, headers=bearer(who)) as answer:
         assert answer.status == 200
         text = await answer.text()
         return (
@@ -55,13 +55,13 @@ def people_in(gop: dict[str, Any]) -> set[int]:
     return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | received
 
 
-async def test_only_the_scoped_person_is_listed(site: Hall) -> None:
+async def test_only_the_scoped_person_is_listed(site: ServedSite) -> None:
     assert [it["object"] for it in (await get(site, "/api/objects", "desk"))["objects"]] == [1, 2]
     assert [it["object"] for it in (await get(site, "/api/objects", "family"))["objects"]] == [1]
     assert (await get(site, "/api/objects", "door"))["objects"] == []
 
 
-async def test_only_the_scoped_camera_is_listed_without_others_errors(site: Hall) -> None:
+async def test_only_the_scoped_camera_is_listed_without_others_errors(site: ServedSite) -> None:
     site.service.ingest.states[B].refused = "its parameters are not those of camera c0"
     everything = (await get(site, "/api/cameras", "desk"))["cameras"]
     assert [it["camera"] for it in everything] == [A, B]
@@ -74,7 +74,7 @@ async def test_only_the_scoped_camera_is_listed_without_others_errors(site: Hall
     assert (await get(site, "/api/site", "family"))["cameras"] == [A, B]
 
 
-async def test_events_are_limited_to_the_scoped_person(site: Hall) -> None:
+async def test_events_are_limited_to_the_scoped_person(site: ServedSite) -> None:
     async with (
         site.session.get("/api/events", headers=bearer("family")) as response,
         site.session.get("/api/events", headers=bearer("desk")) as all_of_it,
@@ -92,14 +92,14 @@ async def test_events_are_limited_to_the_scoped_person(site: Hall) -> None:
         assert [it["choices"]["1"] for it in gops] == [it["choices"]["1"] for it in every]
 
 
-async def test_events_are_limited_to_the_scoped_camera(site: Hall) -> None:
+async def test_events_are_limited_to_the_scoped_camera(site: ServedSite) -> None:
     async with site.session.get("/api/events", headers=bearer("door")) as answer:
         gops = [content for name, content in await events(answer, 0) if name == "gop"]
     assert all(set(gop["boxes"]) == {A} for gop in gops)
     assert not any(gop["choices"] or gop["cuts"] for gop in gops)
 
 
-async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "server.service.operator_assist.flag_budget._COOLDOWN_S", -1.0
     )  # both have a flag, though they are of one
@@ -107,10 +107,10 @@ async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.Mo
         RiskEvent(reason="crossing", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
         RiskEvent(reason="track_loss", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
-    said = word(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
+    said = camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as response:
         site.service.ingest.tracks(tracks(said))
-        site.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
+        site.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
         site.service.decide()
         everything = (await get(site, "/api/flags", "desk"))["flags"]
         assert [(it["objects"], it["cameras"], it["state"]) for it in everything] == [
@@ -128,7 +128,7 @@ async def test_flags_are_limited_to_the_scope(site: Hall, monkeypatch: pytest.Mo
         assert names.index("flag") < names.index("gop"), "who comes is told what is open"
 
 
-async def test_recorded_decisions_are_limited_to_the_scoped_person(site: Hall) -> None:
+async def test_recorded_decisions_are_limited_to_the_scoped_person(site: ServedSite) -> None:
     everything = await get(site, "/api/past?from=p0", "desk")
     response = await get(site, "/api/past?from=p0", "family")
     assert {it for gop in everything for it in people_in({"merged": [], "split": [], **gop})} == {1, 2}
@@ -136,13 +136,13 @@ async def test_recorded_decisions_are_limited_to_the_scoped_person(site: Hall) -
     assert [it["first"] for it in response] == [it["first"] for it in everything]
 
 
-async def test_the_last_subscriber_of_a_scope_leaves_no_state(site: Hall) -> None:
+async def test_the_last_subscriber_of_a_scope_leaves_no_state(site: ServedSite) -> None:
     for who in ("family", "door", "desk"):
         async with site.session.get("/api/events", headers=bearer(who)) as answer:
             await events(answer, 0)
 
 
-async def test_playlist_uris_have_the_token_of_the_request(site: Hall) -> None:
+async def test_playlist_uris_have_the_token_of_the_request(site: ServedSite) -> None:
     for epoch in range(3, 12):
         site.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
     token = token_of("family")
@@ -152,7 +152,7 @@ async def test_playlist_uris_have_the_token_of_the_request(site: Hall) -> None:
             text = await answer.text()
         lines = [it for it in text.splitlines() if it and (not it.startswith("#") or "URI=" in it)]
         assert len(lines) > 1
-        assert all("token=what-family-was-given" in it for it in lines)
+        assert all("token=token-of-family" in it for it in lines)
         address = next(it for it in lines if not it.startswith("#"))
         async with site.session.get(f"/objects/1/hls/{address}") as answer:
             assert answer.status == 200
@@ -161,7 +161,7 @@ async def test_playlist_uris_have_the_token_of_the_request(site: Hall) -> None:
         assert "token=" not in await answer.text()
 
 
-async def test_no_token_is_logged(site: Hall, caplog: pytest.LogCaptureFixture) -> None:
+async def test_no_token_is_logged(site: ServedSite, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG)
     for token in (token_of("desk"), "a wrong one that is as long as a right one"):
         for path in ("/api/objects", "/objects/1/best.mp4", "/api/nothing", "/objects/99/best.mp4"):

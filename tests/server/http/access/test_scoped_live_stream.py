@@ -10,47 +10,49 @@ import pytest
 
 from fakes.http.tokens import token_of
 from fakes.media.audio import FRAMES as SOUNDING
-from fakes.media.audio import beeps, sends, write_flashes
-from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.media.audio import beeps, send_audio, write_flashes
+from fakes.media.browser_playback import PLAY_JS, play_in_chromium
 from fakes.programs import needs_chromium
 from fakes.service.departure import (
     EPOCHS,
-    PATIENT,
-    begun,
-    chosen,
+    PATIENT_HTTP,
+    assert_equal_pictures,
+    camera_pictures,
+    chosen_pictures,
     decoded,
-    equal,
-    expected,
-    fetched,
-    go_on,
+    departure_site,
+    expected_pictures,
+    feed_epochs,
+    fetch,
+    finish_streams,
     is_gray,
-    left,
-    own,
-    to_the_end,
+    open_stream,
 )
-from fakes.service.fed_site import Hall
+from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE
 from server.service.streaming.subscriber_queue import Chunk
 
-HLS = {**PATIENT, "hls_segment_s": 0.4, "hls_window_s": 8.0}
+HLS = {**PATIENT_HTTP, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 """Two GOPs in a segment, and all that there is in the playlist."""
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "webm"])
 async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: Path, form: str) -> None:
     codec = "vp8" if form == "webm" else "h264"
-    async with left(tmp_path, encode={"codec": codec}) as hall:
-        decisions = go_on(hall, range(3))
-        theirs, all_of_it = [await begun(hall, f"/objects/1/best.{form}", who) for who in ("family", "desk")]
-        decisions += go_on(hall, range(3, EPOCHS))
-        narrow, full = map(decoded, await to_the_end(hall, theirs, all_of_it))
-    right = expected(decisions, codec)
+    async with departure_site(tmp_path, encode={"codec": codec}) as served:
+        decisions = feed_epochs(served, range(3))
+        theirs, all_of_it = [
+            await open_stream(served, f"/objects/1/best.{form}", who) for who in ("family", "desk")
+        ]
+        decisions += feed_epochs(served, range(3, EPOCHS))
+        narrow, full = map(decoded, await finish_streams(served, theirs, all_of_it))
+    right = expected_pictures(decisions, codec)
     if form == "ts":  # which begins at some time of its own
         narrow, full = (
             {pulse - max(it) + max(right): shown for pulse, shown in it.items()} for it in (narrow, full)
         )
-    equal(narrow, right)
-    equal(full, chosen(decisions, codec))
+    assert_equal_pictures(narrow, right)
+    assert_equal_pictures(full, chosen_pictures(decisions, codec))
     grey = [pulse for pulse in narrow if is_gray(narrow[pulse])]
     assert grey == list(range(grey[0], grey[-1] + 1))
     assert len(grey) > 3 * GOP
@@ -59,57 +61,59 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
 
 
 async def test_a_stream_opened_while_the_person_is_away_begins_with_gray(tmp_path: Path) -> None:
-    async with left(tmp_path) as hall:
-        decisions = go_on(hall, range(14))
-        theirs = await begun(hall, "/objects/1/best.mp4", "family")
-        decisions += go_on(hall, range(14, EPOCHS))
-        shown = decoded((await to_the_end(hall, theirs))[0])
+    async with departure_site(tmp_path) as served:
+        decisions = feed_epochs(served, range(14))
+        theirs = await open_stream(served, "/objects/1/best.mp4", "family")
+        decisions += feed_epochs(served, range(14, EPOCHS))
+        shown = decoded((await finish_streams(served, theirs))[0])
     assert is_gray(shown[min(shown)])
-    equal(shown, expected(decisions))
+    assert_equal_pictures(shown, expected_pictures(decisions))
 
 
 async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> None:
-    async with left(tmp_path) as hall:
-        decisions = go_on(hall, range(3))
-        theirs = await begun(hall, "/objects/1/best.mp4?prefer=c0", "family")
-        decisions += go_on(hall, range(3, EPOCHS))
-        shown = decoded((await to_the_end(hall, theirs))[0])
+    async with departure_site(tmp_path) as served:
+        decisions = feed_epochs(served, range(3))
+        theirs = await open_stream(served, "/objects/1/best.mp4?prefer=c0", "family")
+        decisions += feed_epochs(served, range(3, EPOCHS))
+        shown = decoded((await finish_streams(served, theirs))[0])
     is_as_expected = {
-        pulse: is_gray(picture) for pulse, picture in expected(decisions).items() if pulse in shown
+        pulse: is_gray(picture) for pulse, picture in expected_pictures(decisions).items() if pulse in shown
     }
     assert {pulse: is_gray(picture) for pulse, picture in shown.items()} == is_as_expected
-    np.testing.assert_array_equal(shown[max(shown)], own("c0")[max(shown)])
+    np.testing.assert_array_equal(shown[max(shown)], camera_pictures("c0")[max(shown)])
 
 
-async def listed(hall: Hall, pattern: str, who: str) -> bytes:
+async def listed(served: ServedSite, pattern: str, who: str) -> bytes:
     """Fetch what a playlist names, behind what a player needs first."""
-    text = (await fetched(hall, "/objects/1/hls/index.m3u8", who)).decode()
+    text = (await fetch(served, "/objects/1/hls/index.m3u8", who)).decode()
     names = ["init.mp4", *re.findall(pattern, text, re.MULTILINE)]
-    return b"".join([await fetched(hall, f"/objects/1/hls/{name}", who) for name in names])
+    return b"".join([await fetch(served, f"/objects/1/hls/{name}", who) for name in names])
 
 
 @pytest.mark.parametrize("pattern", [r"^[0-9]+\.m4s$", r'PART:.*URI="([0-9.]+\.m4s)"'])
 async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: Path, pattern: str) -> None:
-    async with left(tmp_path, http=HLS) as hall:
-        decisions = go_on(hall, range(EPOCHS - 5))
-        narrow, full = [decoded(await listed(hall, pattern, who)) for who in ("family", "desk")]
+    async with departure_site(tmp_path, http=HLS) as served:
+        decisions = feed_epochs(served, range(EPOCHS - 5))
+        narrow, full = [decoded(await listed(served, pattern, who)) for who in ("family", "desk")]
     until = max(full) + 1
-    right = expected(decisions)
+    right = expected_pictures(decisions)
     for pulse in range(min(narrow), until):  # what stands all segment long lasts
         standing = narrow[max(it for it in narrow if it <= pulse)]
         np.testing.assert_array_equal(standing, right[pulse], str(pulse))
-    equal(full, {pulse: picture for pulse, picture in chosen(decisions).items() if pulse < until})
+    assert_equal_pictures(
+        full, {pulse: picture for pulse, picture in chosen_pictures(decisions).items() if pulse < until}
+    )
     assert any(map(is_gray, narrow.values()))
 
 
 async def test_sound_is_silent_without_the_person(tmp_path: Path) -> None:
     recording = write_flashes(tmp_path / "flashes.mp4", SOUNDING)
-    async with left(tmp_path, sound={"source": str(recording)}) as hall:
-        sends(hall.service, recording)
-        go_on(hall, range(3))
-        answers = [await begun(hall, "/objects/1/best.mp4", who) for who in ("family", "desk")]
-        go_on(hall, range(3, EPOCHS))
-        narrow, full = await to_the_end(hall, *answers)
+    async with departure_site(tmp_path, sound={"source": str(recording)}) as served:
+        send_audio(served.service, recording)
+        feed_epochs(served, range(3))
+        answers = [await open_stream(served, "/objects/1/best.mp4", who) for who in ("family", "desk")]
+        feed_epochs(served, range(3, EPOCHS))
+        narrow, full = await finish_streams(served, *answers)
     assert [round(it * FPS) for it in beeps(full)] == [20, 40, 60, 80, 100]
     assert [round(it * FPS) for it in beeps(narrow)] == [20, 80, 100]
 
@@ -118,13 +122,18 @@ async def test_sound_is_silent_without_the_person(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", ["mp4", "webm"])
 async def test_a_browser_plays_held_and_gray_pictures_without_a_break(tmp_path: Path, form: str) -> None:
     codec = "vp8" if form == "webm" else "h264"
-    async with left(tmp_path, encode={"codec": codec}) as hall:
-        go_on(hall, range(3))
-        kind = f'video/{form}; codecs="{hall.service.stream_format.codec}"'
+    async with departure_site(tmp_path, encode={"codec": codec}) as served:
+        feed_epochs(served, range(3))
+        kind = f'video/{form}; codecs="{served.service.stream_format.codec}"'
         path = f"/objects/1/best.{form}?token={token_of('family')}"
-        decisions = await seen_in_chromium(
-            *(hall.port, hall.service.splicer, EPOCHS - 2, lambda gop: go_on(hall, range(gop + 2, gop + 3))),
-            *(PLAY, path, kind, 4),
+        decisions = await play_in_chromium(
+            *(
+                served.port,
+                served.service.splicer,
+                EPOCHS - 2,
+                lambda gop: feed_epochs(served, range(gop + 2, gop + 3)),
+            ),
+            *(PLAY_JS, path, kind, 4),
         )
     assert decisions["error"] == ""
     assert decisions["ranges"] == 1
@@ -132,19 +141,19 @@ async def test_a_browser_plays_held_and_gray_pictures_without_a_break(tmp_path: 
 
 
 async def test_gray_pictures_are_encoded_once_for_all_viewers(tmp_path: Path) -> None:
-    async with left(tmp_path) as hall:
+    async with departure_site(tmp_path) as served:
         for epoch in range(2):
-            hall.service.feed(epoch, {camera: {1: LARGE, 2: LARGE} for camera in CAMERAS})
+            served.service.feed(epoch, {camera: {1: LARGE, 2: LARGE} for camera in CAMERAS})
         for epoch in range(2, 14):
-            hall.service.feed(epoch, {camera: {1: None, 2: None} for camera in CAMERAS})
-        viewers = [hall.service.splicer.scoped_persons[number].subscribe() for number in (1, 2)]
+            served.service.feed(epoch, {camera: {1: None, 2: None} for camera in CAMERAS})
+        viewers = [served.service.splicer.scoped_persons[number].subscribe() for number in (1, 2)]
         pieces: list[Chunk] = [viewer._queue[-1] for viewer in viewers]
     assert pieces[0] is pieces[1]
     assert pieces[0].random_access
 
 
 async def test_a_site_without_tokens_has_no_scoped_streams(tmp_path: Path) -> None:
-    async with left(tmp_path, access={"tokens": None}) as hall:
-        decisions = go_on(hall, range(14))
+    async with departure_site(tmp_path, access={"tokens": None}) as served:
+        decisions = feed_epochs(served, range(14))
         assert decisions[-1].choices[1]
-        assert not hall.service.splicer.scoped_persons
+        assert not served.service.splicer.scoped_persons

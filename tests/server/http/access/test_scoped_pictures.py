@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.http.tokens import bearer, line_of, write_tokens
-from fakes.service.departure import GRAY, begun, fetched, go_on, left
-from fakes.service.drawn_site import Drawn, Image, drawn_room, parts, read_film
+from fakes.http.tokens import bearer, token_entry, write_tokens
+from fakes.service.departure import GRAY, departure_site, feed_epochs, fetch, open_stream
+from fakes.service.drawn_site import DrawnSite, Image, drawn_room, jpeg_parts, read_film
 from fakes.service.scripted_cameras import GOP
 
 NEARLY = 3
@@ -30,15 +30,15 @@ def picture_of(jpeg: bytes) -> Image:
 
 @pytest.mark.parametrize("query", ["", "?overlay=1"])
 async def test_scoped_pictures_are_gray_without_the_person(tmp_path: Path, query: str) -> None:
-    async with left(tmp_path) as hall:
-        go_on(hall, range(12))
-        theirs = picture_of(await fetched(hall, f"/objects/1/best.jpg{query}", "family"))
-        everything = picture_of(await fetched(hall, f"/objects/1/best.jpg{query}", "desk"))
+    async with departure_site(tmp_path) as served:
+        feed_epochs(served, range(12))
+        theirs = picture_of(await fetch(served, f"/objects/1/best.jpg{query}", "family"))
+        everything = picture_of(await fetch(served, f"/objects/1/best.jpg{query}", "desk"))
         async with (
-            await begun(hall, f"/objects/1/best.mjpeg{query}", "family") as series,
-            aclosing(parts(series)) as shown,
+            await open_stream(served, f"/objects/1/best.mjpeg{query}", "family") as series,
+            aclosing(jpeg_parts(series)) as shown,
         ):
-            go_on(hall, range(12, 14))
+            feed_epochs(served, range(12, 14))
             several = [picture_of((await anext(shown)).jpeg) for _ in range(2)]
     assert is_nearly_grey(theirs)
     assert not is_nearly_grey(everything)
@@ -46,10 +46,10 @@ async def test_scoped_pictures_are_gray_without_the_person(tmp_path: Path, query
 
 
 async def test_a_scoped_stream_with_boxes_is_gray_without_the_person(tmp_path: Path) -> None:
-    async with left(tmp_path) as hall:
-        go_on(hall, range(12))
-        async with await begun(hall, "/objects/1/best.mp4?overlay=1", "family") as film:
-            go_on(hall, range(12, 15))
+    async with departure_site(tmp_path) as served:
+        feed_epochs(served, range(12))
+        async with await open_stream(served, "/objects/1/best.mp4?overlay=1", "family") as film:
+            feed_epochs(served, range(12, 15))
             data = await read_film(film, 3 * GOP)
     with av.open(io.BytesIO(data), "r") as stream:
         pictures = [it.to_ndarray(format="bgr24") for it in stream.decode(video=0)]
@@ -58,7 +58,7 @@ async def test_a_scoped_stream_with_boxes_is_gray_without_the_person(tmp_path: P
 
 
 async def test_only_the_box_of_the_scoped_person_is_drawn(tmp_path: Path) -> None:
-    path = write_tokens(tmp_path / "tokens.yaml", line_of("family"), line_of("desk"))
+    path = write_tokens(tmp_path / "tokens.yaml", token_entry("family"), token_entry("desk"))
     async with aclosing(drawn_room(access={"tokens": str(path)})) as rooms:
         room = await anext(rooms)
         decision = room.decisions[max(room.decisions)]
@@ -71,7 +71,7 @@ async def test_only_the_box_of_the_scoped_person_is_drawn(tmp_path: Path) -> Non
         assert has_box(theirs, plain, box) == (number == 1)
 
 
-async def still(room: Drawn, query: str, who: str) -> Image:
+async def still(room: DrawnSite, query: str, who: str) -> Image:
     async with room.session.get(f"/objects/1/best.jpg{query}", headers=bearer(who)) as answer:
         assert answer.status == 200
         return picture_of(await answer.read())

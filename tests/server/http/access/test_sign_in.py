@@ -13,8 +13,8 @@ import pytest
 from aiohttp import ClientSession, CookieJar, web
 from aiohttp.test_utils import make_mocked_request
 
-from fakes.http.tokens import bearer, line_of, locked, token_of, write_tokens
-from fakes.service.fed_site import Hall, opened
+from fakes.http.tokens import bearer, serve_with_tokens, token_entry, token_of, write_tokens
+from fakes.service.fed_site import ServedSite, serve_site
 from server.config.tokens_file import token_digest
 from server.http.access.authentication import COOKIE_PREFIX, Authenticator, Credential
 from server.http.access.csrf import CSRF_HEADER
@@ -43,27 +43,29 @@ HEADS_OF_PROXIES = (
 
 
 @pytest.fixture
-async def site(tmp_path: Path) -> AsyncIterator[Hall]:
+async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Serve a site that takes a token."""
-    async with locked(tmp_path) as it:
+    async with serve_with_tokens(tmp_path) as it:
         yield it
 
 
 async def asked(
-    hall: Hall, path: str = SESSION, method: str = "GET", json: object = None, **headers: str
+    served: ServedSite, path: str = SESSION, method: str = "GET", json: object = None, **headers: str
 ) -> tuple[int, str]:
     """Return the status and the error; headers are named with _ for -."""
     heads = {name.replace("_", "-"): value for name, value in headers.items()}
-    async with hall.session.request(method, path, headers=heads, json=json) as answer:
+    async with served.session.request(method, path, headers=heads, json=json) as answer:
         assert "Access-Control-Allow-Origin" not in answer.headers
         return answer.status, (await answer.json()).get("error", "")
 
 
-async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_operate(hall: Hall) -> None:
-    session = await hall.get_json(SESSION)
+async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_operate(
+    served: ServedSite,
+) -> None:
+    session = await served.get_json(SESSION)
     assert session == {"by_token": False, "name": None, "role": "operate", "object": None, "camera": None}
-    assert await asked(hall, CAMERAS, Host=f"localhost:{hall.port}") == (200, "")
-    async with hall.session.get(SESSION, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
+    assert await asked(served, CAMERAS, Host=f"localhost:{served.port}") == (200, "")
+    async with served.session.get(SESSION, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
         assert (await answer.json())["role"] == "watch"
 
 
@@ -81,9 +83,9 @@ async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_opera
     ],
 )
 async def test_without_tokens_other_machines_cannot_operate_and_get_instructions(
-    hall: Hall, head: str, value: str
+    served: ServedSite, head: str, value: str
 ) -> None:
-    status, error = await asked(hall, CAMERAS, **{head.replace("-", "_"): value})
+    status, error = await asked(served, CAMERAS, **{head.replace("-", "_"): value})
     assert status == 403
     assert "access.tokens" in error
     assert "\n" not in error
@@ -137,19 +139,19 @@ def test_loopback_addresses_are_this_machine(address: str, here: bool) -> None:
 @pytest.mark.parametrize("path", [SESSION, "/api/operator/view_selection"])
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 async def test_pages_of_other_sites_can_neither_read_nor_change_anything(
-    hall: Hall, site: str, path: str
+    served: ServedSite, site: str, path: str
 ) -> None:
-    assert (await asked(hall, path, Sec_Fetch_Site=site))[0] == 403
-    assert (await asked(hall, path, method="DELETE", Sec_Fetch_Site=site))[0] == 403
+    assert (await asked(served, path, Sec_Fetch_Site=site))[0] == 403
+    assert (await asked(served, path, method="DELETE", Sec_Fetch_Site=site))[0] == 403
     for method in ("PUT", "POST", "DELETE"):
-        status, error = await asked(hall, path, method=method, json={})
+        status, error = await asked(served, path, method=method, json={})
         assert status == 403
         assert CSRF_HEADER in error
     asks = {"Origin": "https://evil.example", "Access_Control_Request_Method": "DELETE"}
-    assert (await asked(hall, path, method="OPTIONS", **asks))[0] == 403
+    assert (await asked(served, path, method="OPTIONS", **asks))[0] == 403
 
 
-async def test_with_tokens_requests_need_one_and_answers_reveal_none(site: Hall) -> None:
+async def test_with_tokens_requests_need_one_and_answers_reveal_none(site: ServedSite) -> None:
     for path in (SESSION, CAMERAS, "/api/objects"):
         async with site.session.get(path) as answer:
             assert answer.status == 401
@@ -162,10 +164,10 @@ async def test_with_tokens_requests_need_one_and_answers_reveal_none(site: Hall)
         assert await asked(site, CAMERAS, **bearer("lead"), **more) == (200, "")
     async with site.session.get("/api/operator/config", headers=bearer("lead")) as answer:
         told = await answer.text()
-    assert not any(line_of(name)["sha256"] in told for name in ("lead", "desk"))
+    assert not any(token_entry(name)["sha256"] in told for name in ("lead", "desk"))
 
 
-async def test_a_session_describes_the_permissions_of_its_token(site: Hall) -> None:
+async def test_a_session_describes_the_permissions_of_its_token(site: ServedSite) -> None:
     async with site.session.get(SESSION, headers=bearer("family")) as answer:
         assert await answer.json() == {
             "by_token": True,
@@ -178,23 +180,23 @@ async def test_a_session_describes_the_permissions_of_its_token(site: Hall) -> N
     assert (status, error) == (403, "the token 'desk' is only for watching")
 
 
-async def test_players_send_the_token_in_the_query(site: Hall) -> None:
+async def test_players_send_the_token_in_the_query(site: ServedSite) -> None:
     async with site.session.get("/api/objects", params={"token": token_of("desk")}) as answer:
         assert answer.status == 200
     async with site.session.get("/api/objects", params={"token": "wrong"}) as answer:
         assert answer.status == 401
 
 
-async def sign_in(hall: Hall, name: str) -> str:
+async def sign_in(served: ServedSite, name: str) -> str:
     """Return the cookie, as a browser sends it."""
-    async with hall.session.post(SESSION, headers=MINE, json={"token": token_of(name)}) as answer:
+    async with served.session.post(SESSION, headers=MINE, json={"token": token_of(name)}) as answer:
         assert answer.status == 200
         [cookie] = answer.cookies.values()
-    hall.session.cookie_jar.clear()
+    served.session.cookie_jar.clear()
     return f"{cookie.key}={cookie.value}"
 
 
-async def test_signing_in_sets_an_http_only_cookie_until_signing_out(site: Hall) -> None:
+async def test_signing_in_sets_an_http_only_cookie_until_signing_out(site: ServedSite) -> None:
     async with site.session.post(SESSION, headers=MINE, json={"token": token_of("lead")}) as answer:
         assert answer.status == 200
         [cookie] = answer.cookies.values()
@@ -209,27 +211,27 @@ async def test_signing_in_sets_an_http_only_cookie_until_signing_out(site: Hall)
     assert (await asked(site, CAMERAS, Cookie=kept))[0] == 401  # not only forgotten by the browser
 
 
-async def test_behind_an_https_proxy_the_cookie_is_secure(site: Hall) -> None:
+async def test_behind_an_https_proxy_the_cookie_is_secure(site: ServedSite) -> None:
     heads = {**MINE, "X-Forwarded-Proto": "https"}
     async with site.session.post(SESSION, headers=heads, json={"token": token_of("desk")}) as answer:
         [cookie] = answer.cookies.values()
     assert cookie["secure"]
 
 
-async def test_a_token_takes_precedence_over_a_session(site: Hall) -> None:
+async def test_a_token_takes_precedence_over_a_session(site: ServedSite) -> None:
     kept = await sign_in(site, "desk")
     assert (await asked(site, CAMERAS, Cookie=kept))[0] == 403
     assert (await asked(site, CAMERAS, Cookie=kept, **bearer("lead")))[0] == 200
 
 
 async def test_signing_in_to_another_service_of_the_machine_keeps_this_session(
-    site: Hall, tmp_path: Path
+    site: ServedSite, tmp_path: Path
 ) -> None:
     url = f"http://127.0.0.1:{site.port}{SESSION}"
-    tokens = write_tokens(tmp_path / "yard.yaml", line_of("lead"))
+    tokens = write_tokens(tmp_path / "yard.yaml", token_entry("lead"))
     other = {"site": {"name": "yard"}, "access": {"tokens": str(tokens)}}
     async with (
-        aclosing(opened(**other)) as halls,
+        aclosing(serve_site(**other)) as halls,
         ClientSession(cookie_jar=CookieJar(unsafe=True)) as browser,
     ):
         for address in (url, f"http://127.0.0.1:{(await anext(halls)).port}{SESSION}", url):
@@ -258,7 +260,7 @@ def test_a_session_expires_and_a_token_has_a_limited_number_of_sessions() -> Non
 @pytest.mark.parametrize(
     "head", [b"Authorization: Bearer \xff\xfe", f"Cookie: {COOKIE_PREFIX}_hall_0=".encode() + b"\xff"]
 )
-async def test_invalid_bytes_are_neither_a_token_nor_a_session(site: Hall, head: bytes) -> None:
+async def test_invalid_bytes_are_neither_a_token_nor_a_session(site: ServedSite, head: bytes) -> None:
     reader, writer = await asyncio.open_connection("127.0.0.1", site.port)
     writer.write(f"GET {SESSION} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n".encode() + head)
     writer.write(b"\r\n\r\n")
@@ -268,7 +270,7 @@ async def test_invalid_bytes_are_neither_a_token_nor_a_session(site: Hall, head:
 
 
 async def test_wrong_tokens_are_rate_limited_but_known_valid_ones_are_not(
-    site: Hall,
+    site: ServedSite,
 ) -> None:
     assert (await asked(site, **bearer("desk")))[0] == 200
     codes = [(await asked(site, Authorization=f"Bearer {it}"))[0] for it in range(7)]
@@ -285,7 +287,7 @@ async def test_wrong_tokens_are_rate_limited_but_known_valid_ones_are_not(
 
 def test_retry_after_is_never_zero(tmp_path: Path) -> None:
     now = [0.0]
-    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("desk"))
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("desk"))
     authenticator = Authenticator(tokens, now=lambda: now[0])
     request = make_mocked_request("GET", "/")
     for _ in range(5):
@@ -298,7 +300,7 @@ def test_retry_after_is_never_zero(tmp_path: Path) -> None:
     assert authenticator.check_token(request, token_of("desk")) == Credential(token_digest(token_of("desk")))
 
 
-async def test_an_expired_cookie_does_not_count_as_a_wrong_token(site: Hall) -> None:
+async def test_an_expired_cookie_does_not_count_as_a_wrong_token(site: ServedSite) -> None:
     codes = [(await asked(site, Cookie=f"{COOKIE_PREFIX}_hall_0={it}"))[0] for it in range(9)]
     assert codes == 9 * [401]
 
@@ -320,7 +322,7 @@ def test_wrong_tokens_are_forgiven_one_by_one_for_each_address() -> None:
 
 
 @pytest.mark.parametrize("body", ["", "no JSON", "[]", '{"token": 7}', '{"token": "x", "more": 1}'])
-async def test_an_invalid_sign_in_is_refused_with_one_line(site: Hall, body: str) -> None:
+async def test_an_invalid_sign_in_is_refused_with_one_line(site: ServedSite, body: str) -> None:
     async with site.session.post(SESSION, headers=MINE, data=body) as answer:
         assert answer.status == 400
         error = (await answer.json())["error"]
@@ -329,18 +331,18 @@ async def test_an_invalid_sign_in_is_refused_with_one_line(site: Hall, body: str
 
 
 @pytest.mark.parametrize("packing", ["gzip", "deflate"])
-async def test_request_bodies_are_not_decompressed(site: Hall, packing: str) -> None:
+async def test_request_bodies_are_not_decompressed(site: ServedSite, packing: str) -> None:
     heads = {**MINE, "Content-Encoding": packing}
     packed = compress(b'{"token": "x"}') if packing == "gzip" else b"nothing packed"
     async with site.session.post(SESSION, headers=heads, data=packed) as answer:
         assert answer.status == 400
 
 
-async def test_signing_in_without_tokens_is_refused(hall: Hall) -> None:
-    assert (await asked(hall, method="POST", json={"token": "x"}, **{CSRF_HEADER: "1"}))[0] == 400
+async def test_signing_in_without_tokens_is_refused(served: ServedSite) -> None:
+    assert (await asked(served, method="POST", json={"token": "x"}, **{CSRF_HEADER: "1"}))[0] == 400
 
 
-async def test_the_page_is_public_and_reveals_nothing(site: Hall) -> None:
+async def test_the_page_is_public_and_reveals_nothing(site: ServedSite) -> None:
     for path in ("/", "/operator"):
         async with site.session.get(path, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
             assert answer.status == 200

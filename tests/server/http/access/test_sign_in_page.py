@@ -11,10 +11,10 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.common.browser import chromium
-from fakes.http.tokens import line_of, locked, token_of, write_tokens
+from fakes.http.tokens import serve_with_tokens, token_entry, token_of, write_tokens
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import Hall, see
+from fakes.service.fed_site import ServedSite, show_people
 from fakes.timeouts import PATIENCE_MS
 
 pytestmark = [
@@ -33,10 +33,10 @@ async def browser() -> AsyncIterator[Browser]:
 @asynccontextmanager
 async def watching(
     browser: Browser, folder: Path, address: str = ""
-) -> AsyncIterator[tuple[Hall, Page, list[str]]]:
+) -> AsyncIterator[tuple[ServedSite, Page, list[str]]]:
     """Open the page of a site with tokens and two people; also yield the requests that it received."""
-    async with locked(folder) as hall:
-        see(hall)
+    async with serve_with_tokens(folder) as served:
+        show_people(served)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         page.set_default_timeout(PATIENCE_MS)
         await page.add_init_script(AXE.read_text(encoding="utf-8") if AXE.exists() else "")
@@ -44,8 +44,8 @@ async def watching(
         addresses: list[str] = []
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("request", lambda request: addresses.append(request.url))
-        await page.goto(f"http://127.0.0.1:{hall.port}/{address}")
-        yield hall, page, addresses
+        await page.goto(f"http://127.0.0.1:{served.port}/{address}")
+        yield served, page, addresses
         await page.close()
         assert complaints == []
 
@@ -89,7 +89,7 @@ async def test_a_viewer_whose_token_is_revoked_is_shown_the_sign_in_form(
         await field.fill(token_of("desk"))
         await page.keyboard.press("Enter")
         await expect(page.locator("#people li")).to_have_count(2)
-        write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+        write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
         await expect(field).to_be_visible()
 
 

@@ -14,8 +14,8 @@ import aiohttp
 import msgspec
 import pytest
 
-from fakes.http.tokens import LATER, bearer, line_of, locked, token_of, write_tokens
-from fakes.service.fed_site import A, B, Hall
+from fakes.http.tokens import IN_FUTURE, bearer, serve_with_tokens, token_entry, token_of, write_tokens
+from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.config.tokens_file import token_digest
 from server.http.access.csrf import CSRF_HEADER
@@ -31,17 +31,17 @@ def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-async def site(tmp_path: Path) -> AsyncIterator[Hall]:
-    async with locked(tmp_path) as hall:
-        hall.service.come(*CAMERAS)
+async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
+    async with serve_with_tokens(tmp_path) as served:
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
-        yield hall
+            served.service.feed(epoch, {A: {1: SMALL}, B: {}})
+        yield served
 
 
-async def stream(hall: Hall, path: str, **heads: str) -> aiohttp.ClientResponse:
+async def stream(served: ServedSite, path: str, **heads: str) -> aiohttp.ClientResponse:
     """Open a stream and read its beginning."""
-    answer = await hall.session.get(path, headers=heads)
+    answer = await served.session.get(path, headers=heads)
     assert answer.status == 200
     assert await answer.content.read(16)
     return answer
@@ -56,11 +56,11 @@ async def ended(answer: aiohttp.ClientResponse) -> None:
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/api/events"])
-async def test_revoking_a_token_ends_only_its_streams(site: Hall, tmp_path: Path, path: str) -> None:
+async def test_revoking_a_token_ends_only_its_streams(site: ServedSite, tmp_path: Path, path: str) -> None:
     by_head = await stream(site, path, **bearer("desk"))
     by_address = await stream(site, f"{path}?token={token_of('desk')}")
     other = await stream(site, path, **bearer("lead"))
-    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
     await ended(by_head)
     await ended(by_address)
     async with site.session.get("/api/objects", headers=bearer("desk")) as answer:
@@ -71,7 +71,7 @@ async def test_revoking_a_token_ends_only_its_streams(site: Hall, tmp_path: Path
 
 
 async def test_streams_of_its_sessions_end_too_and_those_of_a_signed_out_session(
-    site: Hall, tmp_path: Path
+    site: ServedSite, tmp_path: Path
 ) -> None:
     kept = []
     for name in ("desk", "desk", "lead"):
@@ -84,49 +84,49 @@ async def test_streams_of_its_sessions_end_too_and_those_of_a_signed_out_session
     signed_out, revoked, other = [await stream(site, "/api/events", Cookie=it) for it in kept]
     async with site.session.delete("/api/session", headers={CSRF_HEADER: "1", "Cookie": kept[0]}):
         await ended(signed_out)
-    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
     await ended(revoked)
     assert await other.content.readany()
     other.close()
 
 
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mp4", "/api/events"])
-@pytest.mark.parametrize("less", [{"camera": "c1"}, {"object": 9, "made": LATER}])
+@pytest.mark.parametrize("less", [{"camera": "c1"}, {"object": 9, "made": IN_FUTURE}])
 async def test_streams_outside_a_narrowed_scope_end(
-    site: Hall, tmp_path: Path, path: str, less: dict[str, object]
+    site: ServedSite, tmp_path: Path, path: str, less: dict[str, object]
 ) -> None:
     answer = await stream(site, path, **bearer("desk"))
-    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", **less))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", **less))
     await ended(answer)
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/objects/1/best.mjpeg"])
 async def test_a_persons_stream_ends_when_its_token_becomes_limited_to_that_person(
-    site: Hall, tmp_path: Path, path: str
+    site: ServedSite, tmp_path: Path, path: str
 ) -> None:
     """It would go on with the room when the person has left."""
     answer = await stream(site, path, **bearer("desk"))
-    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", object=1, made=LATER))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", object=1, made=IN_FUTURE))
     await ended(answer)
 
 
-async def test_streams_within_a_changed_scope_continue(site: Hall, tmp_path: Path) -> None:
+async def test_streams_within_a_changed_scope_continue(site: ServedSite, tmp_path: Path) -> None:
     camera = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
     events = await stream(site, "/api/events", **bearer("desk"))
-    write_tokens(tmp_path / "tokens.yaml", line_of("desk", role="watch", camera="c0"))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", camera="c0"))
     await ended(events)
     site.service.feed(3, {A: {1: SMALL}, B: {}})
     assert await camera.content.readany()
     camera.close()
 
 
-async def test_a_blocked_disk_does_not_delay_revocation(site: Hall, tmp_path: Path) -> None:
+async def test_a_blocked_disk_does_not_delay_revocation(site: ServedSite, tmp_path: Path) -> None:
     """All threads for recordings wait for it; the file of tokens is on another one."""
     answer = await stream(site, "/api/events", **bearer("desk"))
     hangs = threading.Event()
     waiting = [asyncio.create_task(asyncio.to_thread(hangs.wait, 30.0)) for _ in range(64)]
     await asyncio.sleep(0)
-    write_tokens(tmp_path / "tokens.yaml", line_of("lead"))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
     try:
         await asyncio.wait_for(ended(answer), 10.0)
     finally:
@@ -135,7 +135,7 @@ async def test_a_blocked_disk_does_not_delay_revocation(site: Hall, tmp_path: Pa
 
 
 async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
-    site: Hall, monkeypatch: pytest.MonkeyPatch
+    site: ServedSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looked, hangs = threading.Event(), threading.Event()
 
@@ -158,9 +158,9 @@ async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
         hangs.set()
 
 
-async def test_a_new_token_is_valid_without_a_restart(site: Hall, tmp_path: Path) -> None:
+async def test_a_new_token_is_valid_without_a_restart(site: ServedSite, tmp_path: Path) -> None:
     old = await stream(site, "/api/events", **bearer("desk"))
-    write_tokens(tmp_path / "tokens.yaml", line_of("guest", role="watch"))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("guest", role="watch"))
     await ended(old)
     async with site.session.get("/api/site", headers=bearer("guest")) as answer:
         assert answer.status == 200
@@ -171,26 +171,26 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
     tmp_path: Path, remembered: float | None, then: int
 ) -> None:
     """Object 1 may be another person; if the cameras have retained the numbers, the token stays valid."""
-    async with locked(tmp_path) as hall:
+    async with serve_with_tokens(tmp_path) as served:
         write_tokens(
             tmp_path / "tokens.yaml",
-            line_of("family", role="watch", object=1, made="2026-01-01T00:00:00Z"),
-            line_of("guest", role="watch"),
+            token_entry("family", role="watch", object=1, made="2026-01-01T00:00:00Z"),
+            token_entry("guest", role="watch"),
         )
-        hall.service.come(*CAMERAS)
+        served.service.connect_cameras(*CAMERAS)
         if remembered is not None:
             said = IdentitySnapshot(pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[])
             key = ZenohKeys("hall").camera("c0", "retained_identities")
-            hall.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(said), b""))
+            served.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(said), b""))
         while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)
-            async with hall.session.get("/api/site", headers=bearer("guest")) as answer:
+            async with served.session.get("/api/site", headers=bearer("guest")) as answer:
                 if answer.status == 200:
                     break
-        async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
+        async with served.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
             assert answer.status == 503, "nobody can tell yet"
-        hall.service.feed(0, {camera: {} for camera in CAMERAS})
-        async with hall.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
+        served.service.feed(0, {camera: {} for camera in CAMERAS})
+        async with served.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
             assert answer.status == then
             if then == 403:
                 error = (await answer.json())["error"]
@@ -202,7 +202,7 @@ class Looked:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.file = TokenStore(write_tokens(path, line_of("desk")))
+        self.file = TokenStore(write_tokens(path, token_entry("desk")))
 
     def has(self, name: str) -> bool:
         return self.file.find(token_digest(token_of(name))) is not None
@@ -228,7 +228,7 @@ def test_an_invalid_token_file_keeps_the_old_tokens_and_is_logged_once(
     [line] = caplog.messages
     assert line.endswith("the previous 1 tokens stay in force")
     assert "\n" not in line
-    write_tokens(looked.path, line_of("lead"))
+    write_tokens(looked.path, token_entry("lead"))
     for _ in range(2):
         looked.file.reload_if_changed()
     assert (looked.has("desk"), looked.has("lead")) == (False, True)
@@ -239,7 +239,7 @@ def test_a_token_file_is_reloaded_only_when_it_stays_unchanged(looked: Looked) -
     write_tokens(looked.path)  # as far as it has come: a list of nobody
     looked.file.reload_if_changed()
     assert looked.has("desk")
-    write_tokens(looked.path, line_of("desk"), line_of("lead"))
+    write_tokens(looked.path, token_entry("desk"), token_entry("lead"))
     looked.file.reload_if_changed()
     assert not looked.has("lead")
     looked.file.reload_if_changed()
@@ -248,7 +248,7 @@ def test_a_token_file_is_reloaded_only_when_it_stays_unchanged(looked: Looked) -
 
 
 def test_a_replaced_file_of_equal_size_and_time_is_reloaded(looked: Looked) -> None:
-    other = write_tokens(looked.path.with_name("new.yaml"), line_of("lead"))
+    other = write_tokens(looked.path.with_name("new.yaml"), token_entry("lead"))
     before = looked.path.stat()
     os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))
     other.replace(looked.path)

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from fakes.service.fed_site import A, B, Hall
+from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -24,8 +24,8 @@ from fakes.service.scripted_cameras import (
 from server.messaging.inbox import Inbox
 
 
-async def test_the_site_is_described(busy: Hall) -> None:
-    site = await busy.get_json("/api/site")
+async def test_the_site_is_described(site_with_people: ServedSite) -> None:
+    site = await site_with_people.get_json("/api/site")
     assert {key: site[key] for key in ("name", "fps", "width", "height", "gop", "lookahead_frames")} == {
         "name": "hall",
         "fps": FPS,
@@ -40,29 +40,31 @@ async def test_the_site_is_described(busy: Hall) -> None:
     assert abs(site["now"]) > 1e9
 
 
-async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(hall: Hall) -> None:
-    assert (await hall.get_json("/api/site"))["codec"] is None
-    code, content = await hall.get("/cameras/c0/live.mp4")
+async def test_before_the_first_picture_there_is_no_codec_and_no_stream_yet(served: ServedSite) -> None:
+    assert (await served.get_json("/api/site"))["codec"] is None
+    code, content = await served.get("/cameras/c0/live.mp4")
     assert code == 503
     assert content == {"error": "no camera has delivered a picture yet"}
-    async with hall.session.get("/readyz") as answer:
+    async with served.session.get("/readyz") as answer:
         assert answer.status == 503
-    async with hall.session.get("/healthz") as answer:
+    async with served.session.get("/healthz") as answer:
         assert (answer.status, await answer.text()) == (200, "ok\n")
 
 
-async def test_health_checks_are_answered_under_a_flood_of_camera_messages(hall: Hall) -> None:
+async def test_health_checks_are_answered_under_a_flood_of_camera_messages(served: ServedSite) -> None:
     """Messages arrive faster than they can be processed, for longer than a health check waits."""
     flood: Inbox[int] = Inbox(lambda left: flood.put(left - 1) if left else None, turn_s=0.0)
     flood.put(100_000)
     for _ in range(3):
-        async with hall.session.get("/healthz") as answer:
+        async with served.session.get("/healthz") as answer:
             assert answer.status == 200
     assert flood.waiting
 
 
-async def test_all_people_are_listed_with_the_cameras_that_show_and_see_them(busy: Hall) -> None:
-    one, two = (await busy.get_json("/api/objects"))["objects"]
+async def test_all_people_are_listed_with_the_cameras_that_show_and_see_them(
+    site_with_people: ServedSite,
+) -> None:
+    one, two = (await site_with_people.get_json("/api/objects"))["objects"]
     assert one == {
         "object": 1,
         "name": None,
@@ -77,9 +79,9 @@ async def test_all_people_are_listed_with_the_cameras_that_show_and_see_them(bus
     assert (two["object"], two["camera"], two["cameras"]) == (2, A, [A])
 
 
-async def test_the_cameras_are_listed_with_their_state(busy: Hall) -> None:
-    busy.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
-    c0, c1 = (await busy.get_json("/api/cameras"))["cameras"]
+async def test_the_cameras_are_listed_with_their_state(site_with_people: ServedSite) -> None:
+    site_with_people.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
+    c0, c1 = (await site_with_people.get_json("/api/cameras"))["cameras"]
     assert c0 == {
         "camera": A,
         "state": "live",
@@ -93,36 +95,36 @@ async def test_the_cameras_are_listed_with_their_state(busy: Hall) -> None:
         "message": "",
     }
     assert c1["state"] == "live"
-    async with busy.session.get("/readyz") as answer:
+    async with site_with_people.session.get("/readyz") as answer:
         assert (answer.status, await answer.text()) == (200, "2 of 2 cameras\n")
 
 
-async def test_a_refused_camera_is_listed_with_the_reason(busy: Hall) -> None:
-    busy.service.ingest.video(video(A, encoded(5, crf=40)[0]))
-    c0 = (await busy.get_json("/api/cameras"))["cameras"][0]
+async def test_a_refused_camera_is_listed_with_the_reason(site_with_people: ServedSite) -> None:
+    site_with_people.service.ingest.video(video(A, encoded(5, crf=40)[0]))
+    c0 = (await site_with_people.get_json("/api/cameras"))["cameras"][0]
     assert c0["state"] == "refused"
     assert "parameter sets differ" in c0["message"]
 
 
-async def test_past_choices_are_explained_from_the_first_request_on(busy: Hall) -> None:
-    newest = await busy.get_json("/api/objects/1/choice")
-    busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
-    assert (await busy.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
+async def test_past_choices_are_explained_from_the_first_request_on(site_with_people: ServedSite) -> None:
+    newest = await site_with_people.get_json("/api/objects/1/choice")
+    site_with_people.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+    assert (await site_with_people.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
     for at in (f"p{newest['first']}", f"p{newest['first'] + GOP - 1}", f"-{GOP / FPS}"):
-        assert await busy.get_json(f"/api/objects/1/choice?at={at}") == newest
+        assert await site_with_people.get_json(f"/api/objects/1/choice?at={at}") == newest
     for path, expected, words in (
         ("1/choice?at=p0", 404, "no reasons are stored"),
         ("1/choice?at=p999999", 404, "no reasons are stored"),
         ("9/choice?at=-1", 404, "object 9"),
         ("1/choice?at=soon", 400, "at: 'soon' is not a time"),
     ):
-        code, content = await busy.get(f"/api/objects/{path}")
+        code, content = await site_with_people.get(f"/api/objects/{path}")
         assert code == expected
         assert words in content["error"]
 
 
-async def test_a_choice_is_explained(busy: Hall) -> None:
-    choice = await busy.get_json("/api/objects/1/choice")
+async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:
+    choice = await site_with_people.get_json("/api/objects/1/choice")
     costs, quality, terms, weights = (choice.pop(it) for it in ("costs", "quality", "terms", "weights"))
     assert 0 == costs[B] < costs[A] < 1
     assert costs[A] == pytest.approx(1 - quality[A] / quality[B])
@@ -147,11 +149,13 @@ async def test_a_choice_is_explained(busy: Hall) -> None:
     }
 
 
-async def test_a_thumbnail_is_of_the_chosen_camera_and_its_url_changes_with_it(busy: Hall) -> None:
-    busy.service.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
-    busy.service.ingest.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
-    one = (await busy.get_json("/api/objects"))["objects"][0]
+async def test_a_thumbnail_is_of_the_chosen_camera_and_its_url_changes_with_it(
+    site_with_people: ServedSite,
+) -> None:
+    site_with_people.service.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
+    site_with_people.service.ingest.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
+    one = (await site_with_people.get_json("/api/objects"))["objects"][0]
     assert one["thumbnail"].endswith("objects/1/thumb.jpg?v=10")
-    async with busy.session.get("/objects/1/thumb.jpg?v=10") as answer:
+    async with site_with_people.session.get("/objects/1/thumb.jpg?v=10") as answer:
         assert answer.content_type == "image/jpeg"
         assert await answer.read() == b"\xff\xd8 of c1"

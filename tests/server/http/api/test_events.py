@@ -8,7 +8,7 @@ from typing import Any
 
 import aiohttp
 
-from fakes.service.fed_site import A, B, Hall
+from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import CAMERAS, GOP, LARGE, SMALL
 from fakes.timeouts import PATIENCE
 from server.http.access.permissions import ALL
@@ -28,14 +28,16 @@ async def events(answer: aiohttp.ClientResponse, count: int) -> list[tuple[str, 
     return received
 
 
-async def test_events_begin_with_the_current_state_and_continue_with_every_gop(busy: Hall) -> None:
-    async with busy.session.get("/api/events") as answer:
+async def test_events_begin_with_the_current_state_and_continue_with_every_gop(
+    site_with_people: ServedSite,
+) -> None:
+    async with site_with_people.session.get("/api/events") as answer:
         assert answer.content_type == "text/event-stream"
         received = await events(answer, 5)
         assert [name for name, _ in received] == ["site", "objects", "cameras", "gop", "gop"]
         assert [content["first"] for _, content in received[3:]] == [0, GOP]
-        assert received[1][1] == await busy.get_json("/api/objects")
-        busy.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+        assert received[1][1] == await site_with_people.get_json("/api/objects")
+        site_with_people.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
         while (event := (await events(answer, 1))[0])[0] != "gop":
             pass
     gop = event[1]
@@ -44,36 +46,38 @@ async def test_events_begin_with_the_current_state_and_continue_with_every_gop(b
     assert gop["cuts"] == []
 
 
-async def test_a_cut_event_has_both_cameras(busy: Hall) -> None:
+async def test_a_cut_event_has_both_cameras(site_with_people: ServedSite) -> None:
     for epoch in range(3, 6):
-        busy.service.feed(epoch, {A: {1: LARGE}, B: {}})
-    async with busy.session.get("/api/events") as answer:
+        site_with_people.service.feed(epoch, {A: {1: LARGE}, B: {}})
+    async with site_with_people.session.get("/api/events") as answer:
         received = await events(answer, 7)
     cuts = [cut for name, content in received if name == "gop" for cut in content["cuts"]]
     assert cuts == [{"object": 1, "pulse": 3 * GOP, "from": B, "to": A}]
 
 
-async def test_the_event_of_a_gop_is_sent_before_its_video(hall: Hall) -> None:
+async def test_the_event_of_a_gop_is_sent_before_its_video(served: ServedSite) -> None:
     order: list[str] = []
-    hall.service.on_decision.append(lambda _: order.append("told"))
-    sent = hall.service.splicer.publish_decision
+    served.service.on_decision.append(lambda _: order.append("told"))
+    sent = served.service.splicer.publish_decision
 
     def decision(it: Any) -> None:
         order.append("sent")
         sent(it)
 
-    hall.service.splicer.publish_decision = decision  # type: ignore[method-assign,assignment]
-    hall.service.come(*CAMERAS)
+    served.service.splicer.publish_decision = decision  # type: ignore[method-assign,assignment]
+    served.service.connect_cameras(*CAMERAS)
     for epoch in range(4):
-        hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
+        served.service.feed(epoch, {A: {1: SMALL}, B: {}})
     assert order == ["told", "sent"] * 3
 
 
-async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(busy: Hall) -> None:
-    received = Events(BestViewService(busy.service))
+async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(
+    site_with_people: ServedSite,
+) -> None:
+    received = Events(BestViewService(site_with_people.service))
     reader = received.join(ALL)
     for epoch in range(3, 120):
-        busy.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
+        site_with_people.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
     assert reader.lost_gops, "some of what was told, maybe a list"
     speaking = asyncio.create_task(received.run())
     lists: set[str] = set()

@@ -14,11 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fakes.http.certificates import make_certificate
-from fakes.http.tokens import bearer, locked
+from fakes.http.tokens import bearer, serve_with_tokens
 from fakes.programs import needs_openssl
-from fakes.service.fed_site import A, B, Hall, opened, see
+from fakes.service.fed_site import A, B, ServedSite, serve_site, show_people
 from fakes.service.scripted_cameras import SMALL
-from fakes.system.few_descriptors import MYVIEW, awaited, connected, running, written
+from fakes.system.few_descriptors import MYVIEW, connect, running, wait_for_log, write_site
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.networks import network_of
 from server.http.connections.connection_limiter import Connection, ConnectionLimiter, ConnectionLimits
@@ -32,17 +32,17 @@ GET = "GET {} HTTP/1.1\r\nHost: localhost\r\n{}\r\n"
 
 
 @asynccontextmanager
-async def small(**http: Any) -> AsyncIterator[Hall]:
+async def small(**http: Any) -> AsyncIterator[ServedSite]:
     """Serve a site with people; timeouts are long unless a test sets them."""
-    async with aclosing(opened(http={"request_timeout_s": 60.0, **http})) as halls:
-        hall = await anext(halls)
-        see(hall)
-        yield hall
+    async with aclosing(serve_site(http={"request_timeout_s": 60.0, **http})) as halls:
+        served = await anext(halls)
+        show_people(served)
+        yield served
 
 
-async def silent(hall: Hall, begin: str = "") -> Pair:
+async def silent(served: ServedSite, begin: str = "") -> Pair:
     """Connect, and send an incomplete request."""
-    reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
+    reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
     writer.write(begin.encode())
     return reader, writer
 
@@ -58,70 +58,72 @@ async def over(pair: Pair) -> bytes:
         writer.close()
 
 
-async def stream(hall: Hall, path: str = "/objects/1/best.ts", heads: str = "X-Forwarded-For: x\r\n") -> Pair:
+async def stream(
+    served: ServedSite, path: str = "/objects/1/best.ts", heads: str = "X-Forwarded-For: x\r\n"
+) -> Pair:
     """Watch; give the connection once the stream has begun."""
-    pair = await silent(hall, GET.format(path, heads))
+    pair = await silent(served, GET.format(path, heads))
     assert (await pair[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
     return pair
 
 
-async def status(hall: Hall, path: str, **heads: str) -> int:
+async def status(served: ServedSite, path: str, **heads: str) -> int:
     """Ask by a connection of its own."""
     lines = "".join(f"{name}: {value}\r\n" for name, value in {**heads, "Connection": "close"}.items())
-    said = await over(await silent(hall, GET.format(path, lines)))
+    said = await over(await silent(served, GET.format(path, lines)))
     return int(said.split(maxsplit=2)[1]) if said else 0
 
 
 @pytest.mark.parametrize("begin", ["", "GET /api/site HTTP/1.1\r\nHost: ha", "\r\n\r\n", "\x16\x03\x01"])
 async def test_an_incomplete_request_times_out(begin: str) -> None:
-    async with small(request_timeout_s=SOON) as hall:
-        assert b" 200 " not in await over(await silent(hall, begin))
+    async with small(request_timeout_s=SOON) as served:
+        assert b" 200 " not in await over(await silent(served, begin))
 
 
 async def test_an_incomplete_body_times_out(tmp_path: Path) -> None:
-    async with locked(tmp_path, http={"request_timeout_s": SOON}) as hall:
+    async with serve_with_tokens(tmp_path, http={"request_timeout_s": SOON}) as served:
         head = f"POST /api/session HTTP/1.1\r\nHost: hall\r\n{CSRF_HEADER}: 1\r\nContent-Length: 99\r\n\r\n{{"
-        assert await over(await silent(hall, head)) == b""
+        assert await over(await silent(served, head)) == b""
 
 
 async def test_a_body_above_the_limit_is_refused(tmp_path: Path) -> None:
-    async with locked(tmp_path) as hall:
+    async with serve_with_tokens(tmp_path) as served:
         body = b" " * 70_000
-        async with hall.session.post("/api/session", data=body, headers={CSRF_HEADER: "1"}) as answer:
+        async with served.session.post("/api/session", data=body, headers={CSRF_HEADER: "1"}) as answer:
             assert answer.status == 413
 
 
 async def test_an_idle_connection_is_closed() -> None:
-    async with small(keepalive_timeout_s=SOON) as hall:
-        said = await over(await silent(hall, GET.format("/healthz", "")))
+    async with small(keepalive_timeout_s=SOON) as served:
+        said = await over(await silent(served, GET.format("/healthz", "")))
         assert said.endswith(b"ok\n")
 
 
 @needs_openssl
 async def test_a_missing_tls_handshake_times_out(tmp_path: Path) -> None:
     tls = make_certificate(tmp_path, "hall")
-    async with small(request_timeout_s=SOON, tls=tls.model_dump()) as hall:
+    async with small(request_timeout_s=SOON, tls=tls.model_dump()) as served:
         for begin in ("", "GET / HTTP/1.1\r\n\r\n"):
-            await over(await silent(hall, begin))
+            await over(await silent(served, begin))
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.ts", "/api/events"])
 async def test_a_connection_with_an_endless_answer_is_not_idle(path: str) -> None:
-    async with small(request_timeout_s=1.0, keepalive_timeout_s=SOON) as hall:
-        reader, writer = await stream(hall, path)
-        await over(await silent(hall))  # that one was as quiet, and came later
+    async with small(request_timeout_s=1.0, keepalive_timeout_s=SOON) as served:
+        reader, writer = await stream(served, path)
+        await over(await silent(served))  # that one was as quiet, and came later
         while len(await reader.read(1 << 20)) == 1 << 20:
             pass  # what there is by now
-        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {}})
+        served.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {}})
         assert await reader.read(1)
         writer.close()
 
 
 async def test_at_the_limit_the_longest_waiting_connection_is_closed() -> None:
-    async with small(connections_max=3) as hall:
-        first, second, third = [await silent(hall) for _ in range(3)]
+    async with small(connections_max=3) as served:
+        first, second, third = [await silent(served) for _ in range(3)]
         for _ in range(3):
-            assert await status(hall, "/api/site", **ELSEWHERE) == 200
+            assert await status(served, "/api/site", **ELSEWHERE) == 200
         await over(first)
         second[1].write(GET.format("/healthz", "").encode())
         assert (await second[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
@@ -130,49 +132,49 @@ async def test_at_the_limit_the_longest_waiting_connection_is_closed() -> None:
 
 
 async def test_when_all_are_busy_operators_are_admitted_and_others_get_503() -> None:
-    async with small(connections_max=2) as hall, AsyncExitStack() as stack:
+    async with small(connections_max=2) as served, AsyncExitStack() as stack:
         for _ in range(2):
-            _, writer = await stream(hall)
+            _, writer = await stream(served)
             stack.callback(writer.close)
-        assert await status(hall, "/api/site", **ELSEWHERE) == 503
-        assert await status(hall, "/objects/1/best.jpg", **ELSEWHERE) == 503
+        assert await status(served, "/api/site", **ELSEWHERE) == 503
+        assert await status(served, "/objects/1/best.jpg", **ELSEWHERE) == 503
         for open_to_all in ("/healthz", "/", "/operator"):
-            assert await status(hall, open_to_all, **ELSEWHERE) == 200
-        flood = [await silent(hall) for _ in range(100)]
-        assert await status(hall, "/api/operator/cameras") == 200
-        assert await status(hall, "/api/site", **ELSEWHERE) == 503
-        _, writer = await stream(hall, heads="")
+            assert await status(served, open_to_all, **ELSEWHERE) == 200
+        flood = [await silent(served) for _ in range(100)]
+        assert await status(served, "/api/operator/cameras") == 200
+        assert await status(served, "/api/site", **ELSEWHERE) == 503
+        _, writer = await stream(served, heads="")
         stack.callback(writer.close)
         for _, writer in flood:
             writer.close()
 
 
 async def test_when_all_are_busy_operators_are_recognized_by_token_or_session(tmp_path: Path) -> None:
-    async with locked(tmp_path, http={"connections_max": 1}) as hall:
-        see(hall)
-        async with hall.session.post(
-            "/api/session", json={"token": "what-lead-was-given"}, headers={CSRF_HEADER: "1"}
+    async with serve_with_tokens(tmp_path, http={"connections_max": 1}) as served:
+        show_people(served)
+        async with served.session.post(
+            "/api/session", json={"token": "token-of-lead"}, headers={CSRF_HEADER: "1"}
         ) as answer:
             [cookie] = answer.cookies.values()
         desk, lead = bearer("desk"), bearer("lead")
-        _, writer = await stream(hall, heads=f"Authorization: {desk['Authorization']}\r\n")
-        assert await status(hall, "/api/site", **lead) == 200
-        assert await status(hall, "/api/site", Cookie=f"{cookie.key}={cookie.value}") == 200
-        assert await status(hall, "/api/site", **desk) == 503
-        assert await status(hall, "/api/site") == 503
+        _, writer = await stream(served, heads=f"Authorization: {desk['Authorization']}\r\n")
+        assert await status(served, "/api/site", **lead) == 200
+        assert await status(served, "/api/site", Cookie=f"{cookie.key}={cookie.value}") == 200
+        assert await status(served, "/api/site", **desk) == 503
+        assert await status(served, "/api/site") == 503
         writer.close()
 
 
 def test_a_flood_of_connections_leaves_descriptors_for_the_service(tmp_path: Path) -> None:
-    path, log = written(tmp_path, 1), tmp_path / "log"
+    path, log = write_site(tmp_path, 1), tmp_path / "log"
     port = int(path.read_text().partition("http:\n  port: ")[2].split()[0])
     ask = b"GET /%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
     with running(f"{MYVIEW} bestview {path}", log, descriptors=300), ExitStack() as flood:
-        connected(port).close()
+        connect(port).close()
         for _ in range(500):
-            flood.enter_context(connected(port))
+            flood.enter_context(connect(port))
         for what, said in ((b"healthz", b"ok\n"), (b"metrics", b"process_open_fds")):
-            with connected(port) as asking:
+            with connect(port) as asking:
                 asking.settimeout(60)
                 asking.sendall(ask % what)
                 answer = b""
@@ -181,7 +183,7 @@ def test_a_flood_of_connections_leaves_descriptors_for_the_service(tmp_path: Pat
             assert said in answer
         (open_now,) = [it for it in answer.splitlines() if it.startswith(b"process_open_fds ")]
         assert float(open_now.split()[1]) < 300 - 32
-        awaited(log, b"http.connections_max")
+        wait_for_log(log, b"http.connections_max")
     assert b"Traceback" not in log.read_bytes()
     assert len(log.read_bytes().splitlines()) < 20
 
@@ -231,7 +233,7 @@ ACTS = st.lists(
 
 @given(ACTS)
 def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str, int]]) -> None:
-    clock, there, busy = Clock(), list[Connection](), set[int]()
+    clock, there, site_with_people = Clock(), list[Connection](), set[int]()
     places = ConnectionLimiter(BOUNDS, clock)
     for act, address, which in acts:
         it = there[which % len(there)] if there else None
@@ -240,7 +242,7 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
             if new is None:
                 beyond = [it for it in there if it.is_reserved]
                 assert len(beyond) == BOUNDS.for_operators
-                assert all(id(it) in busy for it in beyond)
+                assert all(id(it) in site_with_people for it in beyond)
             else:
                 there.append(new)
         elif act == "time":
@@ -248,13 +250,13 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
             places.close_overdue()
         elif it is not None and act in {"asks", "is sent"}:
             places.busy(it)
-            busy.add(id(it))
+            site_with_people.add(id(it))
             if act == "is sent":
                 places.sending(it)
         elif it is not None:
-            busy.discard(id(it))
+            site_with_people.discard(id(it))
             {"rests": places.idle, "waits": places.receiving, "leaves": places.closed}[act](it)
-        assert not any(it.transport.ended for it in there if id(it) in busy)  # type: ignore[attr-defined]
+        assert not any(it.transport.ended for it in there if id(it) in site_with_people)  # type: ignore[attr-defined]
         there = [it for it in there if not it.closed]
         assert places.open == len(there)
         assert len([it for it in there if not it.is_reserved]) <= BOUNDS.most

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.http.tokens import bearer, locked
-from fakes.service.fed_site import Hall, opened, see
+from fakes.http.tokens import bearer, serve_with_tokens
+from fakes.service.fed_site import ServedSite, serve_site, show_people
 from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare, Slot
 
@@ -44,38 +44,38 @@ class Viewer:
 
 
 @asynccontextmanager
-async def site(folder: Path, **http: Any) -> AsyncIterator[Hall]:
-    async with locked(folder, http={"hls_segment_s": 0.4, **http}) as hall:
-        see(hall)
+async def site(folder: Path, **http: Any) -> AsyncIterator[ServedSite]:
+    async with serve_with_tokens(folder, http={"hls_segment_s": 0.4, **http}) as served:
+        show_people(served)
         for epoch in (3, 4):
-            hall.service.feed(epoch, {"c0": {}, "c1": {}})
-        yield hall
+            served.service.feed(epoch, {"c0": {}, "c1": {}})
+        yield served
 
 
-async def fetched(hall: Hall, path: str, name: str, player: str) -> int:
-    async with hall.session.get(path, headers={**bearer(name), "User-Agent": player}) as answer:
+async def fetched(served: ServedSite, path: str, name: str, player: str) -> int:
+    async with served.session.get(path, headers={**bearer(name), "User-Agent": player}) as answer:
         return answer.status
 
 
-async def joined(stack: AsyncExitStack, hall: Hall, path: str, **heads: str) -> Viewer | int:
+async def joined(stack: AsyncExitStack, served: ServedSite, path: str, **heads: str) -> Viewer | int:
     """Watch or listen until the stack is left; give the status where that is not let."""
-    session = await stack.enter_async_context(aiohttp.ClientSession(f"http://127.0.0.1:{hall.port}"))
+    session = await stack.enter_async_context(aiohttp.ClientSession(f"http://127.0.0.1:{served.port}"))
     answer = await session.get(path, headers=heads)
     stack.callback(answer.close)
     return Viewer(answer) if answer.status == 200 else answer.status
 
 
 async def test_a_token_with_many_players_does_not_take_others_streams(tmp_path: Path) -> None:
-    async with site(tmp_path, viewers_max=20) as hall:
-        flood = [await fetched(hall, DOOR, "door", f"player {it}") for it in range(40)]
+    async with site(tmp_path, viewers_max=20) as served:
+        flood = [await fetched(served, DOOR, "door", f"player {it}") for it in range(40)]
         assert flood == [200] * 20 + [503] * 20
         for name in ("desk", "family", "lead"):
             path = "/objects/1/hls/index.m3u8"
-            assert [await fetched(hall, path, name, f"{name} {it}") for it in range(3)] == [200] * 3, name
-        assert await fetched(hall, DOOR, "door", "player 0") == 200, "who came first stays"
-        assert await fetched(hall, DOOR, "door", "player 19") == 503, "who came last made way"
+            assert [await fetched(served, path, name, f"{name} {it}") for it in range(3)] == [200] * 3, name
+        assert await fetched(served, DOOR, "door", "player 0") == 200, "who came first stays"
+        assert await fetched(served, DOOR, "door", "player 19") == 503, "who came last made way"
         for name in ("desk", "family", "lead"):
-            assert await fetched(hall, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, "and goes on"
+            assert await fetched(served, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, "and goes on"
 
 
 @pytest.mark.parametrize(
@@ -90,48 +90,48 @@ async def test_a_token_with_many_players_does_not_take_others_streams(tmp_path: 
 async def test_a_token_with_many_connections_does_not_take_others_streams(
     tmp_path: Path, path: str, bound: str
 ) -> None:
-    async with site(tmp_path, **{bound: 3}) as hall, AsyncExitStack() as stack:
+    async with site(tmp_path, **{bound: 3}) as served, AsyncExitStack() as stack:
         door, desk, lead = bearer("door"), bearer("desk"), bearer("lead")
-        flood = [await joined(stack, hall, path, **door) for _ in range(4)]
+        flood = [await joined(stack, served, path, **door) for _ in range(4)]
         *held, newest, refused = flood
         assert refused == 503
         assert isinstance(newest, Viewer)
-        async with hall.session.head(path, headers=desk) as answer:
+        async with served.session.head(path, headers=desk) as answer:
             assert answer.status == 503, "who does not take the place does not take it away"
-        mine = await joined(stack, hall, path, **desk)
+        mine = await joined(stack, served, path, **desk)
         assert isinstance(mine, Viewer)
         await newest.ends()
-        assert await joined(stack, hall, path, **desk) == 503, "that would be more than the others have"
-        assert await joined(stack, hall, path, **door) == 503
+        assert await joined(stack, served, path, **desk) == 503, "that would be more than the others have"
+        assert await joined(stack, served, path, **door) == 503
         for _ in range(3):
-            assert isinstance(await joined(stack, hall, path, **lead), Viewer), "operators always get in"
-        assert await joined(stack, hall, path, **lead) == 503, "but not for each other's places"
+            assert isinstance(await joined(stack, served, path, **lead), Viewer), "operators always get in"
+        assert await joined(stack, served, path, **lead) == 503, "but not for each other's places"
         for it in (*held, mine):
             assert isinstance(it, Viewer)
             await it.ends()
 
 
 async def test_a_stream_that_has_caught_up_can_be_evicted_like_live_ones(tmp_path: Path) -> None:
-    async with site(tmp_path, viewers_per_object=2) as hall, AsyncExitStack() as stack:
+    async with site(tmp_path, viewers_per_object=2) as served, AsyncExitStack() as stack:
         flood = [
-            await joined(stack, hall, "/cameras/c0/live.mp4?from=-1", **bearer("door")) for _ in range(2)
+            await joined(stack, served, "/cameras/c0/live.mp4?from=-1", **bearer("door")) for _ in range(2)
         ]
-        channel = hall.service.splicer.cameras["c0"]
+        channel = served.service.splicer.cameras["c0"]
         while channel.viewers < 2:
-            await hall.get("/healthz", "HEAD")
-        assert isinstance(await joined(stack, hall, "/cameras/c0/live.ts", **bearer("desk")), Viewer)
+            await served.get("/healthz", "HEAD")
+        assert isinstance(await joined(stack, served, "/cameras/c0/live.ts", **bearer("desk")), Viewer)
         assert isinstance(flood[1], Viewer)
         await flood[1].ends()
 
 
 async def test_without_tokens_shares_are_by_address_and_this_machine_operates() -> None:
-    async for hall in opened(http={"viewers_max": 2}):
-        see(hall)
+    async for served in serve_site(http={"viewers_max": 2}):
+        show_people(served)
         async with AsyncExitStack() as stack:
             elsewhere = {"X-Forwarded-For": "10.0.0.7"}
-            flood = [await joined(stack, hall, "/objects/1/best.ts", **elsewhere) for _ in range(3)]
+            flood = [await joined(stack, served, "/objects/1/best.ts", **elsewhere) for _ in range(3)]
             assert flood[2] == 503
-            assert isinstance(await joined(stack, hall, "/objects/1/best.ts"), Viewer)
+            assert isinstance(await joined(stack, served, "/objects/1/best.ts"), Viewer)
             assert isinstance(flood[1], Viewer)
             await flood[1].ends()
             assert isinstance(flood[0], Viewer)

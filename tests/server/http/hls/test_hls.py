@@ -8,14 +8,14 @@ from itertools import pairwise
 
 import pytest
 
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
 
 SEGMENT = "hls/index.m3u8"
 
 
-async def text_of(hall: Hall, path: str) -> str:
-    async with hall.session.get(path) as answer:
+async def text_of(served: ServedSite, path: str) -> str:
+    async with served.session.get(path) as answer:
         assert answer.status == 200, await answer.text()
         assert answer.content_type == "application/vnd.apple.mpegurl"
         assert answer.headers["Access-Control-Allow-Origin"] == "*"
@@ -48,26 +48,26 @@ def entries(text: str) -> list[tuple[float, str, datetime]]:
     return listed
 
 
-def feed(hall: Hall, epochs: range) -> None:
+def feed(served: ServedSite, epochs: range) -> None:
     """Feed a person who is larger in alternating cameras, which causes cuts."""
     for epoch in epochs:
-        hall.service.feed(
+        served.service.feed(
             epoch, {A: {1: SMALL}, B: {1: LARGE}} if epoch % 4 < 2 else {A: {1: LARGE}, B: {1: SMALL}}
         )
 
 
 @pytest.mark.parametrize("path", ["/objects/1/hls/", "/cameras/c0/hls/"])
 async def test_playlists_change_only_as_the_rfc_allows(path: str) -> None:
-    async for hall in opened(http={"hls_segment_s": 0.2, "hls_window_s": 0.6}):
-        hall.service.pulse0 = 1_800_000_000.0
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(http={"hls_segment_s": 0.2, "hls_window_s": 0.6}):
+        served.service.pulse0 = 1_800_000_000.0
+        served.service.connect_cameras(*CAMERAS)
         before: list[tuple[float, str, datetime]] = []
         number, target = 0, ""
         for epoch in range(8):
-            feed(hall, range(epoch, epoch + 1))
+            feed(served, range(epoch, epoch + 1))
             if epoch < 2:
                 continue
-            text = await text_of(hall, path + "index.m3u8")
+            text = await text_of(served, path + "index.m3u8")
             listed, sequence = entries(text), int(tag(text, "MEDIA-SEQUENCE"))
             assert 1 <= len(listed) <= 3
             if before:
@@ -79,31 +79,31 @@ async def test_playlists_change_only_as_the_rfc_allows(path: str) -> None:
             assert [uri for _, uri, _ in listed] == [f"{sequence + n}.m4s" for n in range(len(listed))]
             assert "ENDLIST" not in text
         assert number > 0, "the window has moved"
-        hall.service.splicer.close()
-        assert (await text_of(hall, path + "index.m3u8")).endswith("#EXT-X-ENDLIST\n")
+        served.service.splicer.close()
+        assert (await text_of(served, path + "index.m3u8")).endswith("#EXT-X-ENDLIST\n")
 
 
-async def test_wall_clock_times_follow_from_pulses(busy: Hall) -> None:
-    busy.service.pulse0 = 1_800_000_000.25
-    busy.service.splicer.close()
-    text = await text_of(busy, "/objects/1/" + SEGMENT)
+async def test_wall_clock_times_follow_from_pulses(site_with_people: ServedSite) -> None:
+    site_with_people.service.pulse0 = 1_800_000_000.25
+    site_with_people.service.splicer.close()
+    text = await text_of(site_with_people, "/objects/1/" + SEGMENT)
     assert [when.timestamp() for _, _, when in entries(text)] == [1_800_000_000.25]
 
 
-async def test_a_segment_is_immutable_and_cacheable(busy: Hall) -> None:
-    feed(busy, range(3, 8))
-    listed = entries_without_time(await text_of(busy, "/objects/1/" + SEGMENT))
+async def test_a_segment_is_immutable_and_cacheable(site_with_people: ServedSite) -> None:
+    feed(site_with_people, range(3, 8))
+    listed = entries_without_time(await text_of(site_with_people, "/objects/1/" + SEGMENT))
     for uri in ["init.mp4", *listed]:
-        async with busy.session.get(f"/objects/1/hls/{uri}") as answer:
+        async with site_with_people.session.get(f"/objects/1/hls/{uri}") as answer:
             data = await answer.read()
             assert answer.content_type == "video/mp4"
             assert answer.headers["Cache-Control"].startswith("public, max-age=")
             assert answer.headers["Cache-Control"].endswith("immutable")
             assert int(answer.headers["Content-Length"]) == len(data) > 100
-        async with busy.session.head(f"/objects/1/hls/{uri}") as answer:
+        async with site_with_people.session.head(f"/objects/1/hls/{uri}") as answer:
             assert int(answer.headers["Content-Length"]) == len(data)
         assert data[4:8] == (b"ftyp" if uri == "init.mp4" else b"moof")
-    async with busy.session.get("/objects/1/" + SEGMENT) as answer:
+    async with site_with_people.session.get("/objects/1/" + SEGMENT) as answer:
         assert answer.headers["Cache-Control"] == "no-cache"
 
 
@@ -112,12 +112,12 @@ def entries_without_time(text: str) -> list[str]:
     return [line for line in text.splitlines() if not line.startswith("#")]
 
 
-async def test_before_the_first_segment_players_get_503(busy: Hall) -> None:
-    async with busy.session.get("/objects/1/" + SEGMENT) as answer:
+async def test_before_the_first_segment_players_get_503(site_with_people: ServedSite) -> None:
+    async with site_with_people.session.get("/objects/1/" + SEGMENT) as answer:
         assert answer.status == 503
         assert int(answer.headers["Retry-After"]) > 0
-    feed(busy, range(3, 7))  # a segment is 25 frames here
-    assert len(entries_without_time(await text_of(busy, "/objects/1/" + SEGMENT))) == 1
+    feed(site_with_people, range(3, 7))  # a segment is 25 frames here
+    assert len(entries_without_time(await text_of(site_with_people, "/objects/1/" + SEGMENT))) == 1
 
 
 @pytest.mark.parametrize(
@@ -132,11 +132,11 @@ async def test_before_the_first_segment_players_get_503(busy: Hall) -> None:
         ("/cameras/c0/hls/1.ts", "there is nothing at /cameras/c0/hls/1.ts"),
     ],
 )
-async def test_unknown_segments_get_404(busy: Hall, path: str, error: str) -> None:
-    assert await busy.get(path) == (404, {"error": error})
+async def test_unknown_segments_get_404(site_with_people: ServedSite, path: str, error: str) -> None:
+    assert await site_with_people.get(path) == (404, {"error": error})
 
 
-async def test_segments_exist_before_the_first_request(busy: Hall) -> None:
-    feed(busy, range(3, 8))
-    async with busy.session.get("/objects/1/hls/0.m4s") as answer:
+async def test_segments_exist_before_the_first_request(site_with_people: ServedSite) -> None:
+    feed(site_with_people, range(3, 8))
+    async with site_with_people.session.get("/objects/1/hls/0.m4s") as answer:
         assert (await answer.read()).count(b"moof") == FPS // GOP * GOP

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, SMALL
 from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare
@@ -93,79 +93,81 @@ def test_players_that_fetched_recently_or_wait_are_counted(
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
+async def served() -> AsyncIterator[ServedSite]:
     """Two viewers at most; two people, whose first segment is whole."""
-    async for hall in opened(http={"viewers_max": 2, "hls_segment_s": 0.4}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(http={"viewers_max": 2, "hls_segment_s": 0.4}):
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(5):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
-        yield hall
+            served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        yield served
 
 
-async def status(hall: Hall, path: str, player: str) -> int:
-    async with hall.session.get(path, headers={"User-Agent": player}) as answer:
+async def status(served: ServedSite, path: str, player: str) -> int:
+    async with served.session.get(path, headers={"User-Agent": player}) as answer:
         if answer.status == 503:
             assert int(answer.headers["Retry-After"]) > 0
             assert "viewers_max" in (await answer.json())["error"]
         return answer.status
 
 
-async def viewers_in_metrics(hall: Hall) -> float:
-    async with hall.session.get("/metrics") as answer:
+async def viewers_in_metrics(served: ServedSite) -> float:
+    async with served.session.get("/metrics") as answer:
         text = await answer.text()
     return float(next(it for it in text.splitlines() if it.startswith("myview_viewers ")).split()[1])
 
 
 @pytest.mark.parametrize("path", PATHS)
-async def test_hls_players_take_slots_and_one_more_gets_503(hall: Hall, path: str) -> None:
+async def test_hls_players_take_slots_and_one_more_gets_503(served: ServedSite, path: str) -> None:
     for player in ("one", "two", "one", "two"):
-        assert await status(hall, f"/objects/1/hls/{path}", player) == 200
-    assert await viewers_in_metrics(hall) == 2
-    assert await status(hall, f"/objects/1/hls/{path}", "three") == 503
-    assert await status(hall, "/objects/2/hls/index.m3u8", "one") == 503, "another stream is another place"
-    async with hall.session.get("/objects/1/best.mp4") as answer:
+        assert await status(served, f"/objects/1/hls/{path}", player) == 200
+    assert await viewers_in_metrics(served) == 2
+    assert await status(served, f"/objects/1/hls/{path}", "three") == 503
+    assert await status(served, "/objects/2/hls/index.m3u8", "one") == 503, "another stream is another place"
+    async with served.session.get("/objects/1/best.mp4") as answer:
         assert answer.status == 503
     for other in PATHS:
-        assert await status(hall, f"/objects/1/hls/{other}", "two") == 200, "who is there goes on"
+        assert await status(served, f"/objects/1/hls/{other}", "two") == 200, "who is there goes on"
 
 
-async def test_connected_viewers_reduce_the_slots_for_hls_players(hall: Hall) -> None:
-    async with hall.session.get("/objects/2/best.mp4"):
-        assert await status(hall, "/cameras/c0/hls/index.m3u8", "one") == 200
-        assert await status(hall, "/cameras/c0/hls/index.m3u8", "two") == 503
-        assert await viewers_in_metrics(hall) == 2
+async def test_connected_viewers_reduce_the_slots_for_hls_players(served: ServedSite) -> None:
+    async with served.session.get("/objects/2/best.mp4"):
+        assert await status(served, "/cameras/c0/hls/index.m3u8", "one") == 200
+        assert await status(served, "/cameras/c0/hls/index.m3u8", "two") == 503
+        assert await viewers_in_metrics(served) == 2
 
 
-async def test_head_takes_no_slot(hall: Hall) -> None:
+async def test_head_takes_no_slot(served: ServedSite) -> None:
     for path in PATHS:
-        async with hall.session.head(f"/objects/1/hls/{path}") as answer:
+        async with served.session.head(f"/objects/1/hls/{path}") as answer:
             assert answer.status == 200
-    assert await viewers_in_metrics(hall) == 0
+    assert await viewers_in_metrics(served) == 0
 
 
-async def test_blocked_players_of_one_address_and_user_agent_are_counted_separately(hall: Hall) -> None:
+async def test_blocked_players_of_one_address_and_user_agent_are_counted_separately(
+    served: ServedSite,
+) -> None:
     coming = "/objects/1/hls/index.m3u8?_HLS_msn=3"
-    waiting = [asyncio.create_task(status(hall, coming, "same")) for _ in range(2)]
-    while await viewers_in_metrics(hall) < 2:  # noqa: ASYNC110 — they come one after the other
+    waiting = [asyncio.create_task(status(served, coming, "same")) for _ in range(2)]
+    while await viewers_in_metrics(served) < 2:  # noqa: ASYNC110 — they come one after the other
         await asyncio.sleep(0.005)
-    assert await status(hall, coming, "same") == 503
-    assert await status(hall, "/objects/1/hls/index.m3u8", "other") == 503
+    assert await status(served, coming, "same") == 503
+    assert await status(served, "/objects/1/hls/index.m3u8", "other") == 503
     assert not any(it.done() for it in waiting)
     for epoch in range(5, 16):
-        hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
     assert await asyncio.gather(*waiting) == [200, 200]
-    assert await viewers_in_metrics(hall) == 1, "they cannot be told apart any more"
+    assert await viewers_in_metrics(served) == 1, "they cannot be told apart any more"
 
 
 async def test_the_viewer_limit_of_one_stream_includes_hls_players() -> None:
-    async for hall in opened(http={"viewers_per_object": 1, "hls_segment_s": 0.4}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(http={"viewers_per_object": 1, "hls_segment_s": 0.4}):
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(5):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
-        async with hall.session.get("/objects/1/best.ts"):
-            assert (await hall.get("/objects/1/hls/index.m3u8"))[0] == 503
-            async with hall.session.get("/objects/2/hls/index.m3u8") as answer:
+            served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        async with served.session.get("/objects/1/best.ts"):
+            assert (await served.get("/objects/1/hls/index.m3u8"))[0] == 503
+            async with served.session.get("/objects/2/hls/index.m3u8") as answer:
                 assert answer.status == 200
-            async with hall.session.get("/objects/2/best.mp4") as answer:
+            async with served.session.get("/objects/2/best.mp4") as answer:
                 assert answer.status == 503
                 assert "viewers_per_object" in (await answer.json())["error"]

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fakes.programs import needs_ffmpeg
-from fakes.service.fed_site import A, Hall, opened
+from fakes.service.fed_site import A, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, video
 from fakes.timeouts import PATIENCE
 from server.http.hls.live_playlist import _cached
@@ -32,31 +32,31 @@ FRAMES = 250
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
+async def served() -> AsyncIterator[ServedSite]:
     """A site whose segments have three parts."""
-    async for hall in opened(http=HTTP):
-        hall.service.come(*CAMERAS)
-        yield hall
+    async for served in serve_site(http=HTTP):
+        served.service.connect_cameras(*CAMERAS)
+        yield served
 
 
-def shows(hall: Hall, gops: range, nobody: frozenset[int] = frozenset()) -> None:
+def shows(served: ServedSite, gops: range, nobody: frozenset[int] = frozenset()) -> None:
     """Decide GOPs: person 1 is in either camera in turn; in some no pictures come."""
     for gop in gops:
         for seed, camera in enumerate(CAMERAS if gop not in nobody else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-                hall.service.ingest.video(video(camera, unit))
+                served.service.ingest.video(video(camera, unit))
         choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, departed=False)
-        hall.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
+        served.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
-async def text_of(hall: Hall, query: str = "") -> str:
-    async with hall.session.get(f"{STREAM}index.m3u8{query}") as answer:
+async def text_of(served: ServedSite, query: str = "") -> str:
+    async with served.session.get(f"{STREAM}index.m3u8{query}") as answer:
         assert answer.status == 200, await answer.text()
         return await answer.text()
 
 
-async def data_of(hall: Hall, uri: str) -> bytes:
-    async with hall.session.get(STREAM + uri) as answer:
+async def data_of(served: ServedSite, uri: str) -> bytes:
+    async with served.session.get(STREAM + uri) as answer:
         assert answer.status == 200, await answer.text()
         assert answer.headers["Cache-Control"].endswith("immutable")
         return await answer.read()
@@ -122,12 +122,12 @@ def found(text: str, pattern: str) -> str:
     return str(it)
 
 
-async def test_playlists_follow_the_draft_and_grow_part_by_part(hall: Hall) -> None:
-    shows(hall, range(PARTS))
-    before = read(await text_of(hall))
+async def test_playlists_follow_the_draft_and_grow_part_by_part(served: ServedSite) -> None:
+    shows(served, range(PARTS))
+    before = read(await text_of(served))
     for gop in range(PARTS, 45):
-        shows(hall, range(gop, gop + 1))
-        now = read(await text_of(hall))
+        shows(served, range(gop, gop + 1))
+        now = read(await text_of(served))
         newest = [it for its in now.parts.values() for it in its]
         assert newest[-1].uri == before.hint, "what was hinted at is what came"
         assert now.sequence >= before.sequence
@@ -136,52 +136,52 @@ async def test_playlists_follow_the_draft_and_grow_part_by_part(hall: Hall) -> N
         for number, its in before.parts.items():
             assert now.parts.get(number, its)[: len(its)] == its, "6.2.1: nothing changes"
         before = now
-    hall.service.splicer.close()
-    assert read(await text_of(hall)).hint is None
+    served.service.splicer.close()
+    assert read(await text_of(served)).hint is None
 
 
-async def test_a_playlist_is_written_once_per_part_for_all_players(hall: Hall) -> None:
-    shows(hall, range(PARTS))
-    reel = hall.service.splicer.segmenter_of_person(1)
+async def test_a_playlist_is_written_once_per_part_for_all_players(served: ServedSite) -> None:
+    shows(served, range(PARTS))
+    reel = served.service.splicer.segmenter_of_person(1)
     assert reel is not None
     texts = [_cached(reel, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
     assert texts[0] is texts[1]
     assert texts[1] != texts[2], "the time of day is known now"
-    shows(hall, range(PARTS, PARTS + 1))
+    shows(served, range(PARTS, PARTS + 1))
     assert _cached(reel, 1_800_000_000.0) not in texts
     reel.end()
     assert _cached(reel, 1_800_000_000.0).endswith("#EXT-X-ENDLIST\n")
 
 
-async def test_a_blocked_request_is_answered_when_its_part_exists(hall: Hall) -> None:
-    shows(hall, range(PARTS + 1))
+async def test_a_blocked_request_is_answered_when_its_part_exists(served: ServedSite) -> None:
+    shows(served, range(PARTS + 1))
     waiting = {
-        query: asyncio.create_task(text_of(hall, query))
+        query: asyncio.create_task(text_of(served, query))
         for query in ("?_HLS_msn=1&_HLS_part=1", "?_HLS_msn=1", "?_HLS_msn=1&_HLS_part=3")
     }
-    part = asyncio.create_task(data_of(hall, "1.1.m4s"))
-    at_once = read(await text_of(hall, "?_HLS_msn=1&_HLS_part=0"))
+    part = asyncio.create_task(data_of(served, "1.1.m4s"))
+    at_once = read(await text_of(served, "?_HLS_msn=1&_HLS_part=0"))
     assert [it.uri for it in at_once.parts[1]] == ["1.0.m4s"]
     assert not any(task.done() for task in (*waiting.values(), part))
-    shows(hall, range(PARTS + 1, PARTS + 2))
+    shows(served, range(PARTS + 1, PARTS + 2))
     first = read(await waiting.pop("?_HLS_msn=1&_HLS_part=1"))
     assert [it.uri for it in first.parts[1]] == ["1.0.m4s", "1.1.m4s"]
-    assert await part == await data_of(hall, "1.1.m4s")
-    shows(hall, range(PARTS + 2, PARTS + 3))
+    assert await part == await data_of(served, "1.1.m4s")
+    shows(served, range(PARTS + 2, PARTS + 3))
     assert 1 in read(await waiting.pop("?_HLS_msn=1")).whole
     (last,) = waiting.values()
-    await text_of(hall)
+    await text_of(served)
     assert not last.done(), "a part beyond the last of a segment is the first of the next (6.2.5.2)"
-    shows(hall, range(PARTS + 3, PARTS + 4))
+    shows(served, range(PARTS + 3, PARTS + 4))
     assert [it.uri for it in read(await last).parts[2]] == ["2.0.m4s"]
 
 
-async def test_the_end_of_a_stream_answers_blocked_requests(hall: Hall) -> None:
-    shows(hall, range(2 * PARTS))
-    waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=2&_HLS_part=0"))
-    part = asyncio.create_task(hall.get(STREAM + "2.0.m4s"))
-    await text_of(hall)
-    hall.service.splicer.close()
+async def test_the_end_of_a_stream_answers_blocked_requests(served: ServedSite) -> None:
+    shows(served, range(2 * PARTS))
+    waiting = asyncio.create_task(text_of(served, "?_HLS_msn=2&_HLS_part=0"))
+    part = asyncio.create_task(served.get(STREAM + "2.0.m4s"))
+    await text_of(served)
+    served.service.splicer.close()
     assert (await waiting).endswith("#EXT-X-ENDLIST\n")
     assert (await part)[0] == 404
 
@@ -196,17 +196,17 @@ async def test_the_end_of_a_stream_answers_blocked_requests(hall: Hall) -> None:
     ],
 )
 async def test_an_invalid_blocking_request_is_refused_with_one_line(
-    hall: Hall, query: str, error: str
+    served: ServedSite, query: str, error: str
 ) -> None:
-    shows(hall, range(PARTS + 1))
-    assert await hall.get(f"{STREAM}index.m3u8?{query}") == (400, {"error": error})
-    assert (await hall.get(STREAM + "7.0.m4s"))[0] == 404
+    shows(served, range(PARTS + 1))
+    assert await served.get(f"{STREAM}index.m3u8?{query}") == (400, {"error": error})
+    assert (await served.get(STREAM + "7.0.m4s"))[0] == 404
 
 
-async def test_a_blocked_request_times_out(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
-    shows(hall, range(PARTS + 1))
+async def test_a_blocked_request_times_out(served: ServedSite, monkeypatch: pytest.MonkeyPatch) -> None:
+    shows(served, range(PARTS + 1))
     monkeypatch.setattr("server.http.hls.live_playlist._MAX_BLOCK", 0.05)
-    async with hall.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
+    async with served.session.get(f"{STREAM}index.m3u8?_HLS_msn=2") as answer:
         assert (answer.status, bool(answer.headers["Retry-After"])) == (503, True)
 
 
@@ -228,33 +228,33 @@ def is_independent(reel: HlsSegmenter, gop: int) -> bool:
 
 
 async def test_parts_equal_their_segments_and_independent_ones_are_decodable(
-    hall: Hall,
+    served: ServedSite,
 ) -> None:
     gops = 8 * PARTS
-    shows(hall, range(gops), nobody=frozenset({5, 6, 7, 10, 13, 14, 15, 16}))
-    init = await data_of(hall, "init.mp4")
+    shows(served, range(gops), nobody=frozenset({5, 6, 7, 10, 13, 14, 15, 16}))
+    init = await data_of(served, "init.mp4")
     numbers = range(1, gops // PARTS)
-    segments = decoded(init + b"".join([await data_of(hall, f"{it}.m4s") for it in numbers]))
+    segments = decoded(init + b"".join([await data_of(served, f"{it}.m4s") for it in numbers]))
     uris = [(f"{it}.{part}.m4s", it * PARTS + part) for it in numbers for part in range(PARTS)]
-    together = decoded(init + b"".join([await data_of(hall, uri) for uri, _ in uris]))
+    together = decoded(init + b"".join([await data_of(served, uri) for uri, _ in uris]))
     for pulse in range(PARTS * GOP, gops * GOP):
         np.testing.assert_array_equal(at(together, pulse), at(segments, pulse), str(pulse))
-    reel = hall.service.splicer.segmenter_of_person(1)
+    reel = served.service.splicer.segmenter_of_person(1)
     assert reel is not None
     alone = [
         (uri, gop) for uri, gop in uris if (part := reel.part(gop // PARTS, gop % PARTS)) and part.independent
     ]
     assert len(alone) == len(uris) - 4, "what is bridged within a segment is not"
     for uri, gop in alone:
-        for pulse, picture in decoded(init + await data_of(hall, uri)).items():
+        for pulse, picture in decoded(init + await data_of(served, uri)).items():
             assert gop * GOP <= pulse < (gop + 1) * GOP
             np.testing.assert_array_equal(picture, at(segments, pulse), uri)
 
 
 @needs_ffmpeg
-async def test_ffmpeg_ignores_parts_and_plays_without_a_warning(hall: Hall) -> None:
-    shows(hall, range(4 * PARTS + 1))
-    url = f"http://127.0.0.1:{hall.port}{STREAM}index.m3u8"
+async def test_ffmpeg_ignores_parts_and_plays_without_a_warning(served: ServedSite) -> None:
+    shows(served, range(4 * PARTS + 1))
+    url = f"http://127.0.0.1:{served.port}{STREAM}index.m3u8"
     command = ["ffmpeg", "-v", "error", "-live_start_index", "0", "-i", url, "-f", "framecrc", "-"]
     playing = asyncio.create_task(
         asyncio.to_thread(
@@ -262,43 +262,43 @@ async def test_ffmpeg_ignores_parts_and_plays_without_a_warning(hall: Hall) -> N
         )
     )
     for gop in range(4 * PARTS + 1, 8 * PARTS):
-        shows(hall, range(gop, gop + 1))
+        shows(served, range(gop, gop + 1))
         await asyncio.sleep(0.02)
-    hall.service.splicer.close()
+    served.service.splicer.close()
     done = await playing
     assert (done.returncode, done.stderr) == (0, "")
     assert sum(not line.startswith("#") for line in done.stdout.splitlines()) == 8 * PARTS * GOP
 
 
 async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> None:
-    async for hall in opened(http=HTTP, encode={"gop": 2}, view={"lookahead": 10}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(http=HTTP, encode={"gop": 2}, view={"lookahead": 10}):
+        served.service.connect_cameras(*CAMERAS)
         gops = 40
         for camera in CAMERAS:
             for unit in encoded(0, 100, gop=2)[: 2 * gops]:
-                hall.service.ingest.video(video(camera, unit))
+                served.service.ingest.video(video(camera, unit))
         choice = ObjectChoice(1, A, None, departed=False)
         decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
         for decision in decisions[: gops // 2]:
-            hall.service.splicer.publish_decision(decision)
-        waiting = asyncio.create_task(text_of(hall, "?_HLS_msn=3"))
-        now = await text_of(hall)
+            served.service.splicer.publish_decision(decision)
+        waiting = asyncio.create_task(text_of(served, "?_HLS_msn=3"))
+        now = await text_of(served)
         assert "CAN-BLOCK-RELOAD=YES\n" in now
         assert "PART" not in now
         assert "3.m4s" not in now
         for decision in decisions[gops // 2 :]:
-            hall.service.splicer.publish_decision(decision)
+            served.service.splicer.publish_decision(decision)
         assert "3.m4s" in await waiting
-        assert (await hall.get(STREAM + "5.0.m4s"))[0] == 404
+        assert (await served.get(STREAM + "5.0.m4s"))[0] == 404
 
 
-async def test_a_camera_has_parts_too(hall: Hall) -> None:
-    shows(hall, range(2 * PARTS + 1))
-    async with hall.session.get(f"/cameras/{A}/hls/index.m3u8") as answer:
+async def test_a_camera_has_parts_too(served: ServedSite) -> None:
+    shows(served, range(2 * PARTS + 1))
+    async with served.session.get(f"/cameras/{A}/hls/index.m3u8") as answer:
         assert [it.uri for it in read(await answer.text()).parts[2]] == ["2.0.m4s"]
-    async with hall.session.get(f"/cameras/{A}/hls/2.0.m4s") as answer:
+    async with served.session.get(f"/cameras/{A}/hls/2.0.m4s") as answer:
         assert (await answer.read())[4:8] == b"moof"
     async with aiohttp.ClientSession() as other:
-        url = f"http://127.0.0.1:{hall.port}/cameras/{A}/hls/2.9.m4s"
+        url = f"http://127.0.0.1:{served.port}/cameras/{A}/hls/2.9.m4s"
         async with other.get(url) as answer:
             assert answer.status == 404

@@ -7,43 +7,45 @@ import pytest
 from fakes.paths import CONFIGS
 from fakes.prometheus.monitoring_files import (
     ALERTS,
-    ASKED,
+    BUILT_IN_METRICS,
     DASHBOARD,
-    OF_PROMETHEUS,
+    EXPRESSIONS,
     SCRAPING,
     VARIABLES,
 )
-from fakes.prometheus.promql_series import Printed, given, selectors
-from fakes.service.fed_site import Hall
-from fakes.service.scripted_cameras import CAMERAS, status, tracks, word
+from fakes.prometheus.promql_series import ExportedMetrics, select_series, selectors
+from fakes.service.fed_site import ServedSite
+from fakes.service.scripted_cameras import CAMERAS, camera_tracks, status, tracks
 
 SEVERITIES = {"critical", "warning", "info"}
 
 
-async def printed(hall: Hall) -> Printed:
+async def printed(served: ServedSite) -> ExportedMetrics:
     """Read what /metrics prints of a site in which everything has happened."""
     for camera in CAMERAS:
-        hall.service.ingest.status(status(camera))
-        hall.service.ingest.tracks(tracks(word(camera, 2, {}, solved_at=1.0)))
-    async with hall.session.get("/metrics") as answer:
+        served.service.ingest.status(status(camera))
+        served.service.ingest.tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
+    async with served.session.get("/metrics") as answer:
         assert answer.status == 200
-        return Printed.of(await answer.text())
+        return ExportedMetrics.of(await answer.text())
 
 
-async def test_every_expression_yields_series_with_the_labels_in_its_legend(busy: Hall) -> None:
-    there = await printed(busy)
-    assert len(ASKED) > 50
-    for query in ASKED:
-        if {it.name for it in selectors(query.expression)} <= OF_PROMETHEUS:
+async def test_every_expression_yields_series_with_the_labels_in_its_legend(
+    site_with_people: ServedSite,
+) -> None:
+    there = await printed(site_with_people)
+    assert len(EXPRESSIONS) > 50
+    for query in EXPRESSIONS:
+        if {it.name for it in selectors(query.expression)} <= BUILT_IN_METRICS:
             continue
-        series = given(query.expression, there)
+        series = select_series(query.expression, there)
         assert series, query.place
         assert all(query.shown <= dict(it).keys() for it in series), query.place
 
 
-async def test_every_exported_metric_is_used_by_a_panel_or_alert(busy: Hall) -> None:
-    looked_at = {it.name for query in ASKED for it in selectors(query.expression)}
-    for name in (await printed(busy)).samples:
+async def test_every_exported_metric_is_used_by_a_panel_or_alert(site_with_people: ServedSite) -> None:
+    looked_at = {it.name for query in EXPRESSIONS for it in selectors(query.expression)}
+    for name in (await printed(site_with_people)).samples:
         if name.startswith("myview_") and not name.endswith(("_created", "_sum", "_count")):
             assert name in looked_at or name in _LOOKED_AT_OTHERWISE, name
 
@@ -82,7 +84,7 @@ h_bucket{camera="c0",le="+Inf"} 1
     ],
 )
 def test_the_evaluator_yields_known_results(expression: str, series: list[dict[str, str]]) -> None:
-    assert given(expression, Printed.of(SAID)) == {frozenset(it.items()) for it in series}
+    assert select_series(expression, ExportedMetrics.of(SAID)) == {frozenset(it.items()) for it in series}
 
 
 @pytest.mark.parametrize(
@@ -97,7 +99,7 @@ def test_the_evaluator_yields_known_results(expression: str, series: list[dict[s
 )
 def test_the_evaluator_reports_invalid_expressions(expression: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        given(expression, Printed.of(SAID))
+        select_series(expression, ExportedMetrics.of(SAID))
 
 
 def test_every_alert_has_a_severity_and_a_unique_name() -> None:

@@ -7,16 +7,16 @@ from contextlib import aclosing
 import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, status
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 
 
-async def test_every_camera_is_listed_with_its_measurements(busy: Hall) -> None:
-    busy.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
-    answer = (await busy.get_json("/api/operator/cameras"))["cameras"]
-    plain = (await busy.get_json("/api/cameras"))["cameras"]
+async def test_every_camera_is_listed_with_its_measurements(site_with_people: ServedSite) -> None:
+    site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    answer = (await site_with_people.get_json("/api/operator/cameras"))["cameras"]
+    plain = (await site_with_people.get_json("/api/cameras"))["cameras"]
     assert [it["camera"] for it in answer] == [A, B]
     for diagnostics, plain_info in zip(answer, plain, strict=True):
         assert diagnostics.items() >= plain_info.items()
@@ -27,12 +27,12 @@ async def test_every_camera_is_listed_with_its_measurements(busy: Hall) -> None:
     assert (first["optimal"], first["solved_windows"], first["last_error"]) == (None, 0, None)
 
 
-async def test_the_last_error_is_shown_until_the_next_one(busy: Hall) -> None:
+async def test_the_last_error_is_shown_until_the_next_one(site_with_people: ServedSite) -> None:
     async def trouble() -> str:
-        camera = (await busy.get_json("/api/operator/cameras"))["cameras"][0]
+        camera = (await site_with_people.get_json("/api/operator/cameras"))["cameras"][0]
         return str(camera["last_error"]["text"])
 
-    ingest = busy.service.ingest
+    ingest = site_with_people.service.ingest
     ingest.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
     assert "invalid message: " in await trouble()
     ingest.status(status(A, state="away"))
@@ -46,12 +46,12 @@ async def test_the_last_error_is_shown_until_the_next_one(busy: Hall) -> None:
 async def test_the_floor_shows_calibrated_cameras_whose_size_is_known() -> None:
     plan = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
     cameras = [{"id": A, "source": "scene:room", "ground": plan}, B]
-    async with aclosing(opened(cameras=cameras)) as halls:
-        hall = await anext(halls)
-        assert await hall.get_json("/api/operator/floor") == {"cameras": [], "uncalibrated": [B]}
-        hall.service.come(*CAMERAS)
-        hall.service.feed(0, {A: {}, B: {}})
-        (camera,) = (await hall.get_json("/api/operator/floor"))["cameras"]
+    async with aclosing(serve_site(cameras=cameras)) as halls:
+        served = await anext(halls)
+        assert await served.get_json("/api/operator/floor") == {"cameras": [], "uncalibrated": [B]}
+        served.service.connect_cameras(*CAMERAS)
+        served.service.feed(0, {A: {}, B: {}})
+        (camera,) = (await served.get_json("/api/operator/floor"))["cameras"]
     assert camera["camera"] == A
     assert camera["homography"] == plan
     corners = [round(side, 6) for corner in camera["outline"] for side in corner]
@@ -63,7 +63,7 @@ async def test_the_pulse_servers_clients_and_missing_ones_are_listed() -> None:
         PulseServer(25.0) as server,
         PulseClient("127.0.0.1", server.port, A) as camera,
         PulseClient("127.0.0.1", server.port, "stranger") as stranger,
-        aclosing(opened(sync={"port": server.port})) as halls,
+        aclosing(serve_site(sync={"port": server.port})) as halls,
     ):
         for client in (camera, stranger):
             await anext(aiter(client))  # it is connected
@@ -81,20 +81,20 @@ async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() 
     async with (
         PulseServer(25.0, users=users) as server,
         PulseClient("127.0.0.1", server.port, A, credentials=Credentials(A, users[A])) as camera,
-        aclosing(opened(sync={"port": server.port})) as halls,
+        aclosing(serve_site(sync={"port": server.port})) as halls,
     ):
         await anext(aiter(camera))
-        hall = await anext(halls)
-        assert "needs a login" in (await hall.get_json("/api/operator/pulses"))["error"]
-        hall.service.pulse_credentials = Credentials("bestview", users["bestview"])
-        answer = await hall.get_json("/api/operator/pulses")
+        served = await anext(halls)
+        assert "needs a login" in (await served.get_json("/api/operator/pulses"))["error"]
+        served.service.pulse_credentials = Credentials("bestview", users["bestview"])
+        answer = await served.get_json("/api/operator/pulses")
     assert (answer["error"], [it["name"] for it in answer["clients"]]) == ("", [A])
     assert answer["missing"] == [B, "bestview"]
 
 
 @pytest.mark.parametrize("port", [1])
 async def test_an_unreachable_pulse_server_is_reported_in_one_line(port: int) -> None:
-    async with aclosing(opened(sync={"port": port})) as halls:
+    async with aclosing(serve_site(sync={"port": port})) as halls:
         answer = await (await anext(halls)).get_json("/api/operator/pulses")
     assert answer["error"].startswith(f"there is no pulse server at 127.0.0.1:{port}")
     assert "\n" not in answer["error"]

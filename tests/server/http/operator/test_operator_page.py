@@ -20,12 +20,21 @@ from playwright.async_api import Browser, Page, Route, expect
 
 from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
-from fakes.cli.calibration_walk import SITE, curved, errors_on_floor, words
-from fakes.http.tokens import line_of, token_of, write_tokens
+from fakes.cli.calibration_walk import SITE, curved_path, errors_on_floor, walk_epochs
+from fakes.http.tokens import token_entry, token_of, write_tokens
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import A, B, Hall, opened, see
-from fakes.service.scripted_cameras import CAMERAS, FPS, LARGE, SMALL, small_config, status, tracks, word
+from fakes.service.fed_site import A, B, ServedSite, serve_site, show_people
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    LARGE,
+    SMALL,
+    camera_tracks,
+    small_config,
+    status,
+    tracks,
+)
 from fakes.timeouts import PATIENCE_MS
 from server.cli.calibrate.points_file import read_points
 from server.messaging.messages import ZenohKeys
@@ -53,11 +62,11 @@ async def browser() -> AsyncIterator[Browser]:
 @asynccontextmanager
 async def operating(
     browser: Browser, place: str = "", axe: str = "", *, patience: float = 60, **changes: Any
-) -> AsyncIterator[tuple[Hall, Page]]:
+) -> AsyncIterator[tuple[ServedSite, Page]]:
     """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
     complaints: list[str] = []
-    async with aclosing(opened(patience=patience, **changes)) as halls:
-        hall = await anext(halls)
+    async with aclosing(serve_site(patience=patience, **changes)) as halls:
+        served = await anext(halls)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         await page.add_init_script(axe)  # where the site's policy does not hold
         page.set_default_timeout(PATIENCE_MS)
@@ -66,14 +75,14 @@ async def operating(
             "console",
             lambda it: complaints.append(it.text) if "Content Security" in it.text else None,
         )
-        await page.goto(f"http://127.0.0.1:{hall.port}/operator{place}")
-        yield hall, page
+        await page.goto(f"http://127.0.0.1:{served.port}/operator{place}")
+        yield served, page
         await page.close()
     assert complaints == []
 
 
 async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_path: Path) -> None:
-    tokens = write_tokens(tmp_path / "tokens.yaml", line_of("lead"), line_of("desk"))
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("lead"), token_entry("desk"))
     async with operating(browser, access={"tokens": str(tokens)}) as (_, page):
         field = page.get_by_label("An operator's token")
         await field.fill("wrong")
@@ -100,16 +109,16 @@ async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_p
 
 
 async def test_a_site_without_tokens_shows_no_sign_in_form(browser: Browser) -> None:
-    async with operating(browser) as (hall, page):
-        await expect(page.locator("#site")).to_have_text(hall.service.config.site.name)
+    async with operating(browser) as (served, page):
+        await expect(page.locator("#site")).to_have_text(served.service.config.site.name)
         await expect(page.get_by_label("An operator's token")).to_be_hidden()
         await expect(page.get_by_role("button", name="Sign out")).to_be_hidden()
 
 
 async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
-    async with operating(browser, "#cameras") as (hall, page):
+    async with operating(browser, "#cameras") as (served, page):
         await expect(page.locator(".camera-tile .state")).to_have_text(["Starting", "Starting"])
-        see(hall)
+        show_people(served)
         await expect(page.locator(".camera-tile .state")).to_have_text(["Live", "Live"])
         picture = await page.get_by_alt_text(f"What {A} sees now").element_handle()
         await page.wait_for_function("(it) => it.naturalWidth > 0", arg=picture)
@@ -118,9 +127,9 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
             await tile.locator("dt").all_text_contents()
             == await page.locator(".camera-tile >> nth=1 >> dt").all_text_contents()
         )
-        hall.service.ingest.status(status(A, missed=3, clock_offset=-0.25))
+        served.service.ingest.status(status(A, missed=3, clock_offset=-0.25))
         await expect(tile.get_by_text("-250 ms")).to_be_visible()
-        hall.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        served.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
         await expect(tile.locator(".state")).to_have_text("Gone")
         await expect(tile.locator(".last-error")).to_contain_text("its process disconnected")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
@@ -128,13 +137,13 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:
     cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
-    async with operating(browser, "#floor", cameras=cameras) as (hall, page):
+    async with operating(browser, "#floor", cameras=cameras) as (served, page):
         await expect(page.locator("#floor-message")).to_have_text("No camera has reported yet.")
-        see(hall)
+        show_people(served)
         await page.reload()
         await expect(page.locator("#plan polygon")).to_have_count(2)
-        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: SMALL}})
-        hall.service.feed(4, {A: {2: SMALL}, B: {1: SMALL}})
+        served.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: SMALL}})
+        served.service.feed(4, {A: {2: SMALL}, B: {1: SMALL}})
         left, _, right, bottom = SMALL
         stands = f"{(left + right) / 20:.2f}, {bottom / 10:.2f}"
         await expect(page.locator("#positions li").nth(1)).to_have_text(f"2 at {stands}, seen by {A}")
@@ -143,18 +152,18 @@ async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browse
 
 
 async def test_an_uncalibrated_site_shows_how_to_calibrate(browser: Browser) -> None:
-    async with operating(browser, "#floor") as (hall, page):
-        see(hall)
+    async with operating(browser, "#floor") as (served, page):
+        show_people(served)
         await expect(page.locator("#floor-message")).to_contain_text("No camera is calibrated")
         await expect(page.locator("#plan")).to_be_hidden()
 
 
 async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browser) -> None:
-    async with operating(browser, "#people") as (hall, page):
-        people = hall.service.decider.people
-        people._registry = IdentityRegistry(hall.service.config.view.identity, dict.fromkeys(CAMERAS))
+    async with operating(browser, "#people") as (served, page):
+        people = served.service.decider.people
+        people._registry = IdentityRegistry(served.service.config.view.identity, dict.fromkeys(CAMERAS))
         await expect(page.locator("#people-message")).to_have_text("No people yet.")
-        see(hall)
+        show_people(served)
         first, second, *_ = people.known
         await page.get_by_label(f"Name of person {first}").fill("Ann")
         await page.keyboard.press("Enter")
@@ -164,7 +173,7 @@ async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browse
         await page.get_by_role("button", name="Merge").click()
         await expect(page.locator("#people-message")).to_have_text(f"{second} is merged into {first}.")
         assert people.registry.merged == {second: first}
-        hall.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+        served.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
         await expect(page.locator(f'#people-list [data-object="{second}"]')).to_have_count(0)
         shown = people.number(A, 1, 15)
         await page.get_by_label("Split", exact=True).select_option(str(shown))
@@ -172,31 +181,31 @@ async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browse
         await page.get_by_role("button", name="Split off as new person").click()
         await expect(page.locator("#people-message")).to_have_text(re.compile(r"Split off as person \d+\."))
         assert people.number(A, 1, 19) != shown
-        await page.goto(f"http://127.0.0.1:{hall.port}/?object={first}")
+        await page.goto(f"http://127.0.0.1:{served.port}/?object={first}")
         await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
         await expect(page).to_have_title(f"Person {first}, Ann · MyView")
 
 
 async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
-    async with operating(browser, "#flags") as (hall, page):
+    async with operating(browser, "#flags") as (served, page):
         await expect(page.locator("#no-flags")).to_have_text("None so far.")
-        see(hall)
-        hall.service.decider.people.registry.set_name(1, "Ann")
+        show_people(served)
+        served.service.decider.people.registry.set_name(1, "Ann")
         trouble = RiskEvent(reason="crossing", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
-        hall.service.ingest.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
-        hall.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
-        hall.service.pulse = 19
-        hall.service.decide()
+        served.service.ingest.tracks(tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
+        served.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
+        served.service.pulse = 19
+        served.service.decide()
         line = page.locator("#flag-list li")
         await expect(line).to_have_text(re.compile(r"2 and 1.* cross .* \(c0\): open"))
         await expect(page.locator("#no-flags")).to_have_text("")
-        hall.service.assist.flags.step(29 + 8 * FPS + 1, [], int)
+        served.service.assist.flags.step(29 + 8 * FPS + 1, [], int)
         await expect(line).to_have_text(re.compile(r": expired without an answer"))
         await page.reload()
         await expect(line).to_have_text(re.compile(r": expired without an answer"))
         # Another run of the service knows nothing of it; the page sees that its connection ends.
-        hall.service.assist.flags._ended.clear()
-        [events] = [tell.__self__ for tell in hall.service.assist.flags.on_flag]  # type: ignore[attr-defined]
+        served.service.assist.flags._ended.clear()
+        [events] = [tell.__self__ for tell in served.service.assist.flags.on_flag]  # type: ignore[attr-defined]
         lines, events._by_scope = events._by_scope, {}
         for it in lines.values():
             it.channel.close()
@@ -204,10 +213,10 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
 
 
 async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browser) -> None:
-    async with operating(browser, "#downloads") as (hall, page):
+    async with operating(browser, "#downloads") as (served, page):
         end = int(time.time())
-        hall.service.pulse0 = end - 0.2  # five frames before
-        see(hall)
+        served.service.pulse0 = end - 0.2  # five frames before
+        show_people(served)
         for label, moment in (("From", end - 60), ("to", end)):
             local = datetime.fromtimestamp(moment)  # noqa: DTZ006 — as the page shows it
             await page.get_by_label(label, exact=True).fill(local.isoformat())
@@ -229,8 +238,8 @@ async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browse
 async def test_a_late_picture_of_another_camera_does_not_replace_the_selected_one(
     browser: Browser,
 ) -> None:
-    async with operating(browser, "#configuration") as (hall, page):  # which asks for no picture
-        see(hall)
+    async with operating(browser, "#configuration") as (served, page):  # which asks for no picture
+        show_people(served)
         late = asyncio.Event()
 
         async def answer(route: Route) -> None:
@@ -256,8 +265,8 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
     browser: Browser,
 ) -> None:
     cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
-    async with operating(browser, "#zones", cameras=cameras) as (hall, page):
-        see(hall)
+    async with operating(browser, "#zones", cameras=cameras) as (served, page):
+        show_people(served)
         pressed = asyncio.Event()
 
         async def answer(route: Route) -> None:
@@ -277,8 +286,8 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
 async def test_ignored_areas_become_configuration_lines(browser: Browser) -> None:
     known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
     cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
-    async with operating(browser, "#zones", cameras=cameras) as (hall, page):
-        see(hall)
+    async with operating(browser, "#zones", cameras=cameras) as (served, page):
+        show_people(served)
         await page.reload()
         stage, lines = page.locator("#mark-stage"), page.get_by_label("Zones as YAML")
         await expect(page.locator("#mark-drawing .area")).to_have_count(2)  # the known one, and one begun
@@ -292,7 +301,7 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
         await page.keyboard.press("Enter")
         await page.keyboard.press("Backspace")
         written = yaml.safe_load(await lines.input_value())["cameras"][0]
-        site = hall.service.config.site
+        site = served.service.config.site
         mine = np.array(written["ignore"][1])
         right, top = 0.75 * site.width, 0.25 * site.height
         expected = [[0.25 * site.width, top], [right, top], [right - 1, top + 10]]
@@ -304,8 +313,8 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
 
 
 async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, tmp_path: Path) -> None:
-    async with operating(browser, "#zones") as (hall, page):
-        see(hall)
+    async with operating(browser, "#zones") as (served, page):
+        show_people(served)
         await page.reload()
         await page.get_by_label("Camera", exact=True).select_option(B)
         await page.get_by_role("button", name="Points on the floor").click()
@@ -330,14 +339,14 @@ async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, 
 
 
 async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browser, tmp_path: Path) -> None:
-    async with operating(browser, "#calibration", patience=280, **SITE) as (hall, page):
-        walking, state = hall.service.walk_session, page.locator("#walk-state")
+    async with operating(browser, "#calibration", patience=280, **SITE) as (served, page):
+        walking, state = served.service.walk_session, page.locator("#walk-state")
         await expect(state).to_have_text("No walk yet.")
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
         await page.get_by_role("button", name="Start the walk").click()
         await expect(state).to_have_text("Walk now. 0:00 minutes so far.")
         await expect(page.locator("#walk-uncovered li")).to_have_count(len(CAMERAS))
-        for sample in words(hall.service.config, curved(500)):
+        for sample in walk_epochs(served.service.config, curved_path(500)):
             walking.add(sample)
         await expect(state).to_have_text("Walk now. 0:20 minutes so far.")
         await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
@@ -362,8 +371,8 @@ async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browse
 
 
 async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browser) -> None:
-    async with operating(browser, "#view-selection") as (hall, page):
-        decider, lines = hall.service.decider, page.get_by_label("Lines for the configuration")
+    async with operating(browser, "#view-selection") as (served, page):
+        decider, lines = served.service.decider, page.get_by_label("Lines for the configuration")
         cost = page.get_by_label("Cut cost λ, s")
         await expect(cost).to_have_value("0.04")
         await cost.fill("2")
@@ -373,7 +382,7 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
         assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
         ahead = page.get_by_label("Look-ahead, frames")
-        await ahead.fill(str(hall.service.max_lookahead + 1))
+        await ahead.fill(str(served.service.max_lookahead + 1))
         await page.keyboard.press("Enter")
         assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
         await ahead.fill("15")
@@ -388,7 +397,7 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
         await page.get_by_role("button", name="Revert to file").click()
         await expect(page.locator("#selection-state")).to_have_text("As in the file.")
         await expect(page.locator("#error-message")).to_be_empty()
-        assert decider.view == hall.service.config.view
+        assert decider.view == served.service.config.view
 
 
 async def test_the_configuration_shows_differences_and_can_be_searched(browser: Browser) -> None:
@@ -405,8 +414,8 @@ async def test_the_configuration_shows_differences_and_can_be_searched(browser: 
 
 async def test_no_width_overflows_and_axe_finds_no_serious_violation(browser: Browser) -> None:
     axe = AXE.read_text(encoding="utf-8") if AXE.exists() else ""
-    async with operating(browser, axe=axe) as (hall, page):
-        see(hall)
+    async with operating(browser, axe=axe) as (served, page):
+        show_people(served)
         for width in (360, 800, 1600):
             await page.set_viewport_size({"width": width, "height": 800})
             for section in SECTIONS:

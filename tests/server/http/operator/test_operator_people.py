@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from bestview import IdentityRegistry
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL
 from server.cli.watch import run_watch
 from server.http.access.csrf import CSRF_HEADER
@@ -19,51 +19,53 @@ PEOPLE = "/api/operator/people"
 
 
 @pytest.fixture
-async def real() -> AsyncIterator[Hall]:
+async def real() -> AsyncIterator[ServedSite]:
     """Serve a site with two people: one in both cameras, the other only in c0."""
-    async with aclosing(opened()) as halls:
-        hall = await anext(halls)
-        config = hall.service.config
-        hall.service.decider.people._registry = IdentityRegistry(
+    async with aclosing(serve_site()) as halls:
+        served = await anext(halls)
+        config = served.service.config
+        served.service.decider.people._registry = IdentityRegistry(
             config.view.identity, camera_homographies(config)
         )
-        hall.service.come(*CAMERAS)
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            feed(hall, epoch)
-        yield hall
+            feed(served, epoch)
+        yield served
 
 
-def feed(hall: Hall, epoch: int) -> None:
-    hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
+def feed(served: ServedSite, epoch: int) -> None:
+    served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
 
 
-async def post_edit(hall: Hall, **edit: Any) -> tuple[int, Any]:
-    async with hall.session.post(PEOPLE, headers={CSRF_HEADER: "1"}, json=edit) as answer:
+async def post_edit(served: ServedSite, **edit: Any) -> tuple[int, Any]:
+    async with served.session.post(PEOPLE, headers={CSRF_HEADER: "1"}, json=edit) as answer:
         return answer.status, await answer.json()
 
 
-async def objects(hall: Hall) -> dict[int, Any]:
-    return {it["object"]: it for it in (await hall.get_json("/api/objects"))["objects"]}
+async def objects(served: ServedSite) -> dict[int, Any]:
+    return {it["object"]: it for it in (await served.get_json("/api/objects"))["objects"]}
 
 
-async def test_a_persons_name_appears_in_every_list(busy: Hall) -> None:
-    assert (await post_edit(busy, object=1, name=" Ann  Lee "))[0] == 200
-    assert (await objects(busy))[1]["name"] == "Ann Lee"
-    assert (await objects(busy))[2]["name"] is None
-    assert (await busy.get_json(PEOPLE))["names"] == {"1": "Ann Lee"}
-    await post_edit(busy, object=1, name="")
-    assert (await objects(busy))[1]["name"] is None
+async def test_a_persons_name_appears_in_every_list(site_with_people: ServedSite) -> None:
+    assert (await post_edit(site_with_people, object=1, name=" Ann  Lee "))[0] == 200
+    assert (await objects(site_with_people))[1]["name"] == "Ann Lee"
+    assert (await objects(site_with_people))[2]["name"] is None
+    assert (await site_with_people.get_json(PEOPLE))["names"] == {"1": "Ann Lee"}
+    await post_edit(site_with_people, object=1, name="")
+    assert (await objects(site_with_people))[1]["name"] is None
 
 
-async def test_a_name_is_listed_unchanged(busy: Hall, capsys: pytest.CaptureFixture[str]) -> None:
-    await post_edit(busy, object=1, name="Ann [bold]")
-    await run_watch(f"http://127.0.0.1:{busy.port}", None, None, None, None, None)
+async def test_a_name_is_listed_unchanged(
+    site_with_people: ServedSite, capsys: pytest.CaptureFixture[str]
+) -> None:
+    await post_edit(site_with_people, object=1, name="Ann [bold]")
+    await run_watch(f"http://127.0.0.1:{site_with_people.port}", None, None, None, None, None)
     lines = capsys.readouterr().out.splitlines()
     assert any(it.split()[:3] == ["1", "Ann", "[bold]"] for it in lines)
     assert any(it.split()[:2] == ["2", "yes"] for it in lines)
 
 
-async def test_merged_people_have_one_number_from_the_next_gop_on(real: Hall) -> None:
+async def test_merged_people_have_one_number_from_the_next_gop_on(real: ServedSite) -> None:
     people = await objects(real)
     kept, lost = sorted(people)[:2]
     decisions: list[Any] = []
@@ -82,7 +84,7 @@ async def test_merged_people_have_one_number_from_the_next_gop_on(real: Hall) ->
     assert (await post_edit(real, object=kept, merge=lost))[0] == 400
 
 
-async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: Hall) -> None:
+async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: ServedSite) -> None:
     who = real.service.decider.people.number(A, 1, 10)
     assert who is not None
     decisions: list[Any] = []
@@ -113,16 +115,16 @@ async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: Hall) -
     ],
 )
 async def test_an_invalid_edit_is_refused_with_one_line(
-    busy: Hall, edit: dict[str, Any], status: int, error: str
+    site_with_people: ServedSite, edit: dict[str, Any], status: int, error: str
 ) -> None:
-    response = await post_edit(busy, **edit)
+    response = await post_edit(site_with_people, **edit)
     assert response[0] == status
     assert response[1]["error"].startswith(error)
 
 
 async def test_people_cannot_be_edited_on_a_sharded_site() -> None:
-    async with aclosing(opened(view={"share": {"of": 2}})) as halls:
-        hall = await anext(halls)
-        status, response = await post_edit(hall, object=1, name="Ann")
+    async with aclosing(serve_site(view={"share": {"of": 2}})) as halls:
+        served = await anext(halls)
+        status, response = await post_edit(served, object=1, name="Ann")
         assert status == 409
-        assert (await hall.get_json(PEOPLE))["unavailable"] == response["error"]
+        assert (await served.get_json(PEOPLE))["unavailable"] == response["error"]

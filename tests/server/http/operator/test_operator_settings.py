@@ -11,8 +11,16 @@ import pytest
 import yaml
 
 from bestview.quality import QualitySettings
-from fakes.service.fed_site import A, B, Hall, opened
-from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, TrackNumbers, epoch_of, small_config, word
+from fakes.service.fed_site import A, B, ServedSite, serve_site
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    LARGE,
+    SMALL,
+    TrackNumbers,
+    camera_tracks,
+    epoch_of,
+    small_config,
+)
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.http.access.csrf import CSRF_HEADER
@@ -24,8 +32,8 @@ MINE = {CSRF_HEADER: "1"}
 WIDE = {"site": {"width": 128, "height": 96}}
 
 
-async def put(hall: Hall, json: Any) -> tuple[int, Any]:
-    async with hall.session.put(CHOOSING, headers=MINE, json=json) as answer:
+async def put(served: ServedSite, json: Any) -> tuple[int, Any]:
+    async with served.session.put(CHOOSING, headers=MINE, json=json) as answer:
         return answer.status, await answer.json()
 
 
@@ -38,7 +46,7 @@ def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -
         if tuned is not None and number == after:
             decider.apply_view_settings(tuned)
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
-        words = [word(A, number, {1: one, 2: SMALL}), word(B, number, {1: other, 2: one})]
+        words = [camera_tracks(A, number, {1: one, 2: SMALL}), camera_tracks(B, number, {1: other, 2: one})]
         decisions += decider.step(epoch_of(number, *words))
     return decisions
 
@@ -80,21 +88,25 @@ def test_settings_can_be_tuned_back() -> None:
     assert np.isclose(decider.switch_cost, 1.0)
 
 
-async def test_trial_settings_are_in_force_at_once_with_configuration_lines(busy: Hall) -> None:
-    at_first = await busy.get_json(CHOOSING)
+async def test_trial_settings_are_in_force_at_once_with_configuration_lines(
+    site_with_people: ServedSite,
+) -> None:
+    at_first = await site_with_people.get_json(CHOOSING)
     assert at_first["values"] == at_first["file"]
-    status, tried = await put(busy, {"switch_cost_s": 2, "quality.facing": 0.5, "quality.relative": False})
+    status, tried = await put(
+        site_with_people, {"switch_cost_s": 2, "quality.facing": 0.5, "quality.relative": False}
+    )
     assert status == 200
-    assert tried == await busy.get_json(CHOOSING)
+    assert tried == await site_with_people.get_json(CHOOSING)
     assert tried["file"] == at_first["file"]
-    assert busy.service.decider.switch_cost == 50.0
+    assert site_with_people.service.decider.switch_cost == 50.0
     assert yaml.safe_load(tried["lines"]) == {
         "view": {"lookahead": 10, "switch_cost_s": 2.0, "quality": {"facing": 0.5, "relative": False}}
     }
     small_config(view=yaml.safe_load(tried["lines"])["view"])  # they are lines of a configuration
-    busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
-    assert (await busy.get_json("/api/objects/1/choice"))["switch_cost"] == 50.0
-    async with busy.session.delete(CHOOSING, headers=MINE) as answer:
+    site_with_people.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+    assert (await site_with_people.get_json("/api/objects/1/choice"))["switch_cost"] == 50.0
+    async with site_with_people.session.delete(CHOOSING, headers=MINE) as answer:
         assert await answer.json() == at_first
 
 
@@ -111,16 +123,18 @@ async def test_trial_settings_are_in_force_at_once_with_configuration_lines(busy
         ([], "the request's JSON: "),
     ],
 )
-async def test_invalid_trial_settings_change_nothing(busy: Hall, json: Any, error: str) -> None:
-    status, response = await put(busy, json)
+async def test_invalid_trial_settings_change_nothing(
+    site_with_people: ServedSite, json: Any, error: str
+) -> None:
+    status, response = await put(site_with_people, json)
     assert status == 400
     assert response["error"].startswith(error)
     assert "\n" not in response["error"]
-    assert busy.service.decider.view == busy.service.config.view
+    assert site_with_people.service.decider.view == site_with_people.service.config.view
 
 
 @pytest.fixture
-async def open_hall() -> AsyncIterator[Hall]:
+async def open_hall() -> AsyncIterator[ServedSite]:
     cameras = [
         {
             "id": A,
@@ -133,11 +147,11 @@ async def open_hall() -> AsyncIterator[Hall]:
         },
         B,
     ]
-    async with aclosing(opened(cameras=cameras)) as halls:
+    async with aclosing(serve_site(cameras=cameras)) as halls:
         yield await anext(halls)
 
 
-async def test_the_configuration_shows_differences_and_no_secrets(open_hall: Hall) -> None:
+async def test_the_configuration_shows_differences_and_no_secrets(open_hall: ServedSite) -> None:
     settings = {it["key"]: it for it in (await open_hall.get_json("/api/operator/config"))["settings"]}
     assert settings["encode.gop"] == {"key": "encode.gop", "value": "5", "default": "10", "differs": True}
     assert settings["view.quality.truncation"]["differs"] is False

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from fakes.service.fed_site import A, B, Hall, opened, see
-from fakes.service.scripted_cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, tracks, word
+from fakes.service.fed_site import A, B, ServedSite, serve_site, show_people
+from fakes.service.scripted_cameras import FPS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, camera_tracks, tracks
 from server.camera.operator_corrections import CorrectionInbox
 from server.http.access.csrf import CSRF_HEADER
 from server.messaging.inbox import Message
@@ -20,28 +20,28 @@ CORRECTIONS = "/api/operator/position_corrections"
 
 
 @pytest.fixture
-async def assisted() -> AsyncIterator[Hall]:
+async def assisted() -> AsyncIterator[ServedSite]:
     """Serve a site whose cameras accept corrections: object 1 in both, 2 in c0 alone."""
-    async with aclosing(opened(track={"assist": {"enabled": True, "memory_frames": 10}})) as halls:
-        hall = await anext(halls)
-        see(hall)
-        yield hall
+    async with aclosing(serve_site(track={"assist": {"enabled": True, "memory_frames": 10}})) as halls:
+        served = await anext(halls)
+        show_people(served)
+        yield served
 
 
-def record_corrections(hall: Hall) -> list[tuple[str, PositionCorrections]]:
+def record_corrections(served: ServedSite) -> list[tuple[str, PositionCorrections]]:
     """Collect the corrections that cameras receive from now on."""
     received: list[tuple[str, PositionCorrections]] = []
 
     def send(camera: str, payload: bytes) -> None:
         received.append((camera, msgspec.json.decode(payload, type=PositionCorrections)))
 
-    hall.service.assist._send = send
+    served.service.assist._send = send
     return received
 
 
-async def post_corrections(hall: Hall, *corrections: Any, **fields: Any) -> tuple[int, Any]:
+async def post_corrections(served: ServedSite, *corrections: Any, **fields: Any) -> tuple[int, Any]:
     body = {"object": 1, "camera": A, "corrections": list(corrections), **fields}
-    async with hall.session.post(CORRECTIONS, headers={CSRF_HEADER: "1"}, json=body) as answer:
+    async with served.session.post(CORRECTIONS, headers={CSRF_HEADER: "1"}, json=body) as answer:
         return answer.status, await answer.json()
 
 
@@ -49,7 +49,7 @@ def at(pulse: int, x: float = 12.0, y: float = 20.0, **more: float) -> dict[str,
     return {"pulse": pulse, "x": x, "y": y, **more}
 
 
-async def test_a_camera_receives_the_corrections_with_its_track_id(assisted: Hall) -> None:
+async def test_a_camera_receives_the_corrections_with_its_track_id(assisted: ServedSite) -> None:
     received = record_corrections(assisted)
     status, answer = await post_corrections(assisted, at(2), at(7, tolerance=3.0), object=2)
     assert (status, answer["accepted"], answer["too_old"], answer["flags"]) == (200, 2, 0, [])
@@ -69,7 +69,7 @@ async def test_a_camera_receives_the_corrections_with_its_track_id(assisted: Hal
     )
 
 
-async def test_corrections_that_are_too_old_are_counted_and_not_sent(assisted: Hall) -> None:
+async def test_corrections_that_are_too_old_are_counted_and_not_sent(assisted: ServedSite) -> None:
     for epoch in range(3, 9):
         assisted.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {1: LARGE}})
     received = record_corrections(assisted)
@@ -98,7 +98,7 @@ async def test_corrections_that_are_too_old_are_counted_and_not_sent(assisted: H
     ids=str,
 )
 async def test_an_invalid_correction_is_refused_with_one_line(
-    assisted: Hall, fields: dict[str, Any], status: int, reason: str
+    assisted: ServedSite, fields: dict[str, Any], status: int, reason: str
 ) -> None:
     received = record_corrections(assisted)
     code, answer = await post_corrections(assisted, at(7), **fields)
@@ -108,25 +108,29 @@ async def test_an_invalid_correction_is_refused_with_one_line(
     assert received == []
 
 
-async def test_a_page_of_another_origin_cannot_send_corrections(assisted: Hall) -> None:
+async def test_a_page_of_another_origin_cannot_send_corrections(assisted: ServedSite) -> None:
     body = {"object": 1, "camera": A, "corrections": [at(7)]}
     async with assisted.session.post(CORRECTIONS, json=body) as answer:
         assert answer.status == 403
 
 
-async def test_without_assistance_corrections_are_refused_with_the_reason(busy: Hall) -> None:
-    status, answer = await post_corrections(busy, at(7))
+async def test_without_assistance_corrections_are_refused_with_the_reason(
+    site_with_people: ServedSite,
+) -> None:
+    status, answer = await post_corrections(site_with_people, at(7))
     assert (status, answer["error"]) == (409, "cameras accept no corrections: track.assist.enabled is off")
-    assert (await busy.get_json(CORRECTIONS))["unavailable"] == answer["error"]
+    assert (await site_with_people.get_json(CORRECTIONS))["unavailable"] == answer["error"]
 
 
-async def test_a_flag_is_raised_followed_answered_and_counted(assisted: Hall) -> None:
+async def test_a_flag_is_raised_followed_answered_and_counted(assisted: ServedSite) -> None:
     expected = 4 * STRIDE
     crossing = RiskEvent(reason="crossing", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
     unknown = [RiskEvent(reason="optimality_gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
     unknown += [RiskEvent(reason="track_loss", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
-    assisted.service.ingest.tracks(tracks(word(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*unknown, crossing])))
-    assisted.service.ingest.tracks(tracks(word(B, 3, {1: LARGE})))
+    assisted.service.ingest.tracks(
+        tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*unknown, crossing]))
+    )
+    assisted.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
     assisted.service.pulse = 4 * STRIDE - 1
     assisted.service.decide()
 

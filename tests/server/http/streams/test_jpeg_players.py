@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.common.browser import chromium
 from fakes.programs import needs_chromium, needs_ffmpeg
-from fakes.service.drawn_site import Drawn, drawn_room
+from fakes.service.drawn_site import DrawnSite, drawn_room
 from fakes.service.scripted_cameras import FPS, GOP
 
 LOOKS = """
@@ -39,10 +39,10 @@ async (address) => {
 
 
 @pytest.fixture
-async def going() -> AsyncIterator[Drawn]:
+async def going() -> AsyncIterator[DrawnSite]:
     """A site that runs in real time."""
     async for drawn in drawn_room():
-        task = asyncio.create_task(drawn.keep_going(GOP / FPS))
+        task = asyncio.create_task(drawn.advance_forever(GOP / FPS))
         yield drawn
         task.cancel()
 
@@ -53,7 +53,7 @@ async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -
         async for drawn in drawn_room():
             page = await browser.new_page()
             await page.goto(f"http://127.0.0.1:{drawn.port}/healthz")
-            going = asyncio.create_task(drawn.keep_going(GOP / FPS))
+            going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
             await page.evaluate(
                 "(path) => new Promise((done) => { const image = new Image(); image.onload = done;"
                 " image.src = path; document.body.append(image); })",
@@ -66,7 +66,7 @@ async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -
 
 @needs_ffmpeg
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mjpeg", "/objects/1/best.mp4?overlay=1"])
-async def test_ffmpeg_reads_mjpeg_without_a_warning(going: Drawn, path: str) -> None:
+async def test_ffmpeg_reads_mjpeg_without_a_warning(going: DrawnSite, path: str) -> None:
     reading = await asyncio.create_subprocess_exec(
         *("ffmpeg", "-v", "warning", "-nostdin", "-i", f"http://127.0.0.1:{going.port}{path}"),
         *("-frames:v", "15", "-f", "framecrc", "-"),

@@ -13,8 +13,18 @@ import cv2
 import numpy as np
 import pytest
 
-from fakes.service.drawn_site import CAMERAS, GOP, SIZE, Drawn, Image, decoded, drawn_room, parts, read_film
-from fakes.service.fed_site import B, Hall
+from fakes.service.drawn_site import (
+    CAMERAS,
+    GOP,
+    SIZE,
+    DrawnSite,
+    Image,
+    decoded,
+    drawn_room,
+    jpeg_parts,
+    read_film,
+)
+from fakes.service.fed_site import B, ServedSite
 from server.http.app_keys import SERVICE
 from server.service.rendering.render_pool import CameraView, PersonView, RenderPool
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR
@@ -24,7 +34,7 @@ SOMEBODY = 1
 
 
 @pytest.fixture
-async def drawn() -> AsyncIterator[Drawn]:
+async def drawn() -> AsyncIterator[DrawnSite]:
     async for it in drawn_room():
         yield it
 
@@ -42,11 +52,11 @@ def difference(image: Image, other: Image) -> float:
     return float(np.abs(image.astype(np.int16) - other).mean())
 
 
-async def test_boxes_are_drawn_on_their_frames(drawn: Drawn) -> None:
+async def test_boxes_are_drawn_on_their_frames(drawn: DrawnSite) -> None:
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as answer:
         assert answer.status == 200
         assert answer.content_type == "video/mp4"
-        drawn.go_on(3)
+        drawn.advance(3)
         data = await read_film(answer, 4 * GOP)
     with av.open(io.BytesIO(data), "r") as stream:
         pictures = {
@@ -80,7 +90,7 @@ async def test_boxes_are_drawn_on_their_frames(drawn: Drawn) -> None:
     assert at < after - 1
 
 
-async def test_a_still_is_the_newest_frame_and_not_cached(drawn: Drawn) -> None:
+async def test_a_still_is_the_newest_frame_and_not_cached(drawn: DrawnSite) -> None:
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
         assert answer.status == 200
         assert answer.content_type == "image/jpeg"
@@ -90,7 +100,7 @@ async def test_a_still_is_the_newest_frame_and_not_cached(drawn: Drawn) -> None:
     assert image.shape == (SIZE[1], SIZE[0], 3)
     near = [difference(image, own) for own in decoded(0, 20)]
     assert int(np.argmin(near)) == 19
-    drawn.go_on()
+    drawn.advance()
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg?overlay=1") as answer:
         last = max(drawn.decisions) + GOP - 1
         assert answer.headers["X-MyView-Pulse"] == str(last)
@@ -99,7 +109,7 @@ async def test_a_still_is_the_newest_frame_and_not_cached(drawn: Drawn) -> None:
         assert green(picture_of(await answer.read())).sum() < 10
 
 
-async def test_a_cameras_boxes_belong_to_decided_frames(drawn: Drawn) -> None:
+async def test_a_cameras_boxes_belong_to_decided_frames(drawn: DrawnSite) -> None:
     async with drawn.session.get("/cameras/c1/live.jpg?overlay=1") as answer:
         assert answer.status == 200
         pulse, image = int(answer.headers["X-MyView-Pulse"]), picture_of(await answer.read())
@@ -115,27 +125,27 @@ async def test_a_cameras_boxes_belong_to_decided_frames(drawn: Drawn) -> None:
             assert beside.any(), "a line where the edge of the box is"
 
 
-async def test_multipart_jpeg_continues_with_the_newest_picture(drawn: Drawn) -> None:
+async def test_multipart_jpeg_continues_with_the_newest_picture(drawn: DrawnSite) -> None:
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
         assert answer.content_type == "multipart/x-mixed-replace"
         pulses = []
-        async for part in parts(answer):
+        async for part in jpeg_parts(answer):
             assert picture_of(part.jpeg).shape == (SIZE[1], SIZE[0], 3)
             pulses.append(part.pulse)
             if part.pulse >= 34:
                 break
             if part.pulse % GOP == GOP - 1:
-                drawn.go_on()
+                drawn.advance()
     assert pulses[0] == 19, "the newest there is comes at once"
     assert pulses == sorted(set(pulses))
 
 
-async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn: Drawn) -> None:
+async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn: DrawnSite) -> None:
     loop = asyncio.get_running_loop()
     came: dict[int, float] = {}
-    going = asyncio.create_task(drawn.keep_going(GOP / FPS))
+    going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg?overlay=1") as answer:
-        async for part in parts(answer):
+        async for part in jpeg_parts(answer):
             came[part.pulse] = loop.time()
             if len(came) > 4 * GOP:
                 break
@@ -147,11 +157,11 @@ async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn
     assert max(max(gop) - min(gop) for gop in gops[1:] if gop) > 0.4 * GOP / FPS, "they do not come in bursts"
 
 
-async def test_the_requested_rate_limits_pictures(drawn: Drawn) -> None:
+async def test_the_requested_rate_limits_pictures(drawn: DrawnSite) -> None:
     async with drawn.session.get("/cameras/c0/live.mjpeg?fps=5") as answer:
-        reading = parts(answer)
+        reading = jpeg_parts(answer)
         first = await anext(reading)
-        drawn.go_on(4)
+        drawn.advance(4)
         pulses = [(await anext(reading)).pulse]
         await reading.aclose()
     assert first.pulse == 19
@@ -162,32 +172,32 @@ async def test_the_requested_rate_limits_pictures(drawn: Drawn) -> None:
         assert content["error"].startswith(f"fps={rate}: must be")
 
 
-async def test_one_worker_renders_a_stream_for_all_viewers(drawn: Drawn) -> None:
+async def test_one_worker_renders_a_stream_for_all_viewers(drawn: DrawnSite) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     film = f"/objects/{SOMEBODY}/best.mp4?overlay=1"
     async with drawn.session.get(film) as one, drawn.session.get(film) as other:
         async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as third:
-            assert (await anext(parts(third))).pulse >= 0
+            assert (await anext(jpeg_parts(third))).pulse >= 0
             assert set(pictures.streams) == {PersonView(SOMEBODY)}
             assert pictures.viewers == 3
-        drawn.go_on(2)
+        drawn.advance(2)
         first, second = await read_film(one, 2 * GOP), await read_film(other, 2 * GOP)
     length = min(len(first), len(second))
     assert first[:length] == second[:length]
 
 
 async def test_a_killed_worker_is_replaced_and_its_streams_continue(
-    drawn: Drawn, monkeypatch: pytest.MonkeyPatch
+    drawn: DrawnSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
     pictures: RenderPool = drawn.app[SERVICE].rendering
-    going = asyncio.create_task(drawn.keep_going(GOP / FPS))
+    going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with (
         drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
         drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as series,
     ):
         data = await read_film(film, 2 * GOP)
-        reading = parts(series)
+        reading = jpeg_parts(series)
         await anext(reading)
         source = pictures.streams[PersonView(SOMEBODY)]
         assert source.pid is not None
@@ -204,7 +214,7 @@ async def test_a_killed_worker_is_replaced_and_its_streams_continue(
     assert len(times) >= 4 * GOP
 
 
-async def test_a_worker_ends_after_its_last_viewer(drawn: Drawn) -> None:
+async def test_a_worker_ends_after_its_last_viewer(drawn: DrawnSite) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     pictures._linger_s = 0.2
     async with drawn.session.get("/cameras/c0/live.jpg") as answer:
@@ -219,17 +229,17 @@ async def test_a_worker_ends_after_its_last_viewer(drawn: Drawn) -> None:
         os.kill(pid, 0)
 
 
-async def test_a_hanging_worker_does_not_delay_others(drawn: Drawn) -> None:
+async def test_a_hanging_worker_does_not_delay_others(drawn: DrawnSite) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
     async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
-        await anext(parts(answer))
+        await anext(jpeg_parts(answer))
         source = pictures.streams[CameraView("c0")]
         assert source.pid is not None
         os.kill(source.pid, signal.SIGSTOP)
         async with drawn.session.get("/cameras/c0/live.mp4") as plain:
             await read_film(plain, GOP)
             for _ in range(4):
-                drawn.go_on(4)
+                drawn.advance(4)
                 await read_film(plain, 4 * GOP)
         assert source.lost, "whole GOPs, and not a byte waits for the process in the service"
         os.kill(source.pid, signal.SIGCONT)
@@ -238,7 +248,7 @@ async def test_a_hanging_worker_does_not_delay_others(drawn: Drawn) -> None:
 async def test_the_number_of_rendered_streams_is_limited() -> None:
     async for drawn in drawn_room(http={"pictures_max": 1}):
         async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
-            await anext(parts(answer))
+            await anext(jpeg_parts(answer))
             async with drawn.session.get("/cameras/c1/live.jpg") as other:
                 assert other.status == 503
                 assert other.headers["Retry-After"] == "5"
@@ -254,23 +264,23 @@ async def test_the_number_of_rendered_streams_is_limited() -> None:
 async def test_rendered_streams_count_towards_the_viewer_limit() -> None:
     async for drawn in drawn_room(http={"viewers_max": 2, "viewers_per_object": 1}):
         async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:  # and the process that draws it
-            await anext(parts(answer))
+            await anext(jpeg_parts(answer))
             for path in ("/cameras/c1/live.mp4", "/cameras/c1/live.mjpeg"):
                 code, content = await drawn.get(path)
                 assert code == 503
                 assert "viewers_max" in content["error"]
     async for drawn in drawn_room(http={"viewers_per_object": 1}):
         async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
-            await anext(parts(answer))
+            await anext(jpeg_parts(answer))
             code, content = await drawn.get("/cameras/c0/live.mjpeg")
             assert code == 503
             assert "viewers_per_object" in content["error"]
 
 
-async def test_a_person_who_cannot_be_shown_gets_503(hall: Hall) -> None:
-    code, content = await hall.get("/cameras/c0/live.jpg")
+async def test_a_person_who_cannot_be_shown_gets_503(served: ServedSite) -> None:
+    code, content = await served.get("/cameras/c0/live.jpg")
     assert (code, content) == (503, {"error": "there is no picture of camera c0 now"})
-    code, content = await hall.get(f"/cameras/{B}/live.mjpeg?overlay=1")
+    code, content = await served.get(f"/cameras/{B}/live.mjpeg?overlay=1")
     assert code == 503
 
 

@@ -17,9 +17,9 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.common.browser import chromium
-from fakes.media.browser_playback import HLS_BY_ITSELF
+from fakes.media.browser_playback import NATIVE_HLS_JS
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -28,10 +28,10 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     WIDTH,
+    camera_tracks,
     encoded,
     tracks,
     video,
-    word,
 )
 from fakes.timeouts import PATIENCE
 from server.messaging.epochs import end_of_epoch
@@ -52,26 +52,28 @@ OF_A_STREAM = re.compile(
 OF_EVERY_FRAGMENT = re.compile(r"no chunk defined|STTS table of 0 entries")
 
 
-def feed(hall: Hall, epoch: int) -> None:
+def feed(served: ServedSite, epoch: int) -> None:
     """Send an epoch; the person is larger in the other camera every other GOP, so there are cuts."""
     sizes = {A: SMALL, B: LARGE} if epoch % 4 < 2 else {A: LARGE, B: SMALL}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, EPOCHS * STRIDE)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            hall.service.ingest.video(video(camera, unit))
-        hall.service.ingest.tracks(tracks(word(camera, epoch, {1: sizes[camera]})))
-    hall.service.pulse = end_of_epoch(epoch, STRIDE)
-    hall.service.pulse0 = 1_800_000_000.0
-    hall.service.decide()
+            served.service.ingest.video(video(camera, unit))
+        served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: sizes[camera]})))
+    served.service.pulse = end_of_epoch(epoch, STRIDE)
+    served.service.pulse0 = 1_800_000_000.0
+    served.service.decide()
 
 
 @pytest.fixture
-async def live() -> AsyncIterator[Hall]:
+async def live() -> AsyncIterator[ServedSite]:
     """A site that runs at five times its rate, too fast for a window of HLS, and ends."""
-    async for hall in opened(http={"hls_segment_s": 0.4, "hls_window_s": 60.0, "viewer_queue_gops": 100}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(
+        http={"hls_segment_s": 0.4, "hls_window_s": 60.0, "viewer_queue_gops": 100}
+    ):
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(20):
-            feed(hall, epoch)
-        yield hall
+            feed(served, epoch)
+        yield served
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Played:
     complaints: str
 
 
-async def played(hall: Hall, *commands: Sequence[str], user: str | None = None) -> list[Played]:
+async def played(served: ServedSite, *commands: Sequence[str], user: str | None = None) -> list[Played]:
     """Run a player for each path while the site runs and ends."""
     pipe = asyncio.subprocess.PIPE
     players = [
@@ -91,13 +93,13 @@ async def played(hall: Hall, *commands: Sequence[str], user: str | None = None) 
     ]
     ends = [asyncio.create_task(player.communicate()) for player in players]
     try:
-        while hall.service.splicer.viewers < STREAMS:
+        while served.service.splicer.viewers < STREAMS:
             assert not any(end.done() for end in ends), await asyncio.wait(ends)
             await asyncio.sleep(0.01)
         for epoch in range(20, EPOCHS):
             await asyncio.sleep(STRIDE / FPS / 5)
-            feed(hall, epoch)
-        hall.service.splicer.close()
+            feed(served, epoch)
+        served.service.splicer.close()
         results = await asyncio.gather(*ends)
     finally:
         for player in players:
@@ -116,11 +118,11 @@ def own(camera: int) -> list[NDArray[np.uint8]]:
     return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
 
 
-def check_pictures(hall: Hall, path: str, output: bytes) -> None:
+def check_pictures(served: ServedSite, path: str, output: bytes) -> None:
     """Find each picture that was shown, none left out, up to the last, in one of the cameras."""
     alone = np.array([own(camera) for camera in range(2)])
     pictures = np.frombuffer(output, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
-    last = end_of(hall, path)
+    last = end_of(served, path)
     first = last - len(pictures)
     assert first <= 20 * STRIDE, f"{path}: from where the player came, to the end"
     cameras = [int(np.array_equal(picture, alone[1, first + n])) for n, picture in enumerate(pictures)]
@@ -130,13 +132,13 @@ def check_pictures(hall: Hall, path: str, output: bytes) -> None:
     assert cuts == 0 if "cameras" in path else cuts >= 10, path
 
 
-def end_of(hall: Hall, path: str) -> int:
+def end_of(served: ServedSite, path: str) -> int:
     """Return the first pulse that a stream does not show."""
-    return EPOCHS * STRIDE if "cameras" in path else hall.service.decider._next_gop or 0
+    return EPOCHS * STRIDE if "cameras" in path else served.service.decider._next_gop or 0
 
 
 @needs_ffmpeg
-async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: Hall) -> None:
+async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: ServedSite) -> None:
     command = "ffmpeg -nostdin -v warning {} -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     starts = ["-live_start_index 0" if "m3u8" in path else "" for path in PATHS]
@@ -148,7 +150,7 @@ async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: Hall
 
 
 @needs_mpv
-async def test_mpv_plays_to_the_end_without_a_warning(live: Hall) -> None:
+async def test_mpv_plays_to_the_end_without_a_warning(live: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal"
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     seen = await played(live, *([*command.split(), url] for url in urls))
@@ -170,7 +172,7 @@ VLC = (
 )
 
 
-def check_order(hall: Hall, path: str, pictures: list[bytes]) -> None:
+def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
     """Find each picture in a camera; a player may repeat or skip pictures, but not go back."""
     known = {it.tobytes(): (pulse, camera) for camera in range(2) for pulse, it in enumerate(own(camera))}
     assert len(known) == 2 * EPOCHS * STRIDE, "no picture is like another"
@@ -178,7 +180,7 @@ def check_order(hall: Hall, path: str, pictures: list[bytes]) -> None:
     pulses = [pulse for pulse, _ in shown]
     assert all(before <= after for before, after in pairwise(pulses)), path
     assert pulses[0] <= 20 * STRIDE, path
-    assert pulses[-1] >= end_of(hall, path) - STRIDE, path
+    assert pulses[-1] >= end_of(served, path) - STRIDE, path
     assert len(set(pulses)) > 0.8 * (pulses[-1] - pulses[0]), path
     cuts = sum(before != after for (_, before), (_, after) in pairwise(shown))
     assert cuts == 0 if "cameras" in path else cuts >= 10, path
@@ -196,7 +198,7 @@ def pictures_of(film: bytes) -> list[bytes]:
 
 @needs_vlc
 @pytest.mark.slow  # it plays at its own rate: at a higher one it loses pictures when the machine is busy
-async def test_vlc_plays_across_cuts_without_a_warning(live: Hall, shared: Path) -> None:
+async def test_vlc_plays_across_cuts_without_a_warning(live: ServedSite, shared: Path) -> None:
     files = [shared / f"{number}.yuv" for number in range(len(PATHS))]
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     user = "nobody" if os.geteuid() == 0 else None
@@ -211,11 +213,11 @@ async def test_vlc_plays_across_cuts_without_a_warning(live: Hall, shared: Path)
 
 
 @needs_chromium
-async def test_chromium_plays_hls_natively_to_the_end(live: Hall) -> None:
+async def test_chromium_plays_hls_natively_to_the_end(live: ServedSite) -> None:
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{live.port}/healthz")
-        playing = asyncio.create_task(page.evaluate(HLS_BY_ITSELF, "/objects/1/hls/index.m3u8"))
+        playing = asyncio.create_task(page.evaluate(NATIVE_HLS_JS, "/objects/1/hls/index.m3u8"))
         async with asyncio.timeout(PATIENCE):
             for epoch in range(20, EPOCHS):
                 await asyncio.sleep(STRIDE / FPS / 5)

@@ -8,7 +8,7 @@ import struct
 
 import pytest
 
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, GOP, SMALL
 from server.service.streaming.subscriber_queue import BytesChunk
 
@@ -23,27 +23,31 @@ NOT_HERE = {"Host": "hall"}
 GET = "GET {} HTTP/1.1\r\nHost: hall\r\n\r\n"
 
 
-async def send_request(hall: Hall, request: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
+async def send_request(
+    served: ServedSite, request: str
+) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
     """Ask by hand; give the connection and the answer's head, in small letters."""
-    reader, writer = await asyncio.open_connection("127.0.0.1", hall.port)
+    reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
     writer.write(request.encode())
     return reader, writer, (await reader.readuntil(b"\r\n\r\n")).decode().lower()
 
 
-async def deserted(hall: Hall) -> None:
+async def deserted(served: ServedSite) -> None:
     """Wait until there are no viewers."""
-    while hall.service.splicer.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
+    while served.service.splicer.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
         await asyncio.sleep(0.005)
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_head_takes_no_slot_and_keeps_the_connection_usable(busy: Hall, path: str) -> None:
-    reader, writer, head = await send_request(busy, GET.format(path).replace("GET", "HEAD"))
+async def test_head_takes_no_slot_and_keeps_the_connection_usable(
+    site_with_people: ServedSite, path: str
+) -> None:
+    reader, writer, head = await send_request(site_with_people, GET.format(path).replace("GET", "HEAD"))
     for _ in range(2):
         assert head.startswith("http/1.1 200")
         assert f"content-type: {STREAMS[path]}\r\n" in head
         assert "access-control-allow-origin: *" in head
-        assert busy.service.splicer.viewers == 0
+        assert site_with_people.service.splicer.viewers == 0
         writer.write(b"HEAD /healthz HTTP/1.1\r\nHost: hall\r\n\r\n")
         assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200"), "no body came before"
         writer.write(GET.format(path).replace("GET", "HEAD").encode())
@@ -52,77 +56,79 @@ async def test_head_takes_no_slot_and_keeps_the_connection_usable(busy: Hall, pa
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_an_http_1_0_client_gets_a_stream_until_the_connection_closes(busy: Hall, path: str) -> None:
-    reader, writer, head = await send_request(busy, f"GET {path} HTTP/1.0\r\n\r\n")
+async def test_an_http_1_0_client_gets_a_stream_until_the_connection_closes(
+    site_with_people: ServedSite, path: str
+) -> None:
+    reader, writer, head = await send_request(site_with_people, f"GET {path} HTTP/1.0\r\n\r\n")
     assert head.startswith("http/1.0 200")
     assert "chunked" not in head
     assert "content-length" not in head
     begin = await reader.readexactly(8)
     assert begin[4:] == b"ftyp" if path.endswith(".mp4") else begin[0] == 0x47
-    busy.service.splicer.close()
+    site_with_people.service.splicer.close()
     rest = await reader.read()
     assert len(begin + rest) % 188 == 0 or path.endswith(".mp4"), "whole packets"
     writer.close()
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_a_range_request_gets_the_whole_stream(busy: Hall, path: str) -> None:
+async def test_a_range_request_gets_the_whole_stream(site_with_people: ServedSite, path: str) -> None:
     for ranges in ("bytes=0-", "bytes=0-1", "bytes=1000000-"):
-        async with busy.session.get(path, headers={"Range": ranges}) as answer:
+        async with site_with_people.session.get(path, headers={"Range": ranges}) as answer:
             assert answer.status == 200
             assert not {"Accept-Ranges", "Content-Range", "Content-Length"} & set(answer.headers)
 
 
 @pytest.mark.parametrize("path", [*STREAMS, "/objects/1/hls/index.m3u8", "/api/objects", "/api/events"])
-async def test_pages_of_other_origins_may_request_streams(busy: Hall, path: str) -> None:
+async def test_pages_of_other_origins_may_request_streams(site_with_people: ServedSite, path: str) -> None:
     asking = {"Origin": "http://elsewhere", "Access-Control-Request-Method": "GET"}
-    async with busy.session.options(path, headers=asking) as answer:
+    async with site_with_people.session.options(path, headers=asking) as answer:
         assert answer.status == 204
         assert answer.headers["Access-Control-Allow-Origin"] == "*"
         assert "GET" in answer.headers["Access-Control-Allow-Methods"]
         assert answer.headers["Access-Control-Allow-Headers"] == "*, Authorization"
-    assert busy.service.splicer.viewers == 0
-    async with busy.session.options("/nothing", headers=asking) as answer:
+    assert site_with_people.service.splicer.viewers == 0
+    async with site_with_people.session.options("/nothing", headers=asking) as answer:
         assert answer.status == 404
 
 
 @pytest.mark.parametrize("path", STREAMS)
-async def test_a_broken_connection_frees_its_slot(busy: Hall, path: str) -> None:
-    _, writer, _ = await send_request(busy, GET.format(path))
-    assert busy.service.splicer.viewers == 1
+async def test_a_broken_connection_frees_its_slot(site_with_people: ServedSite, path: str) -> None:
+    _, writer, _ = await send_request(site_with_people, GET.format(path))
+    assert site_with_people.service.splicer.viewers == 1
     writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     writer.transport.abort()
-    await deserted(busy)
+    await deserted(site_with_people)
 
 
 @pytest.mark.parametrize("limit", ["viewers_max", "viewers_per_object"])
 async def test_beyond_the_limit_a_viewer_gets_503_with_retry_after(limit: str) -> None:
-    async for hall in opened(http={limit: 2}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(http={limit: 2}):
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
-        _, first, _ = await send_request(hall, GET.format("/objects/1/best.mp4"))
-        _, second, _ = await send_request(hall, GET.format("/objects/1/best.ts"))
-        async with hall.session.get("/objects/1/best.mp4", headers=NOT_HERE) as answer:
+            served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
+        _, first, _ = await send_request(served, GET.format("/objects/1/best.mp4"))
+        _, second, _ = await send_request(served, GET.format("/objects/1/best.ts"))
+        async with served.session.get("/objects/1/best.mp4", headers=NOT_HERE) as answer:
             assert answer.status == 503
             assert int(answer.headers["Retry-After"]) > 0
             assert limit in (await answer.json())["error"]
-        async with hall.session.get("/objects/2/best.mp4", headers=NOT_HERE) as answer:
+        async with served.session.get("/objects/2/best.mp4", headers=NOT_HERE) as answer:
             assert answer.status == (503 if limit == "viewers_max" else 200)
         for writer in (first, second):
             writer.close()
-        await deserted(hall)
-        async with hall.session.get("/objects/1/best.ts") as answer:
+        await deserted(served)
+        async with served.session.get("/objects/1/best.ts") as answer:
             assert answer.status == 200, "there is room again"
 
 
-async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(busy: Hall) -> None:
-    channel = busy.service.splicer.persons[1]
+async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(site_with_people: ServedSite) -> None:
+    channel = site_with_people.service.splicer.persons[1]
     stalled = socket.socket()
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    stalled.connect(("127.0.0.1", busy.port))
+    stalled.connect(("127.0.0.1", site_with_people.port))
     stalled.sendall(b"GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
-    reader, writer, _ = await send_request(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+    reader, writer, _ = await send_request(site_with_people, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     while channel.viewers < 2:  # noqa: ASYNC110 — both have come
         await asyncio.sleep(0.005)
     await reader.readuntil(b"mdat")
@@ -131,7 +137,7 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(busy: Hal
         channel.publish(BytesChunk(gop, random_access=True))
         await reader.readuntil(gop)
     slow = next(viewer for viewer in channel._subscribers if viewer.lost_gops)
-    assert len(slow._queue) <= busy.service.config.http.viewer_queue_gops
+    assert len(slow._queue) <= site_with_people.service.config.http.viewer_queue_gops
     assert sum(viewer.lost_gops for viewer in channel._subscribers) == slow.lost_gops, (
         "only who does not read loses"
     )
@@ -151,20 +157,23 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(busy: Hal
     writer.close()
 
 
-async def test_a_viewer_that_disconnects_while_blocked_is_removed(busy: Hall) -> None:
-    channel = busy.service.splicer.persons[1]
-    _, writer, _ = await send_request(busy, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
+async def test_a_viewer_that_disconnects_while_blocked_is_removed(site_with_people: ServedSite) -> None:
+    channel = site_with_people.service.splicer.persons[1]
+    _, writer, _ = await send_request(site_with_people, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     for _ in range(100):
         channel.publish(BytesChunk(bytes(100_000), random_access=True))
         await asyncio.sleep(0)
     writer.transport.abort()
-    await deserted(busy)
+    await deserted(site_with_people)
 
 
-async def test_transport_streams_are_muxed_only_while_watched(busy: Hall) -> None:
-    kept = busy.service.splicer.persons[1]._backlog
+async def test_transport_streams_are_muxed_only_while_watched(site_with_people: ServedSite) -> None:
+    kept = site_with_people.service.splicer.persons[1]._backlog
     assert not any("mpegts" in vars(piece) for piece in kept)
-    async with busy.session.get("/objects/1/best.ts") as one, busy.session.get("/objects/1/best.ts") as two:
+    async with (
+        site_with_people.session.get("/objects/1/best.ts") as one,
+        site_with_people.session.get("/objects/1/best.ts") as two,
+    ):
         data = await one.content.readexactly(188 * 16)
         assert await two.content.readexactly(188 * 16) == data
         assert data[0] == data[188] == 0x47

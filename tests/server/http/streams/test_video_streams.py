@@ -10,7 +10,7 @@ import av
 import numpy as np
 import pytest
 
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
 
 
@@ -28,13 +28,15 @@ def last_fragment(data: bytes) -> bytes:
     return data[start:] if size and len(data) - start == size else b"\x00never"
 
 
-async def test_the_best_view_is_playable_from_the_first_byte_with_times_of_pulses(busy: Hall) -> None:
-    async with busy.session.get("/objects/1/best.mp4") as answer:
+async def test_the_best_view_is_playable_from_the_first_byte_with_times_of_pulses(
+    site_with_people: ServedSite,
+) -> None:
+    async with site_with_people.session.get("/objects/1/best.mp4") as answer:
         assert answer.status == 200
         assert answer.content_type == "video/mp4"
         assert answer.headers["Cache-Control"] == "no-store"
         data = await read_stream(answer, GOP)
-        busy.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
+        site_with_people.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
         data += await read_stream(answer, GOP)
     with av.open(io.BytesIO(data), "r") as stream:
         pictures = list(stream.decode(video=0))
@@ -49,9 +51,9 @@ async def test_the_best_view_is_playable_from_the_first_byte_with_times_of_pulse
 
 
 @pytest.mark.parametrize("how", ["camera", "prefer"])
-async def test_a_stream_shows_its_fixed_or_preferred_camera(busy: Hall, how: str) -> None:
-    assert (await busy.get_json("/api/objects/1/choice"))["camera"] == B
-    async with busy.session.get(f"/objects/1/best.mp4?{how}={A}") as answer:
+async def test_a_stream_shows_its_fixed_or_preferred_camera(site_with_people: ServedSite, how: str) -> None:
+    assert (await site_with_people.get_json("/api/objects/1/choice"))["camera"] == B
+    async with site_with_people.session.get(f"/objects/1/best.mp4?{how}={A}") as answer:
         data = await read_stream(answer, GOP)
     decoder = av.VideoCodecContext.create("h264", "r")
     own = [picture for unit in encoded(0) for picture in decoder.decode(av.Packet(unit.data))]
@@ -80,54 +82,56 @@ async def test_a_stream_shows_its_fixed_or_preferred_camera(busy: Hall, how: str
         ("/objects/1/best.ts?prefer=c0&from=-1", 400),
     ],
 )
-async def test_an_invalid_fixed_or_preferred_camera_is_refused(busy: Hall, path: str, status: int) -> None:
-    code, content = await busy.get(path)
+async def test_an_invalid_fixed_or_preferred_camera_is_refused(
+    site_with_people: ServedSite, path: str, status: int
+) -> None:
+    code, content = await site_with_people.get(path)
     assert code == status
     assert "camera" in content["error"] or "object 7" in content["error"]
 
 
-async def test_a_camera_stream_begins_with_its_newest_gop(busy: Hall) -> None:
-    async with busy.session.get("/cameras/c0/live.mp4") as answer:
+async def test_a_camera_stream_begins_with_its_newest_gop(site_with_people: ServedSite) -> None:
+    async with site_with_people.session.get("/cameras/c0/live.mp4") as answer:
         data = await read_stream(answer, GOP)
     with av.open(io.BytesIO(data), "r") as stream:
         times = [round(float(picture.time or 0) * FPS) for picture in stream.decode(video=0)]
     assert times == list(range(2 * GOP, 3 * GOP))
 
 
-async def test_a_viewer_who_leaves_is_removed(busy: Hall) -> None:
-    async with busy.session.get("/objects/1/best.mp4") as answer:
+async def test_a_viewer_who_leaves_is_removed(site_with_people: ServedSite) -> None:
+    async with site_with_people.session.get("/objects/1/best.mp4") as answer:
         await read_stream(answer, GOP)
-        assert busy.service.splicer.viewers == 1
+        assert site_with_people.service.splicer.viewers == 1
         answer.close()
-    while busy.service.splicer.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
+    while site_with_people.service.splicer.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
         await asyncio.sleep(0.01)
 
 
-async def test_an_http_1_0_client_gets_a_stream_that_is_not_chunked(busy: Hall) -> None:
-    reader, writer = await asyncio.open_connection("127.0.0.1", busy.port)
+async def test_an_http_1_0_client_gets_a_stream_that_is_not_chunked(site_with_people: ServedSite) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", site_with_people.port)
     writer.write(b"GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     head = (await reader.readuntil(b"\r\n\r\n")).lower()
     assert head.startswith(b"http/1.0 200")
     assert b"chunked" not in head
     assert b"content-length" not in head
     assert (await reader.readexactly(8))[4:] == b"ftyp"
-    busy.service.splicer.close()
+    site_with_people.service.splicer.close()
     assert b"mdat" in await reader.read(), "the end of the stream is the end of the connection"
     writer.close()
     await writer.wait_closed()
 
 
-async def test_all_viewers_receive_the_same_bytes_of_each_gop(busy: Hall) -> None:
-    connections = [await asyncio.open_connection("127.0.0.1", busy.port) for _ in range(3)]
+async def test_all_viewers_receive_the_same_bytes_of_each_gop(site_with_people: ServedSite) -> None:
+    connections = [await asyncio.open_connection("127.0.0.1", site_with_people.port) for _ in range(3)]
     for (_, writer), version in zip(connections, ["1.0", "1.1", "1.1"], strict=True):
         writer.write(f"GET /objects/1/best.mp4 HTTP/{version}\r\nHost: hall\r\n\r\n".encode())
     heads = [await reader.readuntil(b"\r\n\r\n") for reader, _ in connections]
     assert [b"chunked" in head for head in heads] == [False, True, True]
-    while busy.service.splicer.viewers < 3:  # noqa: ASYNC110 — they join one after the other
+    while site_with_people.service.splicer.viewers < 3:  # noqa: ASYNC110 — they join one after the other
         await asyncio.sleep(0.01)
     for epoch in range(3, 8):
-        busy.service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
-    busy.service.splicer.close()
+        site_with_people.service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
+    site_with_people.service.splicer.close()
     old = await connections[0][0].read()
     for reader, _ in connections[1:]:
         new = b""
@@ -141,22 +145,25 @@ async def test_all_viewers_receive_the_same_bytes_of_each_gop(busy: Hall) -> Non
 
 
 async def test_a_viewer_beyond_the_limit_gets_503_with_retry_after() -> None:
-    async for hall in opened(http={"viewers_max": 1}):
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(http={"viewers_max": 1}):
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
-        async with hall.session.get("/objects/1/best.mp4"), hall.session.get("/objects/1/best.mp4") as second:
+            served.service.feed(epoch, {A: {1: SMALL}, B: {}})
+        async with (
+            served.session.get("/objects/1/best.mp4"),
+            served.session.get("/objects/1/best.mp4") as second,
+        ):
             assert second.status == 503
             assert second.headers["Retry-After"] == "5"
             assert "viewers_max" in (await second.json())["error"]
 
 
 async def test_streams_end_when_the_server_does() -> None:
-    async for hall in opened():
-        hall.service.come(*CAMERAS)
+    async for served in serve_site():
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
-            hall.service.feed(epoch, {A: {1: SMALL}, B: {}})
-        answers = [await hall.session.get(path) for path in ("/objects/1/best.mp4", "/api/events")]
-        hall.service.splicer.close()
+            served.service.feed(epoch, {A: {1: SMALL}, B: {}})
+        answers = [await served.session.get(path) for path in ("/objects/1/best.mp4", "/api/events")]
+        served.service.splicer.close()
         assert (await answers[0].read()).count(b"moof") == GOP
         answers[1].close()

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks.common.browser import chromium
-from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.media.browser_playback import PLAY_JS, play_in_chromium
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
-from fakes.service.fed_site import A, B, Hall
+from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -23,12 +23,12 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     WIDTH,
+    camera_tracks,
     encoded,
     tracks,
     video,
-    word,
 )
-from fakes.service.vp8_site import EPOCHS, feed, own
+from fakes.service.vp8_site import EPOCHS, decoded_alone, feed
 from fakes.timeouts import PATIENCE_MS
 from server.messaging.epochs import end_of_epoch
 from server.service.view_selection.decider import GopDecision, ObjectChoice
@@ -36,22 +36,22 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
 
 
-async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]]:
+async def played(served: ServedSite, command: str) -> list[tuple[int | None, bytes, str]]:
     """Run a player for each path while the site runs and ends; return exit code, output and warnings."""
     pipe = asyncio.subprocess.PIPE
-    urls = [f"http://127.0.0.1:{hall.port}{path}" for path in PATHS]
+    urls = [f"http://127.0.0.1:{served.port}{path}" for path in PATHS]
     players = [
         await asyncio.create_subprocess_exec(*command.format(url).split(), stdout=pipe, stderr=pipe)
         for url in urls
     ]
     ends = [asyncio.create_task(player.communicate()) for player in players]
-    while hall.service.splicer.viewers < len(PATHS):
+    while served.service.splicer.viewers < len(PATHS):
         assert not any(end.done() for end in ends), await asyncio.wait(ends)
         await asyncio.sleep(0.01)
     for epoch in range(3, EPOCHS):
-        feed(hall, epoch)
+        feed(served, epoch)
         await asyncio.sleep(0.02)
-    hall.service.splicer.close()
+    served.service.splicer.close()
     results = await asyncio.gather(*ends)
     return [
         (player.returncode, output, complaints.decode())
@@ -60,16 +60,16 @@ async def played(hall: Hall, command: str) -> list[tuple[int | None, bytes, str]
 
 
 @needs_ffmpeg
-async def test_ffmpeg_plays_across_cuts_without_a_warning(free: Hall) -> None:
+async def test_ffmpeg_plays_across_cuts_without_a_warning(vp8_site: ServedSite) -> None:
     command = "ffmpeg -nostdin -v warning -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
-    alone = np.array([own(camera) for camera in range(2)])
-    best, live = await played(free, command)
+    alone = np.array([decoded_alone(camera) for camera in range(2)])
+    best, live = await played(vp8_site, command)
     for path, it in zip(PATHS, (best, live), strict=True):
         assert (it[0], it[2]) == (0, ""), path
     camera = np.frombuffer(live[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
     np.testing.assert_array_equal(camera, alone[1, -len(camera) :])
     shown = np.frombuffer(best[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
-    end = free.service.decider._next_gop or 0
+    end = vp8_site.service.decider._next_gop or 0
     whose = [int(np.array_equal(it, alone[1, end - len(shown) + n])) for n, it in enumerate(shown)]
     for n, it in enumerate(shown):
         np.testing.assert_array_equal(it, alone[whose[n], end - len(shown) + n], f"frame {n} of {len(shown)}")
@@ -77,9 +77,9 @@ async def test_ffmpeg_plays_across_cuts_without_a_warning(free: Hall) -> None:
 
 
 @needs_mpv
-async def test_mpv_plays_to_the_end_without_a_warning(free: Hall) -> None:
+async def test_mpv_plays_to_the_end_without_a_warning(vp8_site: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal {}"
-    for path, it in zip(PATHS, await played(free, command), strict=True):
+    for path, it in zip(PATHS, await played(vp8_site, command), strict=True):
         assert it == (0, b"", ""), path
 
 
@@ -91,8 +91,8 @@ LOST = 22
 
 
 @needs_chromium
-async def test_chromium_plays_across_cuts_and_gaps_to_the_end(free: Hall) -> None:
-    splicer, frame_buffers = free.service.splicer, free.service.frame_buffers
+async def test_chromium_plays_across_cuts_and_gaps_to_the_end(vp8_site: ServedSite) -> None:
+    splicer, frame_buffers = vp8_site.service.splicer, vp8_site.service.frame_buffers
     splicer.forget([], [])  # begin with somebody new
     for seed, camera in enumerate((A, B)):
         for unit in encoded(seed, codec="vp8"):
@@ -109,8 +109,9 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(free: Hall) -> Non
         splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
-    seen = await seen_in_chromium(
-        *(free.port, splicer, GOPS, show), *(PLAY, "/objects/7/best.webm", 'video/webm; codecs="vp8"', 1)
+    seen = await play_in_chromium(
+        *(vp8_site.port, splicer, GOPS, show),
+        *(PLAY_JS, "/objects/7/best.webm", 'video/webm; codecs="vp8"', 1),
     )
     assert (seen["error"], seen["ranges"]) == ("", 1)
     assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
@@ -119,31 +120,31 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(free: Hall) -> Non
     assert pulses[-1] > GOPS * GOP - 3
 
 
-async def go_on(hall: Hall) -> None:
+async def go_on(served: ServedSite) -> None:
     """Send epochs at the site's rate: two people, each larger in the other camera every second."""
     frames = 25 * FPS
     for epoch in range(3, frames // STRIDE):
         sizes = (SMALL, LARGE) if epoch // 5 % 2 else (LARGE, SMALL)
         for seed, camera in enumerate(CAMERAS):
             for unit in encoded(seed, frames, codec="vp8")[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                hall.service.ingest.video(video(camera, unit))
+                served.service.ingest.video(video(camera, unit))
             boxes = {1: sizes[seed], 2: sizes[1 - seed]}
-            hall.service.ingest.tracks(tracks(word(camera, epoch, boxes)))
-        hall.service.pulse = end_of_epoch(epoch, STRIDE)
-        hall.service.decide()
+            served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
+        served.service.pulse = end_of_epoch(epoch, STRIDE)
+        served.service.decide()
         await asyncio.sleep(STRIDE / FPS)
 
 
 @needs_chromium
 @pytest.mark.slow
-async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: Hall) -> None:
+async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_site: ServedSite) -> None:
     errors: list[str] = []
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.set_default_timeout(PATIENCE_MS)
-        going_on = asyncio.create_task(go_on(free))
-        await page.goto(f"http://127.0.0.1:{free.port}/?object=1")
+        going_on = asyncio.create_task(go_on(vp8_site))
+        await page.goto(f"http://127.0.0.1:{vp8_site.port}/?object=1")
         await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")
         await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
         await page.locator("#people button.person[aria-current=false]").first.click()
@@ -151,7 +152,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
         pulse = await page.evaluate("myview.pulse")
         await page.wait_for_function(f"myview.pulse > {pulse} + {FPS}")
         assert await page.evaluate("document.querySelector('video').dataset.same") == "yes", "one player"
-        await page.goto(f"http://127.0.0.1:{free.port}/?object=1&camera=c1")
+        await page.goto(f"http://127.0.0.1:{vp8_site.port}/?object=1&camera=c1")
         await page.wait_for_function("myview.state === 'playing' && myview.camera === 'c1'")
         await page.keyboard.press(",")
         results = await page.locator("#notice").text_content()
@@ -169,20 +170,22 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(free: H
         *("/api/objects/1/past", "/api/cameras/c0/past"),
     ],
 )
-async def test_mp4_addresses_of_a_vp8_site_are_refused_with_one_line(free: Hall, path: str) -> None:
-    code, content = await free.get(path)
+async def test_mp4_addresses_of_a_vp8_site_are_refused_with_one_line(vp8_site: ServedSite, path: str) -> None:
+    code, content = await vp8_site.get(path)
     assert code == 404
     assert "VP8 (encode.codec): there is best.webm" in content["error"]
 
 
-async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(free: Hall) -> None:
+async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(vp8_site: ServedSite) -> None:
     pictures = {}
     for path in ("/objects/1/best.jpg", "/objects/1/best.jpg?overlay=1", "/cameras/c1/live.jpg"):
-        async with free.session.get(path) as answer:
+        async with vp8_site.session.get(path) as answer:
             assert (answer.status, answer.content_type) == (200, "image/jpeg"), path
             jpeg, pulse = await answer.read(), int(answer.headers["X-MyView-Pulse"])
         pictures[path] = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), pulse
-    alone = [av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="bgr24") for it in own(1)]
+    alone = [
+        av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="bgr24") for it in decoded_alone(1)
+    ]
     for path in ("/objects/1/best.jpg", "/cameras/c1/live.jpg"):
         picture, pulse = pictures[path]
         off = [np.abs(picture.astype(float) - it).mean() for it in alone]
@@ -192,20 +195,20 @@ async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(free: Hall) -> N
 
 
 async def test_unknown_people_and_webm_of_an_h264_site_are_refused_with_one_line(
-    free: Hall, busy: Hall
+    vp8_site: ServedSite, site_with_people: ServedSite
 ) -> None:
-    assert await free.get("/objects/9/best.webm") == (404, {"error": "there is no object 9"})
-    code, content = await free.get("/cameras/c9/live.webm")
+    assert await vp8_site.get("/objects/9/best.webm") == (404, {"error": "there is no object 9"})
+    code, content = await vp8_site.get("/cameras/c9/live.webm")
     assert (code, content["error"]) == (404, "there is no camera 'c9'; there are c0, c1")
-    code, content = await free.get("/objects/1/best.webm?from=-5")
+    code, content = await vp8_site.get("/objects/1/best.webm?from=-5")
     assert code == 400
-    code, content = await busy.get("/objects/1/best.webm")
+    code, content = await site_with_people.get("/objects/1/best.webm")
     assert code == 404
     assert "H.264 (encode.codec): there is best.mp4" in content["error"]
 
 
-async def test_the_site_names_codec_and_container(free: Hall, busy: Hall) -> None:
-    site = await free.get_json("/api/site")
+async def test_the_site_names_codec_and_container(vp8_site: ServedSite, site_with_people: ServedSite) -> None:
+    site = await vp8_site.get_json("/api/site")
     assert (site["codec"], site["container"]) == ("vp8", "webm")
-    site = await busy.get_json("/api/site")
+    site = await site_with_people.get_json("/api/site")
     assert (site["codec"][:5], site["container"]) == ("avc1.", "mp4")

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.media.ffprobe import probed
-from fakes.media.mpegts import check_counters, taken_apart
+from fakes.media.mpegts import check_counters, parse_packets
 from fakes.programs import needs_ffprobe
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, encoded
 from server.media.containers.fmp4 import FragmentSample, fragment, ticks
@@ -49,7 +49,7 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
         pulse, tables = pulse + len(gop), tables + 1
         video += sum(count_packets(it) for it in pictures) if live else 0
         sent += pictures
-    packets = taken_apart(data)
+    packets = parse_packets(data)
     check_counters(packets)
     assert {packet.pid for packet in packets[:2]} == {0, 0x1000}, "tables first"
     contents: list[bytes] = []
@@ -75,7 +75,7 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
 @given(st.integers(0, 2**34 // 3600), st.sampled_from([4, 7.5, 25, 59.94]))
 def test_clock_references_are_frequent_and_precede_their_pictures(pulse: int, fps: float) -> None:
     pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, duration=40, fps=fps)]
-    packets = taken_apart(pack(pictures, fps, ContinuityCounters()))
+    packets = parse_packets(pack(pictures, fps, ContinuityCounters()))
     times = [it.pcr // 300 for it in packets if it.pcr is not None]
     assert all(0 < (later - earlier) % CLOCK <= 9000 for earlier, later in pairwise(times))
     assert 0 < (ticks(pulse, fps) - times[0]) % CLOCK <= 90_000

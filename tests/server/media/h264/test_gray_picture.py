@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fakes.media.h264 import PRESETS, decoded, encoded, how
-from fakes.service.parameter_sets import MAKES, sent
+from fakes.media.h264 import PRESETS, decoded, encoded, slice_header_format
+from fakes.service.parameter_sets import ENCODINGS, sent_units
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from server.camera.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
@@ -42,7 +42,7 @@ def is_gray(picture: NDArray[np.uint8]) -> bool:
 def test_it_is_gray_and_the_pictures_around_it_are_unchanged(preset: str, blocks: tuple[int, int]) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
     samples = [join_sample(nal_units(it.data)) for it in units]
-    parameters, writer = parameter_sets(nal_units(units[0].data)), how(units[0])
+    parameters, writer = parameter_sets(nal_units(units[0].data)), slice_header_format(units[0])
     assert parameters is not None
     gray = [gray_picture(parameters, 0), writer.repeat(1, reference=True), gray_picture(parameters, 1)]
     shown, alone = decoded([*samples, *gray, *samples]), decoded(samples)
@@ -75,10 +75,10 @@ def test_it_is_gray_in_vp8(blocks: tuple[int, int]) -> None:
 @pytest.mark.parametrize("own", [False, True])
 def test_a_gray_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> None:
     stream_format = PerCameraStreamFormat() if own else StreamFormat()
-    cameras = list(MAKES) if own else list(MAKES)[:1] * 2
+    cameras = list(ENCODINGS) if own else list(ENCODINGS)[:1] * 2
     frame_buffers = {camera: FrameBuffer(FPS, 99, stream_format) for camera in cameras}
     for camera, frame_buffer in frame_buffers.items():
-        for unit in sent(camera):
+        for unit in sent_units(camera):
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     shown: list[EncodedPicture] = stream_format.blank(None, 0, GOP, FPS)
     for gop, camera in enumerate([cameras[0], None, cameras[1], None, cameras[0]], start=1):

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.media.h264 import PRESETS, decoded, encoded, how
+from fakes.media.h264 import PRESETS, decoded, encoded, slice_header_format
 from server.media.h264.annexb import ParameterSets, join_sample, nal_units
 from server.media.h264.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
 from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
@@ -27,7 +27,7 @@ def test_the_last_picture_is_shown_for_as_long_as_it_is_repeated(
     preset: str, blocks: tuple[int, int], shown: int, repeats: int
 ) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 7)
-    writer = how(units[0])
+    writer = slice_header_format(units[0])
     samples = [join_sample(nal_units(unit.data)) for unit in units]
     numbers = [writer.frame_num(samples[shown - 1])]
     for _ in range(repeats):
@@ -48,7 +48,7 @@ def test_the_last_picture_is_shown_for_as_long_as_it_is_repeated(
 @given(st.sampled_from(PRESETS), st.sets(st.integers(1, 5), min_size=1))
 def test_a_picture_can_be_inserted_between_two_of_a_camera(preset: str, before: set[int]) -> None:
     units = encoded((64, 48), preset, 6)
-    writer = how(units[0])
+    writer = slice_header_format(units[0])
     alone = decoded([join_sample(nal_units(unit.data)) for unit in units])
     samples, expected = [], []
     for place, unit in enumerate(units):
@@ -64,7 +64,7 @@ def test_a_picture_can_be_inserted_between_two_of_a_camera(preset: str, before: 
 
 def test_frame_num_counts_from_each_keyframe() -> None:
     units = encoded((64, 48), "ultrafast", 45, gop=40)
-    writer = how(units[0])
+    writer = slice_header_format(units[0])
     numbers = [writer.frame_num(join_sample(nal_units(unit.data))) for unit in units]
     assert numbers[0] == numbers[40] == 0
     assert all(later == writer.next_num(earlier) for earlier, later in pairwise(numbers[:40]))
@@ -72,7 +72,7 @@ def test_frame_num_counts_from_each_keyframe() -> None:
 
 def test_a_sample_without_a_picture_has_no_frame_num() -> None:
     with pytest.raises(ValueError, match="contains no picture"):
-        how(encoded((64, 48), "ultrafast", 1)[0]).frame_num(b"\x00\x00\x00\x02\x06\x05")
+        slice_header_format(encoded((64, 48), "ultrafast", 1)[0]).frame_num(b"\x00\x00\x00\x02\x06\x05")
 
 
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10))

@@ -12,8 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fakes.cli.calibration_walk import HEIGHT, SITE, WIDTH, curved, errors_on_floor, walk_config, words
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.cli.calibration_walk import (
+    HEIGHT,
+    SITE,
+    WIDTH,
+    curved_path,
+    errors_on_floor,
+    walk_config,
+    walk_epochs,
+)
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import FPS, STRIDE
 from server.config.loader import build_config
 from server.http.access.csrf import CSRF_HEADER
@@ -26,29 +34,29 @@ MINE = {CSRF_HEADER: "1"}
 
 
 @pytest.fixture
-async def wide() -> AsyncIterator[Hall]:
+async def wide() -> AsyncIterator[ServedSite]:
     """Serve a site whose pictures are large enough to walk in."""
-    async with aclosing(opened(**SITE)) as halls:
+    async with aclosing(serve_site(**SITE)) as halls:
         yield await anext(halls)
 
 
-async def do(hall: Hall, **step: Any) -> tuple[int, Any]:
-    async with hall.session.post(WALK, headers=MINE, json=step) as answer:
+async def do(served: ServedSite, **step: Any) -> tuple[int, Any]:
+    async with served.session.post(WALK, headers=MINE, json=step) as answer:
         return answer.status, await answer.json()
 
 
-async def finished(hall: Hall) -> Any:
-    assert hall.service.walk_session._task is not None
-    await hall.service.walk_session._task
-    return await hall.get_json(WALK)
+async def finished(served: ServedSite) -> Any:
+    assert served.service.walk_session._task is not None
+    await served.service.walk_session._task
+    return await served.get_json(WALK)
 
 
-def walk(hall: Hall, frames: int, epoch: int = 0, **settings: Any) -> None:
-    for walk_epoch in words(hall.service.config, curved(frames, **settings), epoch):
-        hall.service.walk_session.add(walk_epoch)
+def walk(served: ServedSite, frames: int, epoch: int = 0, **settings: Any) -> None:
+    for walk_epoch in walk_epochs(served.service.config, curved_path(frames, **settings), epoch):
+        served.service.walk_session.add(walk_epoch)
 
 
-async def test_a_walk_yields_the_scenes_homographies(wide: Hall, tmp_path: Path) -> None:
+async def test_a_walk_yields_the_scenes_homographies(wide: ServedSite, tmp_path: Path) -> None:
     before = wide.service.config
     assert (await wide.get_json(WALK))["state"] == "none"
     status, content = await do(wide, action="start")
@@ -83,7 +91,7 @@ async def test_a_walk_yields_the_scenes_homographies(wide: Hall, tmp_path: Path)
     assert await wide.get(f"{WALK}/ground.json") == (404, {"error": "there is no calibration result yet"})
 
 
-async def test_an_insufficient_walk_is_reported_and_can_be_resumed(wide: Hall) -> None:
+async def test_an_insufficient_walk_is_reported_and_can_be_resumed(wide: ServedSite) -> None:
     await do(wide, action="start")
     walk(wide, 50, wide=0.0)
     await do(wide, action="finish")
@@ -97,7 +105,7 @@ async def test_an_insufficient_walk_is_reported_and_can_be_resumed(wide: Hall) -
     assert (await wide.get_json(WALK))["seconds"] == 4.0
 
 
-async def test_uncovered_areas_are_reported_during_the_walk(wide: Hall) -> None:
+async def test_uncovered_areas_are_reported_during_the_walk(wide: ServedSite) -> None:
     await do(wide, action="start")
     assert len((await wide.get_json(WALK))["uncovered"]) == 2  # nothing of either camera
     walk(wide, 100, wide=0.01)
@@ -115,11 +123,11 @@ async def test_uncovered_areas_are_reported_during_the_walk(wide: Hall) -> None:
         ({}, 400, "the request's JSON: "),
     ],
 )
-async def test_invalid_steps_are_refused(hall: Hall, step: Any, status: int, error: str) -> None:
-    code, content = await do(hall, **step)
+async def test_invalid_steps_are_refused(served: ServedSite, step: Any, status: int, error: str) -> None:
+    code, content = await do(served, **step)
     assert code == status
     assert content["error"].startswith(error)
-    assert hall.service.walk_session.state is WalkState.NONE
+    assert served.service.walk_session.state is WalkState.NONE
 
 
 async def task_of(tasks: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
@@ -141,14 +149,14 @@ async def task_of(tasks: list[CalibrationTask], config: Any, *parts: Any) -> Cal
 
 async def test_every_final_box_is_recorded_once_and_counted_from_the_start_of_the_walk() -> None:
     config = walk_config()
-    places = curved(100)
+    places = curved_path(100)
 
     def before_and_on(active_walk: WalkSession) -> None:
         active_walk.discard()
-        for walk_epoch in words(config, places[:50]):  # nobody has started yet
+        for walk_epoch in walk_epochs(config, places[:50]):  # nobody has started yet
             active_walk.add(walk_epoch)
         active_walk.start()
-        for walk_epoch in words(config, places[50:], epoch=10):
+        for walk_epoch in walk_epochs(config, places[50:], epoch=10):
             active_walk.add(walk_epoch)
             active_walk.add(walk_epoch)  # what was said before is not counted again
 
@@ -168,7 +176,7 @@ async def test_a_restarted_camera_has_other_tracks() -> None:
 
     def twice(active_walk: WalkSession) -> None:
         for boot in (1, 2):
-            for walk_epoch in words(config, curved(50), epoch=10 * (boot - 1), boot=boot):
+            for walk_epoch in walk_epochs(config, curved_path(50), epoch=10 * (boot - 1), boot=boot):
                 active_walk.add(walk_epoch)
 
     task = await task_of([], config, twice)
@@ -180,7 +188,7 @@ async def test_a_walk_started_before_any_camera_counts_from_the_first_window() -
     config = walk_config()
 
     def late(active_walk: WalkSession) -> None:
-        for walk_epoch in words(config, curved(50), epoch=10_000_000):
+        for walk_epoch in walk_epochs(config, curved_path(50), epoch=10_000_000):
             active_walk.add(walk_epoch)
 
     task = await task_of([], config, late)
@@ -199,7 +207,7 @@ async def test_nothing_is_recorded_beyond_the_longest_walk(monkeypatch: pytest.M
     config = walk_config()
     active_walk = WalkSession(config)
     active_walk.start()
-    for walk_epoch in words(config, curved(100)):
+    for walk_epoch in walk_epochs(config, curved_path(100)):
         active_walk.add(walk_epoch)
     assert active_walk.seconds == 1.0
 
@@ -215,7 +223,7 @@ async def test_a_calibration_process_that_dies_is_reported_in_one_line(
     assert outcome.error.startswith("the calibration cannot be started: ")
 
 
-async def test_discarding_the_walk_cancels_its_calibration(wide: Hall) -> None:
+async def test_discarding_the_walk_cancels_its_calibration(wide: ServedSite) -> None:
     await do(wide, action="start")
     walk(wide, 20 * STRIDE)
     await do(wide, action="finish")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fakes.service.decisions import behind, choice, decision, noted
+from fakes.service.decisions import choice, collect_decisions, decision, service_with_backlog
 from fakes.service.scripted_cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH
 from fakes.system.full_disk import files_of_at_most
 from server.media.letterbox import Letterbox
@@ -66,14 +66,14 @@ def test_a_full_disk_at_the_end_is_logged_and_all_files_are_intact(
 
 
 async def test_a_service_decides_and_closes_despite_a_full_disk(tmp_path: Path) -> None:
-    service = behind()
-    decided = noted(service)
+    service = service_with_backlog()
+    decided = collect_decisions(service)
     service._decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
     with files_of_at_most(0):
         service.decide()
         service.close()
-    healthy = behind()
-    expected = noted(healthy)
+    healthy = service_with_backlog()
+    expected = collect_decisions(healthy)
     healthy.decide()
     healthy.close()
     assert decided == expected

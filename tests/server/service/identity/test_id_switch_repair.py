@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from fakes.service.scripted_cameras import HEIGHT, WIDTH, word
+from fakes.service.scripted_cameras import HEIGHT, WIDTH, camera_tracks
 from server.media.letterbox import Letterbox
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.id_switch_repair import IdSwitch, find_id_switches
@@ -22,7 +22,7 @@ def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
     """Return a camera's word on some frames, of the boxes (T, F, 4)."""
     tracks = range(1, len(boxes) + 1)
     last = first + boxes.shape[1] - 1
-    message = word("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
+    message = camera_tracks("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
     keys = tuple(TrackKey("c0", it) for it in tracks)
     letterbox = Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT))
     return CameraWindow(message, keys, np.array(list(tracks)), letterbox, boxes, first)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bestview import IdentityUpdate, Merge, Split
-from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, epoch_of, word
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, camera_tracks, epoch_of
 from fakes.service.scripted_identities import ScriptedRegistry, boxes, identity_update, people
 from server.service.identity.manual_overrides import ManualOverrides
 from server.service.identity.people import PersonTracker
@@ -50,7 +50,7 @@ def dictated(*updates: IdentityUpdate) -> PersonTracker:
 
 
 def seen(it: PersonTracker, epoch: int) -> None:
-    it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {1: LARGE})))
+    it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL}), camera_tracks("c1", epoch, {1: LARGE})))
 
 
 TWO = identity_update({("c0", 1): 1, ("c1", 1): 2})
@@ -80,7 +80,7 @@ def test_a_manual_merge_follows_later_automatic_merges() -> None:
     seen(it, 0)
     it.merge(1, 2)
     seen(it, 1)
-    it.update(epoch_of(2, word("c0", 2, {2: SMALL})))
+    it.update(epoch_of(2, camera_tracks("c0", 2, {2: SMALL})))
     assert it.registry.all_numbers == [3]
     assert it.registry.merged == {1: 3, 2: 3}
     assert boxes(it, "c0", 2 * STRIDE) == {3: SMALL}
@@ -109,7 +109,13 @@ def test_of_two_names_the_kept_persons_remains() -> None:
 def test_a_manual_split_takes_effect_at_once_and_is_permanent() -> None:
     it = people()
     for epoch in range(3):
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: LARGE}), word("c1", epoch, {1: SMALL})))
+        it.update(
+            epoch_of(
+                epoch,
+                camera_tracks("c0", epoch, {1: SMALL, 2: LARGE}),
+                camera_tracks("c1", epoch, {1: SMALL}),
+            )
+        )
     one = it.number("c0", 1, 14)
     assert one is not None
     other = it.number("c1", 1, 14)
@@ -126,6 +132,12 @@ def test_a_manual_split_takes_effect_at_once_and_is_permanent() -> None:
     for epoch in range(3, 12):
         assert it.number("c1", 1, epoch * STRIDE - 1) == new
         assert it.number("c0", 1, epoch * STRIDE - 1) == one
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: LARGE}), word("c1", epoch, {1: SMALL})))
+        it.update(
+            epoch_of(
+                epoch,
+                camera_tracks("c0", epoch, {1: SMALL, 2: LARGE}),
+                camera_tracks("c1", epoch, {1: SMALL}),
+            )
+        )
     assert it.split_off(one, ["c1"]) is None
     assert it.split_off(99, CAMERAS) is None

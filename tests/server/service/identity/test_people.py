@@ -11,7 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackKey, TrackletKey, TrackUpdate
-from fakes.service.scripted_cameras import CAMERAS, HEIGHT, LARGE, SMALL, STRIDE, WIDTH, epoch_of, word
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    HEIGHT,
+    LARGE,
+    SMALL,
+    STRIDE,
+    WIDTH,
+    camera_tracks,
+    epoch_of,
+)
 from fakes.service.scripted_identities import ScriptedRegistry, boxes, identity_update, people
 from server.service.identity.local_numbers import LocalNumbers
 from server.service.identity.people import PersonTracker
@@ -54,26 +63,30 @@ def test_the_newest_window_of_a_frame_counts(windows: list[tuple[int, int]], old
 
 def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
     numbers = LocalNumbers()
-    assert numbers.of(word("c0", 0, {1: SMALL, 2: SMALL})) == (TrackKey("c0", 1), TrackKey("c0", 2))
-    assert numbers.of(word("c0", 1, {1: SMALL}, boot=2)) == (TrackKey("c0", 3),)
-    assert numbers.of(word("c1", 1, {1: SMALL})) == (TrackKey("c1", 1),)
+    assert numbers.of(camera_tracks("c0", 0, {1: SMALL, 2: SMALL})) == (TrackKey("c0", 1), TrackKey("c0", 2))
+    assert numbers.of(camera_tracks("c0", 1, {1: SMALL}, boot=2)) == (TrackKey("c0", 3),)
+    assert numbers.of(camera_tracks("c1", 1, {1: SMALL})) == (TrackKey("c1", 1),)
     assert numbers.known("c0", 1, 1) == TrackKey("c0", 1)
     assert numbers.known("c0", 2, 1) == TrackKey("c0", 3)
 
 
 def test_a_forgotten_track_that_reappears_has_a_new_number() -> None:
     numbers = LocalNumbers()
-    numbers.of(word("c0", 0, {1: SMALL}))
+    numbers.of(camera_tracks("c0", 0, {1: SMALL}))
     numbers.forget(TrackKey("c0", 1))
     assert numbers.known("c0", 1, 1) is None
-    assert numbers.of(word("c0", 5, {1: SMALL})) == (TrackKey("c0", 2),)
+    assert numbers.of(camera_tracks("c0", 5, {1: SMALL})) == (TrackKey("c0", 2),)
 
 
 def test_the_registry_receives_picture_sizes_and_boxes_in_the_cameras_own_pixels() -> None:
     it = people()
     track_updates: list[TrackUpdate] = []
     it._registry = registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), word("c1", 0, {})))
+    it.update(
+        epoch_of(
+            0, camera_tracks("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), camera_tracks("c1", 0, {})
+        )
+    )
     assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, "also who sees none"
     [track] = track_updates
     assert track.picture_height == HEIGHT // 2, "of the camera's own picture, as its boxes"
@@ -87,7 +100,11 @@ def test_a_camera_without_detection_is_no_evidence_of_absence() -> None:
         it._registry = registry = RecordingRegistry([])  # type: ignore[assignment]
         away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
         it.update(
-            epoch_of(epoch, word("c0", epoch, {1: SMALL}), word("c1", epoch, {}, without_detection=[*away]))
+            epoch_of(
+                epoch,
+                camera_tracks("c0", epoch, {1: SMALL}),
+                camera_tracks("c1", epoch, {}, without_detection=[*away]),
+            )
         )
         has_picture.append("c1" in registry.pictures)
     assert has_picture == [True, True, True, True, False, False, False, True], (
@@ -100,14 +117,14 @@ def test_a_camera_whose_picture_size_changes_has_boxes_in_the_new_size() -> None
     for epoch, size in enumerate([(WIDTH, HEIGHT), (WIDTH // 2, HEIGHT // 2)]):
         track_updates: list[TrackUpdate] = []
         it._registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
+        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
         [track] = track_updates
         np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) * size[0] / WIDTH, (STRIDE, 1)))
 
 
 def test_people_have_their_tracks_boxes() -> None:
     it = people()
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE}), word("c1", 0, {1: None})))
+    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL, 2: LARGE}), camera_tracks("c1", 0, {1: None})))
     first, second = it.known
     assert boxes(it, "c0", 4) == {first: SMALL, second: LARGE}
     assert boxes(it, "c1", 4) == {}
@@ -118,7 +135,7 @@ def test_people_have_their_tracks_boxes() -> None:
 def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
     it = people()
     for epoch in range(3):
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL if epoch < 2 else None})))
+        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL if epoch < 2 else None})))
     [number] = it.known
     assert (it.registry.first_seen[number], it.registry.last_seen[number]) == (0, 2 * STRIDE - 1)
 
@@ -138,7 +155,7 @@ def test_a_person_confirmed_late_exists_from_their_first_box_on() -> None:
         since((STRIDE, 1), (later, 2)),
     )
     for epoch in range(5):
-        it.update(epoch_of(epoch, word("c0", epoch, {1: None if epoch == 0 else SMALL})))
+        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: None if epoch == 0 else SMALL})))
     assert it.registry.first_seen == {1: STRIDE, 2: later}
     assert it.registry.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
     numbers = it.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
@@ -166,20 +183,20 @@ def test_undecided_frames_keep_their_numbers_after_the_registry_has_settled_them
         return [next(iter(boxes(it, "c0", first)), -1) for first in (0, second, third)]
 
     for epoch in range(5):
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
+        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
     assert current_numbers() == [1, 2, 3]
     it.forget_boxes_before(second)
-    it.update(epoch_of(5, word("c0", 5, {1: SMALL})))
+    it.update(epoch_of(5, camera_tracks("c0", 5, {1: SMALL})))
     assert current_numbers() == [-1, 2, 3]
     assert len(it._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
-    it.update(epoch_of(6, word("c0", 6, {1: SMALL})))
+    it.update(epoch_of(6, camera_tracks("c0", 6, {1: SMALL})))
     assert current_numbers() == [-1, 4, 4], "merges hold for what is settled, too"
 
 
 def test_a_restarted_cameras_tracks_do_not_inherit_earlier_boxes() -> None:
     it = people()
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
-    it.update(epoch_of(1, word("c0", 1, {1: LARGE}, boot=2)))
+    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
+    it.update(epoch_of(1, camera_tracks("c0", 1, {1: LARGE}, boot=2)))
     [before], [after] = boxes(it, "c0", 0), boxes(it, "c0", STRIDE)
     assert it.person_of("c0", 1, 1, 0) == before
     assert it.person_of("c0", 2, 1, STRIDE) == after
@@ -201,7 +218,11 @@ def test_merged_numbers_resolve_through_chains() -> None:
         identity_update({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
     )
     for epoch in range(3):
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL, 2: None}), word("c1", epoch, {1: LARGE})))
+        it.update(
+            epoch_of(
+                epoch, camera_tracks("c0", epoch, {1: SMALL, 2: None}), camera_tracks("c1", epoch, {1: LARGE})
+            )
+        )
     assert it.known == [1]
     assert it.registry.merged == {3: 1, 2: 1}
     assert boxes(it, "c1", 0) == {1: LARGE}, "in frames past, too"
@@ -216,35 +237,35 @@ def test_corrections_are_returned_once_and_in_order() -> None:
         identity_update({("c0", 1): 4}),
     )
     for epoch in range(2):
-        it.update(epoch_of(epoch, word("c0", epoch, {1: SMALL})))
+        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
     assert it.take_corrections() == (merge, split)
-    it.update(epoch_of(2, word("c0", 2, {1: SMALL})))
+    it.update(epoch_of(2, camera_tracks("c0", 2, {1: SMALL})))
     assert it.take_corrections() == ()
 
 
 def test_a_track_that_moves_to_an_unconfirmed_person_has_no_number() -> None:
     it = scripted_people(identity_update({("c0", 1): 1}), identity_update({("c0", 1): 0}))
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
-    it.update(epoch_of(1, word("c0", 1, {1: SMALL})))
+    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
+    it.update(epoch_of(1, camera_tracks("c0", 1, {1: SMALL})))
     assert boxes(it, "c0", STRIDE) == {}
     assert it.number("c0", 1, STRIDE) is None
 
 
 def test_two_tracks_of_one_person_in_one_picture_are_one_box() -> None:
     it = scripted_people(identity_update({("c0", 1): 1, ("c0", 2): 1}))
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL, 2: LARGE})))
+    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL, 2: LARGE})))
     assert boxes(it, "c0", 0) == {1: SMALL}
 
 
 def test_people_not_seen_for_long_are_forgotten_entirely() -> None:
     it = people(departed_after=STRIDE, forget_after=3 * STRIDE)
-    it.update(epoch_of(0, word("c0", 0, {1: SMALL})))
+    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
     [number] = it.known
     for epoch in range(1, 4):
-        it.update(epoch_of(epoch, word("c0", epoch, {})))
+        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {})))
     assert it.known == [number]
     assert it.registry.departed == {number}
-    it.update(epoch_of(9, word("c0", 9, {})))
+    it.update(epoch_of(9, camera_tracks("c0", 9, {})))
     assert it.known == []
     assert it.registry.departed == set()
     assert it.person_of("c0", 1, 1, 0) is None

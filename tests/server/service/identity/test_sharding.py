@@ -19,12 +19,12 @@ from fakes.service.scripted_cameras import (
     SMALL,
     FedService,
     TrackNumbers,
+    camera_tracks,
     encoded,
     epoch_of,
     small_config,
     tracks,
     video,
-    word,
 )
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
@@ -59,7 +59,7 @@ def test_shards_together_decide_as_a_single_service(of: int, seed: int) -> None:
         for camera in CAMERAS:
             size = {track: float(rng.uniform(5, 40)) for track in range(1, 8) if rng.random() < 0.7}
             boxes: dict[int, Box | None] = {it: (0.0, 0.0, s / 2, s) for it, s in size.items()}
-            words.append(word(camera, number, boxes))
+            words.append(camera_tracks(camera, number, boxes))
         epoch = epoch_of(number, *words)
         answers = [decider.step(epoch) for decider in deciders]
         for place, whole in enumerate(alone.step(epoch)):
@@ -99,7 +99,7 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
 
     service = FedService(small_config(**shared(0)))
     service.decider.people._registry = Merging()  # type: ignore[assignment]
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     for epoch in range(6):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE}, "c1": {}})
         if epoch == 2:
@@ -138,7 +138,7 @@ async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
     """Serve the second of two services, which are configured to know each other's address, or not."""
     service = FedService(small_config(**shared(1, servers=request.param)))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     for epoch in range(4):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE, 3: SMALL}, "c1": {1: LARGE}})
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
@@ -212,7 +212,7 @@ async def send(camera: Bus, services: Sequence[BestViewPipeline]) -> None:
             for unit in encoded(0)[5 * (epoch % 8) : 5 * (epoch % 8) + 5]:
                 message = video(name, unit)
                 camera.publish(message.key, message.payload, message.attachment)
-            said = tracks(word(name, epoch, {1: SMALL, 2: LARGE}))
+            said = tracks(camera_tracks(name, epoch, {1: SMALL, 2: LARGE}))
             camera.publish(said.key, said.payload)
         await asyncio.sleep(0.02)
         for service in services:

@@ -19,9 +19,9 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     FedService,
+    camera_tracks,
     small_config,
     tracks,
-    word,
 )
 from server.camera.retained_state import RetainedState
 from server.http.app import make_app
@@ -76,7 +76,7 @@ class Site:
         """Push an epoch with these tracks; pictures do not matter here."""
         for epoch in epochs:
             for camera in CAMERAS:
-                self.service.ingest.tracks(tracks(word(camera, epoch, seen[camera], boot=boot)))
+                self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera], boot=boot)))
             self.service.pulse = end_of_epoch(epoch, STRIDE)
             self.service.decide()
 

@@ -7,7 +7,7 @@ import itertools
 
 import pytest
 
-from fakes.service.decisions import EPOCHS, behind, noted
+from fakes.service.decisions import EPOCHS, collect_decisions, service_with_backlog
 from fakes.service.scripted_cameras import (
     STRIDE,
 )
@@ -17,7 +17,7 @@ from server.service.ingest.epoch_aligner import Epoch
 
 
 async def test_other_tasks_run_between_two_epochs() -> None:
-    service, turns = behind(), list[int]()
+    service, turns = service_with_backlog(), list[int]()
     deciding = asyncio.create_task(service.decide_cooperatively())
     while not deciding.done():
         turns.append(service.aligner._next or 0)
@@ -27,7 +27,7 @@ async def test_other_tasks_run_between_two_epochs() -> None:
 
 
 async def test_waiting_messages_are_handled_before_the_next_epoch() -> None:
-    service, taken, waited = behind(), list[int](), list[int]()
+    service, taken, waited = service_with_backlog(), list[int](), list[int]()
     inbox = Inbox(taken.append, turn_s=0.0)
     service.bus.inboxes.append(inbox)
     step = service._step
@@ -46,7 +46,7 @@ async def test_waiting_messages_are_handled_before_the_next_epoch() -> None:
 
 
 async def test_a_flood_does_not_keep_the_service_from_deciding() -> None:
-    service = behind()
+    service = service_with_backlog()
     inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None, turn_s=0.0)
     service.bus.inboxes.append(inbox)
     inbox.put(100_000)
@@ -60,7 +60,7 @@ async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """Half as fast as the pulses: after each epoch they are two further on."""
-    service, now = behind(), itertools.count(0.0, 1.5)
+    service, now = service_with_backlog(), itertools.count(0.0, 1.5)
     service._backlog_monitor = BacklogMonitor(2 * STRIDE, lambda: next(now))
     decided, step = list[int](), service._step
 
@@ -79,7 +79,7 @@ async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
 
 
 async def test_a_cancelled_service_does_not_finish_its_backlog() -> None:
-    service = behind()
+    service = service_with_backlog()
     deciding = asyncio.create_task(service.decide_cooperatively())
     await asyncio.sleep(0)
     deciding.cancel()
@@ -90,8 +90,8 @@ async def test_a_cancelled_service_does_not_finish_its_backlog() -> None:
 
 
 async def test_cooperative_decisions_equal_those_made_at_once() -> None:
-    one, other = behind(), behind()
-    at_once, by_turns = noted(one), noted(other)
+    one, other = service_with_backlog(), service_with_backlog()
+    at_once, by_turns = collect_decisions(one), collect_decisions(other)
     one.decide()
     await other.decide_cooperatively()
     assert [it.choices for it in at_once] == [it.choices for it in by_turns]

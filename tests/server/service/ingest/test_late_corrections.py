@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from bestview import IdentitySettings
-from fakes.service.scripted_cameras import HEIGHT, STRIDE, WIDTH, epoch_of, word
+from fakes.service.scripted_cameras import HEIGHT, STRIDE, WIDTH, camera_tracks, epoch_of
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, CameraTracks
 from server.service.identity.people import PersonTracker
@@ -21,7 +21,7 @@ MENDED = STRIDE
 def late_revision(epoch: int) -> CameraTracks:
     """Return a camera's word that the two were in each other's place since then."""
     last = end_of_epoch(epoch, STRIDE)
-    said = word("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
+    said = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
     frames = last - MENDED + 1
     tracks = [msgspec.structs.replace(it, boxes=it.boxes[:1] * frames) for it in said.tracks]
     return msgspec.structs.replace(said, tracks=tracks)
@@ -31,10 +31,10 @@ def late_revision(epoch: int) -> CameraTracks:
 def test_tracks_exchange_their_keys_once_however_many_late_revisions_report_it(late: int) -> None:
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
     for epoch in range(4):
-        [said] = people.update(epoch_of(epoch, word("c0", epoch, {1: LEFT, 2: RIGHT})))
+        [said] = people.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: LEFT, 2: RIGHT})))
     left, right = said.keys
     now = 4 + late
     revisions = tuple(late_revision(epoch) for epoch in range(4, now))
-    newest = {"c0": word("c0", now, {1: RIGHT, 2: LEFT})}
+    newest = {"c0": camera_tracks("c0", now, {1: RIGHT, 2: LEFT})}
     for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, late_revisions=revisions)):
         assert window.keys == (right, left), "a name stays where it was: on the left, or on the right"

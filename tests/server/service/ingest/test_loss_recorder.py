@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fakes.service.scripted_cameras import CAMERAS, FPS, STRIDE, epoch_of, word
+from fakes.service.scripted_cameras import CAMERAS, FPS, STRIDE, camera_tracks, epoch_of
 from server.media.stream_format import StreamFormat
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.ingest import CameraState
@@ -27,7 +27,7 @@ class LossyEpochs:
         """Decide epochs that all cameras but one have reported."""
         for number in numbers:
             self.now = number * STRIDE / FPS
-            messages = [word(camera, number, {}) for camera in CAMERAS if camera != late]
+            messages = [camera_tracks(camera, number, {}) for camera in CAMERAS if camera != late]
             epoch = epoch_of(number, *messages)
             late_ones = () if late is None else (late,)
             self.loss_recorder.record_epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
@@ -64,5 +64,5 @@ def test_a_camera_that_has_disconnected_is_not_logged_as_in_time(caplog: pytest.
     lossy = LossyEpochs()
     lossy.epochs(range(3), late=B)
     lossy.now += 1000.0
-    lossy.loss_recorder.record_epoch(epoch_of(9, word(A, 9, {})))
+    lossy.loss_recorder.record_epoch(epoch_of(9, camera_tracks(A, 9, {})))
     assert len(caplog.messages) == 1

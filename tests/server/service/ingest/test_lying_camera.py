@@ -19,13 +19,13 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     FedService,
+    camera_tracks,
     encoded,
     small_config,
     status,
     thumbnail,
     tracks,
     video,
-    word,
 )
 from server.http.app import make_app
 from server.http.metrics.http_collector import METRICS
@@ -65,12 +65,12 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
 
 def altered_tracks(epoch: int, /, **changes: Any) -> list[Message]:
     """Return its word on an epoch, as it is not."""
-    right = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))
+    right = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))
     return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(right | changes).encode(), b"")]
 
 
 def of_one(epoch: int, /, **changes: Any) -> list[Message]:
-    (track,) = msgspec.to_builtins(word(LIAR, epoch, {1: SMALL}))["tracks"]
+    (track,) = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))["tracks"]
     return altered_tracks(epoch, tracks=[track | changes])
 
 
@@ -138,7 +138,7 @@ TAKEN: dict[str, LyingMessages] = {
 
 
 def correct_tracks(epoch: int) -> list[Message]:
-    return [tracks(word(LIAR, epoch, {1: SMALL}))]
+    return [tracks(camera_tracks(LIAR, epoch, {1: SMALL}))]
 
 
 def deliver(service: FedService, message: Message) -> None:
@@ -155,7 +155,7 @@ class LyingSite:
         self.service = service = FedService(small_config())
         self.decided: list[GopChoices] = []
         service.on_decision.append(self.decided.append)
-        service.come(*CAMERAS)
+        service.connect_cameras(*CAMERAS)
         self._viewer = service.splicer.decided_cameras[OTHER].subscribe()
         self.shown: list[MediaChunk] = []
         """What those are sent who watch the other camera."""
@@ -175,7 +175,7 @@ class LyingSite:
         ingest = self.service.ingest
         for unit in encoded(1)[epoch * STRIDE : (epoch + 1) * STRIDE]:
             ingest.video(video(OTHER, unit))
-        ingest.tracks(tracks(word(OTHER, epoch, {7: LARGE})))
+        ingest.tracks(tracks(camera_tracks(OTHER, epoch, {7: LARGE})))
         ingest.status(status(OTHER))
         ingest.thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
 
@@ -222,13 +222,13 @@ async def test_implausible_messages_of_one_camera_do_not_affect_the_other(name: 
 def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
     """Before the first pulse nobody can tell that a frame is far ahead."""
     service = FedService(small_config())
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     service.ingest.video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[: 2 * STRIDE]:
             service.ingest.video(video(camera, unit))
-        service.ingest.tracks(tracks(word(camera, 0, {1: LARGE})))
-        service.ingest.tracks(tracks(word(camera, 1, {1: LARGE}, ended=True)))
+        service.ingest.tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
+        service.ingest.tracks(tracks(camera_tracks(camera, 1, {1: LARGE}, ended=True)))
     service.pulse = 2 * STRIDE - 1
     service.decide()
     assert service.aligner.all_ended
@@ -251,4 +251,6 @@ def test_the_scripted_messages_here_are_like_a_cameras() -> None:
     assert [msgspec.json.decode(it.attachment) for it in frames(0)] == [
         msgspec.json.decode(it.attachment) for it in right
     ]
-    assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == word(LIAR, 1, {1: SMALL})
+    assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == camera_tracks(
+        LIAR, 1, {1: SMALL}
+    )

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fakes.media.decoding import decodes_without_errors
-from fakes.service.decisions import noted
+from fakes.service.decisions import collect_decisions
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -18,11 +18,11 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     FedService,
+    camera_tracks,
     encoded,
     small_config,
     tracks,
     video,
-    word,
 )
 from fakes.service.scripted_recordings import playable_files
 from server.media.audio.aac import SAMPLES
@@ -46,7 +46,7 @@ def sent(service: FedService, epoch: int, *cameras: str) -> None:
         again = epoch % ENCODED
         for unit in encoded(seed)[again * STRIDE : (again + 1) * STRIDE]:
             service.ingest.video(video(camera, replace(unit, pulse=unit.pulse + (epoch - again) * STRIDE)))
-        service.ingest.tracks(tracks(word(camera, epoch, {1: LARGE if seed else SMALL})))
+        service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: LARGE if seed else SMALL})))
 
 
 def lived(service: FedService, epochs: range) -> None:
@@ -63,7 +63,7 @@ def service(tmp_path: Path) -> FedService:
     it = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
     it._decision_writer = it.loss_recorder.decision_writer = it._open_decision_files(tmp_path)
     it.recorder.open()
-    it.come(*CAMERAS)
+    it.connect_cameras(*CAMERAS)
     return it
 
 
@@ -71,7 +71,7 @@ def service(tmp_path: Path) -> FedService:
 def test_a_service_that_was_suspended_skips_to_the_present(
     service: FedService, tmp_path: Path, hours: int
 ) -> None:
-    decided = noted(service)
+    decided = collect_decisions(service)
     lived(service, range(BEFORE))
     before = decided[-1].first + GOP
     then = hours * HOUR
@@ -113,7 +113,7 @@ def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
 
 
 def test_a_backlog_of_a_minute_is_decided_epoch_by_epoch(service: FedService) -> None:
-    decided = noted(service)
+    decided = collect_decisions(service)
     lived(service, range(BEFORE))
     then = HOUR // 60
     lived(service, range(then, then + BEFORE))
@@ -128,7 +128,7 @@ class Started(FedService):
 
     def __init__(self) -> None:
         super().__init__(small_config())
-        self.come(*CAMERAS)
+        self.connect_cameras(*CAMERAS)
         self.pulses: asyncio.Queue[int] = asyncio.Queue()
 
     async def _follow_pulses(self) -> None:
@@ -151,7 +151,7 @@ class Started(FedService):
 @pytest.mark.parametrize("other", [3, 3000 * HOUR], ids=["behind", "ahead"])
 async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(other: int) -> None:
     service, now = Started(), 720 * HOUR
-    decided = noted(service)
+    decided = collect_decisions(service)
     running = asyncio.create_task(service.run())
     await service.does()
     await service.says(other, "c0")
@@ -172,7 +172,7 @@ async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(oth
 async def test_a_site_without_a_pulse_server_is_decided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.service.pipeline._FIRST_PULSE_S", 0.0)
     service = Started()
-    decided = noted(service)
+    decided = collect_decisions(service)
     running = asyncio.create_task(service.run())
     for epoch in range(4):
         await service.says(epoch, *CAMERAS)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.service.scripted_cameras import SMALL, word
+from fakes.service.scripted_cameras import SMALL, camera_tracks
 from server.messaging.messages import FrameHeader, SolverReport
 from server.service.metrics.camera_metrics import CameraMetrics, RecentSeconds
 
@@ -31,7 +31,7 @@ def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> N
 
 def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
     measured = CameraMetrics()
-    said = word("c0", 0, {1: SMALL}, solved_at=100.5)
+    said = camera_tracks("c0", 0, {1: SMALL}, solved_at=100.5)
     measured.window(said)  # of a frame that did not come
     assert measured.tracking_delay is None
     measured.frame(head(said.last, 0.1))
@@ -45,8 +45,8 @@ def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float 
     measured = CameraMetrics()
     for gap in gaps:
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
-        measured.window(msgspec.structs.replace(word("c0", 0, {}), solve=solve))
-    measured.window(word("c0", 1, {}))  # nobody there, nothing solved
+        measured.window(msgspec.structs.replace(camera_tracks("c0", 0, {}), solve=solve))
+    measured.window(camera_tracks("c0", 1, {}))  # nobody there, nothing solved
     assert (measured.optimal, measured.solved_windows) == (share, len(gaps))
 
 

@@ -87,7 +87,7 @@ def test_a_clock_that_jumped_during_recording_is_not_trusted_later_either(
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(4, 6))
     store.close()
-    clocks.off(TRIAL_S)
+    clocks.power_off(TRIAL_S)
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(6, 7))
@@ -107,7 +107,7 @@ def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
 ) -> None:
     recorded(tmp_path, clocks)
     if reboots:
-        clocks.off(1.0)
+        clocks.power_off(1.0)
     clocks.jump(seconds)
     store = opened(tmp_path, clocks)
     assert segments_on_disk(tmp_path) == list(range(10))
@@ -125,7 +125,7 @@ def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
 
 def test_a_clock_that_is_corrected_in_time_deletes_nothing(tmp_path: Path, clocks: ManualClocks) -> None:
     recorded(tmp_path, clocks)
-    clocks.off(5.0, wrong_by=YEAR_S)
+    clocks.power_off(5.0, wrong_by=YEAR_S)
     bounds = RetentionLimits(keep_s=2 * TRIAL_S, max_mb=1e6, segment_s=0.2)
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S / 2
@@ -150,7 +150,7 @@ def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchr
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(30))
     store.close()
-    clocks.off(7 * 86_400.0)
+    clocks.power_off(7 * 86_400.0)
     store = opened(tmp_path, clocks, bounds)
     assert segments_on_disk(tmp_path) == list(range(30)), "there is time to set a clock right that is wrong"
     assert [it for it in caplog.messages if "was off for 7.0 days" in it and "UTC on that counts" in it]
@@ -175,7 +175,7 @@ def test_days_off_add_up(tmp_path: Path, clocks: ManualClocks) -> None:
         clocks.now += TRIAL_S
         records(store, clocks, range(day, day + 1))
         store.close()
-        clocks.off(86_400.0)
+        clocks.power_off(86_400.0)
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(4, 5))
@@ -210,7 +210,7 @@ def test_a_machine_without_a_battery_clock_counts_time_off_once_synchronized(
     tmp_path: Path, clocks: ManualClocks
 ) -> None:
     recorded(tmp_path, clocks)
-    clocks.off(7 * 86_400.0, wrong_by=-7 * 86_400.0)
+    clocks.power_off(7 * 86_400.0, wrong_by=-7 * 86_400.0)
     clocks.is_synchronized = False
     store = opened(tmp_path, clocks)
     clocks.now += 15.0
@@ -239,7 +239,7 @@ def test_recordings_made_before_the_clock_was_trusted_do_not_age_by_time_off(
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(8))
     store.close()
-    clocks.off(YEAR_S)
+    clocks.power_off(YEAR_S)
     store = opened(tmp_path, clocks, bounds)
     records(store, clocks, range(10, 12))
     if restarts:
@@ -337,7 +337,7 @@ def test_deletions_are_logged_rarely_and_with_their_reason(
 
 def test_a_service_uses_the_machines_clocks(tmp_path: Path) -> None:
     service = FedService(small_config(record={"folder": str(tmp_path / "kept"), "trust_clock": True}))
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     service.recorder.open()
     service.close()
     clock_state = json.loads((tmp_path / "kept" / "clock.json").read_bytes())

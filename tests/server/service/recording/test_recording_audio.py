@@ -12,24 +12,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.media.audio import (
-    BEEPS,
+    BEEP_TIMES,
     FRAMES,
     GOPS,
-    STEP,
+    MAX_AV_OFFSET_S,
+    access_units,
     beeps,
+    decode_audio,
     flashes,
-    flashing,
-    heard,
     packets,
-    sends,
+    send_audio,
     write_flashes,
 )
 from fakes.media.ffprobe import probed
-from fakes.media.mpegts import check_counters, taken_apart
+from fakes.media.mpegts import check_counters, parse_packets
 from fakes.programs import needs_ffprobe
-from fakes.service.fed_site import A, Hall, opened
+from fakes.service.fed_site import A, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, FedService, video
-from fakes.service.scripted_recordings import AMPLE, PULSE0, ManualClocks, gop_record, session_info
+from fakes.service.scripted_recordings import PULSE0, UNLIMITED, ManualClocks, gop_record, session_info
 from server.media.audio.aac import SAMPLES as FRAME
 from server.media.audio.audio_chunk import AudioChunk
 from server.media.audio.audio_format import AudioFormat
@@ -52,23 +52,25 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-async def hall(recording: Path, tmp_path: Path) -> AsyncIterator[Hall]:
+async def served(recording: Path, tmp_path: Path) -> AsyncIterator[ServedSite]:
     """A site with that sound, which records into segments of two GOPs."""
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
-    async for hall in opened(
+    async for served in serve_site(
         sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
     ):
-        hall.service.recorder.open()
-        hall.service.come(*CAMERAS)
-        yield hall
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
+        yield served
 
 
-def shows(hall: Hall, recording: Path, gops: range, choices: Mapping[int, str | None] | None = None) -> None:
+def shows(
+    served: ServedSite, recording: Path, gops: range, choices: Mapping[int, str | None] | None = None
+) -> None:
     """Decide some GOPs of the recording: person 1 is in either camera in turn, or as in ``choices``."""
-    service = hall.service
+    service = served.service
     for gop in gops:
         for camera in CAMERAS:
-            for unit in flashing(recording)[gop * GOP : (gop + 1) * GOP]:
+            for unit in access_units(recording)[gop * GOP : (gop + 1) * GOP]:
                 service.ingest.video(video(camera, unit))
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
         choices_of_gop = GopChoices(
@@ -92,110 +94,118 @@ def forget(service: FedService) -> None:
         del service.audio_buffer._frames[number]
 
 
-async def download(hall: Hall, path: str) -> bytes:
-    async with hall.session.get(path) as answer:
+async def download(served: ServedSite, path: str) -> bytes:
+    async with served.session.get(path) as answer:
         assert answer.status == 200, await answer.text()
         return await answer.read()
 
 
 def unbroken(stream: bytes, kind: str | None = None) -> tuple[float, float]:
     """Assert that the audio has no gap; return its first and last time."""
-    times, _ = heard(stream, kind)
+    times, _ = decode_audio(stream, kind)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     return float(times[0]), float(times[-1])
 
 
-async def test_in_a_recording_each_beep_is_with_its_flash_in_any_file(hall: Hall, recording: Path) -> None:
-    own = sends(hall.service, recording)
-    shows(hall, recording, range(GOPS))
-    await until_written(hall.service, GOPS)
-    forget(hall.service)
-    data = await download(hall, f"/objects/1/best.mp4?from=p7&to=p{FRAMES - 2}")
-    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
-    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+async def test_in_a_recording_each_beep_is_with_its_flash_in_any_file(
+    served: ServedSite, recording: Path
+) -> None:
+    own = send_audio(served.service, recording)
+    shows(served, recording, range(GOPS))
+    await until_written(served.service, GOPS)
+    forget(served.service)
+    data = await download(served, f"/objects/1/best.mp4?from=p7&to=p{FRAMES - 2}")
+    assert flashes(data) == pytest.approx(BEEP_TIMES, abs=0.001)
+    assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     assert unbroken(data) == (pytest.approx(GOP / FPS, abs=0.022), pytest.approx(FRAMES / FPS, abs=0.1))
     begin = FORM.frame_at(GOP, FPS)
     assert packets(data) == own[begin : begin + len(packets(data))], "byte for byte the recording's"
-    camera = await download(hall, f"/cameras/c1/live.mp4?from=p0&to=p{FRAMES}")
-    assert beeps(camera) == pytest.approx(BEEPS, abs=STEP)
+    camera = await download(served, f"/cameras/c1/live.mp4?from=p0&to=p{FRAMES}")
+    assert beeps(camera) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
 
 
 @pytest.mark.parametrize(
     "path", ["/objects/1/best.mp4", "/cameras/c0/live.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts"]
 )
 async def test_audio_has_no_gap_where_a_recording_meets_the_live_stream(
-    hall: Hall, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
+    served: ServedSite, recording: Path, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.service.time_shift.time_shift_stream._LEAD_S", 60.0)
-    service, half = hall.service, GOPS // 2
-    own = sends(service, recording)
-    shows(hall, recording, range(half))
+    service, half = served.service, GOPS // 2
+    own = send_audio(service, recording)
+    shows(served, recording, range(half))
     await until_written(service, half)
-    async with hall.session.get(f"{path}?from=p0") as answer:
+    async with served.session.get(f"{path}?from=p0") as answer:
         while not service.splicer.viewers:  # noqa: ASYNC110 — the past is sent first
             await asyncio.sleep(0.001)
         for gop in range(half, GOPS):
-            shows(hall, recording, range(gop, gop + 1))
+            shows(served, recording, range(gop, gop + 1))
             await asyncio.sleep(0.005)
         service.splicer.close()
         data = await answer.read()
     kind = "mpegts" if path.endswith("ts") else "mp4"
-    assert flashes(data, kind) == pytest.approx(BEEPS, abs=0.001)
-    assert beeps(data, kind) == pytest.approx(BEEPS, abs=STEP)
+    assert flashes(data, kind) == pytest.approx(BEEP_TIMES, abs=0.001)
+    assert beeps(data, kind) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     assert unbroken(data, kind)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
     if kind == "mpegts":
-        check_counters(taken_apart(data))
+        check_counters(parse_packets(data))
     else:
         assert packets(data) == own[: len(packets(data))]
 
 
-async def test_audio_continues_where_no_picture_is_shown_for_long(hall: Hall, recording: Path) -> None:
-    sends(hall.service, recording)
+async def test_audio_continues_where_no_picture_is_shown_for_long(
+    served: ServedSite, recording: Path
+) -> None:
+    send_audio(served.service, recording)
     choices = {gop: A if gop < 2 or gop >= GOPS - 2 else None for gop in range(GOPS)}
-    shows(hall, recording, range(GOPS), choices)
-    await until_written(hall.service, GOPS)
-    forget(hall.service)
-    data = await download(hall, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
-    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    shows(served, recording, range(GOPS), choices)
+    await until_written(served.service, GOPS)
+    forget(served.service)
+    data = await download(served, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
+    assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     assert unbroken(data)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
 
 
-async def test_audio_that_was_deleted_or_not_recorded_is_silent(hall: Hall, recording: Path) -> None:
-    sends(hall.service, recording, silent=range(30, 60))
-    shows(hall, recording, range(GOPS))
-    await until_written(hall.service, GOPS)
-    forget(hall.service)
-    session = hall.service.recorder.session
+async def test_audio_that_was_deleted_or_not_recorded_is_silent(served: ServedSite, recording: Path) -> None:
+    send_audio(served.service, recording, silent=range(30, 60))
+    shows(served, recording, range(GOPS))
+    await until_written(served.service, GOPS)
+    forget(served.service)
+    session = served.service.recorder.session
     assert session is not None
     gone = session.segments[6].first
     session.paths.audio_file(gone).unlink()
-    data = await download(hall, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
+    data = await download(served, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
     unbroken(data)
-    _, samples = heard(data)
+    _, samples = decode_audio(data)
     assert not samples[31 * FRAME : 59 * FRAME].any()
     assert not samples[(gone + 1) * 1920 + FRAME : (gone + 2 * GOP) * 1920 - 2 * FRAME].any()
     silent = {*range(round(30 * FRAME / 1920), round(60 * FRAME / 1920)), *range(gone, gone + 2 * GOP)}
-    kept = [at for at in BEEPS if round(at * FPS) not in silent]
+    kept = [at for at in BEEP_TIMES if round(at * FPS) not in silent]
     # The frame before what is gone has the beginning of a beep: frames of AAC overlap.
-    assert [it for it in beeps(data) if abs(it - gone / FPS) > STEP] == pytest.approx(kept, abs=STEP)
+    assert [it for it in beeps(data) if abs(it - gone / FPS) > MAX_AV_OFFSET_S] == pytest.approx(
+        kept, abs=MAX_AV_OFFSET_S
+    )
 
 
 async def test_the_audio_of_an_earlier_session_plays_after_a_restart(recording: Path, tmp_path: Path) -> None:
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     for gops in (range(GOPS - 1), range(GOPS - 1, GOPS)):
-        async for hall in opened(
+        async for served in serve_site(
             sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
         ):
-            hall.service.pulse0 = PULSE0
-            hall.service.recorder.open()
-            hall.service.come(*CAMERAS)
+            served.service.pulse0 = PULSE0
+            served.service.recorder.open()
+            served.service.connect_cameras(*CAMERAS)
             if not gops.start:
-                sends(hall.service, recording)
-            shows(hall, recording, gops)
-            await until_written(hall.service, len(gops))
+                send_audio(served.service, recording)
+            shows(served, recording, gops)
+            await until_written(served.service, len(gops))
             if gops.start:
-                data = await download(hall, f"/cameras/c0/live.mp4?from=p0&to=p{FRAMES}")
-                assert beeps(data) == pytest.approx([it for it in BEEPS if it < FRAMES / FPS - 0.2], abs=STEP)
+                data = await download(served, f"/cameras/c0/live.mp4?from=p0&to=p{FRAMES}")
+                assert beeps(data) == pytest.approx(
+                    [it for it in BEEP_TIMES if it < FRAMES / FPS - 0.2], abs=MAX_AV_OFFSET_S
+                )
                 unbroken(data)
 
 
@@ -221,17 +231,17 @@ async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
         sum(it.stat().st_size for it in session.folder.rglob("*") if it.is_file()), abs=3000
     )
     store.close()
-    again = RecordingFolder(tmp_path, AMPLE)
+    again = RecordingFolder(tmp_path, UNLIMITED)
     again.open()
     assert again.earlier[0].audio.index.all == session.audio.index.all
 
 
 @needs_ffprobe
-async def test_the_audio_playlist_plays_from_the_disk(hall: Hall, recording: Path) -> None:
-    sends(hall.service, recording)
-    shows(hall, recording, range(GOPS))
-    await until_written(hall.service, GOPS)
-    session = hall.service.recorder.session
+async def test_the_audio_playlist_plays_from_the_disk(served: ServedSite, recording: Path) -> None:
+    send_audio(served.service, recording)
+    shows(served, recording, range(GOPS))
+    await until_written(served.service, GOPS)
+    session = served.service.recorder.session
     assert session is not None
     for path in (session.audio.path, session.paths.audio_file(0)):
         ((codec, frames, *_),) = probed(path, "codec_name,nb_read_frames")
@@ -240,16 +250,16 @@ async def test_the_audio_playlist_plays_from_the_disk(hall: Hall, recording: Pat
 
 
 async def test_a_site_without_audio_records_none(tmp_path: Path, recording: Path) -> None:
-    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        hall.service.recorder.open()
-        hall.service.come(*CAMERAS)
-        shows(hall, recording, range(4))
-        await until_written(hall.service, 4)
-        session = hall.service.recorder.session
+    async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
+        shows(served, recording, range(4))
+        await until_written(served.service, 4)
+        session = served.service.recorder.session
         assert session is not None
         assert not (session.folder / "sound").exists()
         assert not session.audio.path.exists()
-        assert b"soun" not in await download(hall, "/objects/1/best.mp4?from=p0&to=p20")
+        assert b"soun" not in await download(served, "/objects/1/best.mp4?from=p0&to=p20")
 
 
 @settings(max_examples=100, deadline=None)

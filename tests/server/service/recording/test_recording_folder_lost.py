@@ -10,11 +10,19 @@ from pathlib import Path
 
 import pytest
 
-from fakes.service.fed_site import Hall, opened
+from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
-from fakes.service.scripted_recordings import AMPLE, A, B, filled_buffers, gop_record, pictures, session_info
+from fakes.service.scripted_recordings import (
+    UNLIMITED,
+    A,
+    B,
+    filled_buffers,
+    gop_record,
+    pictures,
+    session_info,
+)
 from fakes.system.full_disk import files_of_at_most
-from fakes.system.unprivileged import nobodys_folder
+from fakes.system.unprivileged import unprivileged_folder
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
@@ -90,7 +98,7 @@ def records(store: RecordingFolder, gops: range) -> None:
 def nothing_is_orphaned(folder: Path) -> None:
     """Check that whatever is on the disk is known to a service that begins, which takes it away some day."""
     before = {it for it in folder.rglob("*") if it.is_file()}
-    store = RecordingFolder(folder, AMPLE)
+    store = RecordingFolder(folder, UNLIMITED)
     store.open()
     store.close()
     assert {it for it in folder.rglob("*") if it.is_file()} == before, "nothing had to be tidied up"
@@ -114,7 +122,7 @@ def nothing_is_orphaned(folder: Path) -> None:
 
 def shown(folder: Path) -> list[int]:
     """Play what is on the disk of camera c0: give its pulses."""
-    store = RecordingFolder(folder, AMPLE)
+    store = RecordingFolder(folder, UNLIMITED)
     store.open()
     store.close()
     found = [session.cameras[A].path for session in store.earlier if session.cameras[A].path.exists()]
@@ -136,7 +144,7 @@ def shown(folder: Path) -> list[int]:
 )
 def test_recording_continues_at_once_and_leaves_no_orphaned_files(tmp_path: Path, harm: Harm) -> None:
     folder = tmp_path / "kept"
-    store = RecordingFolder(folder, AMPLE)
+    store = RecordingFolder(folder, UNLIMITED)
     store.open()
     records(store, range(3))
     assert store.session is not None
@@ -151,7 +159,7 @@ def test_recording_fails_cleanly_while_a_file_is_in_the_folders_place_and_then_c
     tmp_path: Path,
 ) -> None:
     folder = tmp_path / "kept"
-    store = RecordingFolder(folder, AMPLE)
+    store = RecordingFolder(folder, UNLIMITED)
     store.open()
     records(store, range(3))
     shutil.rmtree(folder)
@@ -167,7 +175,7 @@ def test_recording_fails_cleanly_while_a_file_is_in_the_folders_place_and_then_c
 
 def test_a_disk_that_is_mounted_again_is_recorded_to_and_its_sessions_are_known(tmp_path: Path) -> None:
     folder, away = tmp_path / "kept", tmp_path / "unmounted"
-    store = RecordingFolder(folder, AMPLE)
+    store = RecordingFolder(folder, UNLIMITED)
     store.open()
     records(store, range(3))
     folder.rename(away)
@@ -186,7 +194,7 @@ def test_a_disk_that_is_mounted_again_is_recorded_to_and_its_sessions_are_known(
 
 def test_a_folder_that_another_process_locked_meanwhile_is_left_to_it(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
-    store, other = RecordingFolder(folder, AMPLE), RecordingFolder(folder, AMPLE)
+    store, other = RecordingFolder(folder, UNLIMITED), RecordingFolder(folder, UNLIMITED)
     store.open()
     records(store, range(3))
     shutil.rmtree(folder)
@@ -203,7 +211,7 @@ def test_a_folder_that_another_process_locked_meanwhile_is_left_to_it(tmp_path: 
 
 @pytest.mark.parametrize("closed", [".", "RUN", "RUN/cameras", "RUN/cameras/c0", "RUN/index", "RUN/objects"])
 def test_recording_fails_cleanly_without_permission_and_then_continues(closed: str) -> None:
-    with nobodys_folder() as tmp_path:
+    with unprivileged_folder() as tmp_path:
         folder = tmp_path / "kept"
         store = RecordingFolder(folder, RetentionLimits(1e6, 1e6, 2 * GOP / FPS))
         store.open()
@@ -225,8 +233,8 @@ def test_recording_fails_cleanly_without_permission_and_then_continues(closed: s
 def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    with nobodys_folder() as tmp_path:
-        first = RecordingFolder(tmp_path, AMPLE)
+    with unprivileged_folder() as tmp_path:
+        first = RecordingFolder(tmp_path, UNLIMITED)
         first.open()
         records(first, range(12))
         first.close()
@@ -247,7 +255,7 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
 
 
 def test_a_full_disk_leaves_no_files_at_any_try_and_then_recording_continues(tmp_path: Path) -> None:
-    store = RecordingFolder(tmp_path, AMPLE)
+    store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
     records(store, range(3))
     before = {it for it in tmp_path.rglob("*") if it.is_file()}
@@ -271,7 +279,7 @@ def test_remains_without_media_are_removed_and_media_without_session_info_are_lo
     for it in (media, mine):
         it.parent.mkdir(parents=True)
         it.write_bytes(b"")
-    store = RecordingFolder(tmp_path, AMPLE)
+    store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
     store.close()
     assert not (tmp_path / "20260101T000000Z").exists()
@@ -281,13 +289,13 @@ def test_remains_without_media_are_removed_and_media_without_session_info_are_lo
 
 
 def test_a_session_without_decision_files_stays_and_ages(tmp_path: Path) -> None:
-    store = RecordingFolder(tmp_path, AMPLE)
+    store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
     records(store, range(12))
     store.close()
     assert store.session is not None
     shutil.rmtree(store.session.folder / "index")
-    again = RecordingFolder(tmp_path, AMPLE)
+    again = RecordingFolder(tmp_path, UNLIMITED)
     again.open()
     again.close()
     assert [it.first for it in again.earlier[0].segments] == [0, 25, 50]
@@ -297,7 +305,7 @@ def test_a_session_without_decision_files_stays_and_ages(tmp_path: Path) -> None
 def test_starting_a_new_session_folder_is_logged_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    store = RecordingFolder(tmp_path / "kept", AMPLE)
+    store = RecordingFolder(tmp_path / "kept", UNLIMITED)
     store.open()
     for gop in range(20):
         records(store, range(gop, gop + 1))
@@ -310,22 +318,22 @@ def test_starting_a_new_session_folder_is_logged_once(
 
 
 @pytest.fixture
-async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
+async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Person 1 is in c0 for six GOPs, of which only the last is in memory."""
-    async for it in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+    async for it in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         await shows(it)
         yield it
 
 
-async def shows(hall: Hall) -> None:
+async def shows(served: ServedSite) -> None:
     """Let six GOPs of person 1 be recorded."""
-    hall.service.recorder.recent._frames = GOP
-    hall.service.recorder.open()
-    hall.service.come(*CAMERAS)
-    hall.service.state_replication.begin(0)
+    served.service.recorder.recent._frames = GOP
+    served.service.recorder.open()
+    served.service.connect_cameras(*CAMERAS)
+    served.service.state_replication.begin(0)
     for epoch in range(7):
-        hall.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
-    await until(lambda: written(hall) == 6)
+        served.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+    await until(lambda: written(served) == 6)
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -333,22 +341,22 @@ async def until(condition: Callable[[], bool]) -> None:
         await asyncio.sleep(0.001)
 
 
-def written(hall: Hall) -> int:
-    assert hall.service.recorder.writer is not None
-    return hall.service.recorder.writer.written
+def written(served: ServedSite) -> int:
+    assert served.service.recorder.writer is not None
+    return served.service.recorder.writer.written
 
 
-async def asked(hall: Hall, path: str) -> tuple[int, bytes]:
-    async with hall.session.get(path) as answer:
+async def asked(served: ServedSite, path: str) -> tuple[int, bytes]:
+    async with served.session.get(path) as answer:
         return answer.status, await answer.read()
 
 
 @pytest.mark.parametrize("harm", [gone("."), gone("RUN"), moved("."), made_anew("RUN"), made_a_file("RUN")])
-async def test_lost_recordings_are_not_offered(hall: Hall, harm: Harm) -> None:
-    store = hall.service.recorder.folder
+async def test_lost_recordings_are_not_offered(served: ServedSite, harm: Harm) -> None:
+    store = served.service.recorder.folder
     assert store is not None
     assert store.session is not None
-    assert (await asked(hall, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
+    assert (await asked(served, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
     harm(store.folder, store.session.folder)
     for path in (
         "/objects/1/best.mp4?from=p0&to=p10",
@@ -358,12 +366,12 @@ async def test_lost_recordings_are_not_offered(hall: Hall, harm: Harm) -> None:
         "/cameras/c0/hls/index.m3u8?from=p0&to=p10",
         "/api/past?from=p0&to=p10",
     ):
-        status, body = await asked(hall, path)
+        status, body = await asked(served, path)
         assert status == 416, path
         assert b"recorded from" in body
         assert body.count(b"\n") == 0
     for path in ("/api/objects/1/past", "/api/cameras/c0/past"):
-        spans = (await hall.get_json(path))["spans"]
+        spans = (await served.get_json(path))["spans"]
         assert [it["first"] for it in spans] == [spans[0]["first"]], "what is in memory"
         assert spans[0]["first"] >= 4 * GOP, path
 
@@ -378,66 +386,66 @@ async def test_lost_recordings_are_not_offered(hall: Hall, harm: Harm) -> None:
     ],
 )  # fmt: skip
 async def test_a_person_known_only_from_lost_recordings_is_gone_with_them(
-    hall: Hall, path: str, status: int, error: str
+    served: ServedSite, path: str, status: int, error: str
 ) -> None:
-    store = hall.service.recorder.folder
+    store = served.service.recorder.folder
     assert store is not None
-    hall.service.recorder.recent._choices.clear()
-    hall.service.splicer.forget([], [])
-    hall.service.splicer._persons._ended.clear()
-    hall.service.decider.people.registry.first_seen.clear()
-    assert len((await hall.get_json("/api/objects/1/past"))["spans"]) == 1
+    served.service.recorder.recent._choices.clear()
+    served.service.splicer.forget([], [])
+    served.service.splicer._persons._ended.clear()
+    served.service.decider.people.registry.first_seen.clear()
+    assert len((await served.get_json("/api/objects/1/past"))["spans"]) == 1
     shutil.rmtree(store.folder)
-    assert await hall.get(path) == (status, {"error": error})
+    assert await served.get(path) == (status, {"error": error})
 
 
-async def test_a_lost_segment_is_a_gap(hall: Hall) -> None:
-    store = hall.service.recorder.folder
+async def test_a_lost_segment_is_a_gap(served: ServedSite) -> None:
+    store = served.service.recorder.folder
     assert store is not None
     assert store.session is not None
     store.session.paths.camera_file(A, 0).unlink()
     (store.session.paths.camera_file(A, 2 * GOP)).write_bytes(b"cut short")
-    spans = (await hall.get_json("/api/cameras/c0/past"))["spans"]
+    spans = (await served.get_json("/api/cameras/c0/past"))["spans"]
     assert [it["first"] for it in spans] == [4 * GOP]
-    assert [it["first"] for it in (await hall.get_json("/api/cameras/c1/past"))["spans"]] == [0]
-    status, body = await asked(hall, "/cameras/c0/live.mp4?from=p0&to=p30")
+    assert [it["first"] for it in (await served.get_json("/api/cameras/c1/past"))["spans"]] == [0]
+    status, body = await asked(served, "/cameras/c0/live.mp4?from=p0&to=p30")
     assert status == 200
     assert len(body) > 1000
 
 
 async def test_requests_for_unreadable_recordings_are_answered_with_an_error() -> None:
-    with nobodys_folder() as tmp_path:
-        async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-            await shows(hall)
-            store = hall.service.recorder.folder
+    with unprivileged_folder() as tmp_path:
+        async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+            await shows(served)
+            store = served.service.recorder.folder
             assert store is not None
             assert store.session is not None
             (store.session.folder / "cameras" / "c0").chmod(0)
             error = {"error": "cannot read the recording: Permission denied"}
-            assert await hall.get("/cameras/c0/live.mp4?from=p0&to=p10") == (503, error)
-            assert await hall.get("/api/cameras/c0/past") == (503, error)
+            assert await served.get("/cameras/c0/live.mp4?from=p0&to=p10") == (503, error)
+            assert await served.get("/api/cameras/c0/past") == (503, error)
             (store.session.folder / "cameras" / "c0").chmod(0o700)
-            assert (await asked(hall, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
+            assert (await asked(served, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
 
 
-async def test_that_recording_stops_and_that_it_continues_is_reported(hall: Hall) -> None:
-    store, writer = hall.service.recorder.folder, hall.service.recorder.writer
+async def test_that_recording_stops_and_that_it_continues_is_reported(served: ServedSite) -> None:
+    store, writer = served.service.recorder.folder, served.service.recorder.writer
     assert store is not None
     assert writer is not None
     writer._retry_s = 0.0
     shutil.rmtree(store.folder)
     store.folder.write_text("somebody's\n")
-    hall.service.feed(7, {A: {1: LARGE}, B: {1: SMALL}})
+    served.service.feed(7, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: writer.lost == 1)
-    assert b"myview_recording 0.0" in (await asked(hall, "/metrics"))[1]
-    hall.service.pulse = hall.service.decision_state.end
-    hall.service._pulse_received_at = asyncio.get_running_loop().time()
-    assert await asked(hall, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
+    assert b"myview_recording 0.0" in (await asked(served, "/metrics"))[1]
+    served.service.pulse = served.service.decision_state.end
+    served.service._pulse_received_at = asyncio.get_running_loop().time()
+    assert await asked(served, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
     store.folder.unlink()
-    hall.service.feed(8, {A: {1: LARGE}, B: {1: SMALL}})
-    await until(lambda: written(hall) == 7)
-    assert b"myview_recording 1.0" in (await asked(hall, "/metrics"))[1]
-    assert await asked(hall, "/readyz") == (200, b"2 of 2 cameras\n")
-    status, body = await asked(hall, f"/objects/1/best.mp4?from=p{7 * GOP}&to=p{8 * GOP}")
+    served.service.feed(8, {A: {1: LARGE}, B: {1: SMALL}})
+    await until(lambda: written(served) == 7)
+    assert b"myview_recording 1.0" in (await asked(served, "/metrics"))[1]
+    assert await asked(served, "/readyz") == (200, b"2 of 2 cameras\n")
+    status, body = await asked(served, f"/objects/1/best.mp4?from=p{7 * GOP}&to=p{8 * GOP}")
     assert status == 200
     assert body

@@ -8,8 +8,8 @@ import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, FedService, small_config
 from fakes.service.scripted_recordings import (
-    AMPLE,
     PULSE0,
+    UNLIMITED,
     A,
     ManualClocks,
     filled_buffers,
@@ -129,7 +129,7 @@ def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path,
     with files_of_at_most(0):
         leave(store)
     assert files_in_playlists(store.session) == {0, 25, 50, 75}
-    again = opened(tmp_path, clock, AMPLE)
+    again = opened(tmp_path, clock, UNLIMITED)
     (earlier,) = again.earlier
     assert files_in(earlier) == {50, 75} == files_in_playlists(earlier)
     again.close()
@@ -169,7 +169,7 @@ def test_a_full_disk_does_not_stop_the_service_from_starting(tmp_path: Path, clo
     record(store, clock, range(20))
     leave(store)
     service = FedService(small_config(record={"folder": str(folder), "keep_s": 1.5}))
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     with files_of_at_most(0):
         service.recorder.open()
         assert on_disk(folder) == [50, 75]

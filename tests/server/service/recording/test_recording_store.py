@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from fakes.media.decoding import decodes_without_errors
 from fakes.service.scripted_cameras import FPS, GOP
 from fakes.service.scripted_recordings import (
-    AMPLE,
     PULSE0,
+    UNLIMITED,
     A,
     B,
     ManualClocks,
@@ -45,7 +45,8 @@ def test_a_persons_playlist_plays_the_chosen_cameras_pixels_across_cuts(
 ) -> None:
     choices = [A, A, B, B, A, B, A, A, A, B, B, A]
     store = written_folder(
-        RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: camera}) for gop, camera in enumerate(choices)]
+        RecordingFolder(tmp_path, UNLIMITED),
+        [gop_record(gop, {1: camera}) for gop, camera in enumerate(choices)],
     )
     during = list(pictures(only_run(tmp_path) / "objects" / "1.m3u8"))
     store.close()
@@ -58,10 +59,10 @@ def test_a_persons_playlist_plays_the_chosen_cameras_pixels_across_cuts(
 
 def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -> None:
     few = written_folder(
-        RecordingFolder(tmp_path / "few", AMPLE), [gop_record(gop, {1: A}) for gop in range(4)]
+        RecordingFolder(tmp_path / "few", UNLIMITED), [gop_record(gop, {1: A}) for gop in range(4)]
     )
     many = written_folder(
-        RecordingFolder(tmp_path / "many", AMPLE),
+        RecordingFolder(tmp_path / "many", UNLIMITED),
         [gop_record(gop, dict.fromkeys(range(50), A)) for gop in range(4)],
     )
     few.close()
@@ -72,7 +73,7 @@ def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -
 
 def test_every_file_and_playlist_decodes_without_errors_even_with_gaps(tmp_path: Path) -> None:
     pieces = [gop_record(gop, {1: A, 2: B} if gop % 4 else {1: A}) for gop in range(12) if gop != 7]
-    written_folder(RecordingFolder(tmp_path, AMPLE), pieces).close()
+    written_folder(RecordingFolder(tmp_path, UNLIMITED), pieces).close()
     files = playable_files(tmp_path)
     assert len(files) == 2 + 2 + 3 * 2, "two people, two cameras, three files each"
     for path in files:
@@ -81,7 +82,7 @@ def test_every_file_and_playlist_decodes_without_errors_even_with_gaps(tmp_path:
 
 def test_a_playlist_conforms_to_rfc_8216(tmp_path: Path) -> None:
     written_folder(
-        RecordingFolder(tmp_path, AMPLE),
+        RecordingFolder(tmp_path, UNLIMITED),
         [gop_record(gop, {1: B if gop == 3 else A}) for gop in range(7) if gop != 5],
     )
     text = (only_run(tmp_path) / "objects" / "1.m3u8").read_text()
@@ -102,7 +103,9 @@ def test_a_playlist_conforms_to_rfc_8216(tmp_path: Path) -> None:
 
 
 def test_the_decision_file_has_choices_and_boxes(tmp_path: Path) -> None:
-    written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(7)]).close()
+    written_folder(
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in range(7)]
+    ).close()
     first, second = sorted((only_run(tmp_path) / "index").iterdir())
     lines = [json.loads(line) for path in (first, second) for line in path.read_text().splitlines()]
     assert [line["first"] for line in lines] == [gop * GOP for gop in range(7)]
@@ -112,7 +115,7 @@ def test_the_decision_file_has_choices_and_boxes(tmp_path: Path) -> None:
 
 def test_an_incomplete_gop_is_in_the_cameras_playlist_but_in_no_persons(tmp_path: Path) -> None:
     pieces = [gop_record(0, {1: A}), gop_record(1, {1: A}, frames=3), gop_record(2, {1: A})]
-    session = written_folder(RecordingFolder(tmp_path, AMPLE), pieces).session
+    session = written_folder(RecordingFolder(tmp_path, UNLIMITED), pieces).session
     assert session is not None
     assert [pulse for pulse, _ in pictures(session.cameras[A].path)] == [
         0,
@@ -133,8 +136,12 @@ def test_an_incomplete_gop_is_in_the_cameras_playlist_but_in_no_persons(tmp_path
 
 
 def test_a_restarted_service_records_a_new_session_beside_the_earlier_one(tmp_path: Path) -> None:
-    written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(3)]).close()
-    second = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: B}) for gop in range(3)])
+    written_folder(
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in range(3)]
+    ).close()
+    second = written_folder(
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: B}) for gop in range(3)]
+    )
     assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
     (earlier,) = second.earlier
     assert [(it.first, it.end) for it in earlier.objects[1].index.all] == [(0, 15)]
@@ -146,7 +153,7 @@ def test_a_restarted_service_records_a_new_session_beside_the_earlier_one(tmp_pa
 
 def test_restarted_pulses_begin_a_new_session(tmp_path: Path) -> None:
     store = written_folder(
-        RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in (5, 6, 0, 1)]
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in (5, 6, 0, 1)]
     )
     assert store.session is not None
     assert [(it.first, it.end) for it in store.session.objects[1].index.all] == [(0, 10)]
@@ -154,11 +161,11 @@ def test_restarted_pulses_begin_a_new_session(tmp_path: Path) -> None:
 
 
 def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
-    store = written_folder(RecordingFolder(tmp_path, AMPLE), [])
+    store = written_folder(RecordingFolder(tmp_path, UNLIMITED), [])
     with pytest.raises(BlockingIOError):
-        RecordingFolder(tmp_path, AMPLE).open()
+        RecordingFolder(tmp_path, UNLIMITED).open()
     store.close()
-    RecordingFolder(tmp_path, AMPLE).open()
+    RecordingFolder(tmp_path, UNLIMITED).open()
 
 
 def test_old_segments_are_deleted_whole_with_their_references(tmp_path: Path) -> None:
@@ -200,7 +207,7 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
         on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
         assert on_disk <= max_mb * 1e6 + slack
     store.close()
-    again = RecordingFolder(folder, AMPLE)
+    again = RecordingFolder(folder, UNLIMITED)
     again.open()
     assert store.session is not None
     found = {number: it.index.all for session in again.earlier for number, it in session.objects.items()}
@@ -218,7 +225,9 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
 
 
 def test_on_a_full_disk_earlier_gops_play_and_recording_continues_later(tmp_path: Path) -> None:
-    store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(2)])
+    store = written_folder(
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in range(2)]
+    )
     assert store.session is not None
     size = store.session.paths.camera_file(A, 0).stat().st_size
     with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:

@@ -171,7 +171,7 @@ def test_a_full_disk_is_retried_only_after_a_while() -> None:
 def fed(folder: Path) -> FedService:
     service = FedService(small_config(record={"folder": str(folder), "segment_s": 1.0}))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     return service
 
 

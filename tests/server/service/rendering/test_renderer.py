@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.service.rendering import SETTINGS, fragments, shown
+from fakes.service.rendering import RENDER_SETTINGS, decoded_frames, fragments
 from fakes.service.scripted_cameras import FPS, GOP, encoded
 from server.media.audio.audio_format import AudioFormat
 from server.media.rendering_messages import EncodedFrame, JpegPicture, RenderResult
@@ -66,7 +66,7 @@ def queued_data(subscriber: Subscriber) -> bytes:
 
 
 def test_a_video_has_no_gap_and_never_goes_back_when_its_worker_is_replaced() -> None:
-    video = OverlayVideo(SETTINGS, 8)
+    video = OverlayVideo(RENDER_SETTINGS, 8)
     assert video.head is None
     viewer = video.broadcaster.subscribe()
     video.put(frames(0, 2 * GOP))
@@ -81,7 +81,7 @@ def test_a_video_has_no_gap_and_never_goes_back_when_its_worker_is_replaced() ->
     assert list(pictures) == list(range(4 * GOP))
     for pulse, picture in pictures.items():
         repeated = 2 * GOP <= pulse < 3 * GOP
-        same = shown(0)[2 * GOP - 1 if repeated else pulse]
+        same = decoded_frames(0)[2 * GOP - 1 if repeated else pulse]
         np.testing.assert_array_equal(picture.to_ndarray(format="bgr24"), same)
 
 
@@ -89,7 +89,7 @@ def test_a_video_is_silent_where_its_pictures_are_muted() -> None:
     form = AudioFormat(48_000, 2)
     audio_buffer = AudioBuffer(form, FPS, 60.0)
     audio_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    video = OverlayVideo(SETTINGS, 8, audio_buffer)
+    video = OverlayVideo(RENDER_SETTINGS, 8, audio_buffer)
     viewer = video.broadcaster.subscribe()
     for gop in range(3):
         video.put(frames(gop * GOP, GOP), is_muted=gop == 1)
@@ -103,7 +103,7 @@ def test_the_gaps_of_a_video_are_muted_on_request(*, is_muted: bool) -> None:
     form = AudioFormat(48_000, 2)
     audio_buffer = AudioBuffer(form, FPS, 60.0)
     audio_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    video = OverlayVideo(SETTINGS, 8, audio_buffer, mute_gaps=is_muted)
+    video = OverlayVideo(RENDER_SETTINGS, 8, audio_buffer, mute_gaps=is_muted)
     viewer = video.broadcaster.subscribe()
     video.put(frames(0, GOP))
     video.put(frames(2 * GOP, GOP))
@@ -113,13 +113,13 @@ def test_the_gaps_of_a_video_are_muted_on_request(*, is_muted: bool) -> None:
 
 
 def test_a_new_viewer_of_a_video_begins_with_the_newest_gop() -> None:
-    video = OverlayVideo(SETTINGS, 8)
+    video = OverlayVideo(RENDER_SETTINGS, 8)
     video.put(frames(0, 2 * GOP))
     assert queued_data(video.broadcaster.subscribe()) == fragments(GOP, GOP)
 
 
 def test_only_the_newest_picture_waits_for_a_viewer() -> None:
-    mjpeg = MjpegStreams(SETTINGS, live=True)
+    mjpeg = MjpegStreams(RENDER_SETTINGS, live=True)
     viewer = mjpeg.subscribe(EVERY)
     slow = mjpeg.subscribe(MjpegVariant(1.0, boxed=False))
     for pulse in range(30):
@@ -134,7 +134,7 @@ def test_only_the_newest_picture_waits_for_a_viewer() -> None:
 
 
 def test_pictures_that_arrive_together_are_published_one_by_one_when_due() -> None:
-    mjpeg = MjpegStreams(SETTINGS, live=False)
+    mjpeg = MjpegStreams(RENDER_SETTINGS, live=False)
     mjpeg.subscribe(EVERY)
     mjpeg.put(RenderResult(newest=4, plain=[JpegPicture(pulse, b"") for pulse in range(5)]), now=10.0)
     times = [10.0]

@@ -14,7 +14,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.service.rendering import SETTINGS, fragments, shown
+from fakes.service.rendering import RENDER_SETTINGS, decoded_frames, fragments
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from fakes.timeouts import PATIENCE
 from server.media.containers.fmp4 import FragmentSample, fragment
@@ -82,19 +82,19 @@ def test_demuxing_arbitrary_bytes_raises_no_error(data: bytes) -> None:
 
 
 def test_each_picture_shows_its_own_frame() -> None:
-    result = StreamRenderer(SETTINGS).render(
+    result = StreamRenderer(RENDER_SETTINGS).render(
         RenderRequest(fragments=fragments(0, 2 * GOP), plain=[FPS], still="plain")
     )
     assert [picture.pulse for picture in result.plain] == list(range(2 * GOP))
     for picture in result.plain:
-        assert difference(picture.data, shown(0)[picture.pulse]) < 15
-        assert difference(picture.data, shown(0)[picture.pulse + 1]) > 30
+        assert difference(picture.data, decoded_frames(0)[picture.pulse]) < 15
+        assert difference(picture.data, decoded_frames(0)[picture.pulse + 1]) > 30
     assert result.still == result.plain[-1]
     assert result.newest == 2 * GOP - 1
 
 
 def test_only_requested_pictures_are_made_and_a_still_shows_the_last_frame() -> None:
-    renderer = StreamRenderer(SETTINGS)
+    renderer = StreamRenderer(RENDER_SETTINGS)
     assert renderer.render(RenderRequest(still="boxed")) == RenderResult(newest=-1)
     assert renderer.render(RenderRequest(fragments=fragments(0, GOP))) == RenderResult(newest=GOP - 1)
     still = renderer.render(RenderRequest(still="plain")).still
@@ -103,21 +103,23 @@ def test_only_requested_pictures_are_made_and_a_still_shows_the_last_frame() -> 
 
 
 def test_frames_before_the_first_keyframe_are_left_out() -> None:
-    result = StreamRenderer(SETTINGS).render(RenderRequest(fragments=fragments(2, 2 * GOP), plain=[FPS]))
+    result = StreamRenderer(RENDER_SETTINGS).render(
+        RenderRequest(fragments=fragments(2, 2 * GOP), plain=[FPS])
+    )
     assert [picture.pulse for picture in result.plain] == list(range(GOP, 2 * GOP + 2))
 
 
 @settings(deadline=None, max_examples=25)
 @given(st.binary(max_size=60), st.integers(0, GOP - 1))
 def test_a_damaged_frame_affects_nothing_after_its_gop(damage: bytes, place: int) -> None:
-    renderer = StreamRenderer(SETTINGS)
+    renderer = StreamRenderer(RENDER_SETTINGS)
     broken = fragment([FragmentSample(len(damage).to_bytes(4, "big") + damage, key=False)], place, FPS)
     renderer.render(
         RenderRequest(fragments=fragments(0, place) + broken + fragments(place + 1, GOP - place - 1))
     )
     result = renderer.render(RenderRequest(fragments=fragments(GOP, GOP), plain=[FPS]))
     assert [picture.pulse for picture in result.plain] == list(range(GOP, 2 * GOP))
-    assert all(difference(picture.data, shown(0)[picture.pulse]) < 15 for picture in result.plain)
+    assert all(difference(picture.data, decoded_frames(0)[picture.pulse]) < 15 for picture in result.plain)
 
 
 @settings(deadline=None, max_examples=10)
@@ -125,7 +127,7 @@ def test_a_damaged_frame_affects_nothing_after_its_gop(damage: bytes, place: int
 def test_a_fragment_with_an_impossible_time_is_skipped(ticks: int) -> None:
     whole = fragments(0, GOP)
     start = whole.index(b"tfdt") + len(b"tfdt") + 4
-    renderer = StreamRenderer(SETTINGS)
+    renderer = StreamRenderer(RENDER_SETTINGS)
     broken = whole[:start] + ticks.to_bytes(8, "big") + whole[start + 8 :]
     assert renderer.render(RenderRequest(fragments=broken, video=True, still="plain")) == RenderResult(
         newest=-1
@@ -134,7 +136,7 @@ def test_a_fragment_with_an_impossible_time_is_skipped(ticks: int) -> None:
 
 
 def test_the_video_has_the_gops_of_the_camera_and_a_keyframe_where_time_goes_back() -> None:
-    renderer = StreamRenderer(SETTINGS)
+    renderer = StreamRenderer(RENDER_SETTINGS)
     keys = [
         [
             frame.key
@@ -159,7 +161,7 @@ def test_the_box_of_the_chosen_person_is_drawn_over_the_others() -> None:
 
 def test_the_worker_answers_until_its_input_ends() -> None:
     requests = (
-        encode_message(SETTINGS)
+        encode_message(RENDER_SETTINGS)
         + encode_message(RenderRequest(fragments=fragments(0, GOP), video=True))
         + encode_message(RenderRequest())
     )
@@ -184,7 +186,8 @@ def test_the_worker_process_ends_with_its_input() -> None:
         stdout=subprocess.PIPE,
     )
     out, _ = process.communicate(
-        encode_message(SETTINGS) + encode_message(RenderRequest(fragments=fragments(0, 1))), timeout=PATIENCE
+        encode_message(RENDER_SETTINGS) + encode_message(RenderRequest(fragments=fragments(0, 1))),
+        timeout=PATIENCE,
     )
     assert msgspec.msgpack.decode(out[len(READY) + 4 :], type=RenderResult).newest == 0
     assert process.returncode == 0

@@ -11,24 +11,24 @@ import pytest
 
 import client
 from fakes.media.audio import (
-    BEEPS,
+    BEEP_TIMES,
     FRAMES,
     GOPS,
-    STEP,
+    MAX_AV_OFFSET_S,
+    access_units,
+    audio_messages,
     beeps,
+    decode_audio,
     flashes,
-    flashing,
-    heard,
-    messages,
     packets,
-    sends,
+    send_audio,
     write_flashes,
 )
-from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.media.browser_playback import PLAY_JS, play_in_chromium
 from fakes.media.ffprobe import probed
-from fakes.media.mpegts import check_counters, taken_apart
+from fakes.media.mpegts import check_counters, parse_packets
 from fakes.programs import needs_chromium, needs_ffprobe
-from fakes.service.fed_site import A, B, Hall, opened
+from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -54,10 +54,10 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-async def loud(recording: Path) -> AsyncIterator[Hall]:
+async def loud(recording: Path) -> AsyncIterator[ServedSite]:
     """A site that has that recording's sound."""
-    async for hall in opened(sound={"source": str(recording)}, http={"viewer_queue_gops": 100}):
-        yield hall
+    async for served in serve_site(sound={"source": str(recording)}, http={"viewer_queue_gops": 100}):
+        yield served
 
 
 def decide(service: FedService, gop: int, camera: str | None) -> None:
@@ -66,17 +66,17 @@ def decide(service: FedService, gop: int, camera: str | None) -> None:
 
 
 async def watched(
-    hall: Hall, recording: Path, ways: list[str], lost: frozenset[int] = frozenset()
+    served: ServedSite, recording: Path, ways: list[str], lost: frozenset[int] = frozenset()
 ) -> list[bytes]:
     """Show the recording's pictures as either camera in turn; give what is received on these ways."""
-    service = hall.service
-    service.come(*CAMERAS)
+    service = served.service
+    service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:
-        for unit in flashing(recording):
+        for unit in access_units(recording):
             if unit.pulse not in lost:
                 service.ingest.video(video(camera, unit))
     decide(service, 0, A)
-    answers = [await hall.session.get(way) for way in ways]
+    answers = [await served.session.get(way) for way in ways]
     for gop in range(1, GOPS):
         decide(service, gop, CAMERAS[gop % 2])
         await asyncio.sleep(0.005)
@@ -86,37 +86,39 @@ async def watched(
 
 @pytest.mark.parametrize(("way", "kind"), [("best.mp4", "mp4"), ("best.ts", "mpegts")])
 async def test_after_every_cut_a_beep_is_with_its_flash(
-    loud: Hall, recording: Path, way: str, kind: str
+    loud: ServedSite, recording: Path, way: str, kind: str
 ) -> None:
-    own = sends(loud.service, recording)
+    own = send_audio(loud.service, recording)
     (data,) = await watched(loud, recording, [f"/objects/1/{way}"])
-    assert flashes(data, kind) == pytest.approx(BEEPS, abs=0.001)
-    assert beeps(data, kind) == pytest.approx(BEEPS, abs=STEP)
+    assert flashes(data, kind) == pytest.approx(BEEP_TIMES, abs=0.001)
+    assert beeps(data, kind) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     if kind == "mp4":
         assert packets(data) == own[: len(packets(data))], "byte for byte the recording's"
         assert len(packets(data)) == FRAMES * 48_000 // FPS // FRAME
 
 
-async def test_audio_has_no_gap_where_pictures_or_audio_are_missing(loud: Hall, recording: Path) -> None:
-    sends(loud.service, recording, silent=range(60, 80))
+async def test_audio_has_no_gap_where_pictures_or_audio_are_missing(
+    loud: ServedSite, recording: Path
+) -> None:
+    send_audio(loud.service, recording, silent=range(60, 80))
     lost = frozenset({13, *range(30, 45), 71})
     data, ts = await watched(loud, recording, ["/objects/1/best.mp4", "/objects/1/best.ts"], lost)
     for stream, kind in ((data, "mp4"), (ts, "mpegts")):
-        times, samples = heard(stream, kind)
+        times, samples = decode_audio(stream, kind)
         assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a gap"
         quiet = (times > 61 * FRAME / 48_000) & (times < 80 * FRAME / 48_000)
         assert quiet.sum() > 18 * FRAME
         assert not samples[quiet].any()
-    check_counters(taken_apart(ts))
+    check_counters(parse_packets(ts))
 
 
 async def test_a_camera_stream_has_audio_at_once_or_silence_half_a_second_later(
-    loud: Hall, recording: Path
+    loud: ServedSite, recording: Path
 ) -> None:
     service = loud.service
-    own = sends(service, recording, silent=range(60, 1000))
-    service.come(*CAMERAS)
-    units = flashing(recording)
+    own = send_audio(service, recording, silent=range(60, 1000))
+    service.connect_cameras(*CAMERAS)
+    units = access_units(recording)
     service.ingest.video(video(B, units[0]))
     answers = [await loud.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
     for unit in units[1:]:
@@ -128,15 +130,15 @@ async def test_a_camera_stream_has_audio_at_once_or_silence_half_a_second_later(
     assert frames[:60] == own[:60]
     assert {*frames[60:]} == {service.config.sound.format.silence}  # type: ignore[union-attr]
     assert 0 <= FRAMES * 1.92 / FRAME * 1000 - len(frames) <= 0.5 * 48_000 / FRAME + 1, "half a second later"
-    assert beeps(data) == beeps(ts, "mpegts") == pytest.approx(BEEPS[:1], abs=STEP)
-    check_counters(taken_apart(ts))
+    assert beeps(data) == beeps(ts, "mpegts") == pytest.approx(BEEP_TIMES[:1], abs=MAX_AV_OFFSET_S)
+    check_counters(parse_packets(ts))
 
 
 @pytest.mark.parametrize("parts", [0, 5])
 async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
-    loud: Hall, recording: Path, parts: int
+    loud: ServedSite, recording: Path, parts: int
 ) -> None:
-    sends(loud.service, recording)
+    send_audio(loud.service, recording)
     await watched(loud, recording, [])
     listed = await (await loud.session.get("/objects/1/hls/index.m3u8")).text()
     numbers = [line.removesuffix(".m4s") for line in listed.splitlines() if line.endswith(".m4s")]
@@ -145,17 +147,17 @@ async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
         await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in ("init.mp4", *names)
     ]
     data = b"".join(fetched)
-    times, _ = heard(data)
+    times, _ = decode_audio(data)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     began = int(numbers[0]) * 25 / FPS
     assert times[0] == pytest.approx(began, abs=0.022)
-    assert flashes(data) == pytest.approx([it for it in BEEPS if it > began], abs=0.001)
-    assert beeps(data) == pytest.approx([it for it in BEEPS if it > began], abs=STEP)
+    assert flashes(data) == pytest.approx([it for it in BEEP_TIMES if it > began], abs=0.001)
+    assert beeps(data) == pytest.approx([it for it in BEEP_TIMES if it > began], abs=MAX_AV_OFFSET_S)
 
 
-async def test_all_streams_share_the_bytes_of_the_audio(loud: Hall, recording: Path) -> None:
+async def test_all_streams_share_the_bytes_of_the_audio(loud: ServedSite, recording: Path) -> None:
     service = loud.service
-    sends(service, recording)
+    send_audio(service, recording)
     for camera in CAMERAS:
         for unit in encoded(0):
             service.ingest.video(video(camera, unit))
@@ -167,27 +169,27 @@ async def test_all_streams_share_the_bytes_of_the_audio(loud: Hall, recording: P
     assert one.audio is two.audio
 
 
-async def test_a_site_without_audio_has_no_audio_track(hall: Hall) -> None:
-    service = hall.service
-    service.come(*CAMERAS)
+async def test_a_site_without_audio_has_no_audio_track(served: ServedSite) -> None:
+    service = served.service
+    service.connect_cameras(*CAMERAS)
     for epoch in range(3):
         service.feed(epoch, {A: {1: SMALL}, B: {}})
     site = small_config().site
     parameters = service.stream_format.parameters
     assert parameters is not None
-    answer = await hall.session.get("/objects/1/best.mp4")
+    answer = await served.session.get("/objects/1/best.mp4")
     head = await answer.content.readexactly(len(init_segment(parameters, site.width, site.height)))
     assert head == init_segment(parameters, site.width, site.height)
     assert b"soun" not in head
     assert (await answer.content.readexactly(8))[4:] == b"moof"
-    assert (await hall.get_json("/api/site"))["sound"] is None
+    assert (await served.get_json("/api/site"))["sound"] is None
     service.splicer.close()
     assert b"soun" not in await answer.read()
 
 
-async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(loud: Hall) -> None:
+async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(loud: ServedSite) -> None:
     assert (await loud.get_json("/api/site"))["sound"] == "mp4a.40.2"
-    (good,) = messages(
+    (good,) = audio_messages(
         RecordedAudioSource(
             str(loud.service.config.sound.source), SoundSettings(source="x"), FPS, 0, "stop"
         ).until(5)
@@ -206,11 +208,11 @@ async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(loud: Ha
     assert state.metrics.last_error.text.startswith("invalid message: audio: ")
 
 
-async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: Hall, recording: Path) -> None:
+async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: ServedSite, recording: Path) -> None:
     service = loud.service
-    own = sends(service, recording)
-    service.come(*CAMERAS)
-    for unit in flashing(recording):
+    own = send_audio(service, recording)
+    service.connect_cameras(*CAMERAS)
+    for unit in access_units(recording):
         service.ingest.video(video(A, unit))
     choice = ObjectChoice(1, A, None, departed=False)
     decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
@@ -223,17 +225,17 @@ async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: Hall, recordi
         await asyncio.sleep(0.02)
     service.splicer.close()
     data = await answer.read()
-    times, _ = heard(data)
+    times, _ = decode_audio(data)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     assert (times[0], times[-1]) == (pytest.approx(0, abs=0.001), pytest.approx(FRAMES / FPS, abs=0.03))
-    assert flashes(data) == pytest.approx(BEEPS, abs=0.001)
-    assert beeps(data) == pytest.approx(BEEPS, abs=STEP)
+    assert flashes(data) == pytest.approx(BEEP_TIMES, abs=0.001)
+    assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     assert packets(data) == own[: len(packets(data))]
 
 
 @needs_ffprobe
-async def test_ffprobe_reports_no_errors(loud: Hall, recording: Path, tmp_path: Path) -> None:
-    sends(loud.service, recording)
+async def test_ffprobe_reports_no_errors(loud: ServedSite, recording: Path, tmp_path: Path) -> None:
+    send_audio(loud.service, recording)
     ways = ["best.mp4", "best.ts"]
     for way, data in zip(
         ways, await watched(loud, recording, [f"/objects/1/{it}" for it in ways]), strict=True
@@ -245,12 +247,14 @@ async def test_ffprobe_reports_no_errors(loud: Hall, recording: Path, tmp_path: 
 
 
 @needs_chromium
-async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall, recording: Path) -> None:
-    sends(loud.service, recording, silent=range(100, 1000))
+async def test_chromium_plays_both_to_the_end_where_either_is_missing(
+    loud: ServedSite, recording: Path
+) -> None:
+    send_audio(loud.service, recording, silent=range(100, 1000))
     service = loud.service
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:
-        for unit in flashing(recording):
+        for unit in access_units(recording):
             if unit.pulse not in range(30, 45):
                 service.ingest.video(video(camera, unit))
 
@@ -260,22 +264,22 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(loud: Hall
     decide(service, 0, A)
     parameters = service.stream_format.parameters
     assert parameters is not None
-    seen = await seen_in_chromium(
+    seen = await play_in_chromium(
         *(loud.port, service.splicer, GOPS, show),
-        *(PLAY, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec},mp4a.40.2"', 4),
+        *(PLAY_JS, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec},mp4a.40.2"', 4),
     )
     assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
     assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
 
 
 async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
-    loud: Hall, recording: Path, tmp_path: Path
+    loud: ServedSite, recording: Path, tmp_path: Path
 ) -> None:
     service, out = loud.service, tmp_path / "one.mp4"
-    sends(service, recording)
-    service.come(*CAMERAS)
+    send_audio(service, recording)
+    service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:
-        for unit in flashing(recording):
+        for unit in access_units(recording):
             service.ingest.video(video(camera, unit))
     decide(service, 0, A)
     decide(service, 1, A)
@@ -288,9 +292,9 @@ async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
     done = await recorded
     assert done.complete
     data, begin = out.read_bytes(), GOP / FPS
-    expected = [moment - begin for moment in BEEPS if begin < moment < begin + 3.3]
+    expected = [moment - begin for moment in BEEP_TIMES if begin < moment < begin + 3.3]
     assert flashes(data) == pytest.approx(expected, abs=0.001)
-    assert beeps(data) == pytest.approx(expected, abs=STEP)
-    times, _ = heard(data)
+    assert beeps(data) == pytest.approx(expected, abs=MAX_AV_OFFSET_S)
+    times, _ = decode_audio(data)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     assert (times[0], times[-1]) == (pytest.approx(0, abs=0.025), pytest.approx(3.3, abs=0.025))

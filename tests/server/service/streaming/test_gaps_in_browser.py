@@ -6,9 +6,9 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from fakes.media.browser_playback import PLAY, seen_in_chromium
+from fakes.media.browser_playback import PLAY_JS, play_in_chromium
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import A, Hall, opened
+from fakes.service.fed_site import A, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, SMALL, encoded
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -19,17 +19,17 @@ LOST = 53
 
 
 @pytest.fixture
-async def hall() -> AsyncIterator[Hall]:
+async def served() -> AsyncIterator[ServedSite]:
     """A site whose viewers may be slow."""
-    async for it in opened(http={"viewer_queue_gops": GOPS}):
+    async for it in serve_site(http={"viewer_queue_gops": GOPS}):
         yield it
 
 
 @needs_chromium
-async def test_media_source_extensions_play_over_missing_pictures_to_the_end(hall: Hall) -> None:
-    splicer, frame_buffer = hall.service.splicer, hall.service.frame_buffers[A]
-    hall.service.come(*CAMERAS)
-    hall.service.feed(0, {A: {1: SMALL}})
+async def test_media_source_extensions_play_over_missing_pictures_to_the_end(served: ServedSite) -> None:
+    splicer, frame_buffer = served.service.splicer, served.service.frame_buffers[A]
+    served.service.connect_cameras(*CAMERAS)
+    served.service.feed(0, {A: {1: SMALL}})
     for unit in encoded(0, GOPS * GOP):
         if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
@@ -39,11 +39,11 @@ async def test_media_source_extensions_play_over_missing_pictures_to_the_end(hal
         splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
-    parameters = hall.service.stream_format.parameters
+    parameters = served.service.stream_format.parameters
     assert parameters is not None
-    seen = await seen_in_chromium(
-        *(hall.port, splicer, GOPS, show),
-        *(PLAY, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec}"', 4),
+    seen = await play_in_chromium(
+        *(served.port, splicer, GOPS, show),
+        *(PLAY_JS, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec}"', 4),
     )
     assert (seen["error"], seen["ranges"]) == ("", 1)
     assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]

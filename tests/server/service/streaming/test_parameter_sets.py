@@ -12,10 +12,18 @@ import av
 import numpy as np
 import pytest
 
-from fakes.media.browser_playback import READ, seen_in_chromium
+from fakes.media.browser_playback import READ_JS, play_in_chromium
 from fakes.programs import needs_chromium, needs_ffmpeg
-from fakes.service.fed_site import Hall, opened
-from fakes.service.parameter_sets import GOPS, MAKES, OWN, decision, expected, put, sent
+from fakes.service.fed_site import ServedSite, serve_site
+from fakes.service.parameter_sets import (
+    ENCODINGS,
+    GOPS,
+    OWN_PARAMETERS,
+    decision,
+    expected_pictures,
+    put_frames,
+    sent_units,
+)
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, small_config
 from server.config.site_config import Config
 from server.media.codec import stream_format_for
@@ -32,8 +40,8 @@ async def spliced(config: Config) -> tuple[bytes, bytes]:
     stream_format = stream_format_for(
         config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
     )
-    frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, stream_format) for camera in MAKES}
-    put(frame_buffers)
+    frame_buffers = {camera: FrameBuffer(FPS, GOPS * GOP, stream_format) for camera in ENCODINGS}
+    put_frames(frame_buffers)
     splicer, pieces, viewer = Splicer(frame_buffers, stream_format, config), list[Chunk](), None
     for gop in range(GOPS):
         splicer.publish_decision(decision(gop))
@@ -48,11 +56,11 @@ async def spliced(config: Config) -> tuple[bytes, bytes]:
 
 
 def config(**changes: Any) -> Config:
-    return small_config(**OWN, http={"viewer_queue_gops": 100}, **changes)
+    return small_config(**OWN_PARAMETERS, http={"viewer_queue_gops": 100}, **changes)
 
 
 def test_the_cameras_have_different_parameter_sets() -> None:
-    one, other = (parameter_sets(nal_units(sent(camera)[0].data)) for camera in MAKES)
+    one, other = (parameter_sets(nal_units(sent_units(camera)[0].data)) for camera in ENCODINGS)
     assert one is not None
     assert other is not None
     assert one.sps != other.sps
@@ -65,7 +73,7 @@ async def test_every_frame_is_the_chosen_cameras_and_gaps_repeat_the_last_pictur
     with av.open(io.BytesIO(mp4 if form == "mp4" else ts), format=form) as container:
         seen = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
     assert [round(time * FPS) for time, _ in seen] == list(range(GOPS * GOP))
-    for pulse, ((_, picture), right) in enumerate(zip(seen, expected(), strict=True)):
+    for pulse, ((_, picture), right) in enumerate(zip(seen, expected_pictures(), strict=True)):
         np.testing.assert_array_equal(picture, right, f"pulse {pulse}")
 
 
@@ -78,7 +86,7 @@ async def test_ffmpeg_plays_it_without_a_warning(tmp_path: Path) -> None:
         played = await asyncio.to_thread(subprocess.run, command, capture_output=True, check=True)
         assert played.stderr == b"", name
         pictures = np.frombuffer(played.stdout, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
-        np.testing.assert_array_equal(pictures, expected(), name)
+        np.testing.assert_array_equal(pictures, expected_pictures(), name)
 
 
 async def test_a_second_camera_with_other_parameter_sets_is_refused_if_they_must_be_equal() -> None:
@@ -88,7 +96,7 @@ async def test_a_second_camera_with_other_parameter_sets_is_refused_if_they_must
 
 LOOK = (
     "async ([url, type, width, height]) => {"
-    + READ
+    + READ_JS
     + """
   const canvas = new OffscreenCanvas(width, height).getContext('2d');
   const greens = [];
@@ -116,10 +124,13 @@ LOOK = (
 
 @needs_chromium
 async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
-    async for hall in opened(patience=60, **OWN, http={"viewer_queue_gops": 100}):
-        seen = await _played(hall)
+    async for served in serve_site(patience=60, **OWN_PARAMETERS, http={"viewer_queue_gops": 100}):
+        seen = await _played(served)
     assert (seen["error"], seen["ranges"]) == ("", 1)
-    rgb = [av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="rgb24") for it in expected()]
+    rgb = [
+        av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="rgb24")
+        for it in expected_pictures()
+    ]
     right = np.array([it[4::8, 4::8, 1].ravel() for it in rgb], dtype=float)[::3]
     found = np.array(seen["greens"], dtype=float)
     assert len(found) == GOPS * GOP / 3
@@ -128,13 +139,13 @@ async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
     assert np.abs(found[1:] - right[:-1]).mean(axis=1)[:4].min() > 40
 
 
-async def _played(hall: Hall) -> dict[str, Any]:
-    splicer, stream_format = hall.service.splicer, hall.service.stream_format
-    put(hall.service.frame_buffers)
+async def _played(served: ServedSite) -> dict[str, Any]:
+    splicer, stream_format = served.service.splicer, served.service.stream_format
+    put_frames(served.service.frame_buffers)
     splicer.publish_decision(decision(0))
     assert stream_format.codec is not None
     assert stream_format.codec.startswith("avc3.")
-    return await seen_in_chromium(
-        *(hall.port, splicer, GOPS, lambda gop: splicer.publish_decision(decision(gop))),
+    return await play_in_chromium(
+        *(served.port, splicer, GOPS, lambda gop: splicer.publish_decision(decision(gop))),
         *(LOOK, "/objects/1/best.mp4", f'video/mp4; codecs="{stream_format.codec}"', WIDTH, HEIGHT),
     )

@@ -11,8 +11,15 @@ import av
 import numpy as np
 import pytest
 
-from fakes.service.fed_site import Hall, opened
-from fakes.service.parameter_sets import GOPS, MISSING, OWN, decision, expected, put
+from fakes.service.fed_site import ServedSite, serve_site
+from fakes.service.parameter_sets import (
+    GOPS,
+    LOST_GOPS,
+    OWN_PARAMETERS,
+    decision,
+    expected_pictures,
+    put_frames,
+)
 from fakes.service.scripted_cameras import FPS, GOP
 from fakes.service.scripted_recordings import PULSE0
 from server.messaging.messages import GopChoices
@@ -21,12 +28,12 @@ FRAMES = GOPS * GOP
 
 
 @pytest.fixture
-async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
+async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
     record = {"folder": str(tmp_path / "kept"), "segment_s": 1.0}
-    async for hall in opened(**OWN, record=record, http={"hls_segment_s": 0.4}):
-        service = hall.service
+    async for served in serve_site(**OWN_PARAMETERS, record=record, http={"hls_segment_s": 0.4}):
+        service = served.service
         service.recorder.open()
-        put(service.frame_buffers)
+        put_frames(service.frame_buffers)
         for gop in range(GOPS):
             chosen = decision(gop)
             choices = {it.number: it.camera for it in chosen.choices}
@@ -36,33 +43,33 @@ async def hall(tmp_path: Path) -> AsyncIterator[Hall]:
             service.splicer.publish_decision(chosen)
         while service.recorder.writer is not None and service.recorder.writer.written < GOPS - 2:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
-        yield hall
+        yield served
 
 
-async def fetch(hall: Hall, *paths: str) -> bytes:
+async def fetch(served: ServedSite, *paths: str) -> bytes:
     data = []
     for path in paths:
-        async with hall.session.get(path) as answer:
+        async with served.session.get(path) as answer:
             assert answer.status == 200, await answer.text()
             data.append(await answer.read())
     return b"".join(data)
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "hls"])
-async def test_time_shift_plays_what_was_live(hall: Hall, form: str) -> None:
-    reel = hall.service.splicer.segmenter_of_person(1)
+async def test_time_shift_plays_what_was_live(served: ServedSite, form: str) -> None:
+    reel = served.service.splicer.segmenter_of_person(1)
     assert reel is not None
     reel._segments.clear()
     if form == "hls":
         names = ["init.mp4", *(f"{number}.m4s" for number in range(GOPS // 2))]
-        data = await fetch(hall, *(f"/objects/1/hls/{name}" for name in names))
+        data = await fetch(served, *(f"/objects/1/hls/{name}" for name in names))
     else:
-        data = await fetch(hall, f"/objects/1/best.{form}?from=p0&to=p{FRAMES}")
+        data = await fetch(served, f"/objects/1/best.{form}?from=p0&to=p{FRAMES}")
     with av.open(io.BytesIO(data), "r") as container:
         frames = list(container.decode(video=0))
     start = float(frames[0].time or 0) if form == "ts" else 0.0
     seen = {round((float(it.time or 0) - start) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
-    assert MISSING, "there are gaps, which are filled"
+    assert LOST_GOPS, "there are gaps, which are filled"
     assert form == "hls" or list(seen) == list(range(FRAMES))
-    for pulse, right in enumerate(expected()):
+    for pulse, right in enumerate(expected_pictures()):
         np.testing.assert_array_equal(seen[max(it for it in seen if it <= pulse)], right, str(pulse))

@@ -16,11 +16,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fakes.service.fed_site import Hall, opened
+from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL
 from fakes.service.scripted_recordings import (
-    AMPLE,
     PULSE0,
+    UNLIMITED,
     A,
     B,
     Picture,
@@ -56,20 +56,20 @@ IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
 
 
 @pytest.fixture
-async def recorded(tmp_path: Path) -> AsyncIterator[Hall]:
+async def recorded(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Six GOPs of person 1, in c0, then in c1; all but the last two are on the disk alone."""
-    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        hall.service.recorder.recent._frames = GOP
-        hall.service.recorder.open()
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        served.service.recorder.recent._frames = GOP
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
-            hall.service.feed(epoch, IN_A if epoch < 3 else IN_B)
-        await until_written(hall, 6)
-        yield hall
+            served.service.feed(epoch, IN_A if epoch < 3 else IN_B)
+        await until_written(served, 6)
+        yield served
 
 
-async def until_written(hall: Hall, gops: int) -> None:
-    while hall.service.recorder.writer is not None and hall.service.recorder.writer.written < gops:  # noqa: ASYNC110
+async def until_written(served: ServedSite, gops: int) -> None:
+    while served.service.recorder.writer is not None and served.service.recorder.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
 
 
@@ -81,28 +81,28 @@ def decoded(data: bytes) -> list[tuple[int, Picture]]:
         ]
 
 
-async def read(hall: Hall, path: str) -> list[tuple[int, Picture]]:
-    async with hall.session.get(path) as answer:
+async def read(served: ServedSite, path: str) -> list[tuple[int, Picture]]:
+    async with served.session.get(path) as answer:
         assert answer.status == 200, await answer.text()
         assert answer.content_type == "video/mp4"
         return decoded(await answer.read())
 
 
-async def read_up_to(hall: Hall, path: str, pulse: int, then: int) -> list[tuple[int, Picture]]:
+async def read_up_to(served: ServedSite, path: str, pulse: int, then: int) -> list[tuple[int, Picture]]:
     """Read a stream; when a pulse has come, feed one more epoch, and read that too."""
     data, fed = b"", False
-    async with hall.session.get(path) as answer:
+    async with served.session.get(path) as answer:
         while True:
             data += await answer.content.readany()
             newest = max((pulse_of(it, FPS) for it in fragments(data)), default=-1)
             if not fed and newest >= pulse - 1:
-                hall.service.feed(then, IN_B)
+                served.service.feed(then, IN_B)
                 fed = True
             if newest >= pulse + GOP - 1:
                 return decoded(data)
 
 
-async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(recorded: Hall) -> None:
+async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(recorded: ServedSite) -> None:
     camera = {
         pulse: choices.choices[1]
         for choices in recorded.service.recorder.recent.choices(0)
@@ -119,7 +119,7 @@ async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(
     assert used == {A, B}
 
 
-async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(recorded: Hall) -> None:
+async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(recorded: ServedSite) -> None:
     shown = await read_up_to(recorded, "/cameras/c0/live.mp4?from=p0", 7 * GOP, 7)
     assert [pulse for pulse, _ in shown] == list(range(8 * GOP))
     for pulse, picture in shown:
@@ -136,14 +136,14 @@ async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(
     ],
 )
 async def test_a_range_with_an_end_is_a_download_of_its_frames(
-    recorded: Hall, query: str, pulses: range
+    recorded: ServedSite, query: str, pulses: range
 ) -> None:
     recorded.service.pulse0 = 1_763_700_000.0
     shown = await read(recorded, f"/objects/1/best.mp4?{query}")
     assert [pulse for pulse, _ in shown] == list(pulses)
 
 
-async def test_a_download_waits_for_an_end_in_the_future(recorded: Hall) -> None:
+async def test_a_download_waits_for_an_end_in_the_future(recorded: ServedSite) -> None:
     reading = asyncio.create_task(read(recorded, "/objects/1/best.mp4?from=p20&to=p33"))
     while not recorded.service.splicer.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
@@ -151,12 +151,17 @@ async def test_a_download_waits_for_an_end_in_the_future(recorded: Hall) -> None
     assert [pulse for pulse, _ in await reading] == list(range(20, 33))
 
 
-async def test_without_a_recording_frames_in_memory_are_played(busy: Hall) -> None:
-    for source in (PersonPlayback(busy.service.recorder, (1,)), CameraPlayback(busy.service.recorder, A)):
+async def test_without_a_recording_frames_in_memory_are_played(site_with_people: ServedSite) -> None:
+    for source in (
+        PersonPlayback(site_with_people.service.recorder, (1,)),
+        CameraPlayback(site_with_people.service.recorder, A),
+    ):
         (span,) = available_ranges(source)
         assert (first_available(source, 0), end_of_available(source)) == (span.first, span.end)
         assert first_available(source, span.end) is None
-    assert [pulse for pulse, _ in await read(busy, "/objects/1/best.mp4?from=p0&to=p9")] == list(range(9))
+    assert [pulse for pulse, _ in await read(site_with_people, "/objects/1/best.mp4?from=p0&to=p9")] == list(
+        range(9)
+    )
 
 
 @pytest.mark.parametrize(
@@ -192,12 +197,12 @@ async def test_without_a_recording_frames_in_memory_are_played(busy: Hall) -> No
     ],
 )
 async def test_impossible_requests_are_answered_with_a_one_line_error(
-    recorded: Hall, path: str, status: int, error: str
+    recorded: ServedSite, path: str, status: int, error: str
 ) -> None:
     assert await recorded.get(path) == (status, {"error": error})
 
 
-async def test_spans_list_the_recorded_time(recorded: Hall) -> None:
+async def test_spans_list_the_recorded_time(recorded: ServedSite) -> None:
     recorded.service.pulse0 = 1_763_700_000.0
     span = {
         "begins": "2025-11-21T04:40:00.000Z",
@@ -209,7 +214,7 @@ async def test_spans_list_the_recorded_time(recorded: Hall) -> None:
     assert (await recorded.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
 
 
-async def test_views_list_the_chosen_cameras(recorded: Hall) -> None:
+async def test_views_list_the_chosen_cameras(recorded: ServedSite) -> None:
     async with recorded.session.get("/api/past?from=p0") as answer:
         decisions = [json.loads(line) async for line in answer.content]
     chosen = {it["first"] + n: it["choices"]["1"] for it in decisions for n in range(it["frames"])}
@@ -223,7 +228,7 @@ async def test_views_list_the_chosen_cameras(recorded: Hall) -> None:
 
 @pytest.mark.parametrize(("query", "frames"), [("from=p7&to=p24", 17), ("from=p20", 10), ("to=p4", 4)])
 async def test_spans_and_views_are_limited_to_the_requested_range(
-    recorded: Hall, query: str, frames: int
+    recorded: ServedSite, query: str, frames: int
 ) -> None:
     def cameras(views: list[dict[str, Any]]) -> dict[int, str]:
         return {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])}
@@ -239,7 +244,7 @@ async def test_spans_and_views_are_limited_to_the_requested_range(
     assert nothing == {"spans": [], "views": []}
 
 
-async def test_recorded_decisions_have_choices_and_boxes(recorded: Hall) -> None:
+async def test_recorded_decisions_have_choices_and_boxes(recorded: ServedSite) -> None:
     async with recorded.session.get("/api/past?from=p7&to=p24") as answer:
         assert answer.content_type == "application/x-ndjson"
         lines = [json.loads(line) async for line in answer.content]
@@ -249,7 +254,7 @@ async def test_recorded_decisions_have_choices_and_boxes(recorded: Hall) -> None
 
 
 async def test_a_viewer_of_time_shift_counts_like_others(
-    recorded: Hall, monkeypatch: pytest.MonkeyPatch
+    recorded: ServedSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_stream, "_LEAD_S", 0.2)
     recorder = recorded.service.recorder
@@ -263,7 +268,7 @@ async def test_a_viewer_of_time_shift_counts_like_others(
         await asyncio.sleep(0.001)
 
 
-async def test_a_viewer_of_time_shift_occupies_a_slot_and_frees_it(recorded: Hall) -> None:
+async def test_a_viewer_of_time_shift_occupies_a_slot_and_frees_it(recorded: ServedSite) -> None:
     recorder = recorded.service.recorder
     async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
@@ -308,7 +313,7 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
 ) -> None:
     folder = tmp_path_factory.mktemp("part")
     pieces = [gop_record(gop, {} if camera is None else {1: camera}) for gop, camera in enumerate(shown)]
-    store = written_folder(RecordingFolder(folder, AMPLE), pieces)
+    store = written_folder(RecordingFolder(folder, UNLIMITED), pieces)
     assert store.session is not None
     tapes = (
         [SessionEntries(store.session, store.session.objects[1].index)] if 1 in store.session.objects else []
@@ -339,7 +344,9 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
 
 
 async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> None:
-    store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(12)])
+    store = written_folder(
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in range(12)]
+    )
     assert store.session is not None
     store.session.paths.camera_file(A, 25).unlink()
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=60)
@@ -354,7 +361,7 @@ async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> 
 async def test_a_person_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path, end: int) -> None:
     now = 10 * GOP + FPS
     store = written_folder(
-        RecordingFolder(tmp_path, AMPLE),
+        RecordingFolder(tmp_path, UNLIMITED),
         [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)],
     )
     assert store.session is not None
@@ -369,7 +376,7 @@ async def test_a_person_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path,
 
 async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(tmp_path: Path) -> None:
     store = written_folder(
-        RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
     )
     assert store.session is not None
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
@@ -386,7 +393,9 @@ async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(t
 async def test_a_few_seconds_are_sent_at_once_and_the_rest_in_real_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = written_folder(RecordingFolder(tmp_path, AMPLE), [gop_record(gop, {1: A}) for gop in range(40)])
+    store = written_folder(
+        RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in range(40)]
+    )
     assert store.session is not None
     now, loop = [100.0], asyncio.get_running_loop()
 
@@ -407,57 +416,57 @@ async def test_a_few_seconds_are_sent_at_once_and_the_rest_in_real_time(
 
 async def test_a_cameras_recording_includes_earlier_sessions(tmp_path: Path) -> None:
     written_folder(
-        RecordingFolder(tmp_path / "kept", AMPLE), [gop_record(gop, {1: A}) for gop in range(4)]
+        RecordingFolder(tmp_path / "kept", UNLIMITED), [gop_record(gop, {1: A}) for gop in range(4)]
     ).close()
-    async for hall in opened(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        hall.service.pulse0 = PULSE0 + 0.01
-        hall.service.recorder.open()
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        served.service.pulse0 = PULSE0 + 0.01
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
         for epoch in range(5, 8):
-            hall.service.feed(epoch, IN_A)
-        await until_written(hall, 1)
-        shown = await read(hall, "/cameras/c0/live.mp4?from=p7&to=p35")
+            served.service.feed(epoch, IN_A)
+        await until_written(served, 1)
+        shown = await read(served, "/cameras/c0/live.mp4?from=p7&to=p35")
         assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
         for pulse, picture in shown:
             if not 4 * GOP <= pulse < 5 * GOP:  # while the service was away the last picture is repeated
                 np.testing.assert_array_equal(picture, own_pictures(A)[pulse])
-        assert (await hall.get_json("/api/cameras/c0/past"))["spans"][0]["frames"] == 4 * GOP
-        assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == 5 * GOP, (
+        assert (await served.get_json("/api/cameras/c0/past"))["spans"][0]["frames"] == 4 * GOP
+        assert (await served.get_json("/api/objects/1/past"))["spans"][0]["first"] == 5 * GOP, (
             "another person 1"
         )
-        async with hall.session.get("/api/past?from=p7") as answer:
+        async with served.session.get("/api/past?from=p7") as answer:
             lines = [json.loads(line) async for line in answer.content]
         assert [line["first"] for line in lines] == [5, 10, 15, 25, 30]
-        (earlier,) = hall.service.recorder.folder.earlier
+        (earlier,) = served.service.recorder.folder.earlier
         assert [line.get("run") for line in lines] == [earlier.folder.name] * 3 + [None] * 2
-    other = RecordingFolder(tmp_path / "kept", AMPLE)
+    other = RecordingFolder(tmp_path / "kept", UNLIMITED)
     other.open()
     assert len(other.earlier) == 2
 
 
 async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbers(tmp_path: Path) -> None:
     folder, since = tmp_path / "kept", PULSE0 - 9.0
-    store = RecordingFolder(folder, AMPLE)
+    store = RecordingFolder(folder, UNLIMITED)
     written_folder(store, [gop_record(gop, {}) for gop in range(1)])
     for gop in range(1, 4):  # numbers began when the first camera came
         store.write(
             gop_record(gop, {1: A}), session_info(numbers_since=since), InitSegments(filled_buffers()[1])
         )
     store.close()
-    async for hall in opened(record={"folder": str(folder), "segment_s": 0.4}):
-        hall.service.pulse0 = PULSE0 + 0.01
-        hall.service.recorder.open()
-        hall.service.come(*CAMERAS)
+    async for served in serve_site(record={"folder": str(folder), "segment_s": 0.4}):
+        served.service.pulse0 = PULSE0 + 0.01
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
         snapshot = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
         key = ZenohKeys("hall").camera(A, "retained_identities")
-        hall.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(snapshot), b""))
+        served.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(snapshot), b""))
         for epoch in range(5, 8):
-            hall.service.feed(epoch, IN_A)
-        await until_written(hall, 1)
-        shown = await read(hall, "/objects/1/best.mp4?from=p7&to=p35")
+            served.service.feed(epoch, IN_A)
+        await until_written(served, 1)
+        shown = await read(served, "/objects/1/best.mp4?from=p7&to=p35")
         assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
-        assert (await hall.get_json("/api/objects/1/past"))["spans"][0]["first"] == GOP
-        async with hall.session.get("/api/past?from=p7") as answer:
+        assert (await served.get_json("/api/objects/1/past"))["spans"][0]["first"] == GOP
+        async with served.session.get("/api/past?from=p7") as answer:
             lines = [json.loads(line) async for line in answer.content]
         assert [(line["first"], line.get("run")) for line in lines] == [
             (first, None) for first in (5, 10, 15, 25, 30)

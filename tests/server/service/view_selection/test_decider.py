@@ -18,9 +18,9 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     TrackNumbers,
+    camera_tracks,
     epoch_of,
     small_config,
-    word,
 )
 from server.messaging.messages import Box
 from server.service.decision_state import DecisionState, reason
@@ -42,7 +42,7 @@ def decide(it: ViewDecider, story: Sequence[Seen], *, end: int | None = None) ->
     decisions = []
     for number, seen in enumerate(story):
         decisions += it.step(
-            epoch_of(number, *(word(camera, number, boxes) for camera, boxes in seen.items()))
+            epoch_of(number, *(camera_tracks(camera, number, boxes) for camera, boxes in seen.items()))
         )
     return decisions + ([] if end is None else it.finish(end))
 
@@ -58,7 +58,7 @@ def reason_of(decision: GopDecision) -> str:
 def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
     it = decider()
     assert decide(it, [{A: {1: SMALL}, B: {}}]) == []
-    [decision] = it.step(epoch_of(1, word(A, 1, {1: SMALL}), word(B, 1, {})))
+    [decision] = it.step(epoch_of(1, camera_tracks(A, 1, {1: SMALL}), camera_tracks(B, 1, {})))
     assert (decision.first, decision.frames) == (0, GOP)
 
 
@@ -126,7 +126,7 @@ def test_a_service_started_within_a_gop_begins_with_the_next() -> None:
     it = decider(encode={"gop": 10}, view={"lookahead": 20})
     decisions = []
     for number in range(5, 12):
-        decisions += it.step(epoch_of(number, word(A, number, {1: SMALL})))
+        decisions += it.step(epoch_of(number, camera_tracks(A, number, {1: SMALL})))
     assert [decision.first for decision in decisions] == [30, 40]
 
 
@@ -204,7 +204,7 @@ def test_a_camera_that_dies_within_the_look_ahead_is_left_at_that_gop() -> None:
     alive[A] = dies
     after = []
     for number in range(3, 8):  # its last words are lost with it
-        after += it.step(epoch_of(number, word(B, number, story[number][B])))
+        after += it.step(epoch_of(number, camera_tracks(B, number, story[number][B])))
     assert shown(before) == [A, A]
     assert shown(after) == [B, B, B, B, B], "no hole, and one cut"
     assert after[0].reasons.of(1).views[A].cost is None

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.service.fed_site import A, B, Hall
+from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import (
     CAMERAS,
     GOP,
@@ -18,9 +18,9 @@ from fakes.service.scripted_cameras import (
     STRIDE,
     FedService,
     TrackNumbers,
+    camera_tracks,
     epoch_of,
     small_config,
-    word,
 )
 from server.config.sections import ViewSettings
 from server.http.access.csrf import CSRF_HEADER
@@ -52,7 +52,7 @@ def test_every_gop_is_decided_once_in_order_with_known_frames(
         if number in changes:
             decider.apply_view_settings(looking(config.view, max(gop, changes[number])))
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
-        epoch = epoch_of(number, word(A, number, {1: one}), word(B, number, {1: other}))
+        epoch = epoch_of(number, camera_tracks(A, number, {1: one}), camera_tracks(B, number, {1: other}))
         new = decider.step(epoch)
         assert len(new) <= -(-STRIDE // gop) + 1, "who watches is not overrun"
         for decision in new:
@@ -76,7 +76,9 @@ def test_after_a_change_settles_views_are_selected_as_if_it_had_always_applied()
                 if epoch == number:
                     decider.apply_view_settings(looking(config.view, frames))
             boxes = {A: {1: LARGE if number < 20 else SMALL}, B: {1: SMALL if number < 20 else LARGE}}
-            decided += decider.step(epoch_of(number, *(word(it, number, boxes[it]) for it in CAMERAS)))
+            decided += decider.step(
+                epoch_of(number, *(camera_tracks(it, number, boxes[it]) for it in CAMERAS))
+            )
         return decided
 
     for changes in ([(3, 35), (8, 20)], [(3, 10), (9, 20)]):
@@ -88,7 +90,7 @@ def test_after_a_change_settles_views_are_selected_as_if_it_had_always_applied()
 def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -> None:
     service = FedService(small_config())
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
-    service.come(*CAMERAS)
+    service.connect_cameras(*CAMERAS)
     shown: list[str | None] = []
     service.on_decision.append(lambda it: shown.append(it.choices.get(1)))
     got: list[bytes] = []
@@ -126,26 +128,30 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
     ],
 )
 async def test_an_invalid_look_ahead_is_refused_with_the_limits(
-    busy: Hall, frames: float, error: str
+    site_with_people: ServedSite, frames: float, error: str
 ) -> None:
     request = {"lookahead": frames}
-    async with busy.session.put("/api/operator/view_selection", headers=MINE, json=request) as answer:
+    async with site_with_people.session.put(
+        "/api/operator/view_selection", headers=MINE, json=request
+    ) as answer:
         assert answer.status == 400
         refusal = (await answer.json())["error"]
     assert refusal.startswith(error)
     assert "\n" not in refusal
-    assert busy.service.decider.view == busy.service.config.view
+    assert site_with_people.service.decider.view == site_with_people.service.config.view
 
 
-async def test_the_api_reports_the_look_ahead_in_force(busy: Hall) -> None:
-    most = (await busy.get_json("/api/operator/view_selection"))["max_lookahead"]
+async def test_the_api_reports_the_look_ahead_in_force(site_with_people: ServedSite) -> None:
+    most = (await site_with_people.get_json("/api/operator/view_selection"))["max_lookahead"]
     for frames in (most, 5):
         request: dict[str, Any] = {"lookahead": frames}
-        async with busy.session.put("/api/operator/view_selection", headers=MINE, json=request) as answer:
+        async with site_with_people.session.put(
+            "/api/operator/view_selection", headers=MINE, json=request
+        ) as answer:
             decisions_after = await answer.json()
         assert decisions_after["values"]["lookahead"] == frames
         assert f"lookahead: {frames}\n" in decisions_after["lines"]
-        assert (await busy.get_json("/api/site"))["lookahead_frames"] == frames
+        assert (await site_with_people.get_json("/api/site"))["lookahead_frames"] == frames
 
 
 def test_frame_buffers_cover_the_longest_look_ahead() -> None:

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import TrackKey
-from fakes.service.scripted_cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    STRIDE,
+    TrackNumbers,
+    camera_tracks,
+    epoch_of,
+    small_config,
+)
 from server.messaging.messages import Box, CameraTracks
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
@@ -45,7 +52,7 @@ class Drifting(PersonTracker):
 
 def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]) -> CameraTracks:
     """Return a window of three epochs, the first ones of a recording shorter."""
-    message_of_epoch = word(camera, epoch, dict.fromkeys(boxes))
+    message_of_epoch = camera_tracks(camera, epoch, dict.fromkeys(boxes))
     first = max(0, message_of_epoch.last - WINDOW + 1)
     tracks = [
         type(it)(
@@ -56,7 +63,7 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
         )
         for it in message_of_epoch.tracks
     ]
-    return word(camera, epoch, {}, first=first, tracks=tracks)
+    return camera_tracks(camera, epoch, {}, first=first, tracks=tracks)
 
 
 def slowly(

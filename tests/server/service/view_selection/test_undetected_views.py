@@ -11,7 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.service.scripted_cameras import CAMERAS, STRIDE, TrackNumbers, epoch_of, small_config, word
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    STRIDE,
+    TrackNumbers,
+    camera_tracks,
+    epoch_of,
+    small_config,
+)
 from server.messaging.messages import Box
 from server.service.decision_state import reason
 from server.service.view_selection.cross_view_inference import CrossViewInference
@@ -41,7 +48,7 @@ def decider(ground: Mapping[str, np.ndarray | None] = GROUND, **view: Any) -> Vi
 
 def decide(it: ViewDecider, story: Sequence[CameraBoxes]) -> list[GopDecision]:
     epochs = (
-        epoch_of(number, *(word(camera, number, boxes) for camera, boxes in boxes_of_camera.items()))
+        epoch_of(number, *(camera_tracks(camera, number, boxes) for camera, boxes in boxes_of_camera.items()))
         for number, boxes_of_camera in enumerate(story)
     )
     return [decision for epoch in epochs for decision in it.step(epoch)]
@@ -92,8 +99,10 @@ def test_nothing_is_learned_about_a_disconnected_camera(speaks: bool) -> None:
     decide(it, [FOUND] * 20)
     trust = it._cross_view_inference._detection_probability._cell_rate.copy()
     for number in range(20, 40):
-        away = word(B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)])
-        it.step(epoch_of(number, word(A, number, FOUND[A]), *([away] if speaks else [])))
+        away = camera_tracks(
+            B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)]
+        )
+        it.step(epoch_of(number, camera_tracks(A, number, FOUND[A]), *([away] if speaks else [])))
     changed = np.abs(it._cross_view_inference._detection_probability._cell_rate - trust)
     assert changed.max() < 0.05, "but for forgetting"
 

@@ -33,7 +33,7 @@ def fragment(pulse: int, version: int = 1) -> bytes:
     return moof + box(b"mdat", f"picture {pulse}".encode())
 
 
-def sent(name: str, data: object) -> bytes:
+def sse_event(name: str, data: object) -> bytes:
     return f"event: {name}\ndata: {json.dumps(data)}\n\n".encode()
 
 
@@ -88,19 +88,19 @@ def gop(first: int, camera: str) -> dict[str, Any]:
     }
 
 
-Play = Callable[[web.StreamResponse], Awaitable[None]]
+StreamScript = Callable[[web.StreamResponse], Awaitable[None]]
 
 
-async def nothing_more(_: web.StreamResponse) -> None:
+async def send_nothing(_: web.StreamResponse) -> None:
     await asyncio.Event().wait()
 
 
 @dataclass
-class HandMadeSite:
+class ScriptedSite:
     """Answers as the API does; each connection consumes one script of ``plays`` or ``tells``; then 503."""
 
-    plays: list[Play] = field(default_factory=list)
-    tells: list[Play] = field(default_factory=list)
+    video_scripts: list[StreamScript] = field(default_factory=list)
+    event_scripts: list[StreamScript] = field(default_factory=list)
     opened: int = 0
 
     def app(self) -> web.Application:
@@ -109,13 +109,13 @@ class HandMadeSite:
         app.router.add_get("/api/objects", _json(OBJECTS))
         app.router.add_get("/api/cameras", _json(CAMERAS))
         app.router.add_get("/api/objects/1/choice", _json(CHOICE))
-        app.router.add_get("/objects/1/best.mp4", self._stream(self.plays, "video/mp4"))
-        app.router.add_get("/api/events", self._stream(self.tells, "text/event-stream"))
+        app.router.add_get("/objects/1/best.mp4", self._stream(self.video_scripts, "video/mp4"))
+        app.router.add_get("/api/events", self._stream(self.event_scripts, "text/event-stream"))
         app.router.add_get("/{rest:.*}", _not_found)
         return app
 
     def _stream(
-        self, scripts: list[Play], kind: str
+        self, scripts: list[StreamScript], kind: str
     ) -> Callable[[web.Request], Awaitable[web.StreamResponse]]:
         async def answer(request: web.Request) -> web.StreamResponse:
             self.opened += kind == "video/mp4"
