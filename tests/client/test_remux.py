@@ -38,7 +38,7 @@ def write_stream(part: Path, source: Path, lost: range = range(0), early: int = 
     frames = [frames[number % len(frames)] for number in range(early + count + late)]
     head = stream_format.init_segment((64, 48), FPS, sound)
     assert head is not None
-    pictures = [stream_format.pack(it.data, START + it.pulse, FPS, key=it.key) for it in units]
+    pictures = [stream_format.pack(unit.data, START + unit.pulse, FPS, key=unit.key) for unit in units]
     kept = [picture for number, picture in enumerate(pictures) if number not in lost]
     part.write_bytes(head + audio_fragment(sound, frames, FIRST_SOUND - early) + b"".join(kept))
     return part
@@ -80,7 +80,7 @@ def test_a_sound_track_without_sound_is_left_out(source: Path, tmp_path: Path) -
     out = tmp_path / "film.mp4"
     remux(write_stream(tmp_path / "part", source, early=-1000, late=1000), out, "mp4")
     with av.open(str(out)) as film:
-        assert [it.type for it in film.streams] == ["video"]
+        assert [stream.type for stream in film.streams] == ["video"]
 
 
 def test_a_disk_without_room_for_all_of_it_is_always_reported(source: Path, tmp_path: Path) -> None:

@@ -31,9 +31,9 @@ def bearer(name: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {token_of(name)}"}
 
 
-def token_entry(name: str, **what: Any) -> dict[str, Any]:
+def token_entry(name: str, **fields: Any) -> dict[str, Any]:
     """Return an entry of the token file."""
-    return {"name": name, "sha256": token_digest(token_of(name)), **(what or TOKEN_ENTRIES[name])}
+    return {"name": name, "sha256": token_digest(token_of(name)), **(fields or TOKEN_ENTRIES[name])}
 
 
 def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:

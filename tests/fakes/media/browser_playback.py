@@ -30,8 +30,8 @@ PLAY_JS = (
   const ended = new Promise((done) => video.addEventListener('ended', done, { once: true }));
   const range = [buffer.buffered.start(0), buffer.buffered.end(0)];
   const shown = [];
-  const tell = (now, { mediaTime }) => { shown.push(mediaTime); video.requestVideoFrameCallback(tell); };
-  video.requestVideoFrameCallback(tell);
+  const record = (now, { mediaTime }) => { shown.push(mediaTime); video.requestVideoFrameCallback(record); };
+  video.requestVideoFrameCallback(record);
   video.currentTime = range[0];
   video.playbackRate = rate;
   await video.play();

@@ -23,9 +23,9 @@ def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> li
 
 
 def slice_header_format(unit: AccessUnit) -> SliceHeaderFormat:
-    found = parameter_sets(nal_units(unit.data))
-    assert found is not None
-    return parse_repeatable(found)
+    parameters = parameter_sets(nal_units(unit.data))
+    assert parameters is not None
+    return parse_repeatable(parameters)
 
 
 def decoded(samples: list[bytes]) -> list[NDArray[np.uint8]]:

@@ -48,10 +48,10 @@ def parse_packet(packet: bytes) -> Packet:
     return Packet(pid, bool(packet[1] & 0x40), packet[3] & 0x0F, payload, pcr, key)
 
 
-def check_counters(found: list[Packet]) -> None:
+def check_counters(packets: list[Packet]) -> None:
     """Check the continuity counters, as a receiver does."""
     last: dict[int, int] = {}
-    for packet in found:
+    for packet in packets:
         if packet.pid in last:
             assert packet.counter == (last[packet.pid] + bool(packet.payload)) % COUNTERS, packet.pid
         last[packet.pid] = packet.counter

@@ -75,8 +75,8 @@ async def visiting(
 
 
 async def play_for(visit: Visit, seconds: float) -> None:
-    seen = await visit.get("myview.pulse")
-    await visit.until(f"myview.pulse >= {seen + round(seconds * FPS)}")
+    pulse = await visit.get("myview.pulse")
+    await visit.until(f"myview.pulse >= {pulse + round(seconds * FPS)}")
 
 
 async def displayed_camera(visit: Visit) -> str:

@@ -45,7 +45,7 @@ class FakeSite:
 
     Args:
         bursts: Send whole GOPs at once instead of frame by frame.
-        people: Known people, and whether they are in view.
+        people: People by number, and whether they are in view.
         aliases: Former ids of people.
         split: The splits that every GOP reports.
         first_pulse: Pulse at about the time when the site is created.
@@ -54,15 +54,15 @@ class FakeSite:
         opened: People whose streams were requested, in order.
         listed: Requested HLS playlists, in order.
         fetched: First pulses of the requested HLS segments, in order.
-        kept_from: The first pulse that can be replayed.
+        replayable_from: The first recorded pulse.
         recorded: Seconds of the past that are recorded.
-        past_comes: Set to send more of a replay than its first frame; None: all is sent at once.
+        past_released: Set to send more of a replay than its first frame; None: all is sent at once.
         ahead: Seconds by which the streams are ahead of the clock, to let time pass quickly.
-        blind: Pulses, in whole GOPs, at which the first camera detects nobody.
+        blind_pulses: Pulses, in whole GOPs, at which the first camera detects no one.
         undetected: Share of the look-ahead in which no camera detects the person.
         operates: Whether viewers may operate.
         flags: Flags for the operator.
-        pointed: Where the operator pointed, as it was sent.
+        pointed: The position corrections received.
         busy: Messages of cameras about shed load.
         pulse0: Unix seconds at which pulse 0 was due.
     """
@@ -262,7 +262,7 @@ class SiteServer:
         app.router.add_get("/api/events", self._events)
         app.router.add_get("/api/objects/{k}/choice", self._choice)
         app.router.add_get("/api/objects/{k}/past", self._past)
-        app.router.add_get("/api/past", self._told)
+        app.router.add_get("/api/past", self._decisions)
         app.router.add_get("/objects/{k}/best.mp4", self._best)
         app.router.add_get("/cameras/{camera}/live.mp4", self._best)
         app.router.add_get("/{of}/{k}/hls/index.m3u8", self._playlist)
@@ -304,22 +304,22 @@ class SiteServer:
     async def _pointing(self, request: web.Request) -> web.Response:
         accepted = 0
         if request.method == "POST":
-            said = await request.json()
-            self.site.pointed.append(said)
-            accepted = len(said["corrections"])
+            body = await request.json()
+            self.site.pointed.append(body)
+            accepted = len(body["corrections"])
         return web.json_response({"unavailable": "", "accepted": accepted, "too_old": 0, "flags": []})
 
     async def _choice(self, request: web.Request) -> web.Response:
         k, pulse = int(request.match_info["k"]), int(request.query.get("at", f"p{self.site.edge}")[1:])
         if pulse < self.site.replayable_from:
-            return web.json_response({"error": "nothing is kept of that"}, status=404)
+            return web.json_response({"error": "not kept"}, status=404)
         return web.json_response(self.site.choice(k, pulse - pulse % GOP))
 
     async def _past(self, request: web.Request) -> web.Response:
         first = int(request.query.get("from", "p0")[1:])
         return web.json_response(self.site.past(int(request.match_info["k"]), first))
 
-    async def _told(self, request: web.Request) -> web.Response:
+    async def _decisions(self, request: web.Request) -> web.Response:
         first, end = (int(request.query[name][1:]) for name in ("from", "to"))
         gops = range(first - first % GOP, min(end, self.site.edge), GOP)
         return web.Response(text="".join(json.dumps(self.site.gop(gop)) + "\n" for gop in gops))
@@ -335,7 +335,7 @@ class SiteServer:
         held = request.match_info.get("camera", request.query.get("camera"))
         first = int(request.query.get("from", f"p{site.boundary()}")[1:])
         if "from" in request.query and first < site.replayable_from:
-            return web.json_response({"error": "nothing is kept there"}, status=416)
+            return web.json_response({"error": "not kept"}, status=416)
         first -= first % GOP
         waits = site.past_released if "from" in request.query else None
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
@@ -357,10 +357,10 @@ class SiteServer:
         site, lines = self.site, ["#EXTM3U", "#EXT-X-VERSION:7", "#EXT-X-TARGETDURATION:1"]
         last = site.boundary() - site.boundary() % SEGMENT
         first = int(request.query.get("from", f"p{last - 8 * SEGMENT}")[1:]) // SEGMENT * SEGMENT
-        begun = datetime.fromtimestamp(site.pulse0 + first / FPS, UTC).isoformat(timespec="milliseconds")
+        start_time = datetime.fromtimestamp(site.pulse0 + first / FPS, UTC).isoformat(timespec="milliseconds")
         lines += [f"#EXT-X-MEDIA-SEQUENCE:{first // SEGMENT}", '#EXT-X-MAP:URI="init.mp4"']
         lines += ["#EXT-X-START:TIME-OFFSET=0"] if "from" in request.query else []
-        lines += [f"#EXT-X-PROGRAM-DATE-TIME:{begun}"]
+        lines += [f"#EXT-X-PROGRAM-DATE-TIME:{start_time}"]
         for pulse in range(first, last, SEGMENT):
             lines += [f"#EXTINF:{SEGMENT / FPS:.3f},", f"{pulse}.m4s"]
         site.listed.append(request.path_qs)
@@ -388,16 +388,16 @@ class SiteServer:
         with contextlib.suppress(ConnectionError):
             for name in ("site", "objects", "cameras"):
                 await response.write(_event(name, getattr(site, name)()))
-            said, flags = dict(site.people), list[dict[str, Any]]()
+            sent_people, sent_flags = dict(site.people), list[dict[str, Any]]()
             async for pulse in site.released(site.boundary() - 2 * GOP):
-                if site.people != said:
-                    said = dict(site.people)
+                if site.people != sent_people:
+                    sent_people = dict(site.people)
                     await response.write(_event("objects", site.objects()))
                 if pulse % GOP == 0:
                     await response.write(_event("gop", site.gop(pulse)))
                 for flag in site.flags:
-                    if flag not in flags:
-                        flags.append(flag)
+                    if flag not in sent_flags:
+                        sent_flags.append(flag)
                         await response.write(_event("flag", flag))
         return response
 

@@ -20,7 +20,7 @@ _KIND_OF = {"rate": "counter", "increase": "counter", "delta": "gauge"}
 
 @dataclass(frozen=True)
 class ExportedMetrics:
-    """The metrics of one answer of /metrics."""
+    """The metrics of one response of /metrics."""
 
     samples: dict[str, set[Series]]
     """By metric name."""
@@ -40,45 +40,45 @@ class ExportedMetrics:
 
 def selectors(expression: str) -> list[promql.VectorSelector]:
     """Return the selectors of an expression."""
-    found: list[promql.VectorSelector] = []
+    vector_selectors: list[promql.VectorSelector] = []
     promql.walk(
         promql.parse(expression),
-        lambda node: found.append(node) if isinstance(node, promql.VectorSelector) else None,
+        lambda node: vector_selectors.append(node) if isinstance(node, promql.VectorSelector) else None,
     )
-    return found
+    return vector_selectors
 
 
-def select_series(expression: str, printed: ExportedMetrics) -> set[Series]:
+def select_series(expression: str, metrics: ExportedMetrics) -> set[Series]:
     """Return the series of an expression.
 
     Raises:
         ValueError: it is not supported PromQL, or does not fit the kinds of metrics.
     """
-    return _series_of(promql.parse(expression), printed)
+    return _series_of(promql.parse(expression), metrics)
 
 
-def _series_of(node: promql.Expr, printed: ExportedMetrics) -> set[Series]:
+def _series_of(node: promql.Expr, metrics: ExportedMetrics) -> set[Series]:
     match node:
         case promql.ParenExpr():
-            return _series_of(node.expr, printed)
+            return _series_of(node.expr, metrics)
         case promql.VectorSelector():
-            return _series_of_selector(node, printed)
+            return _series_of_selector(node, metrics)
         case promql.MatrixSelector():
-            return _series_of_selector(node.vector_selector, printed)
+            return _series_of_selector(node.vector_selector, metrics)
         case promql.Call():
-            return _series_of_call(node, printed)
+            return _series_of_call(node, metrics)
         case promql.AggregateExpr():
-            return _series_of_aggregate(node, printed)
+            return _series_of_aggregate(node, metrics)
         case promql.BinaryExpr():
             sides = [side for side in (node.lhs, node.rhs) if not isinstance(side, promql.NumberLiteral)]
             if node.modifier is not None and node.modifier.matching is not None:
                 raise ValueError(f"not supported: {node.modifier}")
-            return set.intersection(*(_series_of(side, printed) for side in sides))
+            return set.intersection(*(_series_of(side, metrics) for side in sides))
     raise ValueError(f"not supported: {type(node).__name__}")
 
 
-def _series_of_selector(node: promql.VectorSelector, printed: ExportedMetrics) -> set[Series]:
-    wanted = {
+def _series_of_selector(node: promql.VectorSelector, metrics: ExportedMetrics) -> set[Series]:
+    labels = {
         matcher.name: matcher.value
         for matcher in node.matchers.matchers
         if matcher.name not in ADDED_BY_PROMETHEUS
@@ -87,30 +87,30 @@ def _series_of_selector(node: promql.VectorSelector, printed: ExportedMetrics) -
         raise ValueError(f"not supported: {node.prettify()}")
     return {
         label_set
-        for label_set in printed.samples.get(node.name or "", ())
-        if wanted.items() <= dict(label_set).items()
+        for label_set in metrics.samples.get(node.name or "", ())
+        if labels.items() <= dict(label_set).items()
     }
 
 
-def _series_of_call(node: promql.Call, printed: ExportedMetrics) -> set[Series]:
+def _series_of_call(node: promql.Call, metrics: ExportedMetrics) -> set[Series]:
     name = node.func.name
     if name == "histogram_quantile":
-        buckets = _series_of(node.args[1], printed)
+        buckets = _series_of(node.args[1], metrics)
         if not all("le" in dict(bucket) for bucket in buckets):
             raise ValueError(f"quantile of a metric without buckets: {node.prettify()}")
         return {frozenset((label, value) for label, value in bucket if label != "le") for bucket in buckets}
-    (over,) = node.args
-    if not isinstance(over, promql.MatrixSelector) or name not in _KIND_OF:
+    (argument,) = node.args
+    if not isinstance(argument, promql.MatrixSelector) or name not in _KIND_OF:
         raise ValueError(f"not supported: {name}")
-    metric = over.vector_selector.name
-    kind = printed.kinds.get(metric, _KIND_OF[name])
+    metric = argument.vector_selector.name
+    kind = metrics.kinds.get(metric, _KIND_OF[name])
     if kind != _KIND_OF[name]:
         raise ValueError(f"{name} of {metric}, which is a {kind}")
-    return _series_of(over, printed)
+    return _series_of(argument, metrics)
 
 
-def _series_of_aggregate(node: promql.AggregateExpr, printed: ExportedMetrics) -> set[Series]:
-    series = _series_of(node.expr, printed)
+def _series_of_aggregate(node: promql.AggregateExpr, metrics: ExportedMetrics) -> set[Series]:
+    series = _series_of(node.expr, metrics)
     by = set(node.modifier.labels) if node.modifier is not None else set()
     if node.modifier is not None and node.modifier.type != promql.AggModifierType.By:
         raise ValueError(f"not supported: {node.modifier}")

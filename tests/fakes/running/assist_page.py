@@ -17,8 +17,8 @@ from fakes.timeouts import PATIENCE_MS
 from server.cli.generated_config import DEMO, free_port
 
 GOP = 10
-PERSON_POSITION_JS = """(wanted) => {
-  const box = myview.boxes.find(([object]) => object === (wanted ?? myview.pointing.object));
+PERSON_POSITION_JS = """(number) => {
+  const box = myview.boxes.find(([object]) => object === (number ?? myview.pointing.object));
   if (!box) return null;
   const { left, top, width } = document.querySelector('#boxes').getBoundingClientRect();
   const scale = width / myview.site.width;

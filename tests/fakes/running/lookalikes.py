@@ -16,7 +16,7 @@ from benchmarks.faults.video.stamped_views import write_film
 from fakes.running.stream_frames import FPS
 
 MEETING = 80
-"""The pulse at which they meet."""
+"""The pulse at which the two people meet."""
 FRAMES = 6000
 """Ten minutes, as long as a test may take on a busy machine."""
 _SIZE = 180, 320
@@ -32,23 +32,23 @@ _GRAY, _GREEN = 110, (60, 200, 60)
 
 def write_camera(name: str, folder: Path) -> dict[str, Any]:
     """Write the film, 320x180 pixels, and its detections; return the camera's configuration."""
-    film, found = folder / f"{name}.mp4", folder / f"{name}.txt"
+    film, detections = folder / f"{name}.mp4", folder / f"{name}.txt"
     sides = [_sides(pulse) for pulse in range(FRAMES)]
     drawn = {side: _picture(side) for side in set(sides)}
     write_film([drawn[side] for side in sides], film, FPS)
     lines = [
         f"{pulse + 1},-1,{left},{_TOP},{_WIDTH},{_HEIGHT},1,-1,-1,-1"
-        for pulse, both in enumerate(sides)
-        for left in both[: 1 if abs(pulse - MEETING) < _OCCLUDED else 2]
+        for pulse, both_edges in enumerate(sides)
+        for left in both_edges[: 1 if abs(pulse - MEETING) < _OCCLUDED else 2]
     ]
-    found.write_text("\n".join(lines), encoding="ascii")
-    return {"id": name, "source": str(film), "detections": str(found)}
+    detections.write_text("\n".join(lines), encoding="ascii")
+    return {"id": name, "source": str(film), "detections": str(detections)}
 
 
 def _sides(pulse: int) -> tuple[int, int]:
     """Return the left edges of the two boxes."""
-    off = min(_STEP * abs(pulse - MEETING), _FAR)
-    return (_SIZE[1] - _WIDTH) // 2 - off, (_SIZE[1] - _WIDTH) // 2 + off
+    distance = min(_STEP * abs(pulse - MEETING), _FAR)
+    return (_SIZE[1] - _WIDTH) // 2 - distance, (_SIZE[1] - _WIDTH) // 2 + distance
 
 
 def _picture(sides: tuple[int, int]) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Decisions of a best-view service: invented ones, and collected ones."""
+"""Decisions of a best-view service: constructed ones, and those that a service makes."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ def service_with_backlog() -> FedService:
 
 def collect_decisions(service: FedService) -> list[GopDecision]:
     """Return a list that collects the decisions of a service."""
-    decided: list[GopDecision] = []
+    decisions: list[GopDecision] = []
     publish = service._publish
 
     def note(decision: GopDecision) -> None:
-        decided.append(decision)
+        decisions.append(decision)
         publish(decision)
 
     service._publish = note  # type: ignore[method-assign]
-    return decided
+    return decisions
 
 
 def decision(

@@ -45,23 +45,23 @@ async def departure_site(folder: Path, **changes: Any) -> AsyncIterator[ServedSi
 
 
 def feed_epochs(served: ServedSite, epochs: range) -> list[GopChoices]:
-    """Feed some epochs; return the decisions made meanwhile."""
+    """Feed some epochs; return the decisions."""
     decisions: list[GopChoices] = []
     served.service.on_decision.append(decisions.append)
     for epoch in epochs:
-        there = epoch not in ABSENT
-        seen_by_a = {1: SMALL if there else None, 2: SECOND_PERSON}  # the first one becomes object 1
-        served.service.feed(epoch, {A: seen_by_a, B: {1: LARGE if there else None}})
+        is_present = epoch not in ABSENT
+        seen_by_a = {1: SMALL if is_present else None, 2: SECOND_PERSON}  # the first one becomes object 1
+        served.service.feed(epoch, {A: seen_by_a, B: {1: LARGE if is_present else None}})
     served.service.on_decision.remove(decisions.append)
     return decisions
 
 
 def expected_pictures(
-    decisions: list[GopChoices], codec: Codec = "h264", *, holds: bool = True
+    decisions: list[GopChoices], codec: Codec = "h264", *, freezes: bool = True
 ) -> dict[int, Picture]:
     """Return the pictures for a viewer with access to object 1 alone, by pulse, of all decisions.
 
-    ``holds``: before it turns gray, the last picture stays.
+    ``freezes``: the last picture stays until it turns gray.
     """
     shown: dict[int, Picture] = {}
     seen_last = -1 - 2 * HIDE_AFTER
@@ -78,7 +78,7 @@ def expected_pictures(
         for pulse in range(gop.first, gop.first + gop.frames):
             if age <= HIDE_AFTER:
                 shown[pulse] = camera_pictures(camera, codec)[pulse]
-            elif holds and age <= 2 * HIDE_AFTER:
+            elif freezes and age <= 2 * HIDE_AFTER:
                 shown[pulse] = shown[pulse - 1]
             else:
                 shown[pulse] = np.full_like(camera_pictures(camera)[pulse], GRAY)
@@ -102,11 +102,11 @@ def decoded(data: bytes) -> dict[int, Picture]:
     return {round(float(frame.time or 0) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames}
 
 
-def assert_equal_pictures(shown: dict[int, Picture], right: dict[int, Picture]) -> None:
+def assert_equal_pictures(shown: dict[int, Picture], expected: dict[int, Picture]) -> None:
     """Assert that pictures are equal by pulse, without a gap, up to the same end."""
-    assert list(shown) == list(range(min(shown), len(right)))
+    assert list(shown) == list(range(min(shown), len(expected)))
     for pulse, picture in shown.items():
-        np.testing.assert_array_equal(picture, right[pulse], str(pulse))
+        np.testing.assert_array_equal(picture, expected[pulse], str(pulse))
 
 
 def chosen_pictures(decisions: list[GopChoices], codec: Codec = "h264") -> dict[int, Picture]:
@@ -123,15 +123,15 @@ def is_gray(picture: Picture) -> bool:
     return bool((picture == GRAY).all())
 
 
-async def open_stream(served: ServedSite, path: str, who: str) -> aiohttp.ClientResponse:
+async def open_stream(served: ServedSite, path: str, token: str) -> aiohttp.ClientResponse:
     """Open a stream."""
-    answer = await served.session.get(path, headers=bearer(who))
+    answer = await served.session.get(path, headers=bearer(token))
     assert answer.status == 200, await answer.text()
     return answer
 
 
-async def fetch(served: ServedSite, path: str, who: str) -> bytes:
-    async with await open_stream(served, path, who) as answer:
+async def fetch(served: ServedSite, path: str, token: str) -> bytes:
+    async with await open_stream(served, path, token) as answer:
         return await answer.read()
 
 

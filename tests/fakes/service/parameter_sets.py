@@ -19,7 +19,7 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 GOPS = 12
 OWN_PARAMETERS = {"encode": {"parameters": "own"}}
 ENCODINGS: dict[str, dict[str, Any]] = {A: {"preset": "ultrafast"}, B: {"preset": "medium", "crf": 30}}
-"""CAVLC without and CABAC with the rest of profile High: as different as two brands."""
+"""CAVLC without and CABAC with the rest of profile High: as different as cameras of two makers."""
 LOST_GOPS = {(B, 3), (A, 6), (A, 7), (B, 10)}
 """GOPs that are lost."""
 
@@ -51,11 +51,13 @@ def shown_gop(gop: int) -> tuple[str, int]:
 
 def expected_pictures() -> list[NDArray[np.uint8]]:
     """Return the expected pictures: in place of a lost GOP, the last picture before it."""
-    own, seen = {camera: decoded_alone(camera) for camera in ENCODINGS}, []
+    decoded, pictures = {camera: decoded_alone(camera) for camera in ENCODINGS}, []
     for gop in range(GOPS):
-        camera, real = shown_gop(gop)
-        seen += [own[camera][gop * GOP + n] if real == gop else seen[-1] for n in range(GOP)]
-    return seen
+        camera, source_gop = shown_gop(gop)
+        pictures += [
+            decoded[camera][gop * GOP + n] if source_gop == gop else pictures[-1] for n in range(GOP)
+        ]
+    return pictures
 
 
 def put_frames(frame_buffers: dict[str, FrameBuffer]) -> None:

@@ -52,7 +52,7 @@ class ManualClocks:
         self.wall = now
 
     def jump(self, seconds: float) -> None:
-        """Set the wall clock by hand: it is not synchronized any more."""
+        """Set the wall clock as a user does; it is no longer synchronized."""
         self.wall += seconds
         self.is_synchronized = False
 
@@ -60,7 +60,7 @@ class ManualClocks:
         """Switch the machine off for a while; afterwards its wall clock is off by ``wrong_by``."""
         self.wall += seconds + wrong_by
         self.steady = 10.0
-        self.boot += " and the next"
+        self.boot += ", restarted"
 
 
 @cache
@@ -85,7 +85,7 @@ def own_pictures(camera: str) -> list[Picture]:
     ]
 
 
-def session_info(began: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
+def session_info(started: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
     return SessionInfo(
         site="hall",
         fps=FPS,
@@ -93,7 +93,7 @@ def session_info(began: float = PULSE0, numbers_since: float | None = None) -> S
         height=HEIGHT,
         codec="avc1",
         cameras=list(CAMERAS),
-        started=began,
+        started=started,
         pulse0=PULSE0,
         person_numbers_since=numbers_since,
     )
@@ -106,8 +106,10 @@ def gop_record(
     first = gop * GOP
     arrived = {}
     for camera in cameras:
-        taken = [filled_buffers()[0][camera].get(pulse) for pulse in range(first, first + frames)]
-        arrived[camera] = RecordedGop(first, tuple(frame.fragment for frame in taken if frame is not None))
+        frames_of_gop = [filled_buffers()[0][camera].get(pulse) for pulse in range(first, first + frames)]
+        arrived[camera] = RecordedGop(
+            first, tuple(frame.fragment for frame in frames_of_gop if frame is not None)
+        )
     boxes = {camera: [[(1, 1.0, 2.0, 3.0, 4.0)]] * GOP for camera in cameras}
     return GopRecord(
         GopChoices(first=first, frames=GOP, choices=dict(choices), boxes=boxes, cuts=[]), arrived
@@ -115,12 +117,12 @@ def gop_record(
 
 
 def written_folder(
-    store: RecordingFolder, records: list[GopRecord], began: float = PULSE0
+    store: RecordingFolder, records: list[GopRecord], started: float = PULSE0
 ) -> RecordingFolder:
     """Open a recording folder and write GOPs to it."""
     store.open()
     for record in records:
-        store.write(record, session_info(began), InitSegments(filled_buffers()[1]))
+        store.write(record, session_info(started), InitSegments(filled_buffers()[1]))
     return store
 
 

@@ -25,7 +25,7 @@ def unprivileged_folder() -> Iterator[Path]:
     finally:
         if root:
             os.seteuid(0)
-        for inside, folders, _ in os.walk(folder):
+        for parent, folders, _ in os.walk(folder):
             for name in folders:
-                Path(inside, name).chmod(0o700)
+                Path(parent, name).chmod(0o700)
         shutil.rmtree(folder)

@@ -55,8 +55,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 async def running() -> AsyncIterator[list[SiteInOneLoop]]:
     sites: list[SiteInOneLoop] = []
     yield sites
-    for it in sites:
-        await it.stop()
+    for site in sites:
+        await site.stop()
 
 
 class Plain:
@@ -283,7 +283,7 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
     words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
     assert [word.epoch for word in words] == list(range(FRAMES // 5 + 1))
     assert sorted(pulse for word in words for pulse in word.shed) == [
-        it for it in range(FRAMES) if it % 5 != 4
+        number for number in range(FRAMES) if number % 5 != 4
     ], "all but the last of every window, and it is told"
     assert sum(gop.frames for gop in gops) == FRAMES
     assert b"no detection" in written_files(tmp_path / "out")["late.csv"]

@@ -68,7 +68,7 @@ def test_the_unit_of_the_file_is_that_of_its_homographies(tmp_path: Path) -> Non
     )
     cameras = [{"id": "c0", "source": "a"}, {"id": "c1", "source": "b", "ground": matrix}]
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="site.yaml", folder=tmp_path)
-    assert [it.ground_unit for it in config.cameras] == ["m", None]
+    assert [camera.ground_unit for camera in config.cameras] == ["m", None]
 
 
 @pytest.mark.parametrize("kind", ["background", "boxes", "hog"])

@@ -97,7 +97,9 @@ def _stream_format(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> flo
         update = registry.update(tracks, last)
         numbers = {(key.camera, key.local_id): number for key, number in update.person_ids.items()}
         if last > 100:
-            pairs = [(numbers.get(("c0", it)), numbers.get(("c1", (it + 1) % 3))) for it in range(3)]
+            pairs = [
+                (numbers.get(("c0", number)), numbers.get(("c1", (number + 1) % 3))) for number in range(3)
+            ]
             same += [one is not None and one == other for one, other in pairs]
     return float(np.mean(same))
 

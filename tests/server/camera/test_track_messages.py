@@ -20,7 +20,7 @@ def test_bridged_occlusions_have_interpolated_boxes() -> None:
     message = TrackMessageBuilder("c0", 1, (640, 360), stride=4).regular(
         WindowResult(0, 3, 3, (track,), None)
     )
-    assert [it.boxes for it in message.tracks] == [[SEEN, SEEN, SEEN, None]]
+    assert [track.boxes for track in message.tracks] == [[SEEN, SEEN, SEEN, None]]
 
 
 def test_a_box_far_outside_the_image_can_be_encoded() -> None:

@@ -24,11 +24,11 @@ FRAMES = 30
 
 @pytest.fixture
 async def served() -> AsyncIterator[ServedSite]:
-    async for it in serve_site():
-        it.service.connect_cameras(*CAMERAS)
+    async for site_served in serve_site():
+        site_served.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
-            it.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: SMALL}})
-        yield it
+            site_served.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: SMALL}})
+        yield site_served
 
 
 async def recorded(served: ServedSite, out: Path) -> None:
@@ -64,7 +64,7 @@ async def test_an_older_recording_is_kept_if_there_is_no_room_for_a_new_one(
     with files_of_at_most(100), pytest.raises(UserError, match=r"File too large$"):
         await recorded(served, out)
     assert out.read_bytes() == b"older"
-    assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
+    assert [path.name for path in tmp_path.iterdir()] == ["one.mp4"]
 
 
 @pytest.mark.parametrize("part", [0.3, 0.6, 0.95])
@@ -79,8 +79,8 @@ async def test_a_disk_that_fills_up_keeps_only_complete_pictures(
         pytest.raises(UserError, match=r"File too large; the recording up to then is kept$"),
     ):
         await recorded(served, out)
-    assert all(it.stat().st_size for it in out.parent.iterdir()), "none is empty"
-    assert "one.mp4" in {it.name for it in out.parent.iterdir()} <= {"one.mp4", "one.vtt", "one.ass"}
+    assert all(path.stat().st_size for path in out.parent.iterdir()), "none is empty"
+    assert "one.mp4" in {path.name for path in out.parent.iterdir()} <= {"one.mp4", "one.vtt", "one.ass"}
     shown = [place for place, _ in pictures(out)]
     assert 0 < len(shown) < FRAMES
     assert shown == list(range(shown[0], shown[0] + len(shown))), "each is whole"
@@ -94,7 +94,7 @@ async def test_a_recording_without_room_for_sidecar_files_is_kept_without_them(
     with pytest.raises(UserError, match=r"kept$"):
         await recorded(served, out)
     (tmp_path / "one.ass").rmdir()
-    assert [it.name for it in tmp_path.iterdir()] == ["one.mp4"]
+    assert [path.name for path in tmp_path.iterdir()] == ["one.mp4"]
     assert [place for place, _ in pictures(out)] == list(range(FRAMES))
 
 
@@ -123,4 +123,4 @@ def test_a_command_without_disk_space_reports_it_in_one_line_and_leaves_nothing(
         done = myview(*words, "--out", tmp_path / "out")
     assert done.code == 2
     assert [line.rpartition(": ")[2] for line in done.err.splitlines()] == ["File too large"]
-    assert [it.name for it in tmp_path.iterdir()] == ["given"]
+    assert [path.name for path in tmp_path.iterdir()] == ["given"]

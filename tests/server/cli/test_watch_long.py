@@ -108,8 +108,8 @@ def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path:
     again = tuple((BOX,) for _ in range(GOP))
     history.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": again}, cuts=()))
     frames = list(history.frames(0, 3 * GOP))
-    assert [it.pulse for it in frames] == list(range(3 * GOP))
-    assert [len(it.boxes) for it in frames] == [5] * GOP + [1] * GOP + [5] * GOP
+    assert [frame.pulse for frame in frames] == list(range(3 * GOP))
+    assert [len(frame.boxes) for frame in frames] == [5] * GOP + [1] * GOP + [5] * GOP
     assert frames[GOP].camera == "c1"
     spool.close()
 
@@ -125,11 +125,11 @@ def test_without_disk_space_choices_are_kept_without_boxes(tmp_path: Path) -> No
 @pytest.fixture
 async def served() -> AsyncIterator[ServedSite]:
     """Person 1 in both cameras."""
-    async for it in serve_site():
-        it.service.connect_cameras(*CAMERAS)
+    async for site_served in serve_site():
+        site_served.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
-            it.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
-        yield it
+            site_served.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
+        yield site_served
 
 
 async def test_the_recording_is_finished_before_the_sidecar_files(
@@ -139,7 +139,7 @@ async def test_the_recording_is_finished_before_the_sidecar_files(
     names: list[list[str]] = []
 
     def killed(*_: object) -> None:
-        names.append(sorted(it.name for it in tmp_path.iterdir()))
+        names.append(sorted(path.name for path in tmp_path.iterdir()))
         raise MemoryError
 
     monkeypatch.setattr("client.player.write_sidecars", killed)
@@ -152,5 +152,5 @@ async def test_a_recording_has_sidecar_files_with_boxes(served: ServedSite, tmp_
     out = tmp_path / "one.mp4"
     await client.watch(f"http://127.0.0.1:{served.port}", 1, out, start="p0", end="p25")
     cues = out.with_suffix(".vtt").read_text().strip().split("\n\n")[2:]
-    assert [json.loads(it.split("\n")[2])["boxes"] for it in cues] == [[[1, *LARGE]]] * 25
-    assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]
+    assert [json.loads(cue.split("\n")[2])["boxes"] for cue in cues] == [[[1, *LARGE]]] * 25
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]

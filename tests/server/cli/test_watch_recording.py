@@ -32,12 +32,12 @@ FIRST = 2 * GOP  # of what is watched here
 @pytest.fixture
 async def served() -> AsyncIterator[ServedSite]:
     """Person 1, three GOPs in c0, then in c1; person 2 in c0."""
-    async for it in serve_site():
-        it.service.connect_cameras(*CAMERAS)
+    async for site_served in serve_site():
+        site_served.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
             here, there = (LARGE, SMALL) if epoch < 3 else (SMALL, LARGE)
-            it.service.feed(epoch, {A: {1: here, 2: SMALL}, B: {1: there}})
-        yield it
+            site_served.service.feed(epoch, {A: {1: here, 2: SMALL}, B: {1: there}})
+        yield site_served
 
 
 async def watched(served: ServedSite, out: Path) -> client.WatchResult:
@@ -57,7 +57,7 @@ async def test_the_recording_begins_at_0_with_unchanged_pictures(served: ServedS
     out = tmp_path / "one.mp4"
     done = await watched(served, out)
     assert (done.complete, done.cuts, done.fragments) == (True, 1, 28 - FIRST)
-    assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]
     shown = list(pictures(out))
     assert [place for place, _ in shown] == list(range(28 - FIRST))
     for place, picture in shown:
@@ -127,7 +127,7 @@ async def test_every_frame_has_its_boxes_in_the_sidecar(served: ServedSite, tmp_
     for place, cue in enumerate(cues):
         name, times, text = cue.split("\n")
         assert name == f"p{FIRST + place}"
-        begin, end = (float(it.rpartition(":")[2]) for it in times.split(" --> "))
+        begin, end = (float(part.rpartition(":")[2]) for part in times.split(" --> "))
         assert (begin, end) == pytest.approx((place / FPS, (place + 1) / FPS))
         content = json.loads(text)
         assert content["camera"] == chosen(served)[FIRST + place]

@@ -37,7 +37,7 @@ async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(
     vp8_site.service.splicer.close()
     done = await watching
     assert (done.complete, done.fragments) == (True, 3 * GOP)
-    assert sorted(it.name for it in tmp_path.iterdir()) == ["one.ass", "one.vtt", "one.webm"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ass", "one.vtt", "one.webm"]
     with av.open(str(out)) as film:
         assert film.duration == round(seconds * av.time_base)
         shown = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in film.decode(video=0)]

@@ -18,8 +18,8 @@ SUM = token_digest("x")
 def test_tokens_are_read_in_the_order_of_the_file(tmp_path: Path) -> None:
     path = write_tokens(tmp_path / "tokens.yaml", *map(token_entry, ("lead", "desk", "family", "door")))
     tokens = read_tokens(path)
-    assert [it.name for it in tokens] == ["lead", "desk", "family", "door"]
-    assert [(it.role, it.object, it.camera) for it in tokens] == [
+    assert [token.name for token in tokens] == ["lead", "desk", "family", "door"]
+    assert [(token.role, token.object, token.camera) for token in tokens] == [
         ("operate", None, None),
         ("watch", None, None),
         ("watch", 1, None),

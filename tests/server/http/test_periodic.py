@@ -42,7 +42,7 @@ async def test_a_failing_step_is_logged_once_and_retried(caplog: pytest.LogCaptu
     await failing.done.wait()
     task.cancel()
     assert failing.times >= 4
-    assert [str(it.exc_info and it.exc_info[1]) for it in caplog.records] == ["one", "'other'"]
+    assert [str(record.exc_info and record.exc_info[1]) for record in caplog.records] == ["one", "'other'"]
     assert caplog.messages[0].startswith("counting failed")
 
 
@@ -110,7 +110,7 @@ def test_a_half_done_renewal_is_loaded_when_it_is_complete(
     certificate.reload_if_changed()
     certificate.reload_if_changed()
     assert certificate._newest is before
-    assert [it for it in caplog.messages if "stays in force" in it] == caplog.messages[:1]
+    assert [message for message in caplog.messages if "stays in force" in message] == caplog.messages[:1]
     assert "No such file or directory" in caplog.messages[0]
     gone.clear()
     certificate.reload_if_changed()

@@ -141,7 +141,7 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c1"),
-        *(partial(Bus.client, it, "c0") for it in strangers),
+        *(partial(Bus.client, stranger, "c0") for stranger in strangers),
     ) as (bestview, c1, *them):
         bestview.subscribe(SITE.camera("*", "*"), heard)
         alive: list[str] = []
@@ -152,12 +152,12 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         c1.declare_alive(SITE.camera("c1", "alive"))
         for number in range(10):  # time enough for who would have been let in
             await heard.until(f"c1/video {number}", partial(_all, [*them, c1], number))
-        assert not [it for it in heard.texts if it.startswith("c0")]
+        assert not [text for text in heard.texts if text.startswith("c0")]
         assert alive == [SITE.camera("c1", "alive")]
-        assert not [it for it in overheard.texts if it.startswith("c1")]  # they hear themselves
-        for it in strangers:
+        assert not [text for text in overheard.texts if text.startswith("c1")]  # they hear themselves
+        for stranger in strangers:
             with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at"):
-                await asyncio.to_thread(Bus.listener, it, "c0")
+                await asyncio.to_thread(Bus.listener, stranger, "c0")
 
 
 def _all(buses: Sequence[Bus], number: int) -> None:

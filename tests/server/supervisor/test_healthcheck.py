@@ -216,7 +216,7 @@ def test_a_host_name_too_long_for_a_certificate_is_refused(tmp_path: Path) -> No
     assert done.returncode == 1
     assert "too long" in done.stderr
     assert made(tmp_path, "cameras.example").returncode == 0
-    assert not [it.name for it in tmp_path.iterdir() if it.name in {"log", "names", "request"}]
+    assert not [path.name for path in tmp_path.iterdir() if path.name in {"log", "names", "request"}]
 
 
 @needs_openssl
@@ -247,11 +247,11 @@ def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str,
 def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, tmp_path: Path) -> None:
     folder = tmp_path / "secrets"
     shutil.copytree(secrets, folder)
-    before = {it: it.read_bytes() for it in folder.rglob("*") if it.is_file()}
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0", "yard"]
     subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
     assert all(it.read_bytes().startswith(content) for it, content in before.items())
-    new = {str(it.relative_to(folder)) for it in folder.rglob("*") if it.is_file()}
+    new = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     new -= {str(it.relative_to(folder)) for it in before}
     assert new == {f"cameras/yard/{it}" for it in ("bus", "pulses", "token")}
 
@@ -262,7 +262,7 @@ def test_a_site_without_pulse_passwords_gets_them(secrets: Path, tmp_path: Path)
     shutil.copytree(secrets, folder)
     for name in ("pulses", "web/pulses", "cameras/c0/pulses"):
         (folder / name).unlink()
-    before = {it: it.read_bytes() for it in folder.rglob("*") if it.is_file()}
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert made(folder, "cameras.example").returncode == 0
     assert all(it.read_bytes() == content for it, content in before.items())
     assert set(users(folder / "pulses")) == {"bestview", "c0"}

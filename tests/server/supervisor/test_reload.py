@@ -64,7 +64,9 @@ CHANGES: dict[str, tuple[str, Any]] = {
 
 def changed(keys: set[str]) -> Config:
     content: dict[str, Any] = {}
-    cameras: dict[str, dict[str, Any]] = {it: {"id": it, "source": "scene:room"} for it in CAMERAS}
+    cameras: dict[str, dict[str, Any]] = {
+        camera: {"id": camera, "source": "scene:room"} for camera in CAMERAS
+    }
     small = {
         "view": {"identity": {"confirmation_frames": 1, "clustering_interval": 1}},
         "track": {"window": WINDOW},

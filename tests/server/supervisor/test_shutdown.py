@@ -179,7 +179,7 @@ def waits_for_a_file(pid: int) -> bool:
     """Return whether a thread of a process is held up in the system call that opens a file."""
     opening = {"2", "257", "56"}  # open and openat, as Linux counts them on x86 and ARM
     try:
-        calls = [it.read_text(encoding="ascii") for it in Path(f"/proc/{pid}/task").glob("*/syscall")]
+        calls = [path.read_text(encoding="ascii") for path in Path(f"/proc/{pid}/task").glob("*/syscall")]
     except OSError:
         return False
     return any(call.split()[0] in opening for call in calls)

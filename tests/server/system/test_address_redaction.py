@@ -84,7 +84,10 @@ def test_options_of_bus_endpoints_are_hidden(endpoint: str, expected: str) -> No
     assert redact_endpoint(endpoint) == expected
 
 
-@given(st.sampled_from([it for it in ADDRESSES if not it.startswith(("rtsp//", "user:"))]), PASSWORDS)
+@given(
+    st.sampled_from([address for address in ADDRESSES if not address.startswith(("rtsp//", "user:"))]),
+    PASSWORDS,
+)
 def test_texts_are_cut_where_an_address_begins(place: str, password: str) -> None:
     text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
     told = redact_addresses(text)

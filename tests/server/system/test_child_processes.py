@@ -14,5 +14,5 @@ STARTS = re.compile(
 
 def test_no_other_module_of_the_server_starts_processes() -> None:
     root = Path(server.__path__[0])
-    starting = [it for it in root.rglob("*.py") if STARTS.search(it.read_text("utf-8"))]
+    starting = [path for path in root.rglob("*.py") if STARTS.search(path.read_text("utf-8"))]
     assert [str(it.relative_to(root)) for it in starting] == ["system/child_process.py"]

@@ -91,7 +91,9 @@ async def test_invalid_messages_of_a_camera_are_logged_once(
 
 async def test_messages_that_a_camera_cannot_parse_are_in_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
     config = small_config()
-    cameras = [it.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for it in config.cameras]
+    cameras = [
+        camera.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for camera in config.cameras
+    ]
     camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
     payloads: list[bytes] = []
     monkeypatch.setattr(camera, "_publish", lambda _, payload: payloads.append(payload))
@@ -100,7 +102,7 @@ async def test_messages_that_a_camera_cannot_parse_are_in_its_status(monkeypatch
         camera._corrections.put(Message(KEYS.camera("c0", "position_corrections"), b"{", b""))
     camera._send_status()
     camera._pipeline.close()
-    [status] = [msgspec.json.decode(it, type=CameraStatus) for it in payloads]
+    [status] = [msgspec.json.decode(payload, type=CameraStatus) for payload in payloads]
     assert status.bad_messages == 3
 
 

@@ -138,9 +138,9 @@ def test_every_line_of_a_whole_site_can_be_parsed(tmp_path: Path) -> None:
             if lines[-1]["event"] == "camera c0 connected":
                 up.send_signal(signal.SIGTERM)
         assert up.wait(PATIENCE) == 0
-    assert all(set(it) >= FIELDS for it in lines)
-    assert {it["process"] for it in lines} >= {"bestview", "c0", "sync"}
-    assert "camera c0 connected" in {it["event"] for it in lines if it.get("camera") == "c0"}
+    assert all(set(line) >= FIELDS for line in lines)
+    assert {line["process"] for line in lines} >= {"bestview", "c0", "sync"}
+    assert "camera c0 connected" in {line["event"] for line in lines if line.get("camera") == "c0"}
 
 
 def test_the_reason_why_a_process_does_not_start_is_logged(tmp_path: Path) -> None:

@@ -197,7 +197,7 @@ def test_the_doctor_shows_no_password(myview: RunCommand, tmp_path: Path) -> Non
         assert ended.code == 1
         for password in NAIVE:
             assert not leaks(ended.out + ended.err, password, without="")
-    said = {it["check"]: it["text"] for it in json.loads(ended.out)["findings"]}
+    said = {load["check"]: load["text"] for load in json.loads(ended.out)["findings"]}
     assert said["camera c1"].startswith("rtsp://127.0.0.1:1/...: cannot open this video: ")
     assert said["camera c9"] == "(not shown): no such file or folder"
 

@@ -53,8 +53,8 @@ def folder_of(who: str, tmp_path: Path) -> Iterator[Path]:
 def modes(folder: Path) -> dict[bool, set[int]]:
     """Return the modes of all folders (True) and files (False) below one."""
     found: dict[bool, set[int]] = {True: set(), False: set()}
-    for it in folder.rglob("*"):
-        found[it.is_dir()].add(stat.S_IMODE(it.stat().st_mode))
+    for path in folder.rglob("*"):
+        found[path.is_dir()].add(stat.S_IMODE(path.stat().st_mode))
     return found
 
 
@@ -100,7 +100,7 @@ def test_an_existing_folder_is_unchanged_and_reported(
     service.recorder.open()
     service.close()
     assert stat.S_IMODE(folder.stat().st_mode) == 0o755
-    (told,) = [it for it in caplog.messages if it.startswith("record.folder")]
+    (told,) = [message for message in caplog.messages if message.startswith("record.folder")]
     assert "has mode 755" in told
     assert "chmod 700" in told
     (found, *_) = disk_findings(config, {})
@@ -113,7 +113,7 @@ def test_an_existing_folder_is_unchanged_and_reported(
 
 def test_own_runs_of_earlier_versions_become_private(tmp_path: Path) -> None:
     written_folder(RecordingFolder(tmp_path, UNLIMITED), [gop_record(0, {1: A})]).close()
-    (run,) = (it for it in tmp_path.iterdir() if it.is_dir())
+    (run,) = (path for path in tmp_path.iterdir() if path.is_dir())
     run.chmod(0o755)
     other = tmp_path / "holiday"
     other.mkdir()

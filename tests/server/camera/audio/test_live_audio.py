@@ -35,7 +35,7 @@ def send(path: Path, to: Any) -> None:
         av.open(str(path)) as recorded,
         av.open(to, "w", format="mpegts", buffer_size=1316, options={"flush_packets": "1"}) as sent,
     ):
-        streams = {it.index: sent.add_stream_from_template(it) for it in recorded.streams}
+        streams = {stream.index: sent.add_stream_from_template(stream) for stream in recorded.streams}
         for packet in recorded.demux():
             if packet.dts is None:
                 continue
@@ -180,7 +180,8 @@ def test_audio_continues_after_a_time_step_and_after_a_reconnect(
     assert numbers == sorted(set(numbers)), "each once, in order"
     halves = [0.0, step, FRAMES / FPS, 2 * FRAMES / FPS, 3 * FRAMES / FPS]
     first, second, _, anew = (
-        sum(begin <= it * FRAME / FORM.rate < end for it in numbers) for begin, end in pairwise(halves)
+        sum(begin <= number * FRAME / FORM.rate < end for number in numbers)
+        for begin, end in pairwise(halves)
     )
     each = step * FORM.rate / FRAME
     assert first > 0.9 * each - 3

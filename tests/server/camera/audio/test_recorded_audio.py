@@ -39,7 +39,7 @@ FORM = AudioFormat(48_000, 2)
 
 
 def all_until(sound: RecordedAudioSource, pulse: int, first: int = 0) -> list[EncodedAudioFrame]:
-    return [frame for it in range(first, pulse + 1) for frame in sound.until(it)]
+    return [frame for number in range(first, pulse + 1) for frame in sound.until(number)]
 
 
 def as_adts(frames: list[EncodedAudioFrame], form: AudioFormat) -> bytes:
@@ -126,7 +126,7 @@ def test_a_late_start_gives_the_same_audio_frames(tmp_path: Path, codec: str) ->
     assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not all that was"
     moments = beeps(as_adts(frames, form), "aac")
     expected = [(late + n) / FPS for n in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)]
-    assert [it for it in moments if it > late / FPS] == pytest.approx(expected, abs=0.03)
+    assert [moment for moment in moments if moment > late / FPS] == pytest.approx(expected, abs=0.03)
 
 
 def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
     with av.open(str(covered)) as container:
         assert container.streams.video
     ways = [RecordedAudioSource(str(it), STEREO, FPS, 0, "loop") for it in (path, covered)]
-    plain, other = (beeps(as_adts(all_until(it, 2 * FRAMES), FORM), "aac") for it in ways)
+    plain, other = (beeps(as_adts(all_until(way, 2 * FRAMES), FORM), "aac") for way in ways)
     assert len(plain) > 2
     assert other == pytest.approx(plain, abs=0.03)
 
@@ -153,7 +153,7 @@ def test_one_packet_with_a_time_far_ahead_silences_nothing_behind_it() -> None:
         return found
 
     def times(*seconds: float) -> list[float]:
-        return [float(time) for time, _ in _in_order(packet(it) for it in seconds)]
+        return [float(time) for time, _ in _in_order(packet(second) for second in seconds)]
 
     assert times(0, 1, 3600, 2, 3) == [0, 1, 2, 3]
     assert times(0, 1, 60, 61) == [0, 1, 60, 61], "nothing sounded for a minute"
@@ -217,10 +217,10 @@ def test_silence_decodes_to_nothing_at_all(rate: int, channels: int, count: int)
     data = count * (form.adts(len(form.silence)) + form.silence)
     with av.open(io.BytesIO(data), format="aac") as container:
         frames = list(container.decode(audio=0))
-    assert [(it.samples, it.sample_rate, len(it.layout.channels)) for it in frames] == count * [
+    assert [(frame.samples, frame.sample_rate, len(frame.layout.channels)) for frame in frames] == count * [
         (1024, rate, channels)
     ]
-    assert not any(it.to_ndarray().any() for it in frames)
+    assert not any(frame.to_ndarray().any() for frame in frames)
 
 
 @given(

@@ -38,7 +38,7 @@ def followed(current: ShedLevel) -> list[WindowResult]:
     for frame in range(FRAMES):
         searched = current.detects(frame, WINDOW.stride)
         results.append(steps.push(frame, walker(frame)) if searched else steps.skip(frame))
-    return [it for it in (*results, steps.flush()) if it is not None]
+    return [result for result in (*results, steps.flush()) if result is not None]
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def followed(current: ShedLevel) -> list[WindowResult]:
 )
 def test_a_person_keeps_one_track_however_few_frames_are_searched(current: ShedLevel) -> None:
     results = followed(current)
-    assert [it.last for it in results] == [
+    assert [result.last for result in results] == [
         it.last for it in followed(ShedLevel())
     ]  # windows end when they do, and none is late
     final = {
@@ -69,7 +69,7 @@ def test_where_every_frame_is_searched_nothing_is_different() -> None:
         one, other = tracker.push(frame, seen), steps.push(frame, seen)
         assert (one is None) == (other is None)
         if one is not None and other is not None:
-            assert [it.id for it in one.tracks] == [it.id for it in other.tracks]
+            assert [track.id for track in one.tracks] == [track.id for track in other.tracks]
             assert all(
                 np.array_equal(a.boxes, b.boxes, equal_nan=True)
                 for a, b in zip(one.tracks, other.tracks, strict=True)

@@ -48,8 +48,8 @@ def test_the_level_settles_where_the_camera_keeps_up(share: float) -> None:
     levels = simulated(600.0, lambda _: share)
     level = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
-        0.75 * level.detects(it, STRIDE) + 0.25 * level.captures(it, STRIDE, GOP)
-        for it in range(STRIDE * GOP)
+        0.75 * level.detects(number, STRIDE) + 0.25 * level.captures(number, STRIDE, GOP)
+        for number in range(STRIDE * GOP)
     )
     assert work / (STRIDE * GOP) < share  # so high as needed
     assert levels.index(max(levels)) < 10 * FPS
@@ -85,8 +85,8 @@ def test_every_level_sheds_more_and_a_recording_is_always_complete(stride: int, 
     levels = shed_levels(stride, live=live)
     assert levels[0] == ShedLevel()
     frames = range(stride * 60)
-    searched = [sum(it.detects(pulse, stride) for pulse in frames) for it in levels]
-    taken = [sum(it.captures(pulse, stride, 60) for pulse in frames) for it in levels]
+    searched = [sum(level.detects(pulse, stride) for pulse in frames) for level in levels]
+    taken = [sum(level.captures(pulse, stride, 60) for pulse in frames) for level in levels]
     assert all(one >= other for one, other in pairwise(searched))
     assert (
         len(set(zip(searched, taken, strict=True))) >= len(levels) - 1
@@ -104,7 +104,7 @@ def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> No
 
 
 def test_levels_have_a_description() -> None:
-    assert [it.description for it in shed_levels(5, live=True)] == [
+    assert [level.description for level in shed_levels(5, live=True)] == [
         "",
         "detecting in every 2nd frame: the machine is too busy",
         "detecting in every 3rd frame: the machine is too busy",

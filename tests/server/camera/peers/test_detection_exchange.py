@@ -83,8 +83,8 @@ def by_itself(config: Config, folder: Path) -> dict[str, bytes]:
 async def running() -> AsyncIterator[list[SiteInOneLoop]]:
     sites: list[SiteInOneLoop] = []
     yield sites
-    for it in sites:
-        await it.stop()
+    for site in sites:
+        await site.stop()
 
 
 async def live(config: Config, out: Path, running: list[SiteInOneLoop]) -> dict[str, bytes]:

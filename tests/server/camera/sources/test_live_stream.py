@@ -147,7 +147,7 @@ def test_a_long_absence_is_logged_once_and_so_is_the_return(
     assert "Connection refused" in whys[-1]
     assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
     assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: frames arrive again, after ")
-    assert not [it for it in caplog.messages if "hunter2" in it]
+    assert not [message for message in caplog.messages if "hunter2" in message]
 
 
 class Halting:
@@ -295,7 +295,7 @@ def test_a_read_error_ends_the_connection_but_not_the_camera(
     finally:
         source.close()
     assert listener.connections == 2
-    (mistake,) = [it for it in caplog.records if it.exc_info]
+    (mistake,) = [record for record in caplog.records if record.exc_info]
     assert "nobody has thought of this" in str(mistake.exc_info)
 
 

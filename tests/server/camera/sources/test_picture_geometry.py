@@ -169,7 +169,7 @@ def test_a_change_of_size_is_letterboxed_and_logged(tmp_path: Path, caplog: pyte
     recording = Recording(str(path))
     images = [recording.take(n) for n in range(4)]
     recording.close()
-    assert [None if it is None else it.shape for it in images] == 4 * [(HIGH, WIDE, 3)]
+    assert [None if image is None else image.shape for image in images] == 4 * [(HIGH, WIDE, 3)]
     upright = images[2]
     assert upright is not None
     assert [round(float(upright[:, x].mean()), -2) for x in (2, WIDE // 2, -2)] == [0, 200, 0], "undistorted"
@@ -260,7 +260,7 @@ def test_images_of_several_sizes_are_letterboxed_and_logged(
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((high, wide, 3), 200, np.uint8))
     folder = ImageFolder(str(tmp_path), 0, "stop")
     images = [folder.take(number) for number in range(3)]
-    assert [None if it is None else it.shape for it in images] == 3 * [(HIGH, WIDE, 3)]
+    assert [None if image is None else image.shape for image in images] == 3 * [(HIGH, WIDE, 3)]
     upright = images[1]
     assert upright is not None
     assert [int(upright[HIGH // 2, x, 0]) for x in (2, WIDE // 2, -2)] == [0, 200, 0]
@@ -303,4 +303,4 @@ def test_an_animated_gif_is_a_video(tmp_path: Path) -> None:
     recording = Recording(str(tmp_path / "a.gif"), fps=25.0)
     images = [recording.take(n) for n in range(12)]
     recording.close()
-    assert [frame_in(it) for it in images if it is not None] == [n // 2 for n in range(12)]
+    assert [frame_in(image) for image in images if image is not None] == [n // 2 for n in range(12)]

@@ -120,7 +120,10 @@ def test_missing_frames_do_not_shift_later_ones_and_are_logged(
     assert len(frames) == 25
     assert frames[:10] == list(range(10))
     assert frames[20:] == list(range(20, 25)), "the next key picture is where it was"
-    assert any(re.search(r"lossy.ts: \d+ (damaged frames|frames are missing)", it) for it in caplog.messages)
+    assert any(
+        re.search(r"lossy.ts: \d+ (damaged frames|frames are missing)", message)
+        for message in caplog.messages
+    )
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "avi"])

@@ -65,7 +65,7 @@ def test_tracks_become_a_ground_file_and_an_offset_to_copy(run: RunCommand, tmp_
     assert (tmp_path / "ground.png").read_bytes().startswith(b"\x89PNG")
     cameras = [{"id": name, "source": "scene:room"} for name in ("c0", "c1")]
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="test", folder=tmp_path)
-    assert all(it.ground is not None for it in config.cameras)
+    assert all(camera.ground is not None for camera in config.cameras)
     content = json.loads((tmp_path / "ground.json").read_text())
     assert content["unit"] == "m"
     assert content["offset"]["c1"]["use"] == OFFSET
@@ -77,7 +77,7 @@ def test_a_walk_in_one_place_is_refused_and_nothing_is_written(run: RunCommand, 
     code, out, err = run("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert err.startswith("myview: calibrate: c0 and c1: nobody was seen walking by both at once")
-    assert [it.name for it in tmp_path.iterdir()] == ["tracks"]
+    assert [path.name for path in tmp_path.iterdir()] == ["tracks"]
 
 
 def test_a_walk_only_in_the_middle_is_written_only_with_force(run: RunCommand, tmp_path: Path) -> None:
@@ -139,4 +139,4 @@ def test_videos_are_tracked_first_and_must_have_equal_rates(run: RunCommand, tmp
     )
     ended = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
     assert (ended.code, ended.err) == (2, "tracking c0\nmyview: c0.mp4: has no people\n")
-    assert {it.name for it in tmp_path.iterdir()} == {"c0.mp4", "c1.mp4", "site.yaml"}
+    assert {path.name for path in tmp_path.iterdir()} == {"c0.mp4", "c1.mp4", "site.yaml"}

@@ -43,7 +43,7 @@ class Said(NamedTuple):
 
 
 def of(findings: list[Finding], check: str) -> list[Said]:
-    return [Said(it.level, it.text) for it in findings if it.check == check]
+    return [Said(finding.level, finding.text) for finding in findings if finding.check == check]
 
 
 def only(findings: list[Finding], check: str) -> Said:
@@ -69,7 +69,7 @@ def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: RunCommand, tmp
 
 async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -> None:
     there = load_site(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
-    found = [it async for it in run_checks(there, 1.0)]
+    found = [finding async for finding in run_checks(there, 1.0)]
     assert only(found, "camera c0").level is Level.BAD
     assert "there is no scene 'nowhere'" in only(found, "camera c0").text
     assert {it.check for it in found if it.level is Level.BAD} == {"camera c0"}
@@ -80,7 +80,7 @@ def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(
 ) -> None:
     ended = myview("doctor", write_site(tmp_path))
     assert (ended.code, ended.err) == (1, "")
-    (line,) = [it for it in ended.out.splitlines() if "camera c0" in it]
+    (line,) = [line for line in ended.out.splitlines() if "camera c0" in line]
     assert line.startswith("bad ")
     assert "c0.mp4: no such file or folder" in line
     assert "→ fix its source in the configuration, or make the file readable" in line
@@ -194,8 +194,8 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
     first, *doubts = of(found, "camera door")
     assert first.level is Level.OK, first
     assert first.text.startswith("64x48 pixels, ")
-    assert any("are smaller than the site's (128x96)" in it.text for it in doubts)
-    assert all(it.level is Level.WARNING for it in doubts)
+    assert any("are smaller than the site's (128x96)" in finding.text for finding in doubts)
+    assert all(finding.level is Level.WARNING for finding in doubts)
 
 
 def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Path, taken: int) -> None:
@@ -361,11 +361,9 @@ def test_the_available_processors_are_compared(tmp_path: Path, monkeypatch: pyte
 
 def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
     small = load_site(tmp_path)
-    fine, site_with_people = (
-        {"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0)
-    )
+    fine, busy = ({"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
     assert only(machine_findings(small, fine), "processor").level is Level.OK
-    assert only(machine_findings(small, site_with_people), "processor").level is Level.WARNING
+    assert only(machine_findings(small, busy), "processor").level is Level.WARNING
     large = load_site(tmp_path, track={"backlog_s": 1e7})
     assert only(machine_findings(large, fine), "memory").level is Level.WARNING
 

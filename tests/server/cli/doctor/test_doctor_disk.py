@@ -29,7 +29,7 @@ AWAY = CameraProbe("Connection refused")
 
 def site(folder: Path, cameras: tuple[str, ...] = ("c0",), h264: str = "encode", **changes: Any) -> Config:
     content: dict[str, Any] = {
-        "cameras": [{"id": it, "source": f"{it}.mp4", "h264": h264} for it in cameras],
+        "cameras": [{"id": camera, "source": f"{camera}.mp4", "h264": h264} for camera in cameras],
         "record": {"folder": "kept", "keep_s": HOUR_S},
         **changes,
     }
@@ -45,7 +45,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def of(findings: list[Finding], check: str) -> Finding:
-    (found,) = [it for it in findings if it.check == check]
+    (found,) = [finding for finding in findings if finding.check == check]
     return found
 
 

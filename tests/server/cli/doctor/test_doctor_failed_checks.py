@@ -23,7 +23,7 @@ from server.cli.doctor.reachability import reachability_findings
 
 
 def of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
-    return [(it.level, it.text) for it in findings if it.check == check]
+    return [(finding.level, finding.text) for finding in findings if finding.check == check]
 
 
 def broken(*_: object, **__: object) -> Any:
@@ -50,10 +50,10 @@ async def test_a_failed_check_does_not_lose_others_findings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
 ) -> None:
     there = load_site(tmp_path)
-    before = {it.check async for it in command.run_checks(there, 1.0)}
+    before = {finding.check async for finding in command.run_checks(there, 1.0)}
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
     monkeypatch.setattr(command, check, broken)
-    found = [it async for it in command.run_checks(there, 1.0)]
+    found = [finding async for finding in command.run_checks(there, 1.0)]
     (failed,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
     assert {it.check for it in found if it is not failed} == before - lost
 
@@ -77,7 +77,7 @@ async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch:
         raise RuntimeError("cannot be: rtsp://me:hunter2@door/live")
 
     monkeypatch.setattr(command, "sound_findings", wrong)
-    found = [it async for it in command.run_checks(load_site(tmp_path), 1.0)]
+    found = [finding async for finding in command.run_checks(load_site(tmp_path), 1.0)]
     text = "a bug in MyView: RuntimeError: cannot be: ..."
     assert of(found, "sound") == [(Level.BAD, text)]
     assert of(found, "memory")
@@ -121,7 +121,7 @@ async def test_an_unresolvable_server_is_bad(tmp_path: Path, monkeypatch: pytest
 async def test_an_address_of_this_machine_must_lead_to_a_listener(tmp_path: Path) -> None:
     port, other = free_port(), free_port()
     fine = load_site(tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{port}", "listen": f"tcp/0.0.0.0:{port}"})
-    assert {it.level for it in await reachability_findings(fine)} == {Level.OK}
+    assert {finding.level for finding in await reachability_findings(fine)} == {Level.OK}
     astray = load_site(
         tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"}
     )

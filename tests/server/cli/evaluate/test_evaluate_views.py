@@ -119,7 +119,7 @@ def test_a_hidden_person_is_not_visible_by_default(evaluate: RunCommand, tmp_pat
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
     path = write(tmp_path / "choices.csv", choices({1: "c0"}))
     outputs = [evaluate("--gt", tmp_path, "--views", path, *SIZE, "--visible", it)[1] for it in (0.25, 0)]
-    assert [judged(it)["all"][4] for it in outputs] == ["0.0", "100.0"]
+    assert [judged(output)["all"][4] for output in outputs] == ["0.0", "100.0"]
 
 
 def test_rate_and_sizes_are_read_from_a_rendering(evaluate: RunCommand, served: Path) -> None:
@@ -144,8 +144,8 @@ def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: RunComma
     videos = ("--videos", served / "c0.mp4", "--videos", served / "c1.mp4")
     code, _, err = evaluate("--gt", served, "--views", path, *videos, *SIZE, "--plots", served / "plots")
     assert (code, err) == (0, "")
-    assert {it.name for it in (served / "plots").iterdir()} == {"choices.png", "person-1.png"}
-    assert all(it.stat().st_size > 1000 for it in (served / "plots").iterdir())
+    assert {path.name for path in (served / "plots").iterdir()} == {"choices.png", "person-1.png"}
+    assert all(path.stat().st_size > 1000 for path in (served / "plots").iterdir())
 
 
 @pytest.mark.parametrize(

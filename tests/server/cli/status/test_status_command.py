@@ -64,7 +64,7 @@ async def test_a_sites_status_is_shown(site_with_people: ServedSite) -> None:
     text = printed(now)
     assert "hall  " in text
     assert "ready" in text
-    assert next(it for it in text.splitlines() if it.startswith(A)).split()[:3] == [A, "live", "24.5"]
+    assert next(line for line in text.splitlines() if line.startswith(A)).split()[:3] == [A, "live", "24.5"]
     assert "not synchronized" in text
     assert "1 Ann" in text
     assert "not recording" in text
@@ -90,7 +90,7 @@ async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Pat
         show_people(served)
         now = await client.status(url(served), client.HttpSettings(token=token_of("door")))
         assert (now.service, now.pulse, now.ready) == (None, None, True)
-        assert [(it.camera, it.optimal) for it in now.cameras] == [(A, None)]
+        assert [(camera.camera, camera.optimal) for camera in now.cameras] == [(A, None)]
         assert "viewers" not in printed(now)
         assert (
             await client.status(url(served), client.HttpSettings(token=token_of("desk")))

@@ -29,7 +29,7 @@ async def get(served: ServedSite, path: str, who: str) -> Any:
         assert answer.status == 200
         text = await answer.text()
         return (
-            [json.loads(it) for it in text.splitlines()]
+            [json.loads(line) for line in text.splitlines()]
             if "ndjson" in answer.content_type
             else json.loads(text)
         )
@@ -150,10 +150,10 @@ async def test_playlist_uris_have_the_token_of_the_request(site: ServedSite) -> 
         async with site.session.get("/objects/1/hls/index.m3u8", params={**query, "token": token}) as answer:
             assert answer.status == 200, await answer.text()
             text = await answer.text()
-        lines = [it for it in text.splitlines() if it and (not it.startswith("#") or "URI=" in it)]
+        lines = [line for line in text.splitlines() if line and (not line.startswith("#") or "URI=" in line)]
         assert len(lines) > 1
-        assert all("token=token-of-family" in it for it in lines)
-        address = next(it for it in lines if not it.startswith("#"))
+        assert all("token=token-of-family" in line for line in lines)
+        address = next(line for line in lines if not line.startswith("#"))
         async with site.session.get(f"/objects/1/hls/{address}") as answer:
             assert answer.status == 200
             assert "public" not in answer.headers["Cache-Control"]
@@ -173,9 +173,9 @@ async def test_no_token_is_logged(site: ServedSite, caplog: pytest.LogCaptureFix
     async with site.session.get("/api/cameras", params={"token": token_of("lead")}) as answer:
         assert answer.status == 500
     log = [
-        it.getMessage() + (it.exc_text or "")
-        for it in caplog.records
-        if it.name.startswith(("server", "aiohttp.server"))
+        record.getMessage() + (record.exc_text or "")
+        for record in caplog.records
+        if record.name.startswith(("server", "aiohttp.server"))
     ]
     assert log
     assert not any("given" in line or "wrong one" in line for line in log)

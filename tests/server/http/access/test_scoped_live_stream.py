@@ -114,8 +114,8 @@ async def test_sound_is_silent_without_the_person(tmp_path: Path) -> None:
         answers = [await open_stream(served, "/objects/1/best.mp4", who) for who in ("family", "desk")]
         feed_epochs(served, range(3, EPOCHS))
         narrow, full = await finish_streams(served, *answers)
-    assert [round(it * FPS) for it in beeps(full)] == [20, 40, 60, 80, 100]
-    assert [round(it * FPS) for it in beeps(narrow)] == [20, 80, 100]
+    assert [round(beep * FPS) for beep in beeps(full)] == [20, 40, 60, 80, 100]
+    assert [round(beep * FPS) for beep in beeps(narrow)] == [20, 80, 100]
 
 
 @needs_chromium

@@ -52,7 +52,7 @@ async def test_a_scoped_stream_with_boxes_is_gray_without_the_person(tmp_path: P
             feed_epochs(served, range(12, 15))
             data = await read_film(film, 3 * GOP)
     with av.open(io.BytesIO(data), "r") as stream:
-        pictures = [it.to_ndarray(format="bgr24") for it in stream.decode(video=0)]
+        pictures = [frame.to_ndarray(format="bgr24") for frame in stream.decode(video=0)]
     assert len(pictures) >= 3 * GOP
     assert all(map(is_nearly_grey, pictures))
 

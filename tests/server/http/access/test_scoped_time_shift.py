@@ -65,7 +65,7 @@ async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form
     narrow, full = [decoded(await fetch(served, path, who)) for who in ("family", "desk")]
     if form == "ts":
         narrow, full = ({pulse - min(it): shown for pulse, shown in it.items()} for it in (narrow, full))
-    assert_equal_pictures(narrow, expected_pictures(decisions, holds=False))
+    assert_equal_pictures(narrow, expected_pictures(decisions, freezes=False))
     assert_equal_pictures(full, chosen_pictures(decisions))
     assert sum(map(is_gray, narrow.values())) > 8 * GOP
 
@@ -78,7 +78,7 @@ async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
             await asyncio.sleep(0.001)
         decisions += feed_epochs(served, range(12, EPOCHS))
         shown = decoded((await finish_streams(served, theirs))[0])
-    right = expected_pictures(decisions, holds=False)
+    right = expected_pictures(decisions, freezes=False)
     assert min(shown) == 25
     assert [is_gray(shown[it]) for it in (29, 30, 79, 80)] == [False, True, True, False]
     assert_equal_pictures(shown, right)
@@ -96,9 +96,9 @@ async def test_recorded_segments_are_gray_without_the_person(
             reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
             assert reel is not None
             reel._segments.clear()
-        shown[who] = decoded(b"".join([await fetch(served, f"/objects/1/hls/{it}", who) for it in names]))
+        shown[who] = decoded(b"".join([await fetch(served, f"/objects/1/hls/{name}", who) for name in names]))
     assert max(shown["desk"]) == 89
-    right = {"family": expected_pictures(decisions, holds=False), "desk": chosen_pictures(decisions)}
+    right = {"family": expected_pictures(decisions, freezes=False), "desk": chosen_pictures(decisions)}
     for who, pictures in shown.items():
         for pulse, picture in pictures.items():
             np.testing.assert_array_equal(picture, right[who][pulse], f"{who} {pulse}")
@@ -123,6 +123,6 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
                     reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
                     assert reel is not None
                     reel._segments.clear()
-            data = b"".join([await fetch(served, f"/objects/1/{it}", who) for it in names])
-            heard[who] = [round(it * FPS) for it in beeps(data)]
+            data = b"".join([await fetch(served, f"/objects/1/{name}", who) for name in names])
+            heard[who] = [round(beep * FPS) for beep in beeps(data)]
     assert heard == {"family": [20, 80, 100], "desk": [20, 40, 60, 80, 100]}

@@ -273,7 +273,7 @@ async def test_wrong_tokens_are_rate_limited_but_known_valid_ones_are_not(
     site: ServedSite,
 ) -> None:
     assert (await asked(site, **bearer("desk")))[0] == 200
-    codes = [(await asked(site, Authorization=f"Bearer {it}"))[0] for it in range(7)]
+    codes = [(await asked(site, Authorization=f"Bearer {number}"))[0] for number in range(7)]
     assert codes == 5 * [401] + 2 * [429]
     async with site.session.post(SESSION, headers=MINE, json={"token": token_of("lead")}) as answer:
         assert answer.status == 429
@@ -301,7 +301,7 @@ def test_retry_after_is_never_zero(tmp_path: Path) -> None:
 
 
 async def test_an_expired_cookie_does_not_count_as_a_wrong_token(site: ServedSite) -> None:
-    codes = [(await asked(site, Cookie=f"{COOKIE_PREFIX}_hall_0={it}"))[0] for it in range(9)]
+    codes = [(await asked(site, Cookie=f"{COOKIE_PREFIX}_hall_0={number}"))[0] for number in range(9)]
     assert codes == 9 * [401]
 
 

@@ -129,7 +129,9 @@ async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:
     assert 0 == costs[B] < costs[A] < 1
     assert costs[A] == pytest.approx(1 - quality[A] / quality[B])
     for camera, worth in quality.items():
-        assert worth == pytest.approx(math.prod(1 - weights[it] * (1 - terms[camera][it]) for it in weights))
+        assert worth == pytest.approx(
+            math.prod(1 - weights[weight] * (1 - terms[camera][weight]) for weight in weights)
+        )
     assert choice.pop("stay") == 0.0
     assert choice.pop("cut") == pytest.approx((2 * GOP + 0.5 * FPS) * costs[A] + 1.0)
     assert choice == {

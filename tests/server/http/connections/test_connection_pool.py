@@ -181,7 +181,7 @@ def test_a_flood_of_connections_leaves_descriptors_for_the_service(tmp_path: Pat
                 while some := asking.recv(1 << 16):
                     answer += some
             assert said in answer
-        (open_now,) = [it for it in answer.splitlines() if it.startswith(b"process_open_fds ")]
+        (open_now,) = [line for line in answer.splitlines() if line.startswith(b"process_open_fds ")]
         assert float(open_now.split()[1]) < 300 - 32
         wait_for_log(log, b"http.connections_max")
     assert b"Traceback" not in log.read_bytes()
@@ -233,7 +233,7 @@ ACTS = st.lists(
 
 @given(ACTS)
 def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str, int]]) -> None:
-    clock, there, site_with_people = Clock(), list[Connection](), set[int]()
+    clock, there, busy = Clock(), list[Connection](), set[int]()
     places = ConnectionLimiter(BOUNDS, clock)
     for act, address, which in acts:
         it = there[which % len(there)] if there else None
@@ -242,7 +242,7 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
             if new is None:
                 beyond = [it for it in there if it.is_reserved]
                 assert len(beyond) == BOUNDS.for_operators
-                assert all(id(it) in site_with_people for it in beyond)
+                assert all(id(it) in busy for it in beyond)
             else:
                 there.append(new)
         elif act == "time":
@@ -250,13 +250,13 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
             places.close_overdue()
         elif it is not None and act in {"asks", "is sent"}:
             places.busy(it)
-            site_with_people.add(id(it))
+            busy.add(id(it))
             if act == "is sent":
                 places.sending(it)
         elif it is not None:
-            site_with_people.discard(id(it))
+            busy.discard(id(it))
             {"rests": places.idle, "waits": places.receiving, "leaves": places.closed}[act](it)
-        assert not any(it.transport.ended for it in there if id(it) in site_with_people)  # type: ignore[attr-defined]
+        assert not any(it.transport.ended for it in there if id(it) in busy)  # type: ignore[attr-defined]
         there = [it for it in there if not it.closed]
         assert places.open == len(there)
         assert len([it for it in there if not it.is_reserved]) <= BOUNDS.most

@@ -67,11 +67,13 @@ async def joined(stack: AsyncExitStack, served: ServedSite, path: str, **heads: 
 
 async def test_a_token_with_many_players_does_not_take_others_streams(tmp_path: Path) -> None:
     async with site(tmp_path, viewers_max=20) as served:
-        flood = [await fetched(served, DOOR, "door", f"player {it}") for it in range(40)]
+        flood = [await fetched(served, DOOR, "door", f"player {number}") for number in range(40)]
         assert flood == [200] * 20 + [503] * 20
         for name in ("desk", "family", "lead"):
             path = "/objects/1/hls/index.m3u8"
-            assert [await fetched(served, path, name, f"{name} {it}") for it in range(3)] == [200] * 3, name
+            assert [await fetched(served, path, name, f"{name} {number}") for number in range(3)] == [
+                200
+            ] * 3, name
         assert await fetched(served, DOOR, "door", "player 0") == 200, "who came first stays"
         assert await fetched(served, DOOR, "door", "player 19") == 503, "who came last made way"
         for name in ("desk", "family", "lead"):
@@ -150,7 +152,9 @@ def test_shares_become_equal_and_stay_equal(comes: list[tuple[ClientIdentity, st
         shares.release(place)
 
     for holder, stream, weight in comes:
-        before = Counter({it.key: sum(p.weight for p in there if p.client == it) for it in CLIENTS})
+        before = Counter(
+            {client.key: sum(p.weight for p in there if p.client == client) for client in CLIENTS}
+        )
 
         place = Slot(holder, stream, lambda: None, weight)
         place.end = partial(ended, place)
@@ -163,7 +167,9 @@ def test_shares_become_equal_and_stay_equal(comes: list[tuple[ClientIdentity, st
             continue
         there[place] = None
         shares.take(place)
-        after = Counter({it.key: sum(p.weight for p in there if p.client == it) for it in CLIENTS})
+        after = Counter(
+            {client.key: sum(p.weight for p in there if p.client == client) for client in CLIENTS}
+        )
         lost = [key for key in before if after[key] < before[key]]
         assert "o" not in lost
         assert len(lost) <= 1

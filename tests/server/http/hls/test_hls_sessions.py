@@ -113,7 +113,7 @@ async def status(served: ServedSite, path: str, player: str) -> int:
 async def viewers_in_metrics(served: ServedSite) -> float:
     async with served.session.get("/metrics") as answer:
         text = await answer.text()
-    return float(next(it for it in text.splitlines() if it.startswith("myview_viewers ")).split()[1])
+    return float(next(line for line in text.splitlines() if line.startswith("myview_viewers ")).split()[1])
 
 
 @pytest.mark.parametrize("path", PATHS)

@@ -161,11 +161,11 @@ async def test_a_blocked_request_is_answered_when_its_part_exists(served: Served
     }
     part = asyncio.create_task(data_of(served, "1.1.m4s"))
     at_once = read(await text_of(served, "?_HLS_msn=1&_HLS_part=0"))
-    assert [it.uri for it in at_once.parts[1]] == ["1.0.m4s"]
+    assert [part.uri for part in at_once.parts[1]] == ["1.0.m4s"]
     assert not any(task.done() for task in (*waiting.values(), part))
     shows(served, range(PARTS + 1, PARTS + 2))
     first = read(await waiting.pop("?_HLS_msn=1&_HLS_part=1"))
-    assert [it.uri for it in first.parts[1]] == ["1.0.m4s", "1.1.m4s"]
+    assert [part.uri for part in first.parts[1]] == ["1.0.m4s", "1.1.m4s"]
     assert await part == await data_of(served, "1.1.m4s")
     shows(served, range(PARTS + 2, PARTS + 3))
     assert 1 in read(await waiting.pop("?_HLS_msn=1")).whole
@@ -173,7 +173,7 @@ async def test_a_blocked_request_is_answered_when_its_part_exists(served: Served
     await text_of(served)
     assert not last.done(), "a part beyond the last of a segment is the first of the next (6.2.5.2)"
     shows(served, range(PARTS + 3, PARTS + 4))
-    assert [it.uri for it in read(await last).parts[2]] == ["2.0.m4s"]
+    assert [part.uri for part in read(await last).parts[2]] == ["2.0.m4s"]
 
 
 async def test_the_end_of_a_stream_answers_blocked_requests(served: ServedSite) -> None:
@@ -214,7 +214,7 @@ def decoded(data: bytes) -> dict[int, NDArray[np.uint8]]:
     """Decode: each pulse and the last picture in it."""
     with av.open(io.BytesIO(data), "r") as container:
         frames = list(container.decode(video=0))
-    return {round(float(it.time or 0) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+    return {round(float(frame.time or 0) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames}
 
 
 def at(shown: dict[int, NDArray[np.uint8]], pulse: int) -> NDArray[np.uint8]:
@@ -234,8 +234,8 @@ async def test_parts_equal_their_segments_and_independent_ones_are_decodable(
     shows(served, range(gops), nobody=frozenset({5, 6, 7, 10, 13, 14, 15, 16}))
     init = await data_of(served, "init.mp4")
     numbers = range(1, gops // PARTS)
-    segments = decoded(init + b"".join([await data_of(served, f"{it}.m4s") for it in numbers]))
-    uris = [(f"{it}.{part}.m4s", it * PARTS + part) for it in numbers for part in range(PARTS)]
+    segments = decoded(init + b"".join([await data_of(served, f"{number}.m4s") for number in numbers]))
+    uris = [(f"{number}.{part}.m4s", number * PARTS + part) for number in numbers for part in range(PARTS)]
     together = decoded(init + b"".join([await data_of(served, uri) for uri, _ in uris]))
     for pulse in range(PARTS * GOP, gops * GOP):
         np.testing.assert_array_equal(at(together, pulse), at(segments, pulse), str(pulse))
@@ -295,7 +295,7 @@ async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> 
 async def test_a_camera_has_parts_too(served: ServedSite) -> None:
     shows(served, range(2 * PARTS + 1))
     async with served.session.get(f"/cameras/{A}/hls/index.m3u8") as answer:
-        assert [it.uri for it in read(await answer.text()).parts[2]] == ["2.0.m4s"]
+        assert [part.uri for part in read(await answer.text()).parts[2]] == ["2.0.m4s"]
     async with served.session.get(f"/cameras/{A}/hls/2.0.m4s") as answer:
         assert (await answer.read())[4:8] == b"moof"
     async with aiohttp.ClientSession() as other:

@@ -55,7 +55,7 @@ async def played(served: ServedSite, stream: str, listed: list[int]) -> list[tup
     parts = [await fetch(served, f"{stream}/hls/{it}") for it in ("init.mp4", *(f"{n}.m4s" for n in listed))]
     with av.open(io.BytesIO(b"".join(parts)), "r") as container:
         frames = list(container.decode(video=0))
-    shown = {round(float(it.time or 0) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+    shown = {round(float(frame.time or 0) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames}
     return list(shown.items())
 
 

@@ -36,7 +36,7 @@ async def samples(served: ServedSite) -> dict[tuple[str, ...], float]:
     async with served.session.get("/metrics") as answer:
         text = await answer.text()
     found = {}
-    for sample in (it for family in text_string_to_metric_families(text) for it in family.samples):
+    for sample in (sample for family in text_string_to_metric_families(text) for sample in family.samples):
         labels = sorted(sample.labels.items(), key=lambda it: (it[0] == "le", it[0]))
         found[sample.name, *(value for _, value in labels)] = sample.value
     return found
@@ -83,8 +83,8 @@ async def test_invalid_messages_are_counted_at_every_receiver(served: ServedSite
 
 
 def test_the_alert_covers_invalid_messages_at_both_receivers() -> None:
-    [alert] = [it for it in ALERTS if it["alert"] == "MyViewInvalidMessages"]
-    assert [it.name for it in selectors(alert["expr"])] == [_BAD]
+    [alert] = [alert for alert in ALERTS if alert["alert"] == "MyViewInvalidMessages"]
+    assert [selector.name for selector in selectors(alert["expr"])] == [_BAD]
     assert "way" not in alert["expr"]
 
 
@@ -149,7 +149,7 @@ async def test_gops_lost_by_slow_viewers_stay_counted_after_they_leave() -> None
 def measured(lag: LoopLag, what: str) -> float:
     """Return a sample of the histogram of a loop's lag."""
     [family] = lag.histogram.collect()
-    return next(it.value for it in family.samples if it.name.endswith(what))
+    return next(sample.value for sample in family.samples if sample.name.endswith(what))
 
 
 async def test_a_blocked_event_loop_is_measured_as_late() -> None:

@@ -36,7 +36,7 @@ async def test_every_expression_yields_series_with_the_labels_in_its_legend(
     there = await printed(site_with_people)
     assert len(EXPRESSIONS) > 50
     for query in EXPRESSIONS:
-        if {it.name for it in selectors(query.expression)} <= BUILT_IN_METRICS:
+        if {selector.name for selector in selectors(query.expression)} <= BUILT_IN_METRICS:
             continue
         series = select_series(query.expression, there)
         assert series, query.place
@@ -44,7 +44,7 @@ async def test_every_expression_yields_series_with_the_labels_in_its_legend(
 
 
 async def test_every_exported_metric_is_used_by_a_panel_or_alert(site_with_people: ServedSite) -> None:
-    looked_at = {it.name for query in EXPRESSIONS for it in selectors(query.expression)}
+    looked_at = {selector.name for query in EXPRESSIONS for selector in selectors(query.expression)}
     for name in (await printed(site_with_people)).samples:
         if name.startswith("myview_") and not name.endswith(("_created", "_sum", "_count")):
             assert name in looked_at or name in _LOOKED_AT_OTHERWISE, name

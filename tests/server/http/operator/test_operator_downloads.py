@@ -22,13 +22,13 @@ async def rows(served: ServedSite, what: str, span: str) -> list[dict[str, str]]
 async def test_every_box_and_choice_of_the_time_range_is_a_line(site_with_people: ServedSite) -> None:
     site_with_people.service.pulse0 = 1_000_000.0
     tracks = await rows(site_with_people, "tracks", "from=p2&to=p4")
-    assert [(it["frame"], it["camera"], it["object"]) for it in tracks] == [
+    assert [(track["frame"], track["camera"], track["object"]) for track in tracks] == [
         (frame, camera, number) for frame in "34" for camera, number in ((A, "1"), (A, "2"), (B, "1"))
     ]
     assert [tracks[0][it] for it in ("left", "top", "width", "height")] == ["10.00", "10.00", "6.00", "18.00"]
     assert tracks[0]["time"] == "1970-01-12T13:46:40.080Z"
     choices = await rows(site_with_people, "choices", "from=p4&to=p6")
-    assert [(it["frame"], it["object"], it["camera"]) for it in choices] == [
+    assert [(choice["frame"], choice["object"], choice["camera"]) for choice in choices] == [
         ("5", "1", B),
         ("5", "2", A),
         ("6", "1", B),
@@ -37,7 +37,7 @@ async def test_every_box_and_choice_of_the_time_range_is_a_line(site_with_people
 
 
 async def test_without_an_end_the_download_has_all_decisions(site_with_people: ServedSite) -> None:
-    frames = {int(it["frame"]) for it in await rows(site_with_people, "tracks", "from=p0")}
+    frames = {int(row["frame"]) for row in await rows(site_with_people, "tracks", "from=p0")}
     assert frames == set(range(1, site_with_people.service.decision_state.end + 1))
     assert await rows(site_with_people, "tracks", "from=p900") == []
 

@@ -136,7 +136,7 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
 
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:
-    cameras = [{"id": it, "source": "scene:room", "ground": PLAN} for it in CAMERAS]
+    cameras = [{"id": camera, "source": "scene:room", "ground": PLAN} for camera in CAMERAS]
     async with operating(browser, "#floor", cameras=cameras) as (served, page):
         await expect(page.locator("#floor-message")).to_have_text("No camera has reported yet.")
         show_people(served)
@@ -367,7 +367,7 @@ async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browse
         await expect(state).to_have_text("No walk yet.")
         await expect(page.locator("#walk-result")).to_be_hidden()
     matrices = json.loads((tmp_path / "ground.json").read_text())["homography"]
-    assert np.median(errors_on_floor([np.array(matrices[it]) for it in CAMERAS])) < 0.15  # metres
+    assert np.median(errors_on_floor([np.array(matrices[camera]) for camera in CAMERAS])) < 0.15  # metres
 
 
 async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browser) -> None:

@@ -61,8 +61,8 @@ async def test_a_name_is_listed_unchanged(
     await post_edit(site_with_people, object=1, name="Ann [bold]")
     await run_watch(f"http://127.0.0.1:{site_with_people.port}", None, None, None, None, None)
     lines = capsys.readouterr().out.splitlines()
-    assert any(it.split()[:3] == ["1", "Ann", "[bold]"] for it in lines)
-    assert any(it.split()[:2] == ["2", "yes"] for it in lines)
+    assert any(line.split()[:3] == ["1", "Ann", "[bold]"] for line in lines)
+    assert any(line.split()[:2] == ["2", "yes"] for line in lines)
 
 
 async def test_merged_people_have_one_number_from_the_next_gop_on(real: ServedSite) -> None:

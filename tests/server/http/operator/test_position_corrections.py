@@ -55,11 +55,13 @@ async def test_a_camera_receives_the_corrections_with_its_track_id(assisted: Ser
     assert (status, answer["accepted"], answer["too_old"], answer["flags"]) == (200, 2, 0, [])
     [(camera, sent)] = received
     assert (camera, sent.boot) == (A, 1)
-    assert [(it.pulse, it.track, it.x, it.y) for it in sent.corrections] == [
+    assert [
+        (correction.pulse, correction.track, correction.x, correction.y) for correction in sent.corrections
+    ] == [
         (2, 2, 12, 20),
         (7, 2, 12, 20),
     ]
-    assert [it.tolerance for it in sent.corrections] == [pytest.approx(0.02 * WIDTH), 3.0]
+    assert [correction.tolerance for correction in sent.corrections] == [pytest.approx(0.02 * WIDTH), 3.0]
     status, answer = await post_corrections(assisted, at(7), camera=B)
     assert (status, answer["accepted"]) == (200, 1)
     assert received[1][0] == B
@@ -75,7 +77,7 @@ async def test_corrections_that_are_too_old_are_counted_and_not_sent(assisted: S
     received = record_corrections(assisted)
     status, answer = await post_corrections(assisted, at(2), at(30))
     assert (status, answer["accepted"], answer["too_old"]) == (200, 1, 1)
-    assert [it.pulse for it in received[0][1].corrections] == [30]
+    assert [correction.pulse for correction in received[0][1].corrections] == [30]
     assert (await post_corrections(assisted, at(2)))[0] == 409
     assert len(received) == 1
 
@@ -170,7 +172,7 @@ def test_the_inbox_accepts_corrections_for_its_own_run_and_keeps_only_the_newest
 
     receive({"boot": 1, "corrections": [{"pulse": 1, **point}]})
     for first in (0, 200):
-        receive({"boot": 2, "corrections": [{"pulse": first + it, **point} for it in range(200)]})
+        receive({"boot": 2, "corrections": [{"pulse": first + number, **point} for number in range(200)]})
     precise = {"boot": 2, "corrections": [{"pulse": 1, **point, "tolerance": 1e-200}]}
     for bad in (
         b"",

@@ -60,8 +60,8 @@ async def test_boxes_are_drawn_on_their_frames(drawn: DrawnSite) -> None:
         data = await read_film(answer, 4 * GOP)
     with av.open(io.BytesIO(data), "r") as stream:
         pictures = {
-            round(float(it.time or 0) * FPS): (it.to_ndarray(format="bgr24"), it.key_frame)
-            for it in stream.decode(video=0)
+            round(float(frame.time or 0) * FPS): (frame.to_ndarray(format="bgr24"), frame.key_frame)
+            for frame in stream.decode(video=0)
         }
     pulses = sorted(pictures)
     assert pulses == list(range(pulses[0], pulses[0] + 4 * GOP))
@@ -79,9 +79,9 @@ async def test_boxes_are_drawn_on_their_frames(drawn: DrawnSite) -> None:
         edges.append([])
         for place in (pulse - 2, pulse, pulse + 2):
             (box,) = [
-                it
-                for it in drawn.decisions[place // GOP * GOP].boxes[camera][place % GOP]
-                if it[0] == SOMEBODY
+                box
+                for box in drawn.decisions[place // GOP * GOP].boxes[camera][place % GOP]
+                if box[0] == SOMEBODY
             ]
             edges[-1].append(abs(box[1] - x) + abs(box[3] - x - width) + abs(box[4] - y - height))
     before, at, after = np.mean(edges, axis=0)
@@ -209,7 +209,7 @@ async def test_a_killed_worker_is_replaced_and_its_streams_continue(
         await reading.aclose()
     going.cancel()
     with av.open(io.BytesIO(data), "r") as stream:
-        times = [round(float(it.time or 0) * FPS) for it in stream.decode(video=0)]
+        times = [round(float(frame.time or 0) * FPS) for frame in stream.decode(video=0)]
     assert times == sorted(set(times))
     assert len(times) >= 4 * GOP
 

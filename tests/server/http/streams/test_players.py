@@ -89,7 +89,8 @@ async def played(served: ServedSite, *commands: Sequence[str], user: str | None 
     """Run a player for each path while the site runs and ends."""
     pipe = asyncio.subprocess.PIPE
     players = [
-        await asyncio.create_subprocess_exec(*it, stdout=pipe, stderr=pipe, user=user) for it in commands
+        await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe, user=user)
+        for command in commands
     ]
     ends = [asyncio.create_task(player.communicate()) for player in players]
     try:
@@ -115,7 +116,7 @@ async def played(served: ServedSite, *commands: Sequence[str], user: str | None 
 def own(camera: int) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("h264", "r")
     packets = [*(av.Packet(unit.data) for unit in encoded(camera, EPOCHS * STRIDE)), None]
-    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+    return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
 
 
 def check_pictures(served: ServedSite, path: str, output: bytes) -> None:
@@ -176,7 +177,7 @@ def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
     """Find each picture in a camera; a player may repeat or skip pictures, but not go back."""
     known = {it.tobytes(): (pulse, camera) for camera in range(2) for pulse, it in enumerate(own(camera))}
     assert len(known) == 2 * EPOCHS * STRIDE, "no picture is like another"
-    shown = [known[it] for it in pictures]
+    shown = [known[picture] for picture in pictures]
     pulses = [pulse for pulse, _ in shown]
     assert all(before <= after for before, after in pairwise(pulses)), path
     assert pulses[0] <= 20 * STRIDE, path
@@ -192,8 +193,8 @@ def pictures_of(film: bytes) -> list[bytes]:
     mark = b"FRAME\n"
     whole = len(mark) + WIDTH * HEIGHT * 3 // 2
     pieces = [rest[at : at + whole] for at in range(0, len(rest), whole)]
-    assert all(it.startswith(mark) and len(it) == whole for it in pieces)
-    return [it.removeprefix(mark) for it in pieces]
+    assert all(piece.startswith(mark) and len(piece) == whole for piece in pieces)
+    return [piece.removeprefix(mark) for piece in pieces]
 
 
 @needs_vlc

@@ -47,13 +47,13 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
         counters = ContinuityCounters(tables, video, aligned=not live)
         data += pack(pictures, FPS, counters)
         pulse, tables = pulse + len(gop), tables + 1
-        video += sum(count_packets(it) for it in pictures) if live else 0
+        video += sum(count_packets(picture) for picture in pictures) if live else 0
         sent += pictures
     packets = parse_packets(data)
     check_counters(packets)
     assert {packet.pid for packet in packets[:2]} == {0, 0x1000}, "tables first"
     contents: list[bytes] = []
-    for packet in [it for it in packets if it.pid == 0x100]:
+    for packet in [packet for packet in packets if packet.pid == 0x100]:
         contents[len(contents) :] = [b""] if packet.begins else []
         contents[-1] += packet.payload
     assert len(contents) == len(sent)
@@ -76,7 +76,7 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
 def test_clock_references_are_frequent_and_precede_their_pictures(pulse: int, fps: float) -> None:
     pictures = [picture(pulse, 50, key=True, fps=fps), picture(pulse + 1, 30, duration=40, fps=fps)]
     packets = parse_packets(pack(pictures, fps, ContinuityCounters()))
-    times = [it.pcr // 300 for it in packets if it.pcr is not None]
+    times = [packet.pcr // 300 for packet in packets if packet.pcr is not None]
     assert all(0 < (later - earlier) % CLOCK <= 9000 for earlier, later in pairwise(times))
     assert 0 < (ticks(pulse, fps) - times[0]) % CLOCK <= 90_000
     check_counters(packets)
@@ -98,7 +98,9 @@ def spliced(cameras: list[int]) -> tuple[bytes, list[tuple[int, int]]]:
 def own_pictures(camera: int) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
     decoder = av.CodecContext.create("h264", "r")
     count_packets = [*(av.Packet(unit.data) for unit in encoded(camera)), None]
-    return [it.to_ndarray(format="yuv420p") for packet in count_packets for it in decoder.decode(packet)]
+    return [
+        frame.to_ndarray(format="yuv420p") for packet in count_packets for frame in decoder.decode(packet)
+    ]
 
 
 def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:
@@ -106,9 +108,9 @@ def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:
     own = [own_pictures(camera) for camera in range(2)]
     with av.open(io.BytesIO(data), format="mpegts") as container:
         pictures = list(container.decode(video=0))
-    assert [round(float(it.time or 0) * FPS) for it in pictures] == [pulse for _, pulse in frames]
-    for it, (camera, pulse) in zip(pictures, frames, strict=True):
-        np.testing.assert_array_equal(it.to_ndarray(format="yuv420p"), own[camera][pulse])
+    assert [round(float(picture.time or 0) * FPS) for picture in pictures] == [pulse for _, pulse in frames]
+    for picture, (camera, pulse) in zip(pictures, frames, strict=True):
+        np.testing.assert_array_equal(picture.to_ndarray(format="yuv420p"), own[camera][pulse])
 
 
 @needs_ffprobe

@@ -41,7 +41,7 @@ def is_gray(picture: NDArray[np.uint8]) -> bool:
 @given(st.sampled_from(PRESETS), Sizes)
 def test_it_is_gray_and_the_pictures_around_it_are_unchanged(preset: str, blocks: tuple[int, int]) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
-    samples = [join_sample(nal_units(it.data)) for it in units]
+    samples = [join_sample(nal_units(unit.data)) for unit in units]
     parameters, writer = parameter_sets(nal_units(units[0].data)), slice_header_format(units[0])
     assert parameters is not None
     gray = [gray_picture(parameters, 0), writer.repeat(1, reference=True), gray_picture(parameters, 1)]
@@ -97,10 +97,17 @@ def test_a_gray_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> Non
         *(it.fragment for it in shown),
     ])  # fmt: skip
     with av.open(io.BytesIO(data), "r") as stream:
-        pictures = [it.to_ndarray(format="yuv420p") for it in stream.decode(video=0)]
+        pictures = [frame.to_ndarray(format="yuv420p") for frame in stream.decode(video=0)]
     assert len(pictures) == 6 * GOP
-    assert [is_gray(it) for it in pictures[::GOP]] == [True, False, True, False, True, False]
-    assert [is_gray(it) for it in pictures[GOP - 1 :: GOP]] == [True, False, True, False, True, False]
+    assert [is_gray(picture) for picture in pictures[::GOP]] == [True, False, True, False, True, False]
+    assert [is_gray(picture) for picture in pictures[GOP - 1 :: GOP]] == [
+        True,
+        False,
+        True,
+        False,
+        True,
+        False,
+    ]
 
 
 def with_explicit_order(parameters: ParameterSets) -> ParameterSets:
@@ -150,4 +157,6 @@ def test_parameter_sets_of_arbitrary_bytes_are_used_or_unsupported(
 def test_a_gray_gop_of_vp8_has_no_gap() -> None:
     stream_format: Any = Vp8StreamFormat(WIDTH, HEIGHT)
     pictures = stream_format.blank(None, 10, 5, FPS)
-    assert [(it.pulse, it.until, it.key) for it in pictures] == [(n, n + 1, n == 10) for n in range(10, 15)]
+    assert [(picture.pulse, picture.until, picture.key) for picture in pictures] == [
+        (n, n + 1, n == 10) for n in range(10, 15)
+    ]

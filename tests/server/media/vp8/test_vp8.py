@@ -44,7 +44,9 @@ def encoded(width: int, height: int, missed: frozenset[int] = frozenset()) -> tu
 def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
     context = av.CodecContext.create(decoder, "r")
     assert isinstance(context, av.VideoCodecContext)
-    return [it.to_ndarray(format="yuv420p") for data in frames for it in context.decode(av.Packet(data))]
+    return [
+        frame.to_ndarray(format="yuv420p") for data in frames for frame in context.decode(av.Packet(data))
+    ]
 
 
 @settings(max_examples=25, deadline=None)

@@ -83,7 +83,7 @@ async def test_a_walk_yields_the_scenes_homographies(wide: ServedSite, tmp_path:
     cameras = [{"id": name, "source": "scene:room"} for name in (A, B)]
     assert content["configuration"].startswith("ground: ground.json\n")
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="walk", folder=tmp_path)
-    errors = errors_on_floor([np.array(it.ground) for it in config.cameras])
+    errors = errors_on_floor([np.array(camera.ground) for camera in config.cameras])
     assert np.median(errors) < 0.15  # metres
     assert wide.service.config == before  # nothing in force has changed
     async with wide.session.delete(WALK, headers=MINE) as answer:

@@ -47,7 +47,7 @@ def test_a_floor_point_is_covered_if_it_is_in_the_picture_and_not_too_far(
         return
     np.testing.assert_allclose(mapped[:2] / mapped[2], there, rtol=1e-6, atol=1e-9)
     nearest = max(
-        (part.homography @ np.append(Letterbox(OWN, SITE).to_site(np.array(it)), 1.0))[2] for it in EDGES
+        (part.homography @ np.append(Letterbox(OWN, SITE).to_site(np.array(edge)), 1.0))[2] for edge in EDGES
     )
     reach = mapped[2] / nearest * FARTHEST_RATIO
     if abs(reach - 1) > 1e-3 and 1 < x < 319 and 1 < y < 239:

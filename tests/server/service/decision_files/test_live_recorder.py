@@ -39,14 +39,14 @@ def test_skipped_decisions_are_listed_once_there_is_room(
     writer.close()
     after = written(tmp_path)
     frames = [*range(1, GOP + 1), *range(4 * GOP + 1, 5 * GOP + 1)]
-    assert [int(it.split(",")[0]) for it in after["choices.csv"].splitlines()[1:]] == frames
-    assert [int(it.split(",")[0]) for it in after["c0.txt"].splitlines()] == frames
+    assert [int(line.split(",")[0]) for line in after["choices.csv"].splitlines()[1:]] == frames
+    assert [int(line.split(",")[0]) for line in after["c0.txt"].splitlines()] == frames
     assert after["late.csv"].splitlines()[1:] == [
         *[f"{4 * GOP + 1},{B},no frame"] * 3,
         f"{GOP + 1},,not written up to {4 * GOP}",
         f"{5 * GOP + 1},{A},tracks late",
     ]
-    logged = [it.getMessage() for it in caplog.records]
+    logged = [record.getMessage() for record in caplog.records]
     assert len(logged) == 2
     assert "decisions are skipped until writing succeeds" in logged[0]
     assert f"{3 * GOP} frames are missing" in logged[1]

@@ -25,7 +25,7 @@ def test_texts_are_appended_to_all_files_or_to_none(
 ) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        files = AtomicFiles({folder / it: head for it, head in zip(NAMES, heads, strict=True)})
+        files = AtomicFiles({folder / name: head for name, head in zip(NAMES, heads, strict=True)})
         expected = dict(zip(NAMES, heads, strict=True))
         for it in appended:
             longer = {which: expected[which] + it.get(which, "") for which in NAMES}

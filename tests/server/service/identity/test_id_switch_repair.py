@@ -23,7 +23,7 @@ def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
     tracks = range(1, len(boxes) + 1)
     last = first + boxes.shape[1] - 1
     message = camera_tracks("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
-    keys = tuple(TrackKey("c0", it) for it in tracks)
+    keys = tuple(TrackKey("c0", track) for track in tracks)
     letterbox = Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT))
     return CameraWindow(message, keys, np.array(list(tracks)), letterbox, boxes, first)
 

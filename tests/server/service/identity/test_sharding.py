@@ -158,7 +158,7 @@ async def test_people_of_another_service_are_listed_and_redirected(
                 return answer.status, answer.headers.get("Location"), content
 
         _, _, objects = await get("/api/objects")
-        assert [it["object"] for it in objects["objects"]] == [1, 3]
+        assert [object["object"] for object in objects["objects"]] == [1, 3]
         assert objects["elsewhere"] == [{"object": 2, "server": "http://one:1/" if told else None}]
         assert (await get("/api/objects/1/choice"))[0] == 200
         for path in ("objects/2/best.mp4?a=b", "api/objects/2/choice", "objects/2/thumb.jpg"):

@@ -13,7 +13,7 @@ REACH = 100  # pulses
 
 def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     """Return what is said to so many pulses behind, second by second."""
-    times = iter(it * every_s for it in range(len(behind)))
+    times = iter(number * every_s for number in range(len(behind)))
     keeping_up = BacklogMonitor(REACH, lambda: next(times))
     return [keeping_up.is_lost(it) for it in behind]
 
@@ -22,7 +22,7 @@ def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     "behind",
     [
         [0, REACH] * 10,
-        [1500 - 100 * it for it in range(14)],  # it was stopped, and makes up for it
+        [1500 - 100 * number for number in range(14)],  # it was stopped, and makes up for it
         [REACH + 1] * 2,  # it may, by then
         [REACH + 1, REACH + 1, REACH] * 5,
     ],
@@ -34,5 +34,5 @@ def test_nothing_is_skipped_while_decisions_keep_up_or_catch_up(behind: list[int
 
 @pytest.mark.parametrize("more", [0, 5, 25])
 def test_a_backlog_that_does_not_shrink_is_skipped_and_then_has_time_again(more: int) -> None:
-    behind = [REACH + 1 + more * it for it in range(3)]
+    behind = [REACH + 1 + more * number for number in range(3)]
     assert lost(behind + behind) == [False, False, True] * 2

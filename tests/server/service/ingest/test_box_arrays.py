@@ -30,4 +30,6 @@ def test_any_number_of_boxes_is_converted() -> None:
 
 def test_integer_coordinates_are_converted() -> None:
     assert boxes_array([[(1, 2, 3.5, 4), None]])[0].tolist() == [1.0, 2.0, 3.5, 4.0]
-    assert boxes_array([[(2**40, 2**41, 2**42, 2**43)]]).tolist() == [[2.0**it for it in range(40, 44)]]
+    assert boxes_array([[(2**40, 2**41, 2**42, 2**43)]]).tolist() == [
+        [2.0**number for number in range(40, 44)]
+    ]

@@ -164,7 +164,7 @@ def test_recent_epochs_and_those_with_windows_are_not_skipped() -> None:
     aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []
     one_by_one = (FAR - GRACE) // STRIDE
-    assert [it.number for it in aligner.ready(now=FAR)] == list(range(one_by_one))
+    assert [epoch.number for epoch in aligner.ready(now=FAR)] == list(range(one_by_one))
     aligner.add_tracks(window("c0", one_by_one))
     (spoken,) = taken(aligner, 1000 * FAR, 2)
     (leap,) = taken(aligner, 1000 * FAR + STRIDE + GRACE, 1)
@@ -185,7 +185,7 @@ def test_windows_far_from_the_present_do_not_determine_the_first_epoch() -> None
 def test_no_epoch_of_recordings_is_skipped() -> None:
     aligner = connected_aligner("c0")
     aligner.add_tracks(window("c0", 1000))
-    assert [it.number for it in taken(aligner, 10**9, 1001)] == list(range(1001))
+    assert [epoch.number for epoch in taken(aligner, 10**9, 1001)] == list(range(1001))
 
 
 BEHIND = 50
@@ -258,6 +258,6 @@ def test_a_window_ahead_of_time_does_not_cut_other_cameras_off() -> None:
     epochs = aligner.ready(now=late)
     assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "it was waited for"
     aligner.add_tracks(window("c1", 8))
-    taken_out = [it for now in range(late, 9 * STRIDE) for it in aligner.ready(now)]
+    taken_out = [epoch for now in range(late, 9 * STRIDE) for epoch in aligner.ready(now)]
     assert "c1" in next(it.tracks for it in taken_out if it.number == 8)
     assert aligner.late_messages["c1"] == 0

@@ -23,7 +23,7 @@ def late_revision(epoch: int) -> CameraTracks:
     last = end_of_epoch(epoch, STRIDE)
     said = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
     frames = last - MENDED + 1
-    tracks = [msgspec.structs.replace(it, boxes=it.boxes[:1] * frames) for it in said.tracks]
+    tracks = [msgspec.structs.replace(track, boxes=track.boxes[:1] * frames) for track in said.tracks]
     return msgspec.structs.replace(said, tracks=tracks)
 
 

@@ -56,7 +56,7 @@ def test_each_camera_is_logged_separately(caplog: pytest.LogCaptureFixture) -> N
     lossy = LossyEpochs()
     lossy.epochs(range(5), late=A)
     lossy.epochs(range(5, 10), late=B)
-    assert [it.partition(":")[0] for it in caplog.messages] == [f"camera {A}", f"camera {B}"]
+    assert [message.partition(":")[0] for message in caplog.messages] == [f"camera {A}", f"camera {B}"]
 
 
 def test_a_camera_that_has_disconnected_is_not_logged_as_in_time(caplog: pytest.LogCaptureFixture) -> None:

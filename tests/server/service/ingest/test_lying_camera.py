@@ -76,7 +76,7 @@ def of_one(epoch: int, /, **changes: Any) -> list[Message]:
 
 def very_many(epoch: int) -> list[Message]:
     boxes = [SMALL] * STRIDE
-    many = [TrackMessage(id=it, boxes=[*boxes], confidence=1.0) for it in range(TRACKS_MAX + 1)]
+    many = [TrackMessage(id=number, boxes=[*boxes], confidence=1.0) for number in range(TRACKS_MAX + 1)]
     return altered_tracks(epoch, tracks=msgspec.to_builtins(many))
 
 
@@ -119,7 +119,7 @@ TAKEN: dict[str, LyingMessages] = {
     "frames long past": lambda epoch: frames(epoch, pulse=epoch),
     "frames a minute ahead": lambda epoch: frames(epoch, pulse=1400 + epoch),
     "windows a minute ahead": lambda epoch: [
-        it for ahead in range(40) for it in correct_tracks(epoch + ahead)
+        track for ahead in range(40) for track in correct_tracks(epoch + ahead)
     ],
     "another run each time": lambda epoch: [*frames(epoch, boot=epoch), *altered_tracks(epoch, boot=epoch)],
     "ended, again and again": lambda epoch: [*frames(epoch), *altered_tracks(epoch, ended=True)],
@@ -132,7 +132,7 @@ TAKEN: dict[str, LyingMessages] = {
     ),
     "tracks of any number": lambda epoch: of_one(epoch, id=2**62 - epoch),
     "small pictures without end": lambda epoch: [
-        thumbnail(LIAR, epoch * 1000 + it, b"jpeg", pulse=epoch) for it in range(400)
+        thumbnail(LIAR, epoch * 1000 + number, b"jpeg", pulse=epoch) for number in range(400)
     ],
 }
 
@@ -183,7 +183,7 @@ class LyingSite:
         while self.service.pulse < pulse:
             self.service.pulse += 1
             self.service.decide()
-            self.shown += [it for it in self._viewer._queue if isinstance(it, MediaChunk)]
+            self.shown += [chunk for chunk in self._viewer._queue if isinstance(chunk, MediaChunk)]
             self._viewer._queue.clear()
 
 
@@ -204,11 +204,13 @@ async def test_implausible_messages_of_one_camera_do_not_affect_the_other(name: 
     number = people.person_of(OTHER, 1, 7, site.last)
     assert number is not None, "its person is somebody"
     assert number < 20
-    decisions = [it for it in site.decided if STRIDE <= it.first <= site.last]
-    assert [it.first for it in decisions] == list(range(STRIDE, site.last, GOP)), (
+    decisions = [decision for decision in site.decided if STRIDE <= decision.first <= site.last]
+    assert [decision.first for decision in decisions] == list(range(STRIDE, site.last, GOP)), (
         "all is decided, and in order"
     )
-    assert all(it.choices.get(number) in CAMERAS for it in decisions), "they are shown all the time"
+    assert all(decision.choices.get(number) in CAMERAS for decision in decisions), (
+        "they are shown all the time"
+    )
     sent = [picture.pulse for it in site.shown for picture in it.pictures]
     assert [it for it in sent if it <= site.last] == list(range(site.last + 1)), "and the stream goes on"
     assert any(camera == OTHER for camera, *_ in service.ingest.thumbnails)
@@ -248,7 +250,7 @@ def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
 
 def test_the_scripted_messages_here_are_like_a_cameras() -> None:
     right = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
-    assert [msgspec.json.decode(it.attachment) for it in frames(0)] == [
+    assert [msgspec.json.decode(frame.attachment) for frame in frames(0)] == [
         msgspec.json.decode(it.attachment) for it in right
     ]
     assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == camera_tracks(

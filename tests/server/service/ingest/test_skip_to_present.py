@@ -76,9 +76,11 @@ def test_a_service_that_was_suspended_skips_to_the_present(
     before = decided[-1].first + GOP
     then = hours * HOUR
     lived(service, range(then, then + BEFORE))
-    firsts = [it.first for it in decided]
+    firsts = [decision.first for decision in decided]
     assert firsts == [*range(0, before, GOP), *range(then * STRIDE, (then + BEFORE - 1) * STRIDE, GOP)]
-    assert all(it.choices[0].camera == "c1" for it in decided[-3:]), "all is known of what is of now"
+    assert all(decision.choices[0].camera == "c1" for decision in decided[-3:]), (
+        "all is known of what is of now"
+    )
     assert service.decision_state.end == decided[-1].first + GOP
     service.close()
     rows = (tmp_path / "late.csv").read_text(encoding="utf-8").splitlines()[1:]
@@ -96,13 +98,15 @@ def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
 ) -> None:
     lived(service, range(BEFORE))
     channels = [service.splicer.decided_cameras["c0"], *service.splicer.persons.values()]
-    viewers = [it.subscribe() for it in channels]
+    viewers = [channel.subscribe() for channel in channels]
     until, then = service.decision_state.end, minutes * HOUR // 60 // ENCODED * ENCODED
     lived(service, range(then, then + BEFORE))
     for viewer in viewers:
-        footage = [it for it in viewer._queue if isinstance(it, MediaChunk) and it.until > until]
+        footage = [chunk for chunk in viewer._queue if isinstance(chunk, MediaChunk) and chunk.until > until]
         first, *more = [(it.first, it.until) for it in footage]
-        expected = [(it, it + GOP) for it in range(then * STRIDE, service.decision_state.end, GOP)]
+        expected = [
+            (number, number + GOP) for number in range(then * STRIDE, service.decision_state.end, GOP)
+        ]
         if minutes < 60:
             assert first == (until, then * STRIDE)
             assert len(footage[0].pictures) == 1
@@ -117,7 +121,7 @@ def test_a_backlog_of_a_minute_is_decided_epoch_by_epoch(service: FedService) ->
     lived(service, range(BEFORE))
     then = HOUR // 60
     lived(service, range(then, then + BEFORE))
-    assert [it.first for it in decided] == list(range(0, service.decision_state.end, GOP)), (
+    assert [decision.first for decision in decided] == list(range(0, service.decision_state.end, GOP)), (
         "nothing is left out"
     )
     service.close()
@@ -165,7 +169,7 @@ async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(oth
     await service.does()
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
-    assert [it.first for it in decided[:2]] == [now * STRIDE, now * STRIDE + GOP]
+    assert [decision.first for decision in decided[:2]] == [now * STRIDE, now * STRIDE + GOP]
     service.close()
 
 
@@ -176,7 +180,7 @@ async def test_a_site_without_a_pulse_server_is_decided(monkeypatch: pytest.Monk
     running = asyncio.create_task(service.run())
     for epoch in range(4):
         await service.says(epoch, *CAMERAS)
-    assert [it.first for it in decided] == [0, GOP, 2 * GOP]
+    assert [decision.first for decision in decided] == [0, GOP, 2 * GOP]
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
     service.close()

@@ -83,7 +83,10 @@ def played(
             )
             assert request is not None
             marked = [
-                PositionCorrection(it.pulse, it.track, it.x, it.y, it.tolerance) for it in request.corrections
+                PositionCorrection(
+                    correction.pulse, correction.track, correction.x, correction.y, correction.tolerance
+                )
+                for correction in request.corrections
             ]
         message = camera.take(frame, marked)
         if message is None:

@@ -45,7 +45,7 @@ def records(store: RecordingFolder, clocks: ManualClocks, gops: range) -> None:
 
 def segments_on_disk(folder: Path) -> list[int]:
     """Return the GOPs whose pictures are on the disk."""
-    return sorted(int(it.stem) // GOP for it in folder.glob("*/cameras/c0/*.mp4"))
+    return sorted(int(path.stem) // GOP for path in folder.glob("*/cameras/c0/*.mp4"))
 
 
 def recorded(folder: Path, clocks: ManualClocks, gops: int = 10) -> None:
@@ -111,7 +111,7 @@ def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
     clocks.jump(seconds)
     store = opened(tmp_path, clocks)
     assert segments_on_disk(tmp_path) == list(range(10))
-    (logged,) = [it for it in caplog.messages if "does not count" in it]
+    (logged,) = [message for message in caplog.messages if "does not count" in message]
     assert "the clock is not synchronized (NTP)" in logged
     for gop in range(10, 18):
         records(store, clocks, range(gop, gop + 1))
@@ -153,14 +153,18 @@ def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchr
     clocks.power_off(7 * 86_400.0)
     store = opened(tmp_path, clocks, bounds)
     assert segments_on_disk(tmp_path) == list(range(30)), "there is time to set a clock right that is wrong"
-    assert [it for it in caplog.messages if "was off for 7.0 days" in it and "UTC on that counts" in it]
+    assert [
+        message
+        for message in caplog.messages
+        if "was off for 7.0 days" in message and "UTC on that counts" in message
+    ]
     clocks.now += TRIAL_S
     deleted = []
     for gop in range(30, 34):
         records(store, clocks, range(gop, gop + 1))
-        deleted.append(30 - len([it for it in segments_on_disk(tmp_path) if it < 30]))
+        deleted.append(30 - len([first for first in segments_on_disk(tmp_path) if first < 30]))
     assert deleted == [10, 20, 30, 30], "in parts"
-    logged = [it for it in caplog.messages if "deleted the oldest" in it]
+    logged = [message for message in caplog.messages if "deleted the oldest" in message]
     assert (
         "10 older than record.keep_s (86400 s); 20 more are too old and are deleted in the next passes"
         in logged[0]
@@ -258,12 +262,12 @@ def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
 ) -> None:
     clocks.wall += YEAR_S
     recorded(tmp_path, clocks)
-    (late,) = [it.name for it in tmp_path.iterdir() if it.is_dir()]
+    (late,) = [path.name for path in tmp_path.iterdir() if path.is_dir()]
     clocks.jump(-YEAR_S)
     store = opened(tmp_path, clocks)
     records(store, clocks, range(10, 20))
     store.close()
-    early = next(it.name for it in tmp_path.iterdir() if it.is_dir() and it.name != late)
+    early = next(path.name for path in tmp_path.iterdir() if path.is_dir() and path.name != late)
     assert early < late, "names are by the clock"
     size = sum(session.size for session in (*store.earlier, store.session) if session is not None)
     again = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
@@ -329,7 +333,7 @@ def test_deletions_are_logged_rarely_and_with_their_reason(
     records(store, clocks, range(20))
     clocks.now += 3600
     records(store, clocks, range(20, 21))
-    (first, second) = [it for it in caplog.messages if "deleted the oldest" in it]
+    (first, second) = [message for message in caplog.messages if "deleted the oldest" in message]
     assert first.endswith("/0: 1 older than record.keep_s (1 s)")
     assert second.endswith("/95: 19 older than record.keep_s (1 s)")
     store.close()

@@ -183,7 +183,7 @@ async def test_audio_that_was_deleted_or_not_recorded_is_silent(served: ServedSi
     silent = {*range(round(30 * FRAME / 1920), round(60 * FRAME / 1920)), *range(gone, gone + 2 * GOP)}
     kept = [at for at in BEEP_TIMES if round(at * FPS) not in silent]
     # The frame before what is gone has the beginning of a beep: frames of AAC overlap.
-    assert [it for it in beeps(data) if abs(it - gone / FPS) > MAX_AV_OFFSET_S] == pytest.approx(
+    assert [beep for beep in beeps(data) if abs(beep - gone / FPS) > MAX_AV_OFFSET_S] == pytest.approx(
         kept, abs=MAX_AV_OFFSET_S
     )
 
@@ -204,7 +204,7 @@ async def test_the_audio_of_an_earlier_session_plays_after_a_restart(recording: 
             if gops.start:
                 data = await download(served, f"/cameras/c0/live.mp4?from=p0&to=p{FRAMES}")
                 assert beeps(data) == pytest.approx(
-                    [it for it in BEEP_TIMES if it < FRAMES / FPS - 0.2], abs=MAX_AV_OFFSET_S
+                    [time for time in BEEP_TIMES if time < FRAMES / FPS - 0.2], abs=MAX_AV_OFFSET_S
                 )
                 unbroken(data)
 
@@ -223,12 +223,12 @@ async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
         )
     session = store.session
     assert session is not None
-    firsts = [it.first for it in session.segments]
+    firsts = [segment.first for segment in session.segments]
     assert firsts[0] > 0
-    assert sorted(int(it.stem) for it in (session.folder / "sound").glob("0*.mp4")) == firsts
+    assert sorted(int(path.stem) for path in (session.folder / "sound").glob("0*.mp4")) == firsts
     assert session.audio.index.all[0].first == firsts[0]
     assert session.size == pytest.approx(
-        sum(it.stat().st_size for it in session.folder.rglob("*") if it.is_file()), abs=3000
+        sum(path.stat().st_size for path in session.folder.rglob("*") if path.is_file()), abs=3000
     )
     store.close()
     again = RecordingFolder(tmp_path, UNLIMITED)

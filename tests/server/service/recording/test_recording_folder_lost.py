@@ -97,19 +97,21 @@ def records(store: RecordingFolder, gops: range) -> None:
 
 def nothing_is_orphaned(folder: Path) -> None:
     """Check that whatever is on the disk is known to a service that begins, which takes it away some day."""
-    before = {it for it in folder.rglob("*") if it.is_file()}
+    before = {path for path in folder.rglob("*") if path.is_file()}
     store = RecordingFolder(folder, UNLIMITED)
     store.open()
     store.close()
-    assert {it for it in folder.rglob("*") if it.is_file()} == before, "nothing had to be tidied up"
+    assert {path for path in folder.rglob("*") if path.is_file()} == before, "nothing had to be tidied up"
     named = {
-        it
+        file
         for session in store.earlier
         for first in session.segments
-        for it in session.paths.segment_files(first.first)
+        for file in session.paths.segment_files(first.first)
     }
     lists = {
-        it.path for session in store.earlier for it in (*session.cameras.values(), *session.objects.values())
+        camera.path
+        for session in store.earlier
+        for camera in (*session.cameras.values(), *session.objects.values())
     }
     fixed = {
         session.folder / it
@@ -132,10 +134,10 @@ def shown(folder: Path) -> list[int]:
 @pytest.mark.parametrize(
     "harm",
     [
-        *(pytest.param(gone(it), id=f"gone {it}") for it in [*LEVELS, *FILES]),
-        *(pytest.param(moved(it), id=f"moved {it}") for it in LEVELS),
-        *(pytest.param(made_anew(it), id=f"anew {it}") for it in LEVELS),
-        *(pytest.param(made_a_file(it), id=f"a file {it}") for it in LEVELS[1:]),
+        *(pytest.param(gone(level), id=f"gone {level}") for level in [*LEVELS, *FILES]),
+        *(pytest.param(moved(level), id=f"moved {level}") for level in LEVELS),
+        *(pytest.param(made_anew(level), id=f"anew {level}") for level in LEVELS),
+        *(pytest.param(made_a_file(level), id=f"a file {level}") for level in LEVELS[1:]),
         *(
             pytest.param(cut_short(it), id=f"short {it}")
             for it in ["RUN/cameras/c0.m3u8", "RUN/session.json"]
@@ -186,7 +188,7 @@ def test_a_disk_that_is_mounted_again_is_recorded_to_and_its_sessions_are_known(
     away.rename(folder)
     records(store, range(6, 9))
     (earlier,) = store.earlier
-    assert [(it.first, it.end) for it in earlier.objects[1].index.all] == [(0, 3 * GOP)]
+    assert [(entry.first, entry.end) for entry in earlier.objects[1].index.all] == [(0, 3 * GOP)]
     store.close()
     assert shown(folder) == [*range(3 * GOP), *range(6 * GOP, 9 * GOP)]
     nothing_is_orphaned(folder)
@@ -238,7 +240,7 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
         first.open()
         records(first, range(12))
         first.close()
-        closed = [it for it in tmp_path.rglob("*") if it.is_dir()]
+        closed = [path for path in tmp_path.rglob("*") if path.is_dir()]
         for it in closed:
             it.chmod(0o500)
         store = RecordingFolder(tmp_path, RetentionLimits(1e-9, 1e6, 1.0))
@@ -247,8 +249,8 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
         for it in closed:
             it.chmod(0o700)
         assert store.session is not None
-        assert [(it.first, it.end) for it in store.session.cameras[A].index.all] == [(100, 120)]
-        logged = [it for it in caplog.messages if "cannot delete expired segments" in it]
+        assert [(entry.first, entry.end) for entry in store.session.cameras[A].index.all] == [(100, 120)]
+        logged = [message for message in caplog.messages if "cannot delete expired segments" in message]
         assert len(logged) == 1
         assert "Permission denied" in logged[0]
         store.close()
@@ -258,11 +260,11 @@ def test_a_full_disk_leaves_no_files_at_any_try_and_then_recording_continues(tmp
     store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
     records(store, range(3))
-    before = {it for it in tmp_path.rglob("*") if it.is_file()}
+    before = {path for path in tmp_path.rglob("*") if path.is_file()}
     for size in (0, 100, len(filled_buffers()[1]) + 100):
         with files_of_at_most(size):
             records(store, range(5, 8))
-        assert {it for it in tmp_path.rglob("*") if it.is_file()} == before
+        assert {path for path in tmp_path.rglob("*") if path.is_file()} == before
     records(store, range(8, 10))
     store.close()
     assert shown(tmp_path) == [*range(3 * GOP), *range(8 * GOP, 10 * GOP)]
@@ -298,7 +300,7 @@ def test_a_session_without_decision_files_stays_and_ages(tmp_path: Path) -> None
     again = RecordingFolder(tmp_path, UNLIMITED)
     again.open()
     again.close()
-    assert [it.first for it in again.earlier[0].segments] == [0, 25, 50]
+    assert [segment.first for segment in again.earlier[0].segments] == [0, 25, 50]
     assert set(shown(tmp_path)) == set(range(12 * GOP))
 
 
@@ -312,7 +314,7 @@ def test_starting_a_new_session_folder_is_logged_once(
         assert store.session is not None
         shutil.rmtree(store.session.folder / "cameras" / "c0")
     store.close()
-    lines = [it for it in caplog.records if it.levelno >= logging.WARNING]
+    lines = [record for record in caplog.records if record.levelno >= logging.WARNING]
     assert len(lines) == 1
     assert lines[0].getMessage().endswith(": No such file or directory; starting a new folder")
 
@@ -320,9 +322,9 @@ def test_starting_a_new_session_folder_is_logged_once(
 @pytest.fixture
 async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Person 1 is in c0 for six GOPs, of which only the last is in memory."""
-    async for it in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        await shows(it)
-        yield it
+    async for site_served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        await shows(site_served)
+        yield site_served
 
 
 async def shows(served: ServedSite) -> None:
@@ -372,7 +374,7 @@ async def test_lost_recordings_are_not_offered(served: ServedSite, harm: Harm) -
         assert body.count(b"\n") == 0
     for path in ("/api/objects/1/past", "/api/cameras/c0/past"):
         spans = (await served.get_json(path))["spans"]
-        assert [it["first"] for it in spans] == [spans[0]["first"]], "what is in memory"
+        assert [span["first"] for span in spans] == [spans[0]["first"]], "what is in memory"
         assert spans[0]["first"] >= 4 * GOP, path
 
 
@@ -406,7 +408,7 @@ async def test_a_lost_segment_is_a_gap(served: ServedSite) -> None:
     store.session.paths.camera_file(A, 0).unlink()
     (store.session.paths.camera_file(A, 2 * GOP)).write_bytes(b"cut short")
     spans = (await served.get_json("/api/cameras/c0/past"))["spans"]
-    assert [it["first"] for it in spans] == [4 * GOP]
+    assert [span["first"] for span in spans] == [4 * GOP]
     assert [it["first"] for it in (await served.get_json("/api/cameras/c1/past"))["spans"]] == [0]
     status, body = await asked(served, "/cameras/c0/live.mp4?from=p0&to=p30")
     assert status == 200

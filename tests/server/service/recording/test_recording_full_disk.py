@@ -60,12 +60,12 @@ def refused(store: RecordingFolder, clock: ManualClocks, gop: int) -> None:
 
 def on_disk(folder: Path) -> list[int]:
     """Return the first pulses of the segments whose pictures are on the disk."""
-    return sorted({int(it.stem) for it in folder.glob("*/cameras/*/*.mp4")})
+    return sorted({int(path.stem) for path in folder.glob("*/cameras/*/*.mp4")})
 
 
 def files_in(session: RecordingSession) -> set[int]:
     """Return the files that the playlists in memory refer to."""
-    tapes = [it.index for it in (*session.cameras.values(), *session.objects.values())]
+    tapes = [camera.index for camera in (*session.cameras.values(), *session.objects.values())]
     return {stretch.file for tape in tapes for stretch in tape.all}
 
 
@@ -85,7 +85,7 @@ def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: Manu
     session = store.session
     assert session is not None
     assert on_disk(tmp_path) == [50, 75], "those before ended more than three seconds ago"
-    assert [it.first for it in session.segments if it.bytes] == [50, 75]
+    assert [segment.first for segment in session.segments if segment.bytes] == [50, 75]
     assert files_in(session) == {50, 75}
     assert files_in_playlists(session) == {0, 25, 50, 75}, "the playlists could not be written"
     record(store, clock, range(29, 30))
@@ -104,7 +104,7 @@ def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, 
         again = opened(tmp_path, clock)
     assert on_disk(tmp_path) == [75]
     (earlier,) = again.earlier
-    assert [it.first for it in earlier.segments] == [75]
+    assert [segment.first for segment in earlier.segments] == [75]
     assert files_in(earlier) == {75}
     again.close()
 
@@ -155,7 +155,7 @@ def test_files_that_cannot_be_deleted_are_not_forgotten(
         patch.setattr(Path, "unlink", unlink)
         record(store, clock, range(27, 28))
     assert on_disk(tmp_path) == [0, 50, 75, 135], "and it is recorded all the same"
-    assert [it.first for it in session.segments] == [0, 50, 75, 135]
+    assert [segment.first for segment in session.segments] == [0, 50, 75, 135]
     assert files_in(session) == {50, 75, 135}, "its pictures are not played any more"
     assert f"{session.paths.camera_file(A, 0)}: Operation not permitted" in caplog.text
     record(store, clock, range(33, 34))

@@ -36,7 +36,7 @@ from server.service.recording.session_files import InitSegments
 
 
 def only_run(folder: Path) -> Path:
-    (session,) = (it for it in folder.iterdir() if it.is_dir())
+    (session,) = (path for path in folder.iterdir() if path.is_dir())
     return session
 
 
@@ -67,7 +67,7 @@ def test_a_camera_is_written_once_however_many_people_it_shows(tmp_path: Path) -
     )
     few.close()
     many.close()
-    sizes = [sum(it.stat().st_size for it in folder.rglob("*.mp4")) for folder in tmp_path.iterdir()]
+    sizes = [sum(path.stat().st_size for path in folder.rglob("*.mp4")) for folder in tmp_path.iterdir()]
     assert sizes[0] == sizes[1]
 
 
@@ -90,8 +90,10 @@ def test_a_playlist_conforms_to_rfc_8216(tmp_path: Path) -> None:
     assert lines[0] == "#EXTM3U"
     assert lines[-1] == "#EXT-X-ENDLIST"
     assert text.count("#EXT-X-ENDLIST") == 1
-    target = next(int(it.partition(":")[2]) for it in lines if it.startswith("#EXT-X-TARGETDURATION"))
-    assert all(round(float(it[8:].split(",")[0])) <= target for it in lines if it.startswith("#EXTINF:"))
+    target = next(int(line.partition(":")[2]) for line in lines if line.startswith("#EXT-X-TARGETDURATION"))
+    assert all(
+        round(float(line[8:].split(",")[0])) <= target for line in lines if line.startswith("#EXTINF:")
+    )
     assert lines.count("#EXT-X-DISCONTINUITY") == 1, "where GOP 5 is missing"
     assert "#EXT-X-PROGRAM-DATE-TIME:2025-11-21T04:40:00.000Z" in lines
     for place, line in enumerate(lines):
@@ -132,7 +134,7 @@ def test_an_incomplete_gop_is_in_the_cameras_playlist_but_in_no_persons(tmp_path
         13,
         14,
     ]
-    assert [(it.first, it.end) for it in session.objects[1].index.all] == [(0, 5), (10, 15)]
+    assert [(entry.first, entry.end) for entry in session.objects[1].index.all] == [(0, 5), (10, 15)]
 
 
 def test_a_restarted_service_records_a_new_session_beside_the_earlier_one(tmp_path: Path) -> None:
@@ -142,9 +144,9 @@ def test_a_restarted_service_records_a_new_session_beside_the_earlier_one(tmp_pa
     second = written_folder(
         RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: B}) for gop in range(3)]
     )
-    assert len([it for it in tmp_path.iterdir() if it.is_dir()]) == 2
+    assert len([path for path in tmp_path.iterdir() if path.is_dir()]) == 2
     (earlier,) = second.earlier
-    assert [(it.first, it.end) for it in earlier.objects[1].index.all] == [(0, 15)]
+    assert [(entry.first, entry.end) for entry in earlier.objects[1].index.all] == [(0, 15)]
     for session, camera in ((earlier, A), (second.session, B)):
         assert session is not None
         for pulse, picture in pictures(session.objects[1].path):
@@ -156,8 +158,8 @@ def test_restarted_pulses_begin_a_new_session(tmp_path: Path) -> None:
         RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A}) for gop in (5, 6, 0, 1)]
     )
     assert store.session is not None
-    assert [(it.first, it.end) for it in store.session.objects[1].index.all] == [(0, 10)]
-    assert [(it.first, it.end) for it in store.earlier[0].objects[1].index.all] == [(25, 35)]
+    assert [(entry.first, entry.end) for entry in store.session.objects[1].index.all] == [(0, 10)]
+    assert [(entry.first, entry.end) for entry in store.earlier[0].objects[1].index.all] == [(25, 35)]
 
 
 def test_two_processes_do_not_record_into_one_folder(tmp_path: Path) -> None:
@@ -182,11 +184,15 @@ def test_old_segments_are_deleted_whole_with_their_references(tmp_path: Path) ->
     store.close()
     session = store.session
     assert session is not None
-    assert [it.first for it in session.segments] == [100, 125, 150, 175]
+    assert [segment.first for segment in session.segments] == [100, 125, 150, 175]
     assert sorted(session.objects) == [1, 3]
     assert not (session.folder / "objects" / "2.m3u8").exists()
-    kept = sorted(int(it.stem) for it in (session.folder / "cameras" / A).iterdir())
-    assert kept == [100, 125, 150, 175] == sorted(int(it.stem) for it in (session.folder / "index").iterdir())
+    kept = sorted(int(path.stem) for path in (session.folder / "cameras" / A).iterdir())
+    assert (
+        kept
+        == [100, 125, 150, 175]
+        == sorted(int(path.stem) for path in (session.folder / "index").iterdir())
+    )
     assert [pulse for pulse, _ in pictures(session.objects[1].path)] == list(range(100, 200))
 
 
@@ -204,22 +210,24 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
     slack = 2 * 8_000  # bytes: a GOP of both cameras, its line, its references
     for gop, choices in enumerate(shown):
         store.write(gop_record(gop, choices), session_info(), InitSegments(filled_buffers()[1]))
-        on_disk = sum(it.stat().st_size for it in folder.rglob("*") if it.is_file())
+        on_disk = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
         assert on_disk <= max_mb * 1e6 + slack
     store.close()
     again = RecordingFolder(folder, UNLIMITED)
     again.open()
     assert store.session is not None
-    found = {number: it.index.all for session in again.earlier for number, it in session.objects.items()}
-    assert found == {number: it.index.all for number, it in store.session.objects.items()}
+    found = {
+        number: object.index.all for session in again.earlier for number, object in session.objects.items()
+    }
+    assert found == {number: object.index.all for number, object in store.session.objects.items()}
     for number, entries in found.items():
         expected = [gop for gop, choices in enumerate(shown) if number in choices]
-        kept = [pulse // GOP for it in entries for pulse in range(it.first, it.end, GOP)]
+        kept = [pulse // GOP for entry in entries for pulse in range(entry.first, entry.end, GOP)]
         assert kept == expected[len(expected) - len(kept) :], "the newest, without a new gap"
-        for it in entries:
-            path = again.earlier[0].paths.camera_file(it.camera, it.file)
-            assert [gop.first for gop in read_gops(path, it.offset, it.length, FPS)] == list(
-                range(it.first, it.end, GOP)
+        for entry in entries:
+            path = again.earlier[0].paths.camera_file(entry.camera, entry.file)
+            assert [gop.first for gop in read_gops(path, entry.offset, entry.length, FPS)] == list(
+                range(entry.first, entry.end, GOP)
             )
     again.close()
 

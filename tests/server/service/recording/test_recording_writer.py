@@ -97,7 +97,7 @@ def test_a_full_disk_is_logged_once_retried_and_counted(caplog: pytest.LogCaptur
     writer.close()
     assert (disk.taken, disk.abandoned) == ([15, -1], 3)
     assert (writer.written, writer.lost, writer.error_text) == (1, 3, "")
-    failed, continued = (it.getMessage() for it in caplog.records)
+    failed, continued = (record.getMessage() for record in caplog.records)
     assert failed.startswith("recording: cannot write: No space left on device; nothing is recorded")
     assert continued.startswith("recording: continues after ")
 

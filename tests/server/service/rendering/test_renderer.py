@@ -58,7 +58,7 @@ def test_gops_that_arrive_unevenly_are_shown_evenly_after_the_latest(first: int,
 
 
 def frames(first: int, count: int) -> list[EncodedFrame]:
-    return [EncodedFrame(it.pulse, it.key, it.data) for it in encoded(0)[first : first + count]]
+    return [EncodedFrame(unit.pulse, unit.key, unit.data) for unit in encoded(0)[first : first + count]]
 
 
 def queued_data(subscriber: Subscriber) -> bytes:
@@ -77,7 +77,7 @@ def test_a_video_has_no_gap_and_never_goes_back_when_its_worker_is_replaced() ->
     assert video.head is not None
     data = video.head + queued_data(viewer)
     with av.open(io.BytesIO(data), "r") as stream:
-        pictures = {round(float(it.time or 0) * FPS): it for it in stream.decode(video=0)}
+        pictures = {round(float(frame.time or 0) * FPS): frame for frame in stream.decode(video=0)}
     assert list(pictures) == list(range(4 * GOP))
     for pulse, picture in pictures.items():
         repeated = 2 * GOP <= pulse < 3 * GOP
@@ -94,7 +94,7 @@ def test_a_video_is_silent_where_its_pictures_are_muted() -> None:
     for gop in range(3):
         video.put(frames(gop * GOP, GOP), is_muted=gop == 1)
     chunks = [chunk for chunk in viewer._queue if isinstance(chunk, MediaChunk)]
-    audible = [set(it.audio.frames) for it in chunks if it.audio is not None]
+    audible = [set(chunk.audio.frames) for chunk in chunks if chunk.audio is not None]
     assert audible == [{b"not quiet"}, {form.silence}, {b"not quiet"}]
 
 
@@ -108,7 +108,7 @@ def test_the_gaps_of_a_video_are_muted_on_request(*, is_muted: bool) -> None:
     video.put(frames(0, GOP))
     video.put(frames(2 * GOP, GOP))
     chunks = [chunk for chunk in viewer._queue if isinstance(chunk, MediaChunk)]
-    audible = [set(it.audio.frames) for it in chunks if it.audio is not None]
+    audible = [set(chunk.audio.frames) for chunk in chunks if chunk.audio is not None]
     assert audible == [{b"not quiet"}, {form.silence if is_muted else b"not quiet"}, {b"not quiet"}]
 
 

@@ -142,7 +142,9 @@ async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
     await watched(loud, recording, [])
     listed = await (await loud.session.get("/objects/1/hls/index.m3u8")).text()
     numbers = [line.removesuffix(".m4s") for line in listed.splitlines() if line.endswith(".m4s")]
-    names = [f"{it}.{part}.m4s" for it in numbers for part in range(parts)] or [f"{it}.m4s" for it in numbers]
+    names = [f"{number}.{part}.m4s" for number in numbers for part in range(parts)] or [
+        f"{number}.m4s" for number in numbers
+    ]
     fetched = [
         await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in ("init.mp4", *names)
     ]
@@ -151,8 +153,8 @@ async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
     began = int(numbers[0]) * 25 / FPS
     assert times[0] == pytest.approx(began, abs=0.022)
-    assert flashes(data) == pytest.approx([it for it in BEEP_TIMES if it > began], abs=0.001)
-    assert beeps(data) == pytest.approx([it for it in BEEP_TIMES if it > began], abs=MAX_AV_OFFSET_S)
+    assert flashes(data) == pytest.approx([time for time in BEEP_TIMES if time > began], abs=0.001)
+    assert beeps(data) == pytest.approx([time for time in BEEP_TIMES if time > began], abs=MAX_AV_OFFSET_S)
 
 
 async def test_all_streams_share_the_bytes_of_the_audio(loud: ServedSite, recording: Path) -> None:
@@ -238,7 +240,7 @@ async def test_ffprobe_reports_no_errors(loud: ServedSite, recording: Path, tmp_
     send_audio(loud.service, recording)
     ways = ["best.mp4", "best.ts"]
     for way, data in zip(
-        ways, await watched(loud, recording, [f"/objects/1/{it}" for it in ways]), strict=True
+        ways, await watched(loud, recording, [f"/objects/1/{way}" for way in ways]), strict=True
     ):
         (tmp_path / way).write_bytes(data)
         found = {it[0]: int(it[1]) for it in probed(tmp_path / way, "codec_name,nb_read_frames")}

@@ -21,8 +21,8 @@ LOST = 53
 @pytest.fixture
 async def served() -> AsyncIterator[ServedSite]:
     """A site whose viewers may be slow."""
-    async for it in serve_site(http={"viewer_queue_gops": GOPS}):
-        yield it
+    async for site_served in serve_site(http={"viewer_queue_gops": GOPS}):
+        yield site_served
 
 
 @needs_chromium

@@ -51,21 +51,21 @@ class Site:
         """Return when each picture is shown and until when, in pulses, and the picture."""
         assert self.stream_format.parameters is not None
         head = init_segment(self.stream_format.parameters, WIDTH, HEIGHT)
-        with av.open(io.BytesIO(head + b"".join(it.data for it in segments))) as container:
+        with av.open(io.BytesIO(head + b"".join(segment.data for segment in segments))) as container:
             return [
                 (
-                    float(it.time or 0) * FPS,
-                    float(it.time or 0) * FPS + (it.duration or 0) * FPS / 90_000,
-                    it.to_ndarray(format="yuv420p"),
+                    float(frame.time or 0) * FPS,
+                    float(frame.time or 0) * FPS + (frame.duration or 0) * FPS / 90_000,
+                    frame.to_ndarray(format="yuv420p"),
                 )
-                for it in container.decode(video=0)
+                for frame in container.decode(video=0)
             ]
 
 
 def own(camera: int) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("h264", "r")
     packets = [*(av.Packet(unit.data) for unit in encoded(camera, GOPS * GOP)), None]
-    return [it.to_ndarray(format="yuv420p") for packet in packets for it in decoder.decode(packet)]
+    return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
 
 
 @pytest.mark.parametrize(
@@ -91,11 +91,11 @@ def test_segments_are_numbered_by_their_pulses_and_listed_when_complete() -> Non
     site = Site()
     for gop in range(9):
         site.show(gop, CAMERAS[gop % 2])
-    assert [it.number for it in site.reel.playlist_segments] == [0, 1, 2, 3]
-    assert [it.until - it.first for it in site.reel.playlist_segments] == [2 * GOP] * 4
+    assert [segment.number for segment in site.reel.playlist_segments] == [0, 1, 2, 3]
+    assert [segment.until - segment.first for segment in site.reel.playlist_segments] == [2 * GOP] * 4
     assert site.reel.get(4) is None, "it is not whole"
     site.splicer.close()
-    assert [it.number for it in site.reel.playlist_segments] == [0, 1, 2, 3, 4]
+    assert [segment.number for segment in site.reel.playlist_segments] == [0, 1, 2, 3, 4]
     assert site.reel.playlist_segments[-1].until - site.reel.playlist_segments[-1].first == GOP
 
 
@@ -105,7 +105,7 @@ def test_a_service_that_starts_later_makes_the_same_segments() -> None:
         early.show(gop, CAMERAS[gop % 3 % 2])
         if gop >= 7:
             late.show(gop, CAMERAS[gop % 3 % 2])
-    assert [it.number for it in late.reel.playlist_segments] == list(range(3, 10))
+    assert [segment.number for segment in late.reel.playlist_segments] == list(range(3, 10))
     for segment in late.reel.playlist_segments[1:]:
         other = early.reel.get(segment.number)
         assert other is not None
@@ -117,7 +117,7 @@ def test_a_segment_stays_available_for_a_playlists_duration_after_it_left() -> N
     listed = site.splicer.layout.playlist_length
     for gop in range(1000):
         site.show(gop, CAMERAS[0])
-        numbers = [it.number for it in site.reel.playlist_segments]
+        numbers = [segment.number for segment in site.reel.playlist_segments]
         assert len(site.reel._segments) <= 2 * listed + 1
         if numbers and numbers[0] >= listed:
             assert site.reel.get(numbers[0] - listed) is not None
@@ -177,7 +177,7 @@ def test_the_last_segments_of_a_forgotten_person_stay_available_for_a_while() ->
     site.splicer.forget([], [])
     reel = site.reel
     assert reel.has_ended
-    assert [it.number for it in reel.playlist_segments] == [0, 1, 2]
+    assert [segment.number for segment in reel.playlist_segments] == [0, 1, 2]
     for gop in range(5, 200):
         site.splicer.publish_decision(GopDecision(gop * GOP, GOP, (), {}, {}, (), NO_REASON))
     assert site.splicer.segmenter_of_person(1) is None
@@ -190,8 +190,9 @@ def test_segment_numbers_are_consecutive_despite_missing_decisions(absent: int) 
         site.show(gop, CAMERAS[0])
     for gop in range(9 + absent, 20 + absent):
         site.show(gop, CAMERAS[0])
-        numbers = [it.number for it in site.reel.playlist_segments]
+        numbers = [segment.number for segment in site.reel.playlist_segments]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         assert all(
-            it.until - it.first <= site.splicer.layout.segment_frames for it in site.reel.playlist_segments
+            segment.until - segment.first <= site.splicer.layout.segment_frames
+            for segment in site.reel.playlist_segments
         )

@@ -128,8 +128,8 @@ async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
         seen = await _played(served)
     assert (seen["error"], seen["ranges"]) == ("", 1)
     rgb = [
-        av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="rgb24")
-        for it in expected_pictures()
+        av.VideoFrame.from_ndarray(picture, format="yuv420p").to_ndarray(format="rgb24")
+        for picture in expected_pictures()
     ]
     right = np.array([it[4::8, 4::8, 1].ravel() for it in rgb], dtype=float)[::3]
     found = np.array(seen["greens"], dtype=float)

@@ -117,13 +117,15 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
         if not pieces:
             continue
         pictures = shown(head, pieces)
-        assert [it.pulse for it in pictures[1:]] == [it.pulse + it.duration for it in pictures[:-1]], "no gap"
+        assert [picture.pulse for picture in pictures[1:]] == [
+            picture.pulse + picture.duration for picture in pictures[:-1]
+        ], "no gap"
         before: NDArray[np.uint8] | None = None
-        for it in pictures:
-            possible = [own[camera][it.pulse] for camera in cameras if it.pulse in own[camera]]
+        for picture in pictures:
+            possible = [own[camera][picture.pulse] for camera in cameras if picture.pulse in own[camera]]
             possible += [] if before is None else [before]
-            assert any(np.array_equal(it.picture, other) for other in possible), it.pulse
-            before = it.picture
+            assert any(np.array_equal(picture.picture, other) for other in possible), picture.pulse
+            before = picture.picture
         if viewer is best:
             assert pictures[-1].pulse + pictures[-1].duration == FRAMES
 
@@ -152,10 +154,15 @@ async def test_a_skipped_frame_affects_no_other_picture() -> None:
     viewer = splicer.persons[1].subscribe()
     decide(splicer, 1, None)
     pictures = shown(head, await received(viewer))
-    assert [(it.pulse, it.duration) for it in pictures[GOP:]] == [(5, 1), (6, 1), (7, 2), (9, 1)]
+    assert [(picture.pulse, picture.duration) for picture in pictures[GOP:]] == [
+        (5, 1),
+        (6, 1),
+        (7, 2),
+        (9, 1),
+    ]
     own = alone(units)
-    for it, pulse in zip(pictures[GOP:], [5, 6, 6, 9], strict=True):
-        np.testing.assert_array_equal(it.picture, own[pulse])
+    for picture, pulse in zip(pictures[GOP:], [5, 6, 6, 9], strict=True):
+        np.testing.assert_array_equal(picture.picture, own[pulse])
 
 
 async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> None:
@@ -171,9 +178,11 @@ async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> N
         splicer.publish_frame("c0", frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key))
     splicer.close()
     pictures = shown(head, await received(viewer))
-    assert [it.pulse for it in pictures] == list(range(13 * GOP - 2 * FPS)), "what comes late is not shown"
-    for it in pictures[GOP + 2 :]:
-        np.testing.assert_array_equal(it.picture, alone(units)[GOP + 1])
+    assert [picture.pulse for picture in pictures] == list(range(13 * GOP - 2 * FPS)), (
+        "what comes late is not shown"
+    )
+    for picture in pictures[GOP + 2 :]:
+        np.testing.assert_array_equal(picture.picture, alone(units)[GOP + 1])
 
 
 async def test_a_viewer_who_joins_in_a_long_gap_waits_and_no_queue_grows() -> None:

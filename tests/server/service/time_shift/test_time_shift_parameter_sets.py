@@ -36,7 +36,7 @@ async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
         put_frames(service.frame_buffers)
         for gop in range(GOPS):
             chosen = decision(gop)
-            choices = {it.number: it.camera for it in chosen.choices}
+            choices = {choice.number: choice.camera for choice in chosen.choices}
             service.recorder.put(
                 GopChoices(first=gop * GOP, frames=GOP, choices=choices, boxes={}, cuts=[]), PULSE0
             )
@@ -68,7 +68,9 @@ async def test_time_shift_plays_what_was_live(served: ServedSite, form: str) -> 
     with av.open(io.BytesIO(data), "r") as container:
         frames = list(container.decode(video=0))
     start = float(frames[0].time or 0) if form == "ts" else 0.0
-    seen = {round((float(it.time or 0) - start) * FPS): it.to_ndarray(format="yuv420p") for it in frames}
+    seen = {
+        round((float(frame.time or 0) - start) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames
+    }
     assert LOST_GOPS, "there are gaps, which are filled"
     assert form == "hls" or list(seen) == list(range(FRAMES))
     for pulse, right in enumerate(expected_pictures()):

@@ -94,7 +94,7 @@ async def read_up_to(served: ServedSite, path: str, pulse: int, then: int) -> li
     async with served.session.get(path) as answer:
         while True:
             data += await answer.content.readany()
-            newest = max((pulse_of(it, FPS) for it in fragments(data)), default=-1)
+            newest = max((pulse_of(fragment, FPS) for fragment in fragments(data)), default=-1)
             if not fed and newest >= pulse - 1:
                 served.service.feed(then, IN_B)
                 fed = True
@@ -113,7 +113,7 @@ async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(
     assert [pulse for pulse, _ in shown] == list(range(GOP, 7 * GOP))
     used = set()
     for pulse, picture in shown:
-        (equal,) = [it for it in CAMERAS if np.array_equal(picture, own_pictures(it)[pulse])]
+        (equal,) = [camera for camera in CAMERAS if np.array_equal(picture, own_pictures(camera)[pulse])]
         assert camera.get(pulse, equal) == equal
         used.add(equal)
     assert used == {A, B}
@@ -217,10 +217,14 @@ async def test_spans_list_the_recorded_time(recorded: ServedSite) -> None:
 async def test_views_list_the_chosen_cameras(recorded: ServedSite) -> None:
     async with recorded.session.get("/api/past?from=p0") as answer:
         decisions = [json.loads(line) async for line in answer.content]
-    chosen = {it["first"] + n: it["choices"]["1"] for it in decisions for n in range(it["frames"])}
+    chosen = {
+        decision["first"] + n: decision["choices"]["1"]
+        for decision in decisions
+        for n in range(decision["frames"])
+    }
     views = (await recorded.get_json("/api/objects/1/past"))["views"]
-    assert {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])} == chosen
-    assert [it["camera"] for it in views] == [A, B]
+    assert {view["first"] + n: view["camera"] for view in views for n in range(view["frames"])} == chosen
+    assert [view["camera"] for view in views] == [A, B]
     assert (await recorded.get_json("/api/cameras/c1/past"))["views"] == [
         {"camera": B, "first": 0, "frames": 35}
     ]
@@ -231,13 +235,13 @@ async def test_spans_and_views_are_limited_to_the_requested_range(
     recorded: ServedSite, query: str, frames: int
 ) -> None:
     def cameras(views: list[dict[str, Any]]) -> dict[int, str]:
-        return {it["first"] + n: it["camera"] for it in views for n in range(it["frames"])}
+        return {view["first"] + n: view["camera"] for view in views for n in range(view["frames"])}
 
     whole = cameras((await recorded.get_json("/api/objects/1/past"))["views"])
     part = await recorded.get_json(f"/api/objects/1/past?{query}")
     begin = int(query.partition("from=p")[2].partition("&")[0] or 0)
     assert [(it["first"], it["frames"]) for it in part["spans"]] == [(begin, frames)]
-    assert cameras(part["views"]) == {it: whole[it] for it in range(begin, begin + frames)}
+    assert cameras(part["views"]) == {number: whole[number] for number in range(begin, begin + frames)}
     span = (await recorded.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
     assert (span["first"], span["frames"]) == (begin, 15 if query == "from=p20" else frames)
     nothing = await recorded.get_json("/api/objects/1/past?from=p900")
@@ -321,7 +325,7 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
     source = OnDisk(*tapes, end=len(shown) * GOP)
     stream_format, header = site_of(store)
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
-    data = b"".join([it.data async for it in stream.send(PlaybackRange(start, start + frames))])
+    data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(start, start + frames))])
     store.close()
     there = available_ranges(source)
     assert first_available(source, start) == next(
@@ -340,7 +344,9 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
         camera = shown[pulse // GOP]
         if camera is not None:
             np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
-    assert all(any(it.first <= gop * GOP < it.end for it in available_ranges(source)) for gop in wanted)
+    assert all(
+        any(range.first <= gop * GOP < range.end for range in available_ranges(source)) for gop in wanted
+    )
 
 
 async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> None:
@@ -352,7 +358,7 @@ async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> 
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=60)
     stream_format, header = site_of(store)
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
-    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 60))])
+    data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
     assert available_ranges(source) == [PulseRange(0, 60)]
 
@@ -370,7 +376,7 @@ async def test_a_person_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path,
     stream = TimeShiftStream(
         source, GaplessTimeline(stream_format, FPS, GOP), FPS, Broadcaster
     )  # in which nothing comes
-    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, end))])
+    data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, end))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
 
 
@@ -382,10 +388,10 @@ async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(t
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
     stream_format, header = site_of(store)
     broadcaster, back = Broadcaster(), gop_record(8, {1: A}).cameras[A]
-    came = [Shown(back.first + at, not at, it, boot=1) for at, it in enumerate(back.fragments)]
+    came = [Shown(back.first + at, not at, fragment, boot=1) for at, fragment in enumerate(back.fragments)]
     broadcaster.publish(MediaChunk(came, FPS, ContinuityCounters()))
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: broadcaster)
-    data = b"".join([it.data async for it in stream.send(PlaybackRange(0, 5 * GOP))])
+    data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
     assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
 

@@ -48,7 +48,7 @@ def decide(it: ViewDecider, story: Sequence[Seen], *, end: int | None = None) ->
 
 
 def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
-    return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
+    return [choice.camera for decision in decisions for choice in decision.choices if choice.number == number]
 
 
 def reason_of(decision: GopDecision) -> str:
@@ -88,9 +88,9 @@ def test_a_person_seen_by_a_single_camera_is_shown_by_it() -> None:
 def test_views_change_only_at_gops_and_boxes_are_of_their_frames() -> None:
     story = [{A: {1: LARGE}, B: {}}] * 3 + [{A: {}, B: {}}] * 3
     decisions = decide(decider(), story, end=6 * STRIDE - 1)
-    assert [it.first for it in decisions] == [n * GOP for n in range(6)]
-    for it in decisions:
-        assert all(len(frames) == it.frames for frames in it.boxes.values())
+    assert [decision.first for decision in decisions] == [n * GOP for n in range(6)]
+    for decision in decisions:
+        assert all(len(frames) == decision.frames for frames in decision.boxes.values())
     assert decisions[0].boxes[A] == [[(1, *LARGE)]] * GOP
     assert decisions[3].boxes[A] == [[]] * GOP
 
@@ -113,7 +113,11 @@ def test_no_camera_is_selected_while_none_can_be_shown() -> None:
 def test_finishing_decides_the_rest_including_a_partial_gop(left: int) -> None:
     end = 2 * GOP + left - 1
     decisions = decide(decider(), [{A: {1: LARGE}, B: {}}] * 3, end=end)
-    assert [(it.first, it.frames) for it in decisions] == [(0, GOP), (GOP, GOP), (2 * GOP, left)]
+    assert [(decision.first, decision.frames) for decision in decisions] == [
+        (0, GOP),
+        (GOP, GOP),
+        (2 * GOP, left),
+    ]
     assert shown(decisions) == [A] * 3
     assert all(len(frames) == left for frames in decisions[-1].boxes.values())
 
@@ -164,7 +168,9 @@ def test_a_cut_is_published_once_with_both_cameras() -> None:
     it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
     state = DecisionState(25.0)
     gop_choices = [state.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
-    assert [[(cut.from_camera, cut.to_camera, cut.pulse) for cut in it.cuts] for it in gop_choices] == [
+    assert [
+        [(cut.from_camera, cut.to_camera, cut.pulse) for cut in choice.cuts] for choice in gop_choices
+    ] == [
         [],
         [(A, B, GOP)],
         [(B, A, 2 * GOP)],

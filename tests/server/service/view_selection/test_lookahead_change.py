@@ -59,7 +59,7 @@ def test_every_gop_is_decided_once_in_order_with_known_frames(
             assert decision.reasons.of(1).frames == decider.view.lookahead
             assert decision.first + decider.view.lookahead - 1 <= epoch.last
         decided += new
-    assert [it.first for it in decided] == [gop * n for n in range(len(decided))]
+    assert [decision.first for decision in decided] == [gop * n for n in range(len(decided))]
     # Some epochs after the last change the streams are as near to the cameras as they can be.
     ahead = epoch.last + 1 - (decided[-1].first + gop)
     assert decider.view.lookahead - gop <= ahead < decider.view.lookahead
@@ -77,7 +77,7 @@ def test_after_a_change_settles_views_are_selected_as_if_it_had_always_applied()
                     decider.apply_view_settings(looking(config.view, frames))
             boxes = {A: {1: LARGE if number < 20 else SMALL}, B: {1: SMALL if number < 20 else LARGE}}
             decided += decider.step(
-                epoch_of(number, *(camera_tracks(it, number, boxes[it]) for it in CAMERAS))
+                epoch_of(number, *(camera_tracks(camera, number, boxes[camera]) for camera in CAMERAS))
             )
         return decided
 
@@ -108,13 +108,15 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
         if viewer is None and 1 in service.splicer.persons:
             viewer = service.splicer.persons[1].subscribe()
             begun = len(shown) - 1
-            got += [it.data for it in viewer._queue]
+            got += [chunk.data for chunk in viewer._queue]
             viewer._queue.clear()
             viewer.direct_send = take
     if viewer is not None:
         assert viewer.lost_gops == 0
         names = [it or "" for it in shown[begun:]]
-        assert got == [service.frame_buffers[it].gop((begun + n) * GOP, GOP) for n, it in enumerate(names)]
+        assert got == [
+            service.frame_buffers[name].gop((begun + n) * GOP, GOP) for n, name in enumerate(names)
+        ]
     service.close()
 
 

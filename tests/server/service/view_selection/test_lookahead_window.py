@@ -55,13 +55,13 @@ def long_word(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | None]]
     message_of_epoch = camera_tracks(camera, epoch, dict.fromkeys(boxes))
     first = max(0, message_of_epoch.last - WINDOW + 1)
     tracks = [
-        type(it)(
-            id=it.id,
-            boxes=list(boxes[it.id][: message_of_epoch.last - first + 1]),
-            appearance=it.appearance,
+        type(track)(
+            id=track.id,
+            boxes=list(boxes[track.id][: message_of_epoch.last - first + 1]),
+            appearance=track.appearance,
             confidence=1.0,
         )
-        for it in message_of_epoch.tracks
+        for track in message_of_epoch.tracks
     ]
     return camera_tracks(camera, epoch, {}, first=first, tracks=tracks)
 
@@ -133,7 +133,7 @@ def test_the_window_has_every_view_once_with_relative_quality(
     assert len(quality_of_view) == len(views.frame)
     assert {it: quality for it, (quality, _) in quality_of_view.items()} == expected
     for (pulse, camera, number), (quality, worth) in quality_of_view.items():
-        best = max(expected.get((pulse, it, number), 0.0) for it in CAMERAS) if relative else 1.0
+        best = max(expected.get((pulse, camera, number), 0.0) for camera in CAMERAS) if relative else 1.0
         assert worth == quality / best, camera
     for view, (quality, _) in enumerate(quality_of_view.values()):
         weights = config.view.quality.weights

@@ -55,7 +55,7 @@ def decide(it: ViewDecider, story: Sequence[CameraBoxes]) -> list[GopDecision]:
 
 
 def shown(decisions: Sequence[GopDecision], number: int = 1) -> list[str | None]:
-    return [choice.camera for it in decisions for choice in it.choices if choice.number == number]
+    return [choice.camera for decision in decisions for choice in decision.choices if choice.number == number]
 
 
 PLACE = 15.0, 20.0
