@@ -48,7 +48,7 @@ def test_a_gap_prolongs_the_picture_before_it(source: Path, tmp_path: Path) -> N
     part, out = write_stream(tmp_path / "part", source, lost=range(10, 20)), tmp_path / "film.mp4"
     remux(part, out, "mp4")
     with av.open(str(out)) as film:
-        shown = [(it.pts, it.duration) for it in film.demux(video=0) if it.pts is not None]
+        shown = [(packet.pts, packet.duration) for packet in film.demux(video=0) if packet.pts is not None]
         ticks = round(1 / FPS / film.streams.video[0].time_base)
         assert film.duration == PICTURES * av.time_base // FPS
     times = [number * ticks for number in range(PICTURES) if number not in range(10, 20)]
@@ -59,7 +59,7 @@ def test_pictures_and_sound_are_copied_byte_for_byte(source: Path, tmp_path: Pat
     part, out = write_stream(tmp_path / "part", source), tmp_path / "film.mp4"
     remux(part, out, "mp4")
     with av.open(str(part)) as stream, av.open(str(out)) as film:
-        before, after = ([bytes(it) for it in file.demux(video=0)] for file in (stream, film))
+        before, after = ([bytes(packet) for packet in file.demux(video=0)] for file in (stream, film))
     assert after == before
     assert packets(out.read_bytes()) == packets(part.read_bytes())
 

@@ -211,7 +211,7 @@ async def test_no_error_has_secrets_of_an_address(typed: str) -> None:
     for asking in (ask, ask_status, ask_past, ask_events):
         with pytest.raises((client.ClientError, ValueError)) as refused:
             await asking(typed)
-        assert not any(it in str(refused.value) for it in ("QXZ", "JKV7")), refused.value
+        assert not any(piece in str(refused.value) for piece in ("QXZ", "JKV7")), refused.value
 
 
 @pytest.mark.parametrize("asking", [ask, ask_status, ask_past, ask_events])

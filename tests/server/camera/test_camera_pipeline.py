@@ -93,7 +93,7 @@ def test_epochs_follow_one_another_and_the_last_closes_the_recording(recording: 
 
 def test_an_offset_moves_everything_by_so_many_pulses(recording: Path) -> None:
     # Not ahead: who is there in the very first frame has no window of frames before it, moved they have.
-    plain, moved = (offline(config_of(recording, offset=it, detect=LIVE)) for it in (0, 2 * STRIDE))
+    plain, moved = (offline(config_of(recording, offset=offset, detect=LIVE)) for offset in (0, 2 * STRIDE))
     boxes = [_boxes(batches) for batches in (plain, moved)]
     assert boxes[1] == {(pulse + 2 * STRIDE, track): box for (pulse, track), box in boxes[0].items()}
     assert [unit.pulse for batch in moved for unit in batch.units] == list(range(10, FRAMES + 10))
@@ -117,9 +117,9 @@ def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
 ) -> None:
     pipeline = CameraPipeline(config_of(recording, detect=detect), "c0")
     searched = [pipeline.detect(pulse, pipeline.take(pulse)) for pulse in range(30)]
-    words = [pipeline.track_detections(it) for it in searched]
+    words = [pipeline.track_detections(frame) for frame in searched]
     pipeline.close()
-    assert [it.has_detection for it in searched] == [pulse >= first for pulse in range(30)]
+    assert [frame.has_detection for frame in searched] == [pulse >= first for pulse in range(30)]
     assert [pulse for word in words if word for pulse in word.without_detection] == list(range(first))
 
 

@@ -105,22 +105,22 @@ async def test_recordings_run_to_their_end_without_losses(
     recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = site(recording, c0="c0.mp4", c1="c1.mp4")
-    it = SiteInOneLoop(config, tmp_path / "out")
-    running.append(it)
+    whole_site = SiteInOneLoop(config, tmp_path / "out")
+    running.append(whole_site)
     gops: list[GopChoices] = []
-    it.service.on_decision.append(gops.append)
-    over = await it.start()
+    whole_site.service.on_decision.append(gops.append)
+    over = await whole_site.start()
     plain = await asyncio.to_thread(Plain, config, "myview/**")
-    cameras = [it.camera(camera) for camera in config.camera_ids]
+    cameras = [whole_site.camera(camera) for camera in config.camera_ids]
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(over, *cameras)
     await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
 
     for camera in config.camera_ids:
-        frame_buffer = it.service.frame_buffers[camera]
+        frame_buffer = whole_site.service.frame_buffers[camera]
         assert [pulse for pulse in range(FRAMES + 5) if frame_buffer.has(pulse)] == list(range(FRAMES))
-        assert it.service.ingest.states[camera].label == "ended"
-        assert it.service.ingest.states[camera].bad_messages == 0
+        assert whole_site.service.ingest.states[camera].label == "ended"
+        assert whole_site.service.ingest.states[camera].bad_messages == 0
     assert sum(gop.frames for gop in gops) == FRAMES
     written = written_files(tmp_path / "out")
     assert written["late.csv"] == b"frame,camera,reason\n"
@@ -145,13 +145,13 @@ async def test_a_disconnected_camera_is_detected_and_others_continue(
     tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = site(tmp_path, c0="scene:room?camera=0&objects=1", c1="scene:room?camera=1&objects=1")
-    it = SiteInOneLoop(config)
-    running.append(it)
+    whole_site = SiteInOneLoop(config)
+    running.append(whole_site)
     decided = asyncio.Event()
-    it.service.on_decision.append(lambda _: decided.set())
-    await it.start()
-    _, second = it.camera("c0"), it.camera("c1")
-    states = it.service.ingest.states
+    whole_site.service.on_decision.append(lambda _: decided.set())
+    await whole_site.start()
+    _, second = whole_site.camera("c0"), whole_site.camera("c1")
+    states = whole_site.service.ingest.states
     async with asyncio.timeout(PATIENCE):
         await decided.wait()
         second.cancel()
@@ -168,12 +168,12 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
     tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As of a machine that learns the time only when it has been running for a while."""
-    it = SiteInOneLoop(site(tmp_path, c0="scene:room?camera=0&objects=1"))
-    running.append(it)
+    whole_site = SiteInOneLoop(site(tmp_path, c0="scene:room?camera=0&objects=1"))
+    running.append(whole_site)
     decided = asyncio.Event()
-    it.service.on_decision.append(lambda _: decided.set())
-    await it.start()
-    it.camera("c0")
+    whole_site.service.on_decision.append(lambda _: decided.set())
+    await whole_site.start()
+    whole_site.camera("c0")
     clock = time.time
     async with asyncio.timeout(PATIENCE):
         await decided.wait()
@@ -181,7 +181,7 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
         for _ in range(4):
             decided.clear()
             await decided.wait()
-    gauge = it.service.ingest.states["c0"].metrics
+    gauge = whole_site.service.ingest.states["c0"].metrics
     for spread in (gauge.sync_error, gauge.tracking_delay):
         assert spread is not None
         assert abs(spread.worst) < PATIENCE
@@ -193,16 +193,16 @@ async def test_cameras_and_services_authenticate_to_the_pulse_server(
     (tmp_path / "users").write_text("".join(f"{name}:{name * 8}\n" for name in ("c0", "bestview")))
     config = site(tmp_path, c0="scene:room?objects=1")
     config = config.model_copy(update={"sync": config.sync.model_copy(update={"users": tmp_path / "users"})})
-    it = SiteInOneLoop(config)
-    running.append(it)
+    whole_site = SiteInOneLoop(config)
+    running.append(whole_site)
     decided = asyncio.Event()
-    it.service.on_decision.append(lambda _: decided.set())
-    await it.start()
-    it.camera("c0")
+    whole_site.service.on_decision.append(lambda _: decided.set())
+    await whole_site.start()
+    whole_site.camera("c0")
     async with asyncio.timeout(PATIENCE):
         await decided.wait()
-    assert {client.name for client in it.pulses.clients()} == {"c0", "bestview"}
-    assert it.pulses.refused == 0
+    assert {client.name for client in whole_site.pulses.clients()} == {"c0", "bestview"}
+    assert whole_site.pulses.refused == 0
 
 
 @pytest.mark.parametrize(
@@ -212,9 +212,9 @@ async def test_a_camera_whose_work_fails_ends_with_that_error(
     tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     config = site(tmp_path, c0="scene:room?objects=1")
-    it = SiteInOneLoop(config)
-    running.append(it)
-    await it.start()
+    whole_site = SiteInOneLoop(config)
+    running.append(whole_site)
+    await whole_site.start()
 
     def fail(*_: object) -> None:
         raise ArithmeticError("the camera's own mistake")
@@ -222,7 +222,7 @@ async def test_a_camera_whose_work_fails_ends_with_that_error(
     monkeypatch.setattr(f"server.camera.{what}", fail)
     async with asyncio.timeout(PATIENCE):
         with pytest.raises(ArithmeticError):
-            await it.camera("c0")
+            await whole_site.camera("c0")
 
 
 async def test_a_camera_started_after_its_recording_was_over_lets_everything_end(
@@ -231,18 +231,18 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
     write_video(tmp_path / "short.mp4", 20)
     write_video(tmp_path / "long.mp4", 25)
     config = site(tmp_path, c0="short.mp4", c1="long.mp4")
-    it = SiteInOneLoop(config)
-    running.append(it)
-    over = await it.start()
-    first, second = it.camera("c0"), it.camera("c1")
+    whole_site = SiteInOneLoop(config)
+    running.append(whole_site)
+    over = await whole_site.start()
+    first, second = whole_site.camera("c0"), whole_site.camera("c1")
     async with asyncio.timeout(PATIENCE):
-        while it.service.frame_buffers["c0"].newest < 10:  # noqa: ASYNC110 — no event tells of frames
+        while whole_site.service.frame_buffers["c0"].newest < 10:  # noqa: ASYNC110 — no event tells of frames
             await asyncio.sleep(0.01)
         first.cancel()  # as if killed, before it could say that it has ended
         await second
-        await it.camera("c0")
+        await whole_site.camera("c0")
         await over
-    assert it.service.ingest.states["c0"].label == "ended"
+    assert whole_site.service.ingest.states["c0"].label == "ended"
 
 
 class Overloaded(LoadMonitor):
@@ -264,14 +264,14 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
 ) -> None:
     monkeypatch.setattr("server.camera.process.LoadMonitor", Overloaded)
     config = site(recording, c0="c0.mp4", c1="c1.mp4")
-    it = SiteInOneLoop(config, tmp_path / "out")
-    running.append(it)
+    whole_site = SiteInOneLoop(config, tmp_path / "out")
+    running.append(whole_site)
     gops: list[GopChoices] = []
-    it.service.on_decision.append(gops.append)
-    over = await it.start()
+    whole_site.service.on_decision.append(gops.append)
+    over = await whole_site.start()
     plain = await asyncio.to_thread(Plain, config, "myview/**")
     async with asyncio.timeout(PATIENCE):
-        await asyncio.gather(over, *(it.camera(camera) for camera in config.camera_ids))
+        await asyncio.gather(over, *(whole_site.camera(camera) for camera in config.camera_ids))
     await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
 
     heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]

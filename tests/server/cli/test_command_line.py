@@ -122,7 +122,7 @@ DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200
         (["watch", "http://127.0.0.1:1", "--out", "x.mp4"], "need --object"),
         (["watch", "http://127.0.0.1:1", "--object", "1", "--out", "sub"], "is a folder"),
     ],
-    ids=lambda it: " ".join(it)[:40] if isinstance(it, list) else "",
+    ids=lambda arguments: " ".join(arguments)[:40] if isinstance(arguments, list) else "",
 )
 def test_inputs_and_special_files_are_not_replaced_and_invalid_options_are_refused(
     run: RunCommand, tmp_path: Path, words: list[str], why: str

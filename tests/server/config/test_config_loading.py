@@ -109,10 +109,10 @@ def test_a_mirrored_homography_is_refused_with_its_camera() -> None:
     level = [[3.0, 0.0, -960.0], [0.0, 0.0, 1200.0], [0.0, 1.0, -240.0]]
     down = [[0.02, 0.0, 0.0], [0.0, -0.02, 0.0], [0.0, 0.0, 1.0]]
     past = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 900.0]]
-    ways = {"c0": level, "c1": down, "c2": [[-it for it in row] for row in level]}
+    ways = {"c0": level, "c1": down, "c2": [[-value for value in row] for row in level]}
 
     def cameras(grounds: dict[str, Any]) -> dict[str, Any]:
-        return {"cameras": [{"id": it, "source": "a", "ground": of} for it, of in grounds.items()]}
+        return {"cameras": [{"id": camera, "source": "a", "ground": of} for camera, of in grounds.items()]}
 
     build_config(cameras(ways), where="", folder=Path())
     assert "ground: camera c9 has the floor mirrored against camera c0: " in complaint(

@@ -65,7 +65,7 @@ async def test_unsupported_query_parameters_of_streams_are_refused(
 async def test_overlay_and_time_shift_are_described_where_supported(site_with_people: ServedSite) -> None:
     described = await site_with_people.get_json("/api/openapi.json")
     for path, item in described["paths"].items():
-        queries = {it["name"] for it in item["get"]["parameters"] if it["in"] == "query"}
+        queries = {parameter["name"] for parameter in item["get"]["parameters"] if parameter["in"] == "query"}
         if path.startswith(("/objects/", "/cameras/")):
             asked = (
                 path.replace("{object}", "1")
@@ -171,9 +171,12 @@ async def test_the_description_has_every_route_except_the_page(site_with_people:
     assert set(described["paths"]) == routes - {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json"}
     for path, item in described["paths"].items():
         assert item["get"]["summary"], path
-        inside = {it["name"] for it in item["get"]["parameters"] if it["in"] == "path"}
+        inside = {parameter["name"] for parameter in item["get"]["parameters"] if parameter["in"] == "path"}
         assert inside == set(re.findall(r"\{(\w+)\}", path))
-    asked = {it["name"]: it["required"] for it in described["paths"]["/api/past"]["get"]["parameters"]}
+    asked = {
+        parameter["name"]: parameter["required"]
+        for parameter in described["paths"]["/api/past"]["get"]["parameters"]
+    }
     assert asked == {"from": True, "to": False}
 
 

@@ -286,14 +286,14 @@ async def test_a_busy_loop_drops_the_oldest_items_and_counts_them() -> None:
 
 async def test_a_flooding_sender_takes_neither_space_nor_turns_from_others() -> None:
     got: list[str] = []
-    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, sender_of=lambda it: it[:2])
+    inbox = Inbox(got.append, pending_max=10, turn_s=PATIENCE, sender_of=lambda text: text[:2])
     for number in range(1000):
         inbox.put(f"c0 {number}")
         if number < 5:
             inbox.put(f"c1 {number}")
     await asyncio.sleep(0)
-    assert [it for it in got if it.startswith("c1")] == [f"c1 {number}" for number in range(5)]
-    assert [it for it in got if it.startswith("c0")] == [f"c0 {number}" for number in range(990, 1000)]
+    assert [text for text in got if text.startswith("c1")] == [f"c1 {number}" for number in range(5)]
+    assert [text for text in got if text.startswith("c0")] == [f"c0 {number}" for number in range(990, 1000)]
     assert got[:4] == ["c0 990", "c1 0", "c0 991", "c1 1"]
     assert (inbox.lost, inbox.waiting) == (990, 0)
 

@@ -146,9 +146,9 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         bestview.subscribe(SITE.camera("*", "*"), heard)
         alive: list[str] = []
         bestview.watch_alive(SITE.camera("*", "alive"), lambda key, _: alive.append(key))
-        for it in them:
-            it.subscribe("**", overheard)
-            it.declare_alive(SITE.camera("c0", "alive"))
+        for client in them:
+            client.subscribe("**", overheard)
+            client.declare_alive(SITE.camera("c0", "alive"))
         c1.declare_alive(SITE.camera("c1", "alive"))
         for number in range(10):  # time enough for who would have been let in
             await heard.until(f"c1/video {number}", partial(_all, [*them, c1], number))
@@ -162,8 +162,8 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
 
 def _all(buses: Sequence[Bus], number: int) -> None:
     *them, c1 = buses
-    for it in them:
-        it.publish(SITE.camera("c0", "video"), b"false")
+    for client in them:
+        client.publish(SITE.camera("c0", "video"), b"false")
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
 

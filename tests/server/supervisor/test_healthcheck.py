@@ -250,10 +250,10 @@ def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, t
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0", "yard"]
     subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
-    assert all(it.read_bytes().startswith(content) for it, content in before.items())
+    assert all(path.read_bytes().startswith(content) for path, content in before.items())
     new = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    new -= {str(it.relative_to(folder)) for it in before}
-    assert new == {f"cameras/yard/{it}" for it in ("bus", "pulses", "token")}
+    new -= {str(path.relative_to(folder)) for path in before}
+    assert new == {f"cameras/yard/{name}" for name in ("bus", "pulses", "token")}
 
 
 @needs_openssl
@@ -264,5 +264,5 @@ def test_a_site_without_pulse_passwords_gets_them(secrets: Path, tmp_path: Path)
         (folder / name).unlink()
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert made(folder, "cameras.example").returncode == 0
-    assert all(it.read_bytes() == content for it, content in before.items())
+    assert all(path.read_bytes() == content for path, content in before.items())
     assert set(users(folder / "pulses")) == {"bestview", "c0"}

@@ -95,14 +95,14 @@ class Machine:
 
 @pytest.fixture
 async def machine(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Machine]:
-    it = Machine()
-    monkeypatch.setattr(asyncio, "create_subprocess_exec", it.start)
+    machine = Machine()
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", machine.start)
     monkeypatch.setattr(supervisor, "_RETRY_FIRST_S", 0.0)
     async with asyncio.timeout(PATIENCE):
-        yield it
-        if it.task is not None:
-            it.task.cancel()
-            await asyncio.gather(it.task, return_exceptions=True)
+        yield machine
+        if machine.task is not None:
+            machine.task.cancel()
+            await asyncio.gather(machine.task, return_exceptions=True)
 
 
 async def test_all_processes_are_started_and_ended(machine: Machine) -> None:

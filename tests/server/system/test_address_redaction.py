@@ -53,7 +53,7 @@ def test_no_part_of_a_password_is_shown(place: str, password: str) -> None:
     assert redact_address(told) == told
 
 
-@given(PASSWORDS.filter(lambda it: not set(it) & set("/?#")))
+@given(PASSWORDS.filter(lambda password: not set(password) & set("/?#")))
 def test_the_host_is_shown_if_it_is_unambiguous(password: str) -> None:
     assert redact_address(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
 

@@ -15,4 +15,4 @@ STARTS = re.compile(
 def test_no_other_module_of_the_server_starts_processes() -> None:
     root = Path(server.__path__[0])
     starting = [path for path in root.rglob("*.py") if STARTS.search(path.read_text("utf-8"))]
-    assert [str(it.relative_to(root)) for it in starting] == ["system/child_process.py"]
+    assert [str(path.relative_to(root)) for path in starting] == ["system/child_process.py"]

@@ -80,7 +80,7 @@ def test_the_doctor_reports_the_connections_that_fit() -> None:
 def test_the_doctor_includes_the_check_of_open_files(myview: RunCommand, tmp_path: Path) -> None:
     path = write_site(tmp_path, free_port())
     said = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
-    (found,) = [it for it in said["findings"] if it["check"] == "open files"]
+    (found,) = [finding for finding in said["findings"] if finding["check"] == "open files"]
     assert str(descriptor_limit()) in found["text"]
 
 

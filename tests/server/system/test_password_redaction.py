@@ -56,7 +56,7 @@ def built(**changes: Any) -> Config:
 
 def written(config: Config) -> str:
     """Return all that an operator is shown of a configuration."""
-    return "\n".join(f"{it.key}: {it.value} {it.default}" for it in settings_of(config))
+    return "\n".join(f"{setting.key}: {setting.value} {setting.default}" for setting in settings_of(config))
 
 
 def door(source: str, **changes: Any) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def test_the_operators_page_shows_no_password_of_a_source(place: str, password: 
 
 
 @settings(max_examples=20)
-@given(PASSWORDS.filter(lambda it: not set(it) & set(" /#?")))
+@given(PASSWORDS.filter(lambda password: not set(password) & set(" /#?")))
 def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
     def told(secret: str) -> str:
         options = {"headers": f"Authorization: Basic {secret}", "rtsp_transport": secret}
@@ -120,9 +120,9 @@ def test_no_configuration_error_repeats_a_password(place: str, password: str) ->
     secrets = zip(misplaced(address, password), misplaced(place.format(HARMLESS), HARMLESS), strict=True)
     for content, harmless in secrets:
         told = []
-        for it in (content, harmless):
+        for mapping in (content, harmless):
             with pytest.raises(UserError) as refused:
-                build_config(it, where="site.yaml", folder=Path())
+                build_config(mapping, where="site.yaml", folder=Path())
             told.append("".join(traceback.format_exception(refused.value.__cause__ or refused.value)))
             told[-1] += str(refused.value)
         assert not leaks(told[0], password, without=told[1]), told[0]

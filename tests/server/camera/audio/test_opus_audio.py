@@ -61,7 +61,11 @@ def test_opus_is_passed_on_byte_for_byte(tmp_path: Path, name: str) -> None:
     path = write_flashes(tmp_path / name, FRAMES, codec="libopus")
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     with av.open(str(path)) as container:
-        own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
+        own = [
+            bytes(packet)
+            for packet in container.demux(audio=0)
+            if packet.size and packet.pts is not None and packet.pts >= 0
+        ]
     frames = [*sound.until(0), *sound.until(FRAMES + 10)]
     assert [frame.data for frame in frames] == own
     first = frames[0].number
@@ -210,9 +214,11 @@ async def test_ffprobe_reports_no_audio_errors(served: ServedSite, recording: Pa
     live, ts = await watched(served, "/objects/1/best.mp4", "/objects/1/best.ts")
     (tmp_path / "live.mp4").write_bytes(live)
     (tmp_path / "live.ts").write_bytes(ts)
-    found = {it[0]: int(it[1]) for it in probed(tmp_path / "live.mp4", "codec_name,nb_read_frames")}
+    found = {
+        stream[0]: int(stream[1]) for stream in probed(tmp_path / "live.mp4", "codec_name,nb_read_frames")
+    }
     assert found == {"h264": FRAMES, "opus": FRAMES * 2}
-    assert {it[0] for it in probed(tmp_path / "live.ts", "codec_name,nb_read_frames")} == {"h264"}
+    assert {stream[0] for stream in probed(tmp_path / "live.ts", "codec_name,nb_read_frames")} == {"h264"}
 
 
 @needs_ffprobe
@@ -224,7 +230,7 @@ async def test_a_download_contains_opus_audio(served: ServedSite, recording: Pat
     data = out.read_bytes()
     assert flashes(data) == pytest.approx(BEEP_TIMES, abs=0.001)
     assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
-    assert [it[0] for it in probed(out, "codec_name,nb_read_frames")] == ["h264", "opus"]
+    assert [stream[0] for stream in probed(out, "codec_name,nb_read_frames")] == ["h264", "opus"]
 
 
 @needs_chromium

@@ -57,7 +57,11 @@ def test_compatible_audio_is_passed_through_byte_for_byte(tmp_path: Path) -> Non
     path = write_flashes(tmp_path / "own.mp4", FRAMES)
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     with av.open(str(path)) as container:
-        own = [bytes(it) for it in container.demux(audio=0) if it.size and it.pts is not None and it.pts >= 0]
+        own = [
+            bytes(packet)
+            for packet in container.demux(audio=0)
+            if packet.size and packet.pts is not None and packet.pts >= 0
+        ]
     frames = all_until(sound, FRAMES + 10)
     assert isinstance(sound._framer, AudioPassthrough)
     assert [frame.data for frame in frames] == own
@@ -140,7 +144,7 @@ def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
     covered.write_bytes(tag + head + content + path.read_bytes())
     with av.open(str(covered)) as container:
         assert container.streams.video
-    ways = [RecordedAudioSource(str(it), STEREO, FPS, 0, "loop") for it in (path, covered)]
+    ways = [RecordedAudioSource(str(recording), STEREO, FPS, 0, "loop") for recording in (path, covered)]
     plain, other = (beeps(as_adts(all_until(way, 2 * FRAMES), FORM), "aac") for way in ways)
     assert len(plain) > 2
     assert other == pytest.approx(plain, abs=0.03)

@@ -42,12 +42,12 @@ def followed(current: ShedLevel) -> list[WindowResult]:
 
 
 @pytest.mark.parametrize(
-    "current", shed_levels(WINDOW.stride, live=False), ids=lambda it: f"every {it.detection_interval}"
+    "current", shed_levels(WINDOW.stride, live=False), ids=lambda level: f"every {level.detection_interval}"
 )
 def test_a_person_keeps_one_track_however_few_frames_are_searched(current: ShedLevel) -> None:
     results = followed(current)
     assert [result.last for result in results] == [
-        it.last for it in followed(ShedLevel())
+        result.last for result in followed(ShedLevel())
     ]  # windows end when they do, and none is late
     final = {
         result.first + place: (track.id, track.interpolated[place])
@@ -78,7 +78,9 @@ def test_where_every_frame_is_searched_nothing_is_different() -> None:
 
 def test_windows_of_frames_that_are_all_left_out_end_as_well() -> None:
     steps = stepping(4)
-    ends = [frame for frame in range(40) if (it := steps.skip(frame)) is not None and it.last == frame]
+    ends = [
+        frame for frame in range(40) if (skipped := steps.skip(frame)) is not None and skipped.last == frame
+    ]
     assert ends == list(range(4, 40, 5))
 
 

@@ -129,7 +129,7 @@ def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
     sent = passed(pipeline, range(2 * FRAMES + GOP))
     pipeline.close()
     assert [unit.pulse for unit in sent] == list(range(GOP, 2 * FRAMES + GOP))
-    assert [nals(it.data) for it in sent] == 2 * [nals(it.data) for it in encoded(0)[:FRAMES]]
+    assert [nals(unit.data) for unit in sent] == 2 * [nals(unit.data) for unit in encoded(0)[:FRAMES]]
 
 
 @needs_ffmpeg

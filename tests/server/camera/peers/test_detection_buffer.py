@@ -19,107 +19,107 @@ def buffer(*others: str, near: bool = True) -> PeerDetectionBuffer:
     return PeerDetectionBuffer(others or ("c1",), MOST, lambda _: near)
 
 
-def pulses(it: PeerDetectionBuffer, pulse: int) -> list[tuple[str, int]]:
-    return [(message.camera, message.pulse) for message in it.detections_at(pulse).messages]
+def pulses(peer_buffer: PeerDetectionBuffer, pulse: int) -> list[tuple[str, int]]:
+    return [(message.camera, message.pulse) for message in peer_buffer.detections_at(pulse).messages]
 
 
 def test_detections_are_returned_in_configuration_order() -> None:
-    it = buffer("c1", "c2")
-    it.put(word(7, "c2"), 0.0)
-    it.put(word(7, "c1"), 0.0)
-    it.expect(7, 1.0)
-    assert not it.is_missing(7)
-    assert pulses(it, 7) == [("c1", 7), ("c2", 7)]
-    assert not it.detections_at(7).is_incomplete
+    peer_buffer = buffer("c1", "c2")
+    peer_buffer.put(word(7, "c2"), 0.0)
+    peer_buffer.put(word(7, "c1"), 0.0)
+    peer_buffer.expect(7, 1.0)
+    assert not peer_buffer.is_missing(7)
+    assert pulses(peer_buffer, 7) == [("c1", 7), ("c2", 7)]
+    assert not peer_buffer.detections_at(7).is_incomplete
 
 
 def test_a_camera_that_was_never_there_costs_one_wait() -> None:
-    it = buffer()
-    it.expect(0, 0.0)
-    assert it.is_missing(0)
-    assert it.give_up(0) == ["c1"]
-    assert it.detections_at(0).is_incomplete
+    peer_buffer = buffer()
+    peer_buffer.expect(0, 0.0)
+    assert peer_buffer.is_missing(0)
+    assert peer_buffer.give_up(0) == ["c1"]
+    assert peer_buffer.detections_at(0).is_incomplete
     for pulse in range(1, 50):
-        it.expect(pulse, pulse / 25)
-        assert not it.is_missing(pulse)
-        assert it.detections_at(pulse).is_incomplete, "it is reported all the same"
+        peer_buffer.expect(pulse, pulse / 25)
+        assert not peer_buffer.is_missing(pulse)
+        assert peer_buffer.detections_at(pulse).is_incomplete, "it is reported all the same"
 
 
 def test_a_camera_that_was_late_is_waited_for_once_it_would_have_been_in_time() -> None:
-    it = buffer()
-    it.put(word(0), 0.0)
-    it.expect(1, PATIENCE)
-    it.give_up(1)
-    it.put(word(1), PATIENCE + 0.01)
-    it.expect(2, 0.3 + PATIENCE)
-    assert not it.is_missing(2), "it is too slow by more than the patience"
-    it.put(word(2), 0.3 + PATIENCE / 2)
-    it.expect(3, 0.34 + PATIENCE)
-    assert it.is_missing(3)
-    it.put(word(3), 0.36)
-    assert not it.is_missing(3)
-    assert pulses(it, 3) == [("c1", 3)]
+    peer_buffer = buffer()
+    peer_buffer.put(word(0), 0.0)
+    peer_buffer.expect(1, PATIENCE)
+    peer_buffer.give_up(1)
+    peer_buffer.put(word(1), PATIENCE + 0.01)
+    peer_buffer.expect(2, 0.3 + PATIENCE)
+    assert not peer_buffer.is_missing(2), "it is too slow by more than the patience"
+    peer_buffer.put(word(2), 0.3 + PATIENCE / 2)
+    peer_buffer.expect(3, 0.34 + PATIENCE)
+    assert peer_buffer.is_missing(3)
+    peer_buffer.put(word(3), 0.36)
+    assert not peer_buffer.is_missing(3)
+    assert pulses(peer_buffer, 3) == [("c1", 3)]
 
 
 def test_a_lost_message_is_not_waited_for_after_a_later_one() -> None:
-    it = buffer()
-    it.put(word(4), 0.0)
-    it.expect(3, 0.0)
-    assert not it.is_missing(3)
-    assert it.detections_at(3).is_incomplete
-    it.expect(4, 0.0)
-    assert pulses(it, 4) == [("c1", 4)]
+    peer_buffer = buffer()
+    peer_buffer.put(word(4), 0.0)
+    peer_buffer.expect(3, 0.0)
+    assert not peer_buffer.is_missing(3)
+    assert peer_buffer.detections_at(3).is_incomplete
+    peer_buffer.expect(4, 0.0)
+    assert pulses(peer_buffer, 4) == [("c1", 4)]
 
 
 def test_nothing_is_expected_of_a_recording_that_has_ended() -> None:
-    it = buffer()
-    it.put(word(4), 0.0)
-    it.put(word(5, ended=True), 0.0)
-    it.expect(4, 0.0)
-    assert pulses(it, 4) == [("c1", 4)]
+    peer_buffer = buffer()
+    peer_buffer.put(word(4), 0.0)
+    peer_buffer.put(word(5, ended=True), 0.0)
+    peer_buffer.expect(4, 0.0)
+    assert pulses(peer_buffer, 4) == [("c1", 4)]
     for pulse in (5, 6):
-        it.expect(pulse, 0.0)
-        assert not it.is_missing(pulse)
-        assert it.detections_at(pulse).messages == ()
-        assert not it.detections_at(pulse).is_incomplete
+        peer_buffer.expect(pulse, 0.0)
+        assert not peer_buffer.is_missing(pulse)
+        assert peer_buffer.detections_at(pulse).messages == ()
+        assert not peer_buffer.detections_at(pulse).is_incomplete
 
 
 def test_a_camera_that_was_started_again_is_waited_for_again() -> None:
-    it = buffer()
-    it.put(word(4), 0.0)
-    it.put(word(5, ended=True), 0.0)
-    it.put(word(9, boot=2), 0.0)
-    it.expect(10, 0.0)
-    assert it.is_missing(10)
+    peer_buffer = buffer()
+    peer_buffer.put(word(4), 0.0)
+    peer_buffer.put(word(5, ended=True), 0.0)
+    peer_buffer.put(word(9, boot=2), 0.0)
+    peer_buffer.expect(10, 0.0)
+    assert peer_buffer.is_missing(10)
 
 
 def test_a_camera_without_common_ground_is_not_waited_for() -> None:
-    it = buffer(near=False)
-    assert not it.put(word(0), 0.0)
+    peer_buffer = buffer(near=False)
+    assert not peer_buffer.put(word(0), 0.0)
     for pulse in range(3):
-        it.expect(pulse, 0.0)
-        assert not it.is_missing(pulse)
-        assert it.detections_at(pulse).messages == ()
-        assert not it.detections_at(pulse).is_incomplete
+        peer_buffer.expect(pulse, 0.0)
+        assert not peer_buffer.is_missing(pulse)
+        assert peer_buffer.detections_at(pulse).messages == ()
+        assert not peer_buffer.detections_at(pulse).is_incomplete
 
 
 def test_buffered_messages_are_bounded() -> None:
-    it = buffer()
+    peer_buffer = buffer()
     for pulse in range(10 * MOST):
-        it.put(word(pulse), 0.0)
-    it.expect(MOST - 1, 0.0)
-    assert pulses(it, MOST - 1) == [("c1", MOST - 1)]
-    it.expect(MOST, 0.0)
-    assert not it.is_missing(MOST)
-    assert it.detections_at(MOST).is_incomplete
+        peer_buffer.put(word(pulse), 0.0)
+    peer_buffer.expect(MOST - 1, 0.0)
+    assert pulses(peer_buffer, MOST - 1) == [("c1", MOST - 1)]
+    peer_buffer.expect(MOST, 0.0)
+    assert not peer_buffer.is_missing(MOST)
+    assert peer_buffer.detections_at(MOST).is_incomplete
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 3), st.floats(0, 0.5)), max_size=40))
 def test_between_two_timeouts_a_message_arrives_in_time(steps: list[tuple[bool, int, float]]) -> None:
     """However words and questions come: ``steps`` are a word of so many pulses later, or a question."""
-    it = buffer()
-    it.put(word(0), 0.0)
+    peer_buffer = buffer()
+    peer_buffer.put(word(0), 0.0)
     now, sent, expected = 0.0, 0, -1
     trusted = True
     times: dict[int, float] = {}
@@ -127,16 +127,16 @@ def test_between_two_timeouts_a_message_arrives_in_time(steps: list[tuple[bool, 
         now += later
         if speaks:
             sent += 1 + ahead
-            it.put(word(sent), now)
+            peer_buffer.put(word(sent), now)
             if sent > expected or now <= times.get(sent, -1.0) + PATIENCE:
                 trusted = True
         else:
             expected += 1
             times[expected] = now
-            it.expect(expected, now + PATIENCE)
-            waits = it.is_missing(expected)
+            peer_buffer.expect(expected, now + PATIENCE)
+            waits = peer_buffer.is_missing(expected)
             assert waits == (trusted and sent < expected)
             if waits:
                 now += PATIENCE
-                it.give_up(expected)
+                peer_buffer.give_up(expected)
                 trusted = False

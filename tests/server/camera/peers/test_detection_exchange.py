@@ -89,10 +89,10 @@ async def running() -> AsyncIterator[list[SiteInOneLoop]]:
 
 async def live(config: Config, out: Path, running: list[SiteInOneLoop]) -> dict[str, bytes]:
     """Run a whole site to its end; give what was written."""
-    it = SiteInOneLoop(config, out)
-    running.append(it)
-    over = await it.start()
-    cameras = [it.camera(camera) for camera in config.camera_ids]
+    whole_site = SiteInOneLoop(config, out)
+    running.append(whole_site)
+    over = await whole_site.start()
+    cameras = [whole_site.camera(camera) for camera in config.camera_ids]
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(over, *cameras)
     return written_files(out)
@@ -134,15 +134,15 @@ async def test_a_camera_that_never_connects_is_logged_and_does_not_delay_others(
     recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = config_of(recording, wait=0.5)
-    it = SiteInOneLoop(config, tmp_path / "out")
-    it.pulses = type(it.pulses)(
+    whole_site = SiteInOneLoop(config, tmp_path / "out")
+    whole_site.pulses = type(whole_site.pulses)(
         50, expect={"bestview", "c0", "c1"}, start_timeout=PATIENCE, port=config.sync.port
     )
-    running.append(it)
-    await it.start()
+    running.append(whole_site)
+    await whole_site.start()
     began = asyncio.get_running_loop().time()
     async with asyncio.timeout(PATIENCE):
-        await asyncio.gather(it.camera("c0"), it.camera("c1"))
+        await asyncio.gather(whole_site.camera("c0"), whole_site.camera("c1"))
     assert asyncio.get_running_loop().time() - began < FRAMES * 0.5, "not a wait for every frame"
     with (tmp_path / "out" / "late.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -185,7 +185,7 @@ async def both(
     """Let both say what they found in a frame, and hear the other."""
     pair = (("c0", one), ("c1", two))
     return await asyncio.gather(
-        *(it.exchange(pulse, word(name, pulse), now(), needed=needed) for name, it in pair)
+        *(exchange.exchange(pulse, word(name, pulse), now(), needed=needed) for name, exchange in pair)
     )
 
 
@@ -257,11 +257,11 @@ def test_every_decoded_message_can_be_used_for_scoring(message: dict[str, Any], 
     cross_view = CrossViewScorer(config, "c0", (640, 360), 1)
     seen = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
     good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
-    for it in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
+    for content in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
         try:
-            read = msgspec.json.decode(msgspec.json.encode(it), type=FrameDetections)
+            read = msgspec.json.decode(msgspec.json.encode(content), type=FrameDetections)
         except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
-            assert it is not good
+            assert content is not good
             continue
         if not cross_view.sees_same_ground(read):
             continue

@@ -77,9 +77,9 @@ class MotionJpeg:
 
 @pytest.fixture
 def camera() -> Iterator[MotionJpeg]:
-    it = MotionJpeg()
-    yield it
-    it.unplug()
+    server = MotionJpeg()
+    yield server
+    server.unplug()
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -142,8 +142,8 @@ def test_a_long_absence_is_logged_once_and_so_is_the_return(
     finally:
         source.close()
     *away, back = caplog.records
-    whys = [it.getMessage() for it in away]
-    assert {it.levelname for it in away} == {"WARNING"}
+    whys = [record.getMessage() for record in away]
+    assert {record.levelname for record in away} == {"WARNING"}
     assert "Connection refused" in whys[-1]
     assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
     assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: frames arrive again, after ")

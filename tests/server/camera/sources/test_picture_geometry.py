@@ -48,8 +48,8 @@ def corners() -> Picture:
 
 
 def turned(picture: Picture, turn: int, *, flip: bool) -> Picture:
-    it = np.rot90(picture, turn // 90)
-    return it[:, ::-1] if flip else it
+    rotated = np.rot90(picture, turn // 90)
+    return rotated[:, ::-1] if flip else rotated
 
 
 def same(shown: Picture | None, meant: Picture) -> bool:
@@ -197,7 +197,9 @@ def test_a_cover_is_no_video_and_of_several_videos_the_first_is_taken(
             container.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="bgr24")))
             container.mux(stream.encode(None))
     with av.open(str(path)) as container:
-        covers = sum(bool(it.disposition & Disposition.attached_pic) for it in container.streams.video)
+        covers = sum(
+            bool(stream.disposition & Disposition.attached_pic) for stream in container.streams.video
+        )
     recording = Recording(str(path))
     recording.close()
     assert recording.size == ((64, 64) if covers else (32, 32))

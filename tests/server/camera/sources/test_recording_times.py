@@ -54,7 +54,7 @@ def test_a_view_of_another_rate_shows_the_same_moment_in_the_same_frame(
 def test_pictures_at_uneven_times_are_shown_when_they_were_taken(
     tmp_path_factory: pytest.TempPathFactory, gaps: list[int], fps: float
 ) -> None:
-    times = [it / 50 for it in accumulate(gaps, initial=0)]
+    times = [ticks / 50 for ticks in accumulate(gaps, initial=0)]
     path = write_timed(tmp_path_factory.mktemp("uneven") / "phone.mp4", times)
     frames = shown(path, fps)
     for pulse, frame in enumerate(frames):

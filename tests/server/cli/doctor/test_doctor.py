@@ -58,10 +58,10 @@ def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: RunCommand, tmp
     ended = myview("doctor", path, "--json", "--seconds", 20)
     said = json.loads(ended.out)
     assert (ended.code, ended.err, said["ok"]) == (0, "", True)
-    (camera,) = [it for it in said["findings"] if it["check"] == "camera c0"]
+    (camera,) = [finding for finding in said["findings"] if finding["check"] == "camera c0"]
     assert camera["level"] == "ok"
     assert camera["text"].startswith("64x48 pixels, 25.0 pictures a second, ")
-    assert {it["check"] for it in said["findings"]} >= {
+    assert {finding["check"] for finding in said["findings"]} >= {
         "configuration", "http.port", "sync.port", "zenoh.listen", "clock", "disk", "processor", "memory"
     }  # fmt: skip
     assert sorted(tmp_path.iterdir()) == before
@@ -72,7 +72,7 @@ async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -
     found = [finding async for finding in run_checks(there, 1.0)]
     assert only(found, "camera c0").level is Level.BAD
     assert "there is no scene 'nowhere'" in only(found, "camera c0").text
-    assert {it.check for it in found if it.level is Level.BAD} == {"camera c0"}
+    assert {finding.check for finding in found if finding.level is Level.BAD} == {"camera c0"}
 
 
 def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(
@@ -107,7 +107,7 @@ async def test_a_port_used_by_another_program_is_bad(tmp_path: Path, taken: int)
     found, runs = await port_findings(load_site(tmp_path, sync={"port": taken}))
     assert not runs
     assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is used by another program")
-    assert {only(found, it).level for it in ("http.port", "zenoh.listen")} == {Level.OK}
+    assert {only(found, check).level for check in ("http.port", "zenoh.listen")} == {Level.OK}
 
 
 async def test_an_address_of_another_machine_is_bad(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ async def test_an_address_of_another_machine_is_bad(tmp_path: Path) -> None:
 
 
 async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path, taken: int) -> None:
-    cameras = [{"id": it, "source": "scene:room"} for it in served.service.config.camera_ids]
+    cameras = [{"id": name, "source": "scene:room"} for name in served.service.config.camera_ids]
     changes: Any = {
         "http": {"port": served.port},
         "cameras": cameras,
@@ -325,13 +325,13 @@ def test_files_that_others_can_read_or_write_are_reported(tmp_path: Path) -> Non
     changes: Any = {"access": {"tokens": "tokens.yaml"}}
     bus = {**dict.fromkeys(("connect", "listen"), "tcp/127.0.0.1:7447"), "users": "users"}
     found = file_findings(load_site(tmp_path, **changes, zenoh=bus))
-    words = " ".join(it.text for it in found if it.level is Level.WARNING)
+    words = " ".join(finding.text for finding in found if finding.level is Level.WARNING)
     assert "lets no one in" in words
     assert f"others may write {tokens}" in words
     assert f"others may read {users}" in words
     assert "no line for c0" in words
     pulses = file_findings(load_site(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
-    assert [it.level for it in of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
+    assert [finding.level for finding in of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
     assert "passwords of bestview" in of(pulses, "sync.users")[0].text
     users.write_text("bestview:" + "b" * 32 + "\n")
     pulses = file_findings(load_site(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
@@ -370,7 +370,9 @@ def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
 
 def expired(folder: Path) -> tuple[Path, Path]:
     """Create an expired certificate, signed by an authority, since only that can set its start."""
-    certificate, key, asked, settings = (folder / it for it in ("over.pem", "over.key", "asked", "settings"))
+    certificate, key, asked, settings = (
+        folder / name for name in ("over.pem", "over.key", "asked", "settings")
+    )
     (folder / "known").touch()
     (folder / "serial").write_text("01\n")
     settings.write_text(

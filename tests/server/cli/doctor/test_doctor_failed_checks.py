@@ -54,8 +54,8 @@ async def test_a_failed_check_does_not_lose_others_findings(
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
     monkeypatch.setattr(command, check, broken)
     found = [finding async for finding in command.run_checks(there, 1.0)]
-    (failed,) = [it for it in found if (it.level, it.text) == BROKEN[0]]
-    assert {it.check for it in found if it is not failed} == before - lost
+    (failed,) = [finding for finding in found if (finding.level, finding.text) == BROKEN[0]]
+    assert {finding.check for finding in found if finding is not failed} == before - lost
 
 
 async def test_a_failed_check_of_one_port_or_file_does_not_lose_others(
@@ -143,10 +143,14 @@ async def test_two_services_on_one_port_are_bad(tmp_path: Path) -> None:
 
 def test_a_device_shared_by_two_cameras_is_bad(tmp_path: Path) -> None:
     sources = {"c0": "/dev/video9", "c1": "/dev/video9", "c2": "c.mp4", "c3": "c.mp4"}
-    there = load_site(tmp_path, cameras=[{"id": it, "source": source} for it, source in sources.items()])
+    there = load_site(
+        tmp_path, cameras=[{"id": camera, "source": source} for camera, source in sources.items()]
+    )
     found = camera_findings(there, {}, runs=False)
     text = "/dev/video9 is also used by camera c0, and only one can open it"
-    assert [(it.check, it.level, it.text) for it in found] == [("camera c1", Level.BAD, text)]
+    assert [(finding.check, finding.level, finding.text) for finding in found] == [
+        ("camera c1", Level.BAD, text)
+    ]
 
 
 def test_an_invalid_configuration_is_reported_with_a_remedy(myview: RunCommand, tmp_path: Path) -> None:
@@ -160,7 +164,7 @@ def test_an_invalid_configuration_is_reported_with_a_remedy(myview: RunCommand, 
 
 def test_a_missing_token_file_is_reported_once(tmp_path: Path) -> None:
     found = file_findings(load_site(tmp_path, access={"tokens": "none.yaml"}))
-    (failed,) = [it for it in found if it.level is Level.BAD]
+    (failed,) = [finding for finding in found if finding.level is Level.BAD]
     assert (failed.check, failed.remedy) == ("access.tokens", "`myview token NAME` prints a line for it")
 
 
@@ -178,7 +182,9 @@ def test_the_routers_certificate_must_be_for_the_host_of_zenoh_connect(tmp_path:
         tls = {"authority": "a.pem", "certificate": "r.pem", "key": "r.key", **files}
         ends = {"connect": f"tls/{host}:7447", "listen": "tls/127.0.0.1:7447"}
         found = file_findings(load_site(tmp_path, zenoh={**ends, "tls": tls}))
-        return [it.text for it in found if it.check == "zenoh.tls" and it.level is Level.BAD]
+        return [
+            finding.text for finding in found if finding.check == "zenoh.tls" and finding.level is Level.BAD
+        ]
 
     assert bad("elsewhere") == []
     (other,) = bad("10.0.0.5")

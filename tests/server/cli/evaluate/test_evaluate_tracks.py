@@ -104,7 +104,7 @@ def test_a_missing_file_is_named(refused: Printed, tmp_path: Path) -> None:
 
 def test_files_are_paired_by_name_in_any_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / "seen" / f"c{number}.txt", people((number + 1,))) for number in range(3)]
-    there = [write(tmp_path / "gt" / f"c{it}.txt.gz", people((it + 1,))) for it in (2, 0, 1)]
+    there = [write(tmp_path / "gt" / f"c{number}.txt.gz", people((number + 1,))) for number in (2, 0, 1)]
     once = rows(run(*each("--gt", there), *each("--tracks", found)))
     assert list(once) == ["camera", "c0", "c1", "c2", "mean,", "joint"]
     assert once["joint"][5] == "100.0"

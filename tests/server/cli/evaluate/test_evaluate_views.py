@@ -118,7 +118,9 @@ def test_a_hidden_person_is_not_visible_by_default(evaluate: RunCommand, tmp_pat
     write(tmp_path / "gt" / "c0.txt", boxes({1: BIG}, end="1,1,0.1"))
     write(tmp_path / "gt" / "c1.txt", boxes({1: SMALL}))
     path = write(tmp_path / "choices.csv", choices({1: "c0"}))
-    outputs = [evaluate("--gt", tmp_path, "--views", path, *SIZE, "--visible", it)[1] for it in (0.25, 0)]
+    outputs = [
+        evaluate("--gt", tmp_path, "--views", path, *SIZE, "--visible", visible)[1] for visible in (0.25, 0)
+    ]
     assert [judged(output)["all"][4] for output in outputs] == ["0.0", "100.0"]
 
 

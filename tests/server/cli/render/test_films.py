@@ -95,11 +95,11 @@ def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np
 def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(
     tmp_path: Path, codec: Codec, container: str
 ) -> None:
-    it, _ = films(tmp_path / "best", codec)
+    writer, _ = films(tmp_path / "best", codec)
     for gop, camera in [(2, A), (3, B), (4, A)]:
-        it.write(decision(gop, choice(7, camera)))
-    it.close()
-    assert it.numbers == [7]
+        writer.write(decision(gop, choice(7, camera)))
+    writer.close()
+    assert writer.numbers == [7]
     with av.open(str(tmp_path / "best" / f"object-7.{container}"), "r") as film:
         assert film.duration == 3 * GOP / FPS * av.time_base
         pictures = list(film.decode(video=0))
@@ -111,18 +111,18 @@ def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(
 
 
 def test_a_film_ends_with_the_last_gop_of_the_person(tmp_path: Path) -> None:
-    it, _ = films(tmp_path / "best")
+    writer, _ = films(tmp_path / "best")
     story = [(0, False), (1, True), (2, False), (3, True), (4, True)]
     for gop, away in story:
-        it.write(decision(gop, choice(1, A, away=away)))
-    it.close()
+        writer.write(decision(gop, choice(1, A, away=away)))
+    writer.close()
     with av.open(str(tmp_path / "best" / "object-1.mp4"), "r") as film:
         assert len(list(film.decode(video=0))) == 3 * GOP, "who comes back is shown all the way"
 
 
 @pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
 def test_gaps_in_films_are_filled_as_in_live_streams(tmp_path: Path, codec: Codec, container: str) -> None:
-    it, frame_buffers = films(tmp_path / "best", codec)
+    writer, frame_buffers = films(tmp_path / "best", codec)
     for pulse in (3 * GOP + 2, *range(5 * GOP, 6 * GOP)):
         del frame_buffers[A]._pictures[pulse]
     shown: list[str | None] = [A, None, B, A, B, A, B]
@@ -131,8 +131,8 @@ def test_gaps_in_films_are_filled_as_in_live_streams(tmp_path: Path, codec: Code
             for frame_buffer in frame_buffers.values():
                 for pulse in range(gop * GOP, (gop + 1) * GOP):
                     del frame_buffer._pictures[pulse]
-        it.write(decision(gop, choice(1, camera)))
-    it.close()
+        writer.write(decision(gop, choice(1, camera)))
+    writer.close()
     with av.open(str(tmp_path / "best" / f"object-1.{container}"), "r") as film:
         pictures = list(film.decode(video=0))
     assert [round(float(picture.time or 0) * FPS) for picture in pictures] == list(range(7 * GOP))
@@ -154,12 +154,12 @@ def test_a_film_has_the_sites_sound_in_sync(tmp_path: Path, codec: Literal["aac"
     for unit in access_units(recording):
         for frame_buffer in frame_buffers.values():
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
-    it = FilmWriter(tmp_path / "best", frame_buffers, stream_format, config.site, track.audio_buffer)
+    writer = FilmWriter(tmp_path / "best", frame_buffers, stream_format, config.site, track.audio_buffer)
     begin = 3
     for gop in range(begin, SOUNDING // GOP):
         track.read(gop * GOP, (gop + 1) * GOP)
-        it.write(decision(gop, choice(1, CAMERAS[gop % 2])))
-    it.close()
+        writer.write(decision(gop, choice(1, CAMERAS[gop % 2])))
+    writer.close()
     data = (tmp_path / "best" / "object-1.mp4").read_bytes()
     expected = [at - begin * GOP / FPS for at in BEEP_TIMES]
     assert flashes(data) == pytest.approx(expected, abs=0.001)

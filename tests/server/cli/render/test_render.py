@@ -88,7 +88,7 @@ def test_every_film_has_the_configured_sound(views: Path, tmp_path: Path) -> Non
     with (out / "choices.csv").open(encoding="ascii", newline="") as file:
         rows = [(int(row["object"]), int(row["frame"]) - 1) for row in csv.DictReader(file)]
     for number in {number for number, _ in rows}:
-        frames = [frame for it, frame in rows if it == number]
+        frames = [frame for row_number, frame in rows if row_number == number]
         data = (out / "best" / f"object-{number}.mp4").read_bytes()
         expected = [
             at - frames[0]

@@ -82,7 +82,7 @@ async def test_a_site_that_is_not_ready_exits_with_1_and_the_reason(
     assert await status_once(url(served), None, as_json=True)
     content = json.loads(capsys.readouterr().out)
     assert msgspec.convert(content, client.SiteNow).ready
-    assert [it["camera"] for it in content["cameras"]] == list(CAMERAS)
+    assert [camera["camera"] for camera in content["cameras"]] == list(CAMERAS)
 
 
 async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ async def test_no_text_of_the_server_controls_the_terminal(site_with_people: Ser
     counted = msgspec.structs.replace(now.service, viewers={evil: 1}, waiting={evil: 2})
     said += printed(msgspec.structs.replace(now, service=counted))
     assert said.count("·[2J·]0;owned· new [red]line") == 12
-    assert all(it.isprintable() or it == "\n" for it in said)
+    assert all(char.isprintable() or char == "\n" for char in said)
 
 
 async def test_rates_are_between_two_snapshots_of_one_run(site_with_people: ServedSite) -> None:
@@ -138,7 +138,7 @@ async def test_an_unreachable_server_is_retried(
     said: list[Any] = []
 
     async def until(met: Any) -> None:
-        while not any(met(it) for it in said):
+        while not any(met(line) for line in said):
             await asyncio.sleep(0.01)
             said.extend(map(json.loads, capsys.readouterr().out.splitlines()))
 
@@ -147,13 +147,13 @@ async def test_an_unreachable_server_is_retried(
             make_app(BestViewService(BestViewPipeline(small_config()))), HttpSettings(port=0)
         ) as port:
             live = asyncio.create_task(status_live(f"http://127.0.0.1:{port}", None, as_json=True))
-            await until(lambda it: it.get("name") == "hall")
-        await until(lambda it: "away" in it)
+            await until(lambda status: status.get("name") == "hall")
+        await until(lambda status: "away" in status)
         said.clear()
         async with serving(
             make_app(BestViewService(BestViewPipeline(small_config()))), HttpSettings(port=port)
         ):
-            await until(lambda it: it.get("name") == "hall")
+            await until(lambda status: status.get("name") == "hall")
             live.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await live

@@ -47,8 +47,8 @@ WHO = {
     "/api/objects/{object}/past": FAMILY,
     "/api/cameras/{camera}/past": DOOR,
     **{
-        f"/objects/{{object}}/{it}": FAMILY
-        for it in (
+        f"/objects/{{object}}/{path}": FAMILY
+        for path in (
             "best.mp4",
             "best.ts",
             "best.webm",
@@ -62,8 +62,8 @@ WHO = {
         )
     },
     **{
-        f"/cameras/{{camera}}/{it}": DOOR
-        for it in (
+        f"/cameras/{{camera}}/{path}": DOOR
+        for path in (
             "live.mp4",
             "live.ts",
             "live.webm",
@@ -190,7 +190,7 @@ async def test_a_route_without_an_access_rule_is_refused() -> None:
         return web.Response()
 
     app = web.Application(middlewares=[authorize])
-    app[ACCESS] = AccessControl(Authenticator(None), lambda it: it)
+    app[ACCESS] = AccessControl(Authenticator(None), lambda number: number)
     app.router.add_get("/api/new", handler)
     async with TestClient(TestServer(app)) as client, client.get("/api/new") as answer:
         assert answer.status == 403

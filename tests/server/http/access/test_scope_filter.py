@@ -51,24 +51,26 @@ async def events(answer: aiohttp.ClientResponse, last: int) -> list[tuple[str, A
 def people_in(gop: dict[str, Any]) -> set[int]:
     """Return the numbers of all people in a GOP event."""
     boxes = {box[0] for frames in gop["boxes"].values() for frame in frames for box in frame}
-    received = {it[key] for it in gop["merged"] + gop["split"] for key in ("kept",)}
-    return boxes | {int(it) for it in gop["choices"]} | {it["object"] for it in gop["cuts"]} | received
+    received = {change[key] for change in gop["merged"] + gop["split"] for key in ("kept",)}
+    return (
+        boxes | {int(number) for number in gop["choices"]} | {cut["object"] for cut in gop["cuts"]} | received
+    )
 
 
 async def test_only_the_scoped_person_is_listed(site: ServedSite) -> None:
-    assert [it["object"] for it in (await get(site, "/api/objects", "desk"))["objects"]] == [1, 2]
-    assert [it["object"] for it in (await get(site, "/api/objects", "family"))["objects"]] == [1]
+    assert [person["object"] for person in (await get(site, "/api/objects", "desk"))["objects"]] == [1, 2]
+    assert [person["object"] for person in (await get(site, "/api/objects", "family"))["objects"]] == [1]
     assert (await get(site, "/api/objects", "door"))["objects"] == []
 
 
 async def test_only_the_scoped_camera_is_listed_without_others_errors(site: ServedSite) -> None:
     site.service.ingest.states[B].refused = "its parameters are not those of camera c0"
     everything = (await get(site, "/api/cameras", "desk"))["cameras"]
-    assert [it["camera"] for it in everything] == [A, B]
+    assert [camera["camera"] for camera in everything] == [A, B]
     assert "its parameters" in repr(everything)
-    assert [it["camera"] for it in (await get(site, "/api/cameras", "door"))["cameras"]] == [A]
+    assert [camera["camera"] for camera in (await get(site, "/api/cameras", "door"))["cameras"]] == [A]
     response = (await get(site, "/api/cameras", "family"))["cameras"]
-    assert [it["camera"] for it in response] == [A, B]
+    assert [camera["camera"] for camera in response] == [A, B]
     assert "its parameters" not in repr(response)
     assert (await get(site, "/api/site", "door"))["cameras"] == [A]
     assert (await get(site, "/api/site", "family"))["cameras"] == [A, B]
@@ -85,11 +87,11 @@ async def test_events_are_limited_to_the_scoped_person(site: ServedSite) -> None
         assert [name for name, _ in received[:3]] == ["site", "objects", "cameras"]
         gops = [content for name, content in received if name == "gop"]
         assert len(gops) > 2
-        assert {it for gop in gops for it in people_in(gop)} == {1}
+        assert {number for gop in gops for number in people_in(gop)} == {1}
         every = [content for name, content in await events(all_of_it, last) if name == "gop"]
-        assert {it for gop in every for it in people_in(gop)} == {1, 2}
-        assert [it["first"] for it in gops] == [it["first"] for it in every]
-        assert [it["choices"]["1"] for it in gops] == [it["choices"]["1"] for it in every]
+        assert {number for gop in every for number in people_in(gop)} == {1, 2}
+        assert [gop["first"] for gop in gops] == [gop["first"] for gop in every]
+        assert [gop["choices"]["1"] for gop in gops] == [gop["choices"]["1"] for gop in every]
 
 
 async def test_events_are_limited_to_the_scoped_camera(site: ServedSite) -> None:
@@ -113,7 +115,7 @@ async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pyt
         site.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
         site.service.decide()
         everything = (await get(site, "/api/flags", "desk"))["flags"]
-        assert [(it["objects"], it["cameras"], it["state"]) for it in everything] == [
+        assert [(flag["objects"], flag["cameras"], flag["state"]) for flag in everything] == [
             ([1, 2], [A], "raised"),
             ([2], [A], "raised"),
         ]
@@ -131,9 +133,12 @@ async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pyt
 async def test_recorded_decisions_are_limited_to_the_scoped_person(site: ServedSite) -> None:
     everything = await get(site, "/api/past?from=p0", "desk")
     response = await get(site, "/api/past?from=p0", "family")
-    assert {it for gop in everything for it in people_in({"merged": [], "split": [], **gop})} == {1, 2}
-    assert {it for gop in response for it in people_in({"merged": [], "split": [], **gop})} == {1}
-    assert [it["first"] for it in response] == [it["first"] for it in everything]
+    assert {number for gop in everything for number in people_in({"merged": [], "split": [], **gop})} == {
+        1,
+        2,
+    }
+    assert {number for gop in response for number in people_in({"merged": [], "split": [], **gop})} == {1}
+    assert [gop["first"] for gop in response] == [gop["first"] for gop in everything]
 
 
 async def test_the_last_subscriber_of_a_scope_leaves_no_state(site: ServedSite) -> None:

@@ -49,7 +49,8 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
     right = expected_pictures(decisions, codec)
     if form == "ts":  # which begins at some time of its own
         narrow, full = (
-            {pulse - max(it) + max(right): shown for pulse, shown in it.items()} for it in (narrow, full)
+            {pulse - max(pictures) + max(right): shown for pulse, shown in pictures.items()}
+            for pictures in (narrow, full)
         )
     assert_equal_pictures(narrow, right)
     assert_equal_pictures(full, chosen_pictures(decisions, codec))
@@ -98,7 +99,7 @@ async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: P
     until = max(full) + 1
     right = expected_pictures(decisions)
     for pulse in range(min(narrow), until):  # what stands all segment long lasts
-        standing = narrow[max(it for it in narrow if it <= pulse)]
+        standing = narrow[max(earlier for earlier in narrow if earlier <= pulse)]
         np.testing.assert_array_equal(standing, right[pulse], str(pulse))
     assert_equal_pictures(
         full, {pulse: picture for pulse, picture in chosen_pictures(decisions).items() if pulse < until}

@@ -64,7 +64,9 @@ async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form
     path = f"/objects/1/best.{form}?from=p0&to=p{len(decisions) * GOP}"
     narrow, full = [decoded(await fetch(served, path, who)) for who in ("family", "desk")]
     if form == "ts":
-        narrow, full = ({pulse - min(it): shown for pulse, shown in it.items()} for it in (narrow, full))
+        narrow, full = (
+            {pulse - min(pictures): shown for pulse, shown in pictures.items()} for pictures in (narrow, full)
+        )
     assert_equal_pictures(narrow, expected_pictures(decisions, freezes=False))
     assert_equal_pictures(full, chosen_pictures(decisions))
     assert sum(map(is_gray, narrow.values())) > 8 * GOP
@@ -80,7 +82,7 @@ async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
         shown = decoded((await finish_streams(served, theirs))[0])
     right = expected_pictures(decisions, freezes=False)
     assert min(shown) == 25
-    assert [is_gray(shown[it]) for it in (29, 30, 79, 80)] == [False, True, True, False]
+    assert [is_gray(shown[pulse]) for pulse in (29, 30, 79, 80)] == [False, True, True, False]
     assert_equal_pictures(shown, right)
 
 
@@ -118,7 +120,7 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
         for who in ("family", "desk"):
             names = [f"best.mp4?from=p0&to=p{len(decisions) * GOP}"]
             if hls:
-                names = [f"hls/{it}" for it in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
+                names = [f"hls/{file}" for file in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
                 for scoped in (True, False):
                     reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
                     assert reel is not None

@@ -45,8 +45,8 @@ HEADS_OF_PROXIES = (
 @pytest.fixture
 async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Serve a site that takes a token."""
-    async with serve_with_tokens(tmp_path) as it:
-        yield it
+    async with serve_with_tokens(tmp_path) as served:
+        yield served
 
 
 async def asked(
@@ -248,12 +248,12 @@ def test_a_session_expires_and_a_token_has_a_limited_number_of_sessions() -> Non
     sessions = Sessions(lambda: now[0])
     keys = [token_digest(sessions.open("a")) for _ in range(1024)]
     other = token_digest(sessions.open("b"))
-    assert [sessions.token(it) for it in (keys[0], keys[-1], other)] == ["a", "a", "b"]
+    assert [sessions.token(key) for key in (keys[0], keys[-1], other)] == ["a", "a", "b"]
     now[0] = 1.0
     new = token_digest(sessions.open("a"))
-    assert [sessions.token(it) for it in (keys[0], keys[1], new, other)] == [None, "a", "a", "b"]
+    assert [sessions.token(key) for key in (keys[0], keys[1], new, other)] == [None, "a", "a", "b"]
     now[0] = 12 * 3600.0
-    assert [sessions.token(it) for it in (keys[1], new)] == [None, "a"]
+    assert [sessions.token(key) for key in (keys[1], new)] == [None, "a"]
     assert sessions.token("") is None
 
 

@@ -77,8 +77,8 @@ async def test_a_link_with_a_token_opens_a_person_and_drops_the_token_from_the_u
         await expect(page.get_by_label("Watching needs a token")).to_be_hidden()
         assert "token" not in await page.evaluate("location.href")
         asked = [address for address in addresses if "#" not in address]
-        assert any("best.mp4" in it for it in asked)
-        assert not any(token in it for it in asked)
+        assert any("best.mp4" in address for address in asked)
+        assert not any(token in address for address in asked)
 
 
 async def test_a_viewer_whose_token_is_revoked_is_shown_the_sign_in_form(
@@ -99,4 +99,4 @@ async def test_axe_finds_no_violation_in_the_sign_in_form(browser: Browser, tmp_
     async with watching(browser, tmp_path) as (_, page, _):
         await expect(page.get_by_label("Watching needs a token")).to_be_visible()
         found = await page.evaluate("axe.run()")
-        assert [it["id"] for it in found["violations"]] == []
+        assert [violation["id"] for violation in found["violations"]] == []

@@ -81,7 +81,7 @@ async def test_streams_of_its_sessions_end_too_and_those_of_a_signed_out_session
             [cookie] = answer.cookies.values()
         site.session.cookie_jar.clear()
         kept.append(f"{cookie.key}={cookie.value}")
-    signed_out, revoked, other = [await stream(site, "/api/events", Cookie=it) for it in kept]
+    signed_out, revoked, other = [await stream(site, "/api/events", Cookie=cookie) for cookie in kept]
     async with site.session.delete("/api/session", headers={CSRF_HEADER: "1", "Cookie": kept[0]}):
         await ended(signed_out)
     write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))

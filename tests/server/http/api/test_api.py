@@ -125,7 +125,7 @@ async def test_past_choices_are_explained_from_the_first_request_on(site_with_pe
 
 async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:
     choice = await site_with_people.get_json("/api/objects/1/choice")
-    costs, quality, terms, weights = (choice.pop(it) for it in ("costs", "quality", "terms", "weights"))
+    costs, quality, terms, weights = (choice.pop(field) for field in ("costs", "quality", "terms", "weights"))
     assert 0 == costs[B] < costs[A] < 1
     assert costs[A] == pytest.approx(1 - quality[A] / quality[B])
     for camera, worth in quality.items():

@@ -60,9 +60,9 @@ async def test_the_event_of_a_gop_is_sent_before_its_video(served: ServedSite) -
     served.service.on_decision.append(lambda _: order.append("told"))
     sent = served.service.splicer.publish_decision
 
-    def decision(it: Any) -> None:
+    def decision(choices: Any) -> None:
         order.append("sent")
-        sent(it)
+        sent(choices)
 
     served.service.splicer.publish_decision = decision  # type: ignore[method-assign,assignment]
     served.service.connect_cameras(*CAMERAS)

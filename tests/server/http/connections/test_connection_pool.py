@@ -236,35 +236,35 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
     clock, there, busy = Clock(), list[Connection](), set[int]()
     places = ConnectionLimiter(BOUNDS, clock)
     for act, address, which in acts:
-        it = there[which % len(there)] if there else None
+        connection = there[which % len(there)] if there else None
         if act == "comes":
             new = places.admit(address, Fake())
             if new is None:
-                beyond = [it for it in there if it.is_reserved]
+                beyond = [connection for connection in there if connection.is_reserved]
                 assert len(beyond) == BOUNDS.for_operators
-                assert all(id(it) in busy for it in beyond)
+                assert all(id(connection) in busy for connection in beyond)
             else:
                 there.append(new)
         elif act == "time":
             clock.now += 5.0
             places.close_overdue()
-        elif it is not None and act in {"asks", "is sent"}:
-            places.busy(it)
-            busy.add(id(it))
+        elif connection is not None and act in {"asks", "is sent"}:
+            places.busy(connection)
+            busy.add(id(connection))
             if act == "is sent":
-                places.sending(it)
-        elif it is not None:
-            busy.discard(id(it))
-            {"rests": places.idle, "waits": places.receiving, "leaves": places.closed}[act](it)
-        assert not any(it.transport.ended for it in there if id(it) in busy)  # type: ignore[attr-defined]
-        there = [it for it in there if not it.closed]
+                places.sending(connection)
+        elif connection is not None:
+            busy.discard(id(connection))
+            {"rests": places.idle, "waits": places.receiving, "leaves": places.closed}[act](connection)
+        assert not any(connection.transport.ended for connection in there if id(connection) in busy)  # type: ignore[attr-defined]
+        there = [connection for connection in there if not connection.closed]
         assert places.open == len(there)
-        assert len([it for it in there if not it.is_reserved]) <= BOUNDS.most
-        assert len([it for it in there if it.is_reserved]) <= BOUNDS.for_operators
-        placed = Counter(it.network for it in there if not it.is_reserved)
+        assert len([connection for connection in there if not connection.is_reserved]) <= BOUNDS.most
+        assert len([connection for connection in there if connection.is_reserved]) <= BOUNDS.for_operators
+        placed = Counter(connection.network for connection in there if not connection.is_reserved)
         assert all(count <= BOUNDS.per_address for network, count in placed.items() if network != "127.0.0.1")
-    for it in there:
-        places.closed(it)
+    for connection in there:
+        places.closed(connection)
     assert places.open == 0
     assert not places._per_network
     assert not any(places._waiting.values())
@@ -274,12 +274,12 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
 def test_at_the_limit_of_an_address_its_own_connections_are_closed_first() -> None:
     places = ConnectionLimiter(BOUNDS)
     own = [places.admit("10.0.0.1", Fake()) for _ in range(3)]
-    assert all(it is not None for it in own)
+    assert all(connection is not None for connection in own)
     fourth = places.admit("10.0.0.1", Fake())
-    assert [it.closed for it in own if it] == [True, False, False]
-    for it in [*own[1:], fourth]:
-        assert it is not None
-        places.busy(it)
+    assert [connection.closed for connection in own if connection] == [True, False, False]
+    for connection in [*own[1:], fourth]:
+        assert connection is not None
+        places.busy(connection)
     fifth = places.admit("::ffff:10.0.0.1", Fake())
     other = places.admit("10.0.0.2", Fake())
     assert fifth is not None
@@ -290,18 +290,18 @@ def test_at_the_limit_of_an_address_its_own_connections_are_closed_first() -> No
 def test_loopback_addresses_have_no_limit_per_address() -> None:
     places = ConnectionLimiter(BOUNDS)
     for _ in range(BOUNDS.most):
-        it = places.admit("127.0.0.1", Fake())
-        assert it is not None
-        assert not it.is_reserved
-        places.busy(it)
+        connection = places.admit("127.0.0.1", Fake())
+        assert connection is not None
+        assert not connection.is_reserved
+        places.busy(connection)
 
 
 def test_a_large_network_does_not_take_reserved_connections_from_others() -> None:
     places = ConnectionLimiter(BOUNDS)
     for number in range(BOUNDS.most):
-        it = places.admit(f"10.0.1.{number}", Fake())
-        assert it is not None
-        places.busy(it)
+        connection = places.admit(f"10.0.1.{number}", Fake())
+        assert connection is not None
+        places.busy(connection)
     places.admit("10.0.0.9", Fake())
     operator = places.admit("10.0.0.1", Fake())
     assert operator is not None
@@ -316,10 +316,10 @@ def test_a_stalled_answer_ends_and_a_slow_one_does_not() -> None:
     wires = {name: Fake() for name in ("slow", "stalled")}
     for wire in wires.values():
         wire.unsent = 500_000
-        it = places.admit("10.0.0.1", wire)
-        assert it is not None
-        places.busy(it)
-        places.sending(it)
+        connection = places.admit("10.0.0.1", wire)
+        assert connection is not None
+        places.busy(connection)
+        places.sending(connection)
     for _ in range(100):
         clock.now += 1.0
         wires["slow"].unsent -= 1000

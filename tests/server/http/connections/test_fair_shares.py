@@ -108,9 +108,9 @@ async def test_a_token_with_many_connections_does_not_take_others_streams(
         for _ in range(3):
             assert isinstance(await joined(stack, served, path, **lead), Viewer), "operators always get in"
         assert await joined(stack, served, path, **lead) == 503, "but not for each other's places"
-        for it in (*held, mine):
-            assert isinstance(it, Viewer)
-            await it.ends()
+        for share in (*held, mine):
+            assert isinstance(share, Viewer)
+            await share.ends()
 
 
 async def test_a_stream_that_has_caught_up_can_be_evicted_like_live_ones(tmp_path: Path) -> None:
@@ -179,7 +179,7 @@ def test_shares_become_equal_and_stay_equal(comes: list[tuple[ClientIdentity, st
                 == max(before[key] for key in "abc" if key != holder.key)
                 > before[holder.key] + 1
             )
-    assert shares.all == sum(it.weight for it in there)
+    assert shares.all == sum(share.weight for share in there)
     assert not shares.ending()
 
 

@@ -56,10 +56,10 @@ def test_players_that_fetched_recently_or_wait_are_counted(
     last_request: dict[HlsClient, float] = {}
     open_ones: list[tuple[HlsClient, str | None, ExitStack]] = []
 
-    def least(it: HlsClient) -> int:
-        waiting = [kind for who, kind, _ in open_ones if who == it]
+    def least(client: HlsClient) -> int:
+        waiting = [kind for who, kind, _ in open_ones if who == client]
         most = max((waiting.count(kind) for kind in ("playlist", "part")), default=0)
-        lately = clock.now - last_request.get(it, -KEPT_S) < KEPT_S
+        lately = clock.now - last_request.get(client, -KEPT_S) < KEPT_S
         return max(most, 1 if lately else 0)
 
     for act, stream, player, kind, seconds in acts:
@@ -79,8 +79,8 @@ def test_players_that_fetched_recently_or_wait_are_counted(
             clock.now += seconds
         # whoever waits for nothing in particular is answered at once: here they are kept as long as they wait
         everybody = [reader(one, other) for one in (0, 1) for other in (0, 1)]
-        assert [readers.of(f"object {it}") for it in (0, 1)] == [
-            sum(least(who) for who in everybody if who.stream == f"object {it}") for it in (0, 1)
+        assert [readers.of(f"object {number}") for number in (0, 1)] == [
+            sum(least(who) for who in everybody if who.stream == f"object {number}") for number in (0, 1)
         ]
         assert readers.all == shares.all == sum(map(least, everybody))
     for _, _, stack in open_ones:
@@ -152,7 +152,7 @@ async def test_blocked_players_of_one_address_and_user_agent_are_counted_separat
         await asyncio.sleep(0.005)
     assert await status(served, coming, "same") == 503
     assert await status(served, "/objects/1/hls/index.m3u8", "other") == 503
-    assert not any(it.done() for it in waiting)
+    assert not any(task.done() for task in waiting)
     for epoch in range(5, 16):
         served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
     assert await asyncio.gather(*waiting) == [200, 200]

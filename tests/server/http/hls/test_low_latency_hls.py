@@ -106,20 +106,20 @@ def read(text: str) -> Read:
             number += 1
     for segment, its in parts.items():
         assert its[0].independent, "4.4.3.5: segments are, and so their beginnings"
-        assert all(it.duration >= 0.85 * part_target for it in its[:-1]), "4.4.4.9"
+        assert all(part.duration >= 0.85 * part_target for part in its[:-1]), "4.4.4.9"
         if segment in whole:
-            assert sum(it.duration for it in its) == pytest.approx(whole[segment], abs=1e-4), "4.4.4.9"
-    until = sum(whole.values()) + sum(it.duration for it in parts.get(number, []))
+            assert sum(part.duration for part in its) == pytest.approx(whole[segment], abs=1e-4), "4.4.4.9"
+    until = sum(whole.values()) + sum(part.duration for part in parts.get(number, []))
     for segment in whole:
-        behind = until - sum(it for other, it in whole.items() if other <= segment)
+        behind = until - sum(seconds for other, seconds in whole.items() if other <= segment)
         assert (segment in parts) == (behind < 3 * target - 1e-6), "6.2.2: parts are near the end"
     hint = re.search(r'^#EXT-X-PRELOAD-HINT:TYPE=PART,URI="([^"]+)"$', text, re.MULTILINE)
     return Read(sequence, whole, parts, hint and hint[1])
 
 
 def found(text: str, pattern: str) -> str:
-    (it,) = re.findall(pattern, text)
-    return str(it)
+    (match,) = re.findall(pattern, text)
+    return str(match)
 
 
 async def test_playlists_follow_the_draft_and_grow_part_by_part(served: ServedSite) -> None:
@@ -128,7 +128,7 @@ async def test_playlists_follow_the_draft_and_grow_part_by_part(served: ServedSi
     for gop in range(PARTS, 45):
         shows(served, range(gop, gop + 1))
         now = read(await text_of(served))
-        newest = [it for its in now.parts.values() for it in its]
+        newest = [part for its in now.parts.values() for part in its]
         assert newest[-1].uri == before.hint, "what was hinted at is what came"
         assert now.sequence >= before.sequence
         for number, seconds in before.whole.items():
@@ -219,7 +219,7 @@ def decoded(data: bytes) -> dict[int, NDArray[np.uint8]]:
 
 def at(shown: dict[int, NDArray[np.uint8]], pulse: int) -> NDArray[np.uint8]:
     """Return the picture that is seen at a pulse: it may stand for longer."""
-    return shown[max(it for it in shown if it <= pulse)]
+    return shown[max(earlier for earlier in shown if earlier <= pulse)]
 
 
 def is_independent(reel: HlsSegmenter, gop: int) -> bool:

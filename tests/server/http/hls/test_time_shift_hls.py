@@ -52,7 +52,9 @@ async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
 
 async def played(served: ServedSite, stream: str, listed: list[int]) -> list[tuple[int, Picture]]:
     """Decode segments: each pulse and the last picture in it; what that is decoded by may come before."""
-    parts = [await fetch(served, f"{stream}/hls/{it}") for it in ("init.mp4", *(f"{n}.m4s" for n in listed))]
+    parts = [
+        await fetch(served, f"{stream}/hls/{file}") for file in ("init.mp4", *(f"{n}.m4s" for n in listed))
+    ]
     with av.open(io.BytesIO(b"".join(parts)), "r") as container:
         frames = list(container.decode(video=0))
     shown = {round(float(frame.time or 0) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames}

@@ -37,7 +37,7 @@ async def samples(served: ServedSite) -> dict[tuple[str, ...], float]:
         text = await answer.text()
     found = {}
     for sample in (sample for family in text_string_to_metric_families(text) for sample in family.samples):
-        labels = sorted(sample.labels.items(), key=lambda it: (it[0] == "le", it[0]))
+        labels = sorted(sample.labels.items(), key=lambda label: (label[0] == "le", label[0]))
         found[sample.name, *(value for _, value in labels)] = sample.value
     return found
 
@@ -126,7 +126,9 @@ async def test_viewers_are_counted_by_kind_and_sent_bytes_are_counted(site_with_
         received = len(await best.content.readany())
         received += len(await live.content.readany()) + len(await events.content.readany())
         metrics = await samples(site_with_people)
-        kinds = {it: metrics["myview_viewers_by_kind", it] for it in ("object", "camera", "events", "past")}
+        kinds = {
+            kind: metrics["myview_viewers_by_kind", kind] for kind in ("object", "camera", "events", "past")
+        }
         assert kinds == {"object": 1, "camera": 1, "events": 1, "past": 0}
         assert metrics["myview_sent_bytes_total", "streams"] >= received > 0
     size = len(await (await site_with_people.session.get("/api/site")).read())

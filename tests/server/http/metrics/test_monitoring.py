@@ -40,7 +40,7 @@ async def test_every_expression_yields_series_with_the_labels_in_its_legend(
             continue
         series = select_series(query.expression, there)
         assert series, query.place
-        assert all(query.shown <= dict(it).keys() for it in series), query.place
+        assert all(query.shown <= dict(labels).keys() for labels in series), query.place
 
 
 async def test_every_exported_metric_is_used_by_a_panel_or_alert(site_with_people: ServedSite) -> None:
@@ -84,7 +84,9 @@ h_bucket{camera="c0",le="+Inf"} 1
     ],
 )
 def test_the_evaluator_yields_known_results(expression: str, series: list[dict[str, str]]) -> None:
-    assert select_series(expression, ExportedMetrics.of(SAID)) == {frozenset(it.items()) for it in series}
+    assert select_series(expression, ExportedMetrics.of(SAID)) == {
+        frozenset(labels.items()) for labels in series
+    }
 
 
 @pytest.mark.parametrize(

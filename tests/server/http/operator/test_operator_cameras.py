@@ -17,7 +17,7 @@ async def test_every_camera_is_listed_with_its_measurements(site_with_people: Se
     site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
     answer = (await site_with_people.get_json("/api/operator/cameras"))["cameras"]
     plain = (await site_with_people.get_json("/api/cameras"))["cameras"]
-    assert [it["camera"] for it in answer] == [A, B]
+    assert [camera["camera"] for camera in answer] == [A, B]
     for diagnostics, plain_info in zip(answer, plain, strict=True):
         assert diagnostics.items() >= plain_info.items()
     first = answer[0]
@@ -69,7 +69,7 @@ async def test_the_pulse_servers_clients_and_missing_ones_are_listed() -> None:
             await anext(aiter(client))  # it is connected
         answer = await (await anext(halls)).get_json("/api/operator/pulses")
         assert (answer["server"], answer["error"]) == (f"127.0.0.1:{server.port}", "")
-    assert {(it["name"], it["expected"], it["behind"]) for it in answer["clients"]} == {
+    assert {(client["name"], client["expected"], client["behind"]) for client in answer["clients"]} == {
         (A, True, 0),
         ("stranger", False, 0),
     }
@@ -88,7 +88,7 @@ async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() 
         assert "needs a login" in (await served.get_json("/api/operator/pulses"))["error"]
         served.service.pulse_credentials = Credentials("bestview", users["bestview"])
         answer = await served.get_json("/api/operator/pulses")
-    assert (answer["error"], [it["name"] for it in answer["clients"]]) == ("", [A])
+    assert (answer["error"], [client["name"] for client in answer["clients"]]) == ("", [A])
     assert answer["missing"] == [B, "bestview"]
 
 

@@ -25,7 +25,12 @@ async def test_every_box_and_choice_of_the_time_range_is_a_line(site_with_people
     assert [(track["frame"], track["camera"], track["object"]) for track in tracks] == [
         (frame, camera, number) for frame in "34" for camera, number in ((A, "1"), (A, "2"), (B, "1"))
     ]
-    assert [tracks[0][it] for it in ("left", "top", "width", "height")] == ["10.00", "10.00", "6.00", "18.00"]
+    assert [tracks[0][column] for column in ("left", "top", "width", "height")] == [
+        "10.00",
+        "10.00",
+        "6.00",
+        "18.00",
+    ]
     assert tracks[0]["time"] == "1970-01-12T13:46:40.080Z"
     choices = await rows(site_with_people, "choices", "from=p4&to=p6")
     assert [(choice["frame"], choice["object"], choice["camera"]) for choice in choices] == [

@@ -73,7 +73,7 @@ async def operating(
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
             "console",
-            lambda it: complaints.append(it.text) if "Content Security" in it.text else None,
+            lambda message: complaints.append(message.text) if "Content Security" in message.text else None,
         )
         await page.goto(f"http://127.0.0.1:{served.port}/operator{place}")
         yield served, page
@@ -205,10 +205,10 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
         await expect(line).to_have_text(re.compile(r": expired without an answer"))
         # Another run of the service knows nothing of it; the page sees that its connection ends.
         served.service.assist.flags._ended.clear()
-        [events] = [tell.__self__ for tell in served.service.assist.flags.on_flag]  # type: ignore[attr-defined]
-        lines, events._by_scope = events._by_scope, {}
-        for it in lines.values():
-            it.channel.close()
+        [events] = [callback.__self__ for callback in served.service.assist.flags.on_flag]  # type: ignore[attr-defined]
+        connections, events._by_scope = events._by_scope, {}
+        for connection in connections.values():
+            connection.channel.close()
         await expect(page.locator("#no-flags")).to_have_text("None so far.")
 
 
@@ -440,9 +440,9 @@ async def large_enough_for_a_thumb(page: Page) -> None:
 async def serious_faults(page: Page) -> list[Any]:
     found = await page.evaluate("axe.run()")
     return [
-        (it["id"], [node["html"] for node in it["nodes"]])
-        for it in found["violations"]
-        if it["impact"] in {"serious", "critical"}
+        (violation["id"], [node["html"] for node in violation["nodes"]])
+        for violation in found["violations"]
+        if violation["impact"] in {"serious", "critical"}
     ]
 
 

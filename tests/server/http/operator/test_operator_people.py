@@ -43,7 +43,7 @@ async def post_edit(served: ServedSite, **edit: Any) -> tuple[int, Any]:
 
 
 async def objects(served: ServedSite) -> dict[int, Any]:
-    return {it["object"]: it for it in (await served.get_json("/api/objects"))["objects"]}
+    return {person["object"]: person for person in (await served.get_json("/api/objects"))["objects"]}
 
 
 async def test_a_persons_name_appears_in_every_list(site_with_people: ServedSite) -> None:
@@ -75,7 +75,7 @@ async def test_merged_people_have_one_number_from_the_next_gop_on(real: ServedSi
     assert (status, answer["merged"]) == (200, {str(lost): kept})
     for epoch in range(3, 8):
         feed(real, epoch)
-    assert [(it.kept, it.lost) for gop in decisions for it in gop.merged] == [(kept, lost)]
+    assert [(merge.kept, merge.lost) for gop in decisions for merge in gop.merged] == [(kept, lost)]
     people = await objects(real)
     assert lost not in people
     assert people[kept]["aliases"] == [lost]
@@ -94,7 +94,7 @@ async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: ServedS
     new = answer["new_object"]
     for epoch in range(3, 8):
         feed(real, epoch)
-    splits = [(it.kept, it.new_object, it.camera) for gop in decisions for it in gop.split]
+    splits = [(split.kept, split.new_object, split.camera) for gop in decisions for split in gop.split]
     assert splits == [(who, new, A)]
     assert A in (await objects(real))[new]["cameras"]
     assert (await real.get_json(f"/api/objects/{new}/choice"))["camera"] is not None

@@ -64,7 +64,7 @@ def test_settings_tuned_before_the_start_equal_configured_ones() -> None:
 def test_settings_tuned_while_running_apply_from_the_next_gop_on_to_buffered_views_too() -> None:
     config = small_config()
     tuned, before = decided(config, TRIED, after=6), decided(config)
-    done = sum(it.first < 5 * 5 for it in tuned)
+    done = sum(decision.first < 5 * 5 for decision in tuned)
     assert tuned[: done - 1] == before[: done - 1]
     so = config.model_copy(update={"view": TRIED.model_copy(update={"identity": config.view.identity})})
     for mine, theirs in zip(tuned[done:], decided(so)[done:], strict=True):
@@ -152,7 +152,9 @@ async def open_hall() -> AsyncIterator[ServedSite]:
 
 
 async def test_the_configuration_shows_differences_and_no_secrets(open_hall: ServedSite) -> None:
-    settings = {it["key"]: it for it in (await open_hall.get_json("/api/operator/config"))["settings"]}
+    settings = {
+        setting["key"]: setting for setting in (await open_hall.get_json("/api/operator/config"))["settings"]
+    }
     assert settings["encode.gop"] == {"key": "encode.gop", "value": "5", "default": "10", "differs": True}
     assert settings["view.quality.truncation"]["differs"] is False
     assert settings["view.quality.truncation"]["value"] == str(QualitySettings().truncation)
@@ -160,7 +162,7 @@ async def test_the_configuration_shows_differences_and_no_secrets(open_hall: Ser
     assert source["value"] == "rtsp://10.0.0.1/..."
     assert (source["default"], source["differs"]) == (None, False)
     names = ("headers", "http_proxy", "rtsp_transport")
-    assert options["value"] == f"{{{', '.join(f'{it}: (not shown)' for it in names)}}}"
+    assert options["value"] == f"{{{', '.join(f'{name}: (not shown)' for name in names)}}}"
 
 
 @pytest.mark.parametrize(
@@ -173,5 +175,5 @@ async def test_the_configuration_shows_differences_and_no_secrets(open_hall: Ser
 )
 def test_a_password_is_hidden_wherever_a_source_has_it(source: str) -> None:
     config = small_config(cameras=[{"id": A, "source": source}])
-    [shown] = [it.value for it in settings_of(config) if it.key == f"cameras.{A}.source"]
+    [shown] = [setting.value for setting in settings_of(config) if setting.key == f"cameras.{A}.source"]
     assert shown.strip("'") in {"rtsp://10.0.0.1/...", "http://10.0.0.1/...", "rtsp://10.0.0.1:554/..."}

@@ -138,7 +138,8 @@ async def test_a_flag_is_raised_followed_answered_and_counted(assisted: ServedSi
 
     async def flags() -> list[Any]:
         return [
-            (it["id"], it["objects"], it["state"]) for it in (await assisted.get_json("/api/flags"))["flags"]
+            (flag["id"], flag["objects"], flag["state"])
+            for flag in (await assisted.get_json("/api/flags"))["flags"]
         ]
 
     assert await flags() == [(1, [1, 2], "raised")]
@@ -185,5 +186,5 @@ def test_the_inbox_accepts_corrections_for_its_own_run_and_keeps_only_the_newest
     assert inbox.bad_messages == 5
     receive(b"{}")
     assert len(caplog.messages) == 5, "one for each reason"
-    assert [it.frame for it in inbox.take()] == list(range(400 - 256, 400))
+    assert [correction.frame for correction in inbox.take()] == list(range(400 - 256, 400))
     assert inbox.take() == []

@@ -35,8 +35,8 @@ SOMEBODY = 1
 
 @pytest.fixture
 async def drawn() -> AsyncIterator[DrawnSite]:
-    async for it in drawn_room():
-        yield it
+    async for site in drawn_room():
+        yield site
 
 
 def picture_of(jpeg: bytes) -> Image:

@@ -143,11 +143,11 @@ async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: Serv
     command = "ffmpeg -nostdin -v warning {} -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     starts = ["-live_start_index 0" if "m3u8" in path else "" for path in PATHS]
-    seen = await played(live, *(command.format(*it).split() for it in zip(starts, urls, strict=True)))
-    for path, it in zip(PATHS, seen, strict=True):
+    seen = await played(live, *(command.format(*start).split() for start in zip(starts, urls, strict=True)))
+    for path, player in zip(PATHS, seen, strict=True):
         own_doing = OF_EVERY_PLAYLIST if "m3u8" in path else NEVER
-        assert (it.code, own_doing.sub("", it.complaints)) == (0, ""), path
-        check_pictures(live, path, it.output)
+        assert (player.code, own_doing.sub("", player.complaints)) == (0, ""), path
+        check_pictures(live, path, player.output)
 
 
 @needs_mpv
@@ -155,8 +155,8 @@ async def test_mpv_plays_to_the_end_without_a_warning(live: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal"
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     seen = await played(live, *([*command.split(), url] for url in urls))
-    for path, it in zip(PATHS, seen, strict=True):
-        assert (it.code, it.output + it.complaints.encode()) == (0, b""), path
+    for path, player in zip(PATHS, seen, strict=True):
+        assert (player.code, player.output + player.complaints.encode()) == (0, b""), path
 
 
 @pytest.fixture
@@ -175,7 +175,9 @@ VLC = (
 
 def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
     """Find each picture in a camera; a player may repeat or skip pictures, but not go back."""
-    known = {it.tobytes(): (pulse, camera) for camera in range(2) for pulse, it in enumerate(own(camera))}
+    known = {
+        picture.tobytes(): (pulse, camera) for camera in range(2) for pulse, picture in enumerate(own(camera))
+    }
     assert len(known) == 2 * EPOCHS * STRIDE, "no picture is like another"
     shown = [known[picture] for picture in pictures]
     pulses = [pulse for pulse, _ in shown]
@@ -205,11 +207,11 @@ async def test_vlc_plays_across_cuts_without_a_warning(live: ServedSite, shared:
     user = "nobody" if os.geteuid() == 0 else None
     commands = [VLC.format(shown, url).split() for shown, url in zip(files, urls, strict=True)]
     seen = await played(live, *commands, user=user)
-    for path, it, shown in zip(PATHS, seen, files, strict=True):
+    for path, player, shown in zip(PATHS, seen, files, strict=True):
         complaints = [
-            line for line in OF_A_STREAM.findall(it.complaints) if not OF_EVERY_FRAGMENT.search(line)
+            line for line in OF_A_STREAM.findall(player.complaints) if not OF_EVERY_FRAGMENT.search(line)
         ]
-        assert (it.code, complaints) == (0, []), path
+        assert (player.code, complaints) == (0, []), path
         check_order(live, path, pictures_of(shown.read_bytes()))
 
 

@@ -64,23 +64,25 @@ async def test_ffmpeg_plays_across_cuts_without_a_warning(vp8_site: ServedSite) 
     command = "ffmpeg -nostdin -v warning -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
     alone = np.array([decoded_alone(camera) for camera in range(2)])
     best, live = await played(vp8_site, command)
-    for path, it in zip(PATHS, (best, live), strict=True):
-        assert (it[0], it[2]) == (0, ""), path
+    for path, player in zip(PATHS, (best, live), strict=True):
+        assert (player[0], player[2]) == (0, ""), path
     camera = np.frombuffer(live[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
     np.testing.assert_array_equal(camera, alone[1, -len(camera) :])
     shown = np.frombuffer(best[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
     end = vp8_site.service.decider._next_gop or 0
-    whose = [int(np.array_equal(it, alone[1, end - len(shown) + n])) for n, it in enumerate(shown)]
-    for n, it in enumerate(shown):
-        np.testing.assert_array_equal(it, alone[whose[n], end - len(shown) + n], f"frame {n} of {len(shown)}")
+    whose = [int(np.array_equal(picture, alone[1, end - len(shown) + n])) for n, picture in enumerate(shown)]
+    for n, picture in enumerate(shown):
+        np.testing.assert_array_equal(
+            picture, alone[whose[n], end - len(shown) + n], f"frame {n} of {len(shown)}"
+        )
     assert np.abs(np.diff(whose)).sum() >= 2, "there are cuts"
 
 
 @needs_mpv
 async def test_mpv_plays_to_the_end_without_a_warning(vp8_site: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal {}"
-    for path, it in zip(PATHS, await played(vp8_site, command), strict=True):
-        assert it == (0, b"", ""), path
+    for path, player in zip(PATHS, await played(vp8_site, command), strict=True):
+        assert player == (0, b"", ""), path
 
 
 GOPS = 8
@@ -184,13 +186,14 @@ async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(vp8_site: Served
             jpeg, pulse = await answer.read(), int(answer.headers["X-MyView-Pulse"])
         pictures[path] = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), pulse
     alone = [
-        av.VideoFrame.from_ndarray(it, format="yuv420p").to_ndarray(format="bgr24") for it in decoded_alone(1)
+        av.VideoFrame.from_ndarray(picture, format="yuv420p").to_ndarray(format="bgr24")
+        for picture in decoded_alone(1)
     ]
     for path in ("/objects/1/best.jpg", "/cameras/c1/live.jpg"):
         picture, pulse = pictures[path]
-        off = [np.abs(picture.astype(float) - it).mean() for it in alone]
+        off = [np.abs(picture.astype(float) - own_picture).mean() for own_picture in alone]
         assert int(np.argmin(off)) == pulse, "the picture of its own pulse, of the camera that is chosen"
-    plain, boxed = (pictures[f"/objects/1/best.jpg{it}"][0] for it in ("", "?overlay=1"))
+    plain, boxed = (pictures[f"/objects/1/best.jpg{query}"][0] for query in ("", "?overlay=1"))
     assert np.abs(plain.astype(float) - boxed).max() > 50, "there are boxes in it"
 
 

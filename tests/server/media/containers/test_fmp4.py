@@ -121,7 +121,7 @@ def test_ticks_rise_with_every_pulse(fps: float, pulse: int) -> None:
     assert ticks(pulse + 1, fps) > ticks(pulse, fps)
 
 
-UNITS = st.binary(min_size=1, max_size=9).filter(lambda it: nal_type(it) != NAL_AUD)
+UNITS = st.binary(min_size=1, max_size=9).filter(lambda unit: nal_type(unit) != NAL_AUD)
 
 
 @given(st.lists(UNITS), st.binary(max_size=9))

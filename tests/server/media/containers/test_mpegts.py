@@ -57,17 +57,17 @@ def test_packets_are_valid_and_contain_exactly_what_was_packed(
         contents[len(contents) :] = [b""] if packet.begins else []
         contents[-1] += packet.payload
     assert len(contents) == len(sent)
-    for content, it in zip(contents, sent, strict=True):
+    for content, chunk in zip(contents, sent, strict=True):
         assert content[:4] == b"\x00\x00\x01\xe0"
         assert int.from_bytes(content[4:6], "big") in (len(content) - 6, 0)
         stamp = content[9:14]
         pts = (
             (stamp[0] >> 1 & 7) << 30 | (stamp[1] << 7 | stamp[2] >> 1) << 15 | stamp[3] << 7 | stamp[4] >> 1
         )
-        assert pts == ticks(it.pulse, FPS) % CLOCK
+        assert pts == ticks(chunk.pulse, FPS) % CLOCK
         assert stamp[0] & 1 == stamp[2] & 1 == stamp[4] & 1 == 1, "marker bits"
         assert content[14:20] == b"\x00\x00\x00\x01\x09\xf0"
-        assert content[20:] == b"\x00\x00\x00\x01" + it.sample[4:]
+        assert content[20:] == b"\x00\x00\x00\x01" + chunk.sample[4:]
     for packet in packets:
         assert not packet.key or packet.begins
 

@@ -60,13 +60,15 @@ def test_it_is_gray_in_vp8(blocks: tuple[int, int]) -> None:
     noise = np.random.default_rng(0).integers(0, 255, (3, height, width, 3), dtype=np.uint8)
     units = [encoder.encode(pulse, picture).data for pulse, picture in enumerate(noise)]
 
-    def seen(frames: list[bytes]) -> list[NDArray[np.uint8]]:
+    def decode(frames: list[bytes]) -> list[NDArray[np.uint8]]:
         decoder = av.VideoCodecContext.create("vp8", "r")
         return [
-            it.to_ndarray(format="yuv420p") for frame in frames for it in decoder.decode(av.Packet(frame))
+            picture.to_ndarray(format="yuv420p")
+            for frame in frames
+            for picture in decoder.decode(av.Packet(frame))
         ]
 
-    shown, alone = seen([*units, gray_frame(width, height), *units]), seen(units)
+    shown, alone = decode([*units, gray_frame(width, height), *units]), decode(units)
     assert is_gray(shown[3])
     for place, picture in enumerate(shown[:3] + shown[4:]):
         np.testing.assert_array_equal(picture, alone[place % 3])
@@ -94,7 +96,7 @@ def test_a_gray_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> Non
     assert stream_format.parameters is not None
     data = b"".join([
         init_segment(stream_format.parameters, WIDTH, HEIGHT),
-        *(it.fragment for it in shown),
+        *(picture.fragment for picture in shown),
     ])  # fmt: skip
     with av.open(io.BytesIO(data), "r") as stream:
         pictures = [frame.to_ndarray(format="yuv420p") for frame in stream.decode(video=0)]

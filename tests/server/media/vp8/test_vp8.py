@@ -139,7 +139,7 @@ def test_a_stream_has_a_picture_for_every_pulse_despite_losses(
     assert [round(pulse, 3) for pulse, _ in pictures] == [picture.pulse for picture in shown]
     begun = dict(zip(pulses, seen, strict=True))
     np.testing.assert_array_equal(
-        [picture for _, picture in pictures], [plain[begun[it.pulse]] for it in shown]
+        [picture for _, picture in pictures], [plain[begun[picture.pulse]] for picture in shown]
     )
 
 
@@ -182,7 +182,9 @@ def test_demuxing_returns_the_muxed_frames_and_stops_at_damage(
         clusters += cluster(content, pulse, FPS, key=key, duration=duration)
         expected.append((pulse, key, content, duration))
         pulse += duration
-    assert [(it.pulse, it.key, it.data, it.duration) for it in demux_webm(clusters, FPS)] == expected
+    assert [
+        (frame.pulse, frame.key, frame.data, frame.duration) for frame in demux_webm(clusters, FPS)
+    ] == expected
     assert first_pulse(clusters, FPS) == first
     list(demux_webm(clusters[: data.draw(st.integers(0, len(clusters)))], FPS))
     list(demux_webm(data.draw(st.binary(max_size=100)), FPS))
@@ -191,7 +193,7 @@ def test_demuxing_returns_the_muxed_frames_and_stops_at_damage(
 @needs_ffprobe
 def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
     units = encoded(64, 48)
-    data = header(64, 48, FPS, FRAMES) + b"".join(it.fragment for it in pictures_of(units))
+    data = header(64, 48, FPS, FRAMES) + b"".join(picture.fragment for picture in pictures_of(units))
     file = tmp_path / "film.webm"
     file.write_bytes(data)
     entries = "stream=codec_name,width,height,avg_frame_rate:format=format_name,duration"

@@ -23,18 +23,18 @@ texts = st.dictionaries(st.sampled_from(NAMES), rows)
 def test_texts_are_appended_to_all_files_or_to_none(
     heads: tuple[str, ...], appended: list[dict[str, str]], most: int
 ) -> None:
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         files = AtomicFiles({folder / name: head for name, head in zip(NAMES, heads, strict=True)})
         expected = dict(zip(NAMES, heads, strict=True))
-        for it in appended:
-            longer = {which: expected[which] + it.get(which, "") for which in NAMES}
-            letterboxes = all(len(longer[which]) <= most for which in it if it[which])
-            refused = contextlib.nullcontext() if letterboxes else pytest.raises(OSError, match="too large")
+        for texts_by_name in appended:
+            longer = {name: expected[name] + texts_by_name.get(name, "") for name in NAMES}
+            fits = all(len(longer[name]) <= most for name in texts_by_name if texts_by_name[name])
+            refused = contextlib.nullcontext() if fits else pytest.raises(OSError, match="too large")
             with files_of_at_most(most), refused:
-                files.append({folder / which: text for which, text in it.items()})
+                files.append({folder / name: text for name, text in texts_by_name.items()})
                 expected = longer
-            assert {which: (folder / which).read_text() for which in NAMES} == expected
+            assert {name: (folder / name).read_text() for name in NAMES} == expected
         files.close()
 
 

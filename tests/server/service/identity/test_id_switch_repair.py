@@ -44,7 +44,7 @@ def paths(tracks: int) -> NDArray[np.float64]:
 def test_two_tracks_that_swap_positions_have_switched_identities(
     tracks: int, order: list[int], since: int, newer: int, forgotten: int
 ) -> None:
-    one, two = sorted([it for it in order if it < tracks][:2])
+    one, two = sorted([number for number in order if number < tracks][:2])
     old, now = paths(tracks), paths(tracks)
     now[[one, two], since:] = now[[two, one], since:]
     # Some of the newest frames are spoken of for the first time, and the oldest words may be forgotten.

@@ -44,9 +44,9 @@ class RecordingRegistry:
 
 
 def scripted_people(*updates: IdentityUpdate) -> PersonTracker:
-    it = people()
-    it._registry = ScriptedRegistry(*updates)  # type: ignore[assignment]
-    return it
+    tracker = people()
+    tracker._registry = ScriptedRegistry(*updates)  # type: ignore[assignment]
+    return tracker
 
 
 @settings(deadline=None, max_examples=100)
@@ -57,8 +57,10 @@ def test_the_newest_window_of_a_frame_counts(windows: list[tuple[int, int]], old
         history.put(number, first, first + more)
         expected |= dict.fromkeys(range(first, first + more + 1), number)
     history.forget_before(old)
-    newest = [(pulse, it.window) for it in history.over(2, 14) for pulse in range(it.first, it.last + 1)]
-    assert newest == sorted((pulse, it) for pulse, it in expected.items() if max(old, 2) <= pulse <= 14)
+    newest = [
+        (pulse, span.window) for span in history.over(2, 14) for pulse in range(span.first, span.last + 1)
+    ]
+    assert newest == sorted((pulse, span) for pulse, span in expected.items() if max(old, 2) <= pulse <= 14)
 
 
 def test_a_restarted_cameras_first_track_is_not_its_former_first_track() -> None:
@@ -79,10 +81,10 @@ def test_a_forgotten_track_that_reappears_has_a_new_number() -> None:
 
 
 def test_the_registry_receives_picture_sizes_and_boxes_in_the_cameras_own_pixels() -> None:
-    it = people()
+    tracker = people()
     track_updates: list[TrackUpdate] = []
-    it._registry = registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
-    it.update(
+    tracker._registry = registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
+    tracker.update(
         epoch_of(
             0, camera_tracks("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), camera_tracks("c1", 0, {})
         )
@@ -94,12 +96,12 @@ def test_the_registry_receives_picture_sizes_and_boxes_in_the_cameras_own_pixels
 
 
 def test_a_camera_without_detection_is_no_evidence_of_absence() -> None:
-    it = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
+    tracker = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=STRIDE)
     has_picture = []
     for epoch in range(8):
-        it._registry = registry = RecordingRegistry([])  # type: ignore[assignment]
+        tracker._registry = registry = RecordingRegistry([])  # type: ignore[assignment]
         away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
-        it.update(
+        tracker.update(
             epoch_of(
                 epoch,
                 camera_tracks("c0", epoch, {1: SMALL}),
@@ -113,31 +115,33 @@ def test_a_camera_without_detection_is_no_evidence_of_absence() -> None:
 
 
 def test_a_camera_whose_picture_size_changes_has_boxes_in_the_new_size() -> None:
-    it = people()
+    tracker = people()
     for epoch, size in enumerate([(WIDTH, HEIGHT), (WIDTH // 2, HEIGHT // 2)]):
         track_updates: list[TrackUpdate] = []
-        it._registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
-        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
+        tracker._registry = RecordingRegistry(track_updates)  # type: ignore[assignment]
+        tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL}, size=size, boot=1 + epoch)))
         [track] = track_updates
         np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) * size[0] / WIDTH, (STRIDE, 1)))
 
 
 def test_people_have_their_tracks_boxes() -> None:
-    it = people()
-    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL, 2: LARGE}), camera_tracks("c1", 0, {1: None})))
-    first, second = it.known
-    assert boxes(it, "c0", 4) == {first: SMALL, second: LARGE}
-    assert boxes(it, "c1", 4) == {}
-    assert it.person_of("c0", 1, 2, 0) == second
-    assert it.person_of("c0", 9, 2, 0) is None
+    tracker = people()
+    tracker.update(
+        epoch_of(0, camera_tracks("c0", 0, {1: SMALL, 2: LARGE}), camera_tracks("c1", 0, {1: None}))
+    )
+    first, second = tracker.known
+    assert boxes(tracker, "c0", 4) == {first: SMALL, second: LARGE}
+    assert boxes(tracker, "c1", 4) == {}
+    assert tracker.person_of("c0", 1, 2, 0) == second
+    assert tracker.person_of("c0", 9, 2, 0) is None
 
 
 def test_first_and_last_seen_are_the_frames_with_a_box() -> None:
-    it = people()
+    tracker = people()
     for epoch in range(3):
-        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL if epoch < 2 else None})))
-    [number] = it.known
-    assert (it.registry.first_seen[number], it.registry.last_seen[number]) == (0, 2 * STRIDE - 1)
+        tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL if epoch < 2 else None})))
+    [number] = tracker.known
+    assert (tracker.registry.first_seen[number], tracker.registry.last_seen[number]) == (0, 2 * STRIDE - 1)
 
 
 def test_a_person_confirmed_late_exists_from_their_first_box_on() -> None:
@@ -147,7 +151,7 @@ def test_a_person_confirmed_late_exists_from_their_first_box_on() -> None:
         )
 
     later = 3 * STRIDE
-    it = scripted_people(
+    tracker = scripted_people(
         identity_update({}),
         since((STRIDE, 0)),
         since((STRIDE, 1)),
@@ -155,10 +159,10 @@ def test_a_person_confirmed_late_exists_from_their_first_box_on() -> None:
         since((STRIDE, 1), (later, 2)),
     )
     for epoch in range(5):
-        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: None if epoch == 0 else SMALL})))
-    assert it.registry.first_seen == {1: STRIDE, 2: later}
-    assert it.registry.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
-    numbers = it.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
+        tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: None if epoch == 0 else SMALL})))
+    assert tracker.registry.first_seen == {1: STRIDE, 2: later}
+    assert tracker.registry.last_seen == {1: later - 1, 2: 5 * STRIDE - 1}
+    numbers = tracker.numbers([TrackKey("c0", 1)], 0, 5 * STRIDE)[0].tolist()
     assert numbers == [-1] * STRIDE + [1] * (later - STRIDE) + [2] * (2 * STRIDE)
 
 
@@ -169,7 +173,7 @@ def test_undecided_frames_keep_their_numbers_after_the_registry_has_settled_them
         )
 
     second, third = 2 * STRIDE, 4 * STRIDE
-    it = scripted_people(
+    tracker = scripted_people(
         since((0, 1)),
         since((0, 1)),
         since((0, 1), (second, 2)),
@@ -180,97 +184,97 @@ def test_undecided_frames_keep_their_numbers_after_the_registry_has_settled_them
     )
 
     def current_numbers() -> list[int]:
-        return [next(iter(boxes(it, "c0", first)), -1) for first in (0, second, third)]
+        return [next(iter(boxes(tracker, "c0", first)), -1) for first in (0, second, third)]
 
     for epoch in range(5):
-        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
+        tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
     assert current_numbers() == [1, 2, 3]
-    it.forget_boxes_before(second)
-    it.update(epoch_of(5, camera_tracks("c0", 5, {1: SMALL})))
+    tracker.forget_boxes_before(second)
+    tracker.update(epoch_of(5, camera_tracks("c0", 5, {1: SMALL})))
     assert current_numbers() == [-1, 2, 3]
-    assert len(it._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
-    it.update(epoch_of(6, camera_tracks("c0", 6, {1: SMALL})))
+    assert len(tracker._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
+    tracker.update(epoch_of(6, camera_tracks("c0", 6, {1: SMALL})))
     assert current_numbers() == [-1, 4, 4], "merges hold for what is settled, too"
 
 
 def test_a_restarted_cameras_tracks_do_not_inherit_earlier_boxes() -> None:
-    it = people()
-    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
-    it.update(epoch_of(1, camera_tracks("c0", 1, {1: LARGE}, boot=2)))
-    [before], [after] = boxes(it, "c0", 0), boxes(it, "c0", STRIDE)
-    assert it.person_of("c0", 1, 1, 0) == before
-    assert it.person_of("c0", 2, 1, STRIDE) == after
+    tracker = people()
+    tracker.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
+    tracker.update(epoch_of(1, camera_tracks("c0", 1, {1: LARGE}, boot=2)))
+    [before], [after] = boxes(tracker, "c0", 0), boxes(tracker, "c0", STRIDE)
+    assert tracker.person_of("c0", 1, 1, 0) == before
+    assert tracker.person_of("c0", 2, 1, STRIDE) == after
 
 
 def test_only_the_newest_merged_numbers_are_remembered() -> None:
     """Whoever stays all day has many short tracks merged into them."""
-    it = people(maximum_departed_people=5)
+    tracker = people(maximum_departed_people=5)
     for lost in range(2, 40):
-        it.merge(1, lost)
-    assert it.registry.merged == dict.fromkeys(range(35, 40), 1)
-    assert it.registry.aliases(1) == [*range(35, 40)]
+        tracker.merge(1, lost)
+    assert tracker.registry.merged == dict.fromkeys(range(35, 40), 1)
+    assert tracker.registry.aliases(1) == [*range(35, 40)]
 
 
 def test_merged_numbers_resolve_through_chains() -> None:
-    it = scripted_people(
+    tracker = scripted_people(
         identity_update({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 3}),
         identity_update({("c0", 1): 1, ("c0", 2): 2, ("c1", 1): 2}, Merge(kept=2, lost=3)),
         identity_update({("c0", 1): 1, ("c0", 2): 1, ("c1", 1): 1}, Merge(kept=1, lost=2)),
     )
     for epoch in range(3):
-        it.update(
+        tracker.update(
             epoch_of(
                 epoch, camera_tracks("c0", epoch, {1: SMALL, 2: None}), camera_tracks("c1", epoch, {1: LARGE})
             )
         )
-    assert it.known == [1]
-    assert it.registry.merged == {3: 1, 2: 1}
-    assert boxes(it, "c1", 0) == {1: LARGE}, "in frames past, too"
-    assert it.registry.aliases(1) == [2, 3]
+    assert tracker.known == [1]
+    assert tracker.registry.merged == {3: 1, 2: 1}
+    assert boxes(tracker, "c1", 0) == {1: LARGE}, "in frames past, too"
+    assert tracker.registry.aliases(1) == [2, 3]
 
 
 def test_corrections_are_returned_once_and_in_order() -> None:
     merge, split = Merge(kept=1, lost=2), Split(kept=1, split_off=4, camera="c0")
-    it = scripted_people(
+    tracker = scripted_people(
         identity_update({("c0", 1): 1}, merge),
         identity_update({("c0", 1): 4}, split),
         identity_update({("c0", 1): 4}),
     )
     for epoch in range(2):
-        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
-    assert it.take_corrections() == (merge, split)
-    it.update(epoch_of(2, camera_tracks("c0", 2, {1: SMALL})))
-    assert it.take_corrections() == ()
+        tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
+    assert tracker.take_corrections() == (merge, split)
+    tracker.update(epoch_of(2, camera_tracks("c0", 2, {1: SMALL})))
+    assert tracker.take_corrections() == ()
 
 
 def test_a_track_that_moves_to_an_unconfirmed_person_has_no_number() -> None:
-    it = scripted_people(identity_update({("c0", 1): 1}), identity_update({("c0", 1): 0}))
-    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
-    it.update(epoch_of(1, camera_tracks("c0", 1, {1: SMALL})))
-    assert boxes(it, "c0", STRIDE) == {}
-    assert it.number("c0", 1, STRIDE) is None
+    tracker = scripted_people(identity_update({("c0", 1): 1}), identity_update({("c0", 1): 0}))
+    tracker.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
+    tracker.update(epoch_of(1, camera_tracks("c0", 1, {1: SMALL})))
+    assert boxes(tracker, "c0", STRIDE) == {}
+    assert tracker.number("c0", 1, STRIDE) is None
 
 
 def test_two_tracks_of_one_person_in_one_picture_are_one_box() -> None:
-    it = scripted_people(identity_update({("c0", 1): 1, ("c0", 2): 1}))
-    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL, 2: LARGE})))
-    assert boxes(it, "c0", 0) == {1: SMALL}
+    tracker = scripted_people(identity_update({("c0", 1): 1, ("c0", 2): 1}))
+    tracker.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL, 2: LARGE})))
+    assert boxes(tracker, "c0", 0) == {1: SMALL}
 
 
 def test_people_not_seen_for_long_are_forgotten_entirely() -> None:
-    it = people(departed_after=STRIDE, forget_after=3 * STRIDE)
-    it.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
-    [number] = it.known
+    tracker = people(departed_after=STRIDE, forget_after=3 * STRIDE)
+    tracker.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
+    [number] = tracker.known
     for epoch in range(1, 4):
-        it.update(epoch_of(epoch, camera_tracks("c0", epoch, {})))
-    assert it.known == [number]
-    assert it.registry.departed == {number}
-    it.update(epoch_of(9, camera_tracks("c0", 9, {})))
-    assert it.known == []
-    assert it.registry.departed == set()
-    assert it.person_of("c0", 1, 1, 0) is None
-    assert not it._parts
-    assert not it._last_reported
+        tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {})))
+    assert tracker.known == [number]
+    assert tracker.registry.departed == {number}
+    tracker.update(epoch_of(9, camera_tracks("c0", 9, {})))
+    assert tracker.known == []
+    assert tracker.registry.departed == set()
+    assert tracker.person_of("c0", 1, 1, 0) is None
+    assert not tracker._parts
+    assert not tracker._last_reported
 
 
 @pytest.mark.parametrize("pulse", [-1, 0, 4, 1000])

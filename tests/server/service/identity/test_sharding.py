@@ -52,20 +52,20 @@ def test_shards_together_decide_as_a_single_service(of: int, seed: int) -> None:
         for index in range(of)
     ]
     alone = ViewDecider(small_config(), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
-    for it in [*deciders, alone]:
-        it.people._registry = TrackNumbers()  # type: ignore[assignment]
+    for view_decider in [*deciders, alone]:
+        view_decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     for number in range(6):
         words = []
         for camera in CAMERAS:
             size = {track: float(rng.uniform(5, 40)) for track in range(1, 8) if rng.random() < 0.7}
-            boxes: dict[int, Box | None] = {it: (0.0, 0.0, s / 2, s) for it, s in size.items()}
+            boxes: dict[int, Box | None] = {number: (0.0, 0.0, s / 2, s) for number, s in size.items()}
             words.append(camera_tracks(camera, number, boxes))
         epoch = epoch_of(number, *words)
         answers = [decider.step(epoch) for decider in deciders]
         for place, whole in enumerate(alone.step(epoch)):
             parts = [answer[place] for answer in answers]
             together = [choice for part in parts for choice in part.choices]
-            assert sorted(together, key=lambda it: it.number) == list(whole.choices)
+            assert sorted(together, key=lambda choice: choice.number) == list(whole.choices)
             assert all(part.boxes == whole.boxes for part in parts)
             for index, part in enumerate(parts):
                 assert all(choice.number % of == index for choice in part.choices)
@@ -76,7 +76,7 @@ def test_viewers_of_a_merged_number_stay_at_their_service() -> None:
     assert own_numbers([1, 2, 4, 5], {}, share) == [2, 5]
     assert own_numbers([1, 4], {5: 4}, share) == [4]
     assert own_numbers([1, 2], {8: 7}, share) == [2]
-    assert [shard_of(it, share) for it in (3, 4, 5)] == [0, 1, 2]
+    assert [shard_of(number, share) for number in (3, 4, 5)] == [0, 1, 2]
 
 
 def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
@@ -91,7 +91,7 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
         def update(self, given: Sequence[TrackUpdate], last_frame: int, _: object) -> IdentityUpdate:
             if last_frame < 15:
                 return IdentityUpdate(
-                    {TrackletKey(*it.key, 0): it.local_id for it in given}, (), (), (), (), ()
+                    {TrackletKey(*track.key, 0): track.local_id for track in given}, (), (), (), (), ()
                 )
             merged = (Merge(1, 2),) if last_frame < 20 else ()
             numbers = dict.fromkeys((TrackletKey("c0", 1, 0), TrackletKey("c0", 2, 0)), 1)
@@ -158,7 +158,7 @@ async def test_people_of_another_service_are_listed_and_redirected(
                 return answer.status, answer.headers.get("Location"), content
 
         _, _, objects = await get("/api/objects")
-        assert [object["object"] for object in objects["objects"]] == [1, 3]
+        assert [person["object"] for person in objects["objects"]] == [1, 3]
         assert objects["elsewhere"] == [{"object": 2, "server": "http://one:1/" if told else None}]
         assert (await get("/api/objects/1/choice"))[0] == 200
         for path in ("objects/2/best.mp4?a=b", "api/objects/2/choice", "objects/2/thumb.jpg"):

@@ -56,21 +56,21 @@ class Site:
     def __init__(self, **changes: object) -> None:
         self._changes = changes
         self.cameras = {
-            camera: RetainedState(lambda snapshot, it=camera: self._receive(it, snapshot))
+            camera: RetainedState(lambda snapshot, name=camera: self._receive(name, snapshot))
             for camera in CAMERAS
         }
         self.service = FedService(small_config())
 
     def start(self, *, without_snapshot: str | None = None) -> FedService:
         """Start the service anew: the cameras hear of it, but for one."""
-        self.service = it = FedService(small_config(**self._changes))
-        it.state_replication._send = self._send_identities
+        self.service = service = FedService(small_config(**self._changes))
+        service.state_replication._send = self._send_identities
         for camera in CAMERAS:
-            for part in (it.ingest, it.state_replication):
+            for part in (service.ingest, service.state_replication):
                 part.alive(KEYS.camera(camera, "alive"), is_present=True)
             if camera != without_snapshot:
                 self.cameras[camera].on_service(is_present=True)
-        return it
+        return service
 
     def track_epochs(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
         """Push an epoch with these tracks; pictures do not matter here."""
@@ -306,24 +306,24 @@ class Clock:
 
 def test_decisions_wait_for_the_snapshots_of_connected_cameras() -> None:
     clock, service = Clock(), FedService(small_config())
-    it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
-    it.begin(4)
-    assert not it.is_waiting, "nobody is there"
-    it.alive(KEYS.camera(A, "alive"), is_present=True)
-    it.alive(KEYS.camera("cellar", "alive"), is_present=True)
-    it.alive(KEYS.camera(B, "alive"), is_present=True)
-    assert it.is_waiting
-    it.snapshot_received(Message(KEYS.camera(A, "retained_identities"), b"", b""))
-    assert it.is_waiting
-    it.alive(KEYS.camera(A, "alive"), is_present=True)
-    it.alive(KEYS.camera(B, "alive"), is_present=False)
-    assert not it.is_waiting, "a camera's token may come after its word"
-    it.alive(KEYS.camera(B, "alive"), is_present=True)
+    replication = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    replication.begin(4)
+    assert not replication.is_waiting, "nobody is there"
+    replication.alive(KEYS.camera(A, "alive"), is_present=True)
+    replication.alive(KEYS.camera("cellar", "alive"), is_present=True)
+    replication.alive(KEYS.camera(B, "alive"), is_present=True)
+    assert replication.is_waiting
+    replication.snapshot_received(Message(KEYS.camera(A, "retained_identities"), b"", b""))
+    assert replication.is_waiting
+    replication.alive(KEYS.camera(A, "alive"), is_present=True)
+    replication.alive(KEYS.camera(B, "alive"), is_present=False)
+    assert not replication.is_waiting, "a camera's token may come after its word"
+    replication.alive(KEYS.camera(B, "alive"), is_present=True)
     clock.now += SNAPSHOT_WAIT_S
-    assert not it.is_waiting, "one that is frozen keeps nobody waiting for longer"
-    it.begin(9)
-    it.alive(KEYS.camera(A, "alive"), is_present=True)
-    assert not it.is_waiting, "only at the beginning"
+    assert not replication.is_waiting, "one that is frozen keeps nobody waiting for longer"
+    replication.begin(9)
+    replication.alive(KEYS.camera(A, "alive"), is_present=True)
+    assert not replication.is_waiting, "only at the beginning"
 
 
 async def test_a_number_that_may_be_recovered_is_not_reported_as_unknown() -> None:
@@ -360,11 +360,11 @@ def test_an_invalid_snapshot_is_counted(damage: bytes, caplog: pytest.LogCapture
 
 def test_a_snapshot_is_limited_in_size() -> None:
     snapshot: list[bytes] = []
-    it = RetainedState(snapshot.append)
-    it.put(Message("", b"one", b""))
-    it.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
-    it.on_service(is_present=False)
-    it.on_service(is_present=True)
+    retained = RetainedState(snapshot.append)
+    retained.put(Message("", b"one", b""))
+    retained.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
+    retained.on_service(is_present=False)
+    retained.on_service(is_present=True)
     assert snapshot == [b"one"]
 
 
@@ -393,9 +393,9 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
     one: IdentitySnapshot, other: IdentitySnapshot
 ) -> None:
     site = Site()
-    for camera, it in zip(CAMERAS, (one, other), strict=True):
-        people = [msgspec.structs.replace(them, manual=False) for them in it.people]
-        snapshot = msgspec.json.encode(msgspec.structs.replace(it, people=people))
+    for camera, retained in zip(CAMERAS, (one, other), strict=True):
+        people = [msgspec.structs.replace(them, manual=False) for them in retained.people]
+        snapshot = msgspec.json.encode(msgspec.structs.replace(retained, people=people))
         site.cameras[camera].put(Message("", snapshot, b""))
     site.start()
     site.track_epochs(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
@@ -406,8 +406,8 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
 @given(remembered, remembered)
 def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, other: IdentitySnapshot) -> None:
     site = Site()
-    for camera, it in zip(CAMERAS, (one, other), strict=True):
-        site.cameras[camera].put(Message("", msgspec.json.encode(it), b""))
+    for camera, retained in zip(CAMERAS, (one, other), strict=True):
+        site.cameras[camera].put(Message("", msgspec.json.encode(retained), b""))
     site.start()
     site.track_epochs(range(7, 10))
     people = site.service.decider.people
@@ -484,9 +484,9 @@ def test_of_two_numbering_times_the_later_counts() -> None:
 
 def test_a_flapping_camera_without_a_snapshot_is_waited_for_once() -> None:
     clock, service = Clock(), FedService(small_config())
-    it = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
+    replication = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     for _ in range(4):
-        it.alive(KEYS.camera(B, "alive"), is_present=False)
-        it.alive(KEYS.camera(B, "alive"), is_present=True)
+        replication.alive(KEYS.camera(B, "alive"), is_present=False)
+        replication.alive(KEYS.camera(B, "alive"), is_present=True)
         clock.now += SNAPSHOT_WAIT_S / 2
-    assert not it.is_waiting
+    assert not replication.is_waiting

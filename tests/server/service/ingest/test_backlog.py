@@ -15,7 +15,7 @@ def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     """Return what is said to so many pulses behind, second by second."""
     times = iter(number * every_s for number in range(len(behind)))
     keeping_up = BacklogMonitor(REACH, lambda: next(times))
-    return [keeping_up.is_lost(it) for it in behind]
+    return [keeping_up.is_lost(epochs_behind) for epochs_behind in behind]
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ async def test_cooperative_decisions_equal_those_made_at_once() -> None:
     at_once, by_turns = collect_decisions(one), collect_decisions(other)
     one.decide()
     await other.decide_cooperatively()
-    assert [it.choices for it in at_once] == [it.choices for it in by_turns]
+    assert [decision.choices for decision in at_once] == [decision.choices for decision in by_turns]
     assert len(at_once) > 1
     one.close()
     other.close()

@@ -238,7 +238,7 @@ def test_skipping_goes_to_the_newest_reported_epoch() -> None:
         for camera in CAMERAS:
             aligner.add_tracks(window(camera, epoch))
     now = end_of_epoch(4, STRIDE)
-    assert [it.number for it in [aligner.next_ready(now)] if it] == [0]
+    assert [epoch.number for epoch in [aligner.next_ready(now)] if epoch] == [0]
     assert aligner.backlog(now) == 3 * STRIDE
     assert aligner.skip_to(now) == 3
     found = aligner.next_ready(now)
@@ -259,5 +259,5 @@ def test_a_window_ahead_of_time_does_not_cut_other_cameras_off() -> None:
     assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "it was waited for"
     aligner.add_tracks(window("c1", 8))
     taken_out = [epoch for now in range(late, 9 * STRIDE) for epoch in aligner.ready(now)]
-    assert "c1" in next(it.tracks for it in taken_out if it.number == 8)
+    assert "c1" in next(epoch.tracks for epoch in taken_out if epoch.number == 8)
     assert aligner.late_messages["c1"] == 0

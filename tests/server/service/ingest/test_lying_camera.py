@@ -58,8 +58,12 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
     """Return an epoch's frames of the liar; their heads say something else."""
     sent = [video(LIAR, unit) for unit in encoded(0)[epoch * STRIDE : (epoch + 1) * STRIDE]]
     return [
-        Message(it.key, it.payload, json.dumps(msgspec.json.decode(it.attachment) | changes).encode())
-        for it in sent
+        Message(
+            message.key,
+            message.payload,
+            json.dumps(msgspec.json.decode(message.attachment) | changes).encode(),
+        )
+        for message in sent
     ]
 
 
@@ -211,8 +215,10 @@ async def test_implausible_messages_of_one_camera_do_not_affect_the_other(name: 
     assert all(decision.choices.get(number) in CAMERAS for decision in decisions), (
         "they are shown all the time"
     )
-    sent = [picture.pulse for it in site.shown for picture in it.pictures]
-    assert [it for it in sent if it <= site.last] == list(range(site.last + 1)), "and the stream goes on"
+    sent = [picture.pulse for chunk in site.shown for picture in chunk.pictures]
+    assert [pulse for pulse in sent if pulse <= site.last] == list(range(site.last + 1)), (
+        "and the stream goes on"
+    )
     assert any(camera == OTHER for camera, *_ in service.ingest.thumbnails)
     states = service.ingest.states
     assert states[OTHER].bad_messages == 0
@@ -251,7 +257,7 @@ def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
 def test_the_scripted_messages_here_are_like_a_cameras() -> None:
     right = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
     assert [msgspec.json.decode(frame.attachment) for frame in frames(0)] == [
-        msgspec.json.decode(it.attachment) for it in right
+        msgspec.json.decode(message.attachment) for message in right
     ]
     assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == camera_tracks(
         LIAR, 1, {1: SMALL}

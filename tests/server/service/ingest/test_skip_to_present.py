@@ -60,11 +60,11 @@ def lived(service: FedService, epochs: range) -> None:
 @pytest.fixture
 def service(tmp_path: Path) -> FedService:
     """A service that records and writes decisions, and has lived for some epochs."""
-    it = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
-    it._decision_writer = it.loss_recorder.decision_writer = it._open_decision_files(tmp_path)
-    it.recorder.open()
-    it.connect_cameras(*CAMERAS)
-    return it
+    service = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
+    service._decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
+    service.recorder.open()
+    service.connect_cameras(*CAMERAS)
+    return service
 
 
 @pytest.mark.parametrize("hours", [8, 24 * 365])
@@ -103,7 +103,7 @@ def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
     lived(service, range(then, then + BEFORE))
     for viewer in viewers:
         footage = [chunk for chunk in viewer._queue if isinstance(chunk, MediaChunk) and chunk.until > until]
-        first, *more = [(it.first, it.until) for it in footage]
+        first, *more = [(chunk.first, chunk.until) for chunk in footage]
         expected = [
             (number, number + GOP) for number in range(then * STRIDE, service.decision_state.end, GOP)
         ]

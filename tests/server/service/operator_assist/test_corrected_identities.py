@@ -79,7 +79,7 @@ def played(
         if frame == corrected_at:
             [left] = [number for number, where in positions[20].items() if where < 300]
             request = corrections_for_tracker(
-                people, "c0", left, [MarkedPosition(it, places(it)[0] + 20, 160, 10) for it in of]
+                people, "c0", left, [MarkedPosition(pulse, places(pulse)[0] + 20, 160, 10) for pulse in of]
             )
             assert request is not None
             marked = [
@@ -147,7 +147,7 @@ def test_numbers_follow_a_correction_of_the_distant_past(corrected_at: int) -> N
 def test_points_after_a_correction_still_refer_to_the_same_person() -> None:
     people, positions = played(99, range(MET + 8, MET + 14))
     left, right = sides(positions, 30)
-    before, after = (people.published.of("c0", [left], it) for it in (40, 120))
+    before, after = (people.published.of("c0", [left], pulse) for pulse in (40, 120))
     assert before is not None
     assert after is not None
     assert before.track == after.track, "the tracker's own number stays with the person"

@@ -64,7 +64,7 @@ def test_a_lasting_risk_does_not_use_up_the_flags() -> None:
             risks.append((second * round(FPS), 1 + second, 0.5 + 0.5 * float(rng.random())))
     flags = raised(2, risks)
     risky = [now for now, person, _ in risks if person]
-    last = {it for it in risky if it > (hours - 1) * 60 * MINUTE}
+    last = {pulse for pulse in risky if pulse > (hours - 1) * 60 * MINUTE}
     assert len(last & set(flags)) >= 0.9 * len(last)
 
 

@@ -43,7 +43,7 @@ def test_repeated_events_of_several_cameras_are_one_flag() -> None:
     recorder.step(20, risk_event(9, 7, pulse=39, camera="c1"))
     [flag] = recorder.flags.open
     assert (flag.objects, flag.cameras, flag.state) == ([7, 9], ["c0", "c1"], "raised")
-    assert [it.cameras for it in recorder.published] == [["c0"], ["c0", "c1"]], (
+    assert [flag.cameras for flag in recorder.published] == [["c0"], ["c0", "c1"]], (
         "a frame's difference is not told"
     )
     assert recorder.flags.counts["raised"] == 1
@@ -136,9 +136,9 @@ def test_flags_are_limited_and_each_ends_once(
     for pause, events in steps:
         now += STRIDE * (1 + 40 * pause)
         before = recorder.flags.counts["raised"]
-        recorder.step(now, *(risk_event(one, two, pulse=max(0, now + it)) for one, two, it in events))
+        recorder.step(now, *(risk_event(one, two, pulse=max(0, now + offset)) for one, two, offset in events))
         raised += [now] * (recorder.flags.counts["raised"] - before)
-        assert sum(it > now - 60 * FPS for it in raised) <= 3 * (1 + 3)
+        assert sum(pulse > now - 60 * FPS for pulse in raised) <= 3 * (1 + 3)
         people = [tuple(flag.objects) for flag in recorder.flags.open]
         assert len(people) == len(set(people))
     recorder.step(now + 10_000)

@@ -215,11 +215,13 @@ async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
     store.open()
     for gop in range(GOPS):
         clocks.now = PULSE0 + gop * GOP / FPS
-        it = gop_record(gop, {1: A})
+        record = gop_record(gop, {1: A})
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
         heard = AudioChunk(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
         store.write(
-            GopRecord(it.choices, it.cameras, heard), session_info(), InitSegments(b"pictures", b"sound")
+            GopRecord(record.choices, record.cameras, heard),
+            session_info(),
+            InitSegments(b"pictures", b"sound"),
         )
     session = store.session
     assert session is not None

@@ -114,12 +114,12 @@ def nothing_is_orphaned(folder: Path) -> None:
         for camera in (*session.cameras.values(), *session.objects.values())
     }
     fixed = {
-        session.folder / it
+        session.folder / file
         for session in store.earlier
-        for it in ("session.json", "cameras/init.mp4", "sound/init.mp4")
+        for file in ("session.json", "cameras/init.mp4", "sound/init.mp4")
     }
     strange = before - named - lists - fixed - {folder / ".lock", folder / "clock.json"}
-    assert {it for it in strange if it.read_bytes() != b"somebody's\n"} == set()
+    assert {path for path in strange if path.read_bytes() != b"somebody's\n"} == set()
 
 
 def shown(folder: Path) -> list[int]:
@@ -139,8 +139,8 @@ def shown(folder: Path) -> list[int]:
         *(pytest.param(made_anew(level), id=f"anew {level}") for level in LEVELS),
         *(pytest.param(made_a_file(level), id=f"a file {level}") for level in LEVELS[1:]),
         *(
-            pytest.param(cut_short(it), id=f"short {it}")
-            for it in ["RUN/cameras/c0.m3u8", "RUN/session.json"]
+            pytest.param(cut_short(file), id=f"short {file}")
+            for file in ["RUN/cameras/c0.m3u8", "RUN/session.json"]
         ),
     ],
 )
@@ -241,13 +241,13 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
         records(first, range(12))
         first.close()
         closed = [path for path in tmp_path.rglob("*") if path.is_dir()]
-        for it in closed:
-            it.chmod(0o500)
+        for file in closed:
+            file.chmod(0o500)
         store = RecordingFolder(tmp_path, RetentionLimits(1e-9, 1e6, 1.0))
         store.open()
         records(store, range(20, 24))
-        for it in closed:
-            it.chmod(0o700)
+        for file in closed:
+            file.chmod(0o700)
         assert store.session is not None
         assert [(entry.first, entry.end) for entry in store.session.cameras[A].index.all] == [(100, 120)]
         logged = [message for message in caplog.messages if "cannot delete expired segments" in message]
@@ -278,9 +278,9 @@ def test_remains_without_media_are_removed_and_media_without_session_info_are_lo
     (tmp_path / "20260101T000000Z" / "session.json").unlink()
     media = tmp_path / "20260102T000000Z" / "cameras" / "c0" / "000000000000.mp4"
     mine = tmp_path / "holiday" / "notes.txt"
-    for it in (media, mine):
-        it.parent.mkdir(parents=True)
-        it.write_bytes(b"")
+    for folder in (media, mine):
+        folder.parent.mkdir(parents=True)
+        folder.write_bytes(b"")
     store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
     store.close()
@@ -409,7 +409,7 @@ async def test_a_lost_segment_is_a_gap(served: ServedSite) -> None:
     (store.session.paths.camera_file(A, 2 * GOP)).write_bytes(b"cut short")
     spans = (await served.get_json("/api/cameras/c0/past"))["spans"]
     assert [span["first"] for span in spans] == [4 * GOP]
-    assert [it["first"] for it in (await served.get_json("/api/cameras/c1/past"))["spans"]] == [0]
+    assert [span["first"] for span in (await served.get_json("/api/cameras/c1/past"))["spans"]] == [0]
     status, body = await asked(served, "/cameras/c0/live.mp4?from=p0&to=p30")
     assert status == 200
     assert len(body) > 1000

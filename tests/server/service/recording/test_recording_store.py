@@ -217,9 +217,11 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
     again.open()
     assert store.session is not None
     found = {
-        number: object.index.all for session in again.earlier for number, object in session.objects.items()
+        number: playlist.index.all
+        for session in again.earlier
+        for number, playlist in session.objects.items()
     }
-    assert found == {number: object.index.all for number, object in store.session.objects.items()}
+    assert found == {number: playlist.index.all for number, playlist in store.session.objects.items()}
     for number, entries in found.items():
         expected = [gop for gop, choices in enumerate(shown) if number in choices]
         kept = [pulse // GOP for entry in entries for pulse in range(entry.first, entry.end, GOP)]

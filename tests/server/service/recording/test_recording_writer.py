@@ -37,12 +37,12 @@ class Disk:
         self.open.set()
         self.asked = threading.Semaphore(0)
 
-    def write(self, it: GopRecord) -> None:
+    def write(self, record: GopRecord) -> None:
         self.asked.release()
         assert self.open.wait(PATIENCE)
         if self.refuses:
             raise OSError(28, "No space left on device", "c0/000.mp4")
-        self.taken.append(it.choices.first)
+        self.taken.append(record.choices.first)
 
     def abandon(self) -> None:
         self.abandoned += 1
@@ -142,11 +142,11 @@ def test_a_disk_that_does_not_respond_is_reported() -> None:
 
 def test_an_internal_error_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
     class Mistaken(Disk):
-        def write(self, it: GopRecord) -> None:
+        def write(self, record: GopRecord) -> None:
             if not self.taken:
                 self.taken.append(-2)
                 raise ValueError("a mistake")
-            super().write(it)
+            super().write(record)
 
     disk = Mistaken()
     writer = writer_on(disk, most=100)

@@ -243,7 +243,7 @@ async def test_ffprobe_reports_no_errors(loud: ServedSite, recording: Path, tmp_
         ways, await watched(loud, recording, [f"/objects/1/{way}" for way in ways]), strict=True
     ):
         (tmp_path / way).write_bytes(data)
-        found = {it[0]: int(it[1]) for it in probed(tmp_path / way, "codec_name,nb_read_frames")}
+        found = {stream[0]: int(stream[1]) for stream in probed(tmp_path / way, "codec_name,nb_read_frames")}
         assert found["h264"] == FRAMES
         assert found["aac"] >= FRAMES * 48_000 // FPS // FRAME
 

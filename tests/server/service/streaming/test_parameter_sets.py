@@ -131,7 +131,7 @@ async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
         av.VideoFrame.from_ndarray(picture, format="yuv420p").to_ndarray(format="rgb24")
         for picture in expected_pictures()
     ]
-    right = np.array([it[4::8, 4::8, 1].ravel() for it in rgb], dtype=float)[::3]
+    right = np.array([picture[4::8, 4::8, 1].ravel() for picture in rgb], dtype=float)[::3]
     found = np.array(seen["greens"], dtype=float)
     assert len(found) == GOPS * GOP / 3
     # Colours are converted in two ways; pictures of other pulses or cameras differ by several times as much.

@@ -74,4 +74,6 @@ async def test_time_shift_plays_what_was_live(served: ServedSite, form: str) -> 
     assert LOST_GOPS, "there are gaps, which are filled"
     assert form == "hls" or list(seen) == list(range(FRAMES))
     for pulse, right in enumerate(expected_pictures()):
-        np.testing.assert_array_equal(seen[max(it for it in seen if it <= pulse)], right, str(pulse))
+        np.testing.assert_array_equal(
+            seen[max(earlier for earlier in seen if earlier <= pulse)], right, str(pulse)
+        )

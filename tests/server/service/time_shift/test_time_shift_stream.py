@@ -240,7 +240,7 @@ async def test_spans_and_views_are_limited_to_the_requested_range(
     whole = cameras((await recorded.get_json("/api/objects/1/past"))["views"])
     part = await recorded.get_json(f"/api/objects/1/past?{query}")
     begin = int(query.partition("from=p")[2].partition("&")[0] or 0)
-    assert [(it["first"], it["frames"]) for it in part["spans"]] == [(begin, frames)]
+    assert [(span["first"], span["frames"]) for span in part["spans"]] == [(begin, frames)]
     assert cameras(part["views"]) == {number: whole[number] for number in range(begin, begin + frames)}
     span = (await recorded.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
     assert (span["first"], span["frames"]) == (begin, 15 if query == "from=p20" else frames)
@@ -329,7 +329,7 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
     store.close()
     there = available_ranges(source)
     assert first_available(source, start) == next(
-        (max(it.first, start) for it in there if it.end > start), None
+        (max(span.first, start) for span in there if span.end > start), None
     )
     assert end_of_available(source) == (there[-1].end if there else 0)
     kept = [gop for gop, camera in enumerate(shown) if camera is not None]
@@ -345,7 +345,8 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
         if camera is not None:
             np.testing.assert_array_equal(picture, own_pictures(camera)[pulse])
     assert all(
-        any(range.first <= gop * GOP < range.end for range in available_ranges(source)) for gop in wanted
+        any(available.first <= gop * GOP < available.end for available in available_ranges(source))
+        for gop in wanted
     )
 
 

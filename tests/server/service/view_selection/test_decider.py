@@ -32,19 +32,19 @@ EVERY_FRAME: Callable[[str, int], bool] = lambda _camera, _pulse: True  # noqa: 
 
 
 def decider(has: Callable[[str, int], bool] = EVERY_FRAME, **changes: Any) -> ViewDecider:
-    it = ViewDecider(small_config(**changes), dict.fromkeys(CAMERAS), has)
-    it.people._registry = TrackNumbers()  # type: ignore[assignment]
-    return it
+    view_decider = ViewDecider(small_config(**changes), dict.fromkeys(CAMERAS), has)
+    view_decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    return view_decider
 
 
-def decide(it: ViewDecider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
+def decide(view_decider: ViewDecider, story: Sequence[Seen], *, end: int | None = None) -> list[GopDecision]:
     """Feed a scripted scene epoch by epoch; ``end`` is the last frame of ended recordings."""
     decisions = []
     for number, seen in enumerate(story):
-        decisions += it.step(
+        decisions += view_decider.step(
             epoch_of(number, *(camera_tracks(camera, number, boxes) for camera, boxes in seen.items()))
         )
-    return decisions + ([] if end is None else it.finish(end))
+    return decisions + ([] if end is None else view_decider.finish(end))
 
 
 def shown(decisions: list[GopDecision], number: int = 1) -> list[str | None]:
@@ -56,9 +56,9 @@ def reason_of(decision: GopDecision) -> str:
 
 
 def test_a_gop_is_decided_when_its_look_ahead_is_known() -> None:
-    it = decider()
-    assert decide(it, [{A: {1: SMALL}, B: {}}]) == []
-    [decision] = it.step(epoch_of(1, camera_tracks(A, 1, {1: SMALL}), camera_tracks(B, 1, {})))
+    view_decider = decider()
+    assert decide(view_decider, [{A: {1: SMALL}, B: {}}]) == []
+    [decision] = view_decider.step(epoch_of(1, camera_tracks(A, 1, {1: SMALL}), camera_tracks(B, 1, {})))
     assert (decision.first, decision.frames) == (0, GOP)
 
 
@@ -96,15 +96,15 @@ def test_views_change_only_at_gops_and_boxes_are_of_their_frames() -> None:
 
 
 def test_a_camera_with_a_missing_frame_is_not_selected_for_the_gop() -> None:
-    it = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
-    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
+    view_decider = decider(has=lambda camera, pulse: (camera, pulse) != (A, GOP + 2))
+    decisions = decide(view_decider, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, B, A, A, A]
     assert decisions[1].reasons.of(1).views[A].cost is None
 
 
 def test_no_camera_is_selected_while_none_can_be_shown() -> None:
-    it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
-    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
+    view_decider = decider(has=lambda _camera, pulse: pulse // GOP != 1)
+    decisions = decide(view_decider, [{A: {1: LARGE}, B: {}}] * 5, end=5 * STRIDE - 1)
     assert shown(decisions) == [A, None, A, A, A]
     assert reason_of(decisions[1]) == "No camera can be shown at the moment."
 
@@ -127,10 +127,10 @@ def test_finishing_without_epochs_decides_nothing() -> None:
 
 
 def test_a_service_started_within_a_gop_begins_with_the_next() -> None:
-    it = decider(encode={"gop": 10}, view={"lookahead": 20})
+    view_decider = decider(encode={"gop": 10}, view={"lookahead": 20})
     decisions = []
     for number in range(5, 12):
-        decisions += it.step(epoch_of(number, camera_tracks(A, number, {1: SMALL})))
+        decisions += view_decider.step(epoch_of(number, camera_tracks(A, number, {1: SMALL})))
     assert [decision.first for decision in decisions] == [30, 40]
 
 
@@ -157,17 +157,19 @@ def test_decisions_are_deterministic_and_show_no_missing_frames(
         for _ in "12"
     )
     assert one == two
-    assert sum(it.frames for it in one) == end + 1
-    for it in one:
-        for choice in it.choices:
-            for pulse in range(it.first, it.first + it.frames):
+    assert sum(decision.frames for decision in one) == end + 1
+    for decision in one:
+        for choice in decision.choices:
+            for pulse in range(decision.first, decision.first + decision.frames):
                 assert (choice.camera, pulse) not in missing
 
 
 def test_a_cut_is_published_once_with_both_cameras() -> None:
-    it = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
+    view_decider = decider(has=lambda camera, pulse: (camera, pulse // GOP) != (A, 1))
     state = DecisionState(25.0)
-    gop_choices = [state.put(decision) for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19)]
+    gop_choices = [
+        state.put(decision) for decision in decide(view_decider, [{A: {1: LARGE}, B: {}}] * 4, end=19)
+    ]
     assert [
         [(cut.from_camera, cut.to_camera, cut.pulse) for cut in choice.cuts] for choice in gop_choices
     ] == [
@@ -184,9 +186,9 @@ def test_a_cut_is_published_once_with_both_cameras() -> None:
 
 
 def test_the_same_camera_after_a_gap_is_no_cut() -> None:
-    it = decider(has=lambda _camera, pulse: pulse // GOP != 1)
+    view_decider = decider(has=lambda _camera, pulse: pulse // GOP != 1)
     state = DecisionState(25.0)
-    for decision in decide(it, [{A: {1: LARGE}, B: {}}] * 4, end=19):
+    for decision in decide(view_decider, [{A: {1: LARGE}, B: {}}] * 4, end=19):
         state.put(decision)
     assert state.cuts == 0
 
@@ -205,12 +207,14 @@ def test_a_camera_that_dies_within_the_look_ahead_is_left_at_that_gop() -> None:
     dies = 2 * GOP + 2
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 8
     alive = {A: 10 * GOP}
-    it = decider(has=lambda camera, pulse: pulse < alive.get(camera, pulse + 1))
-    before = decide(it, story[:3])  # decides GOPs 0 and 1; the look-ahead of the second ends with GOP 2
+    view_decider = decider(has=lambda camera, pulse: pulse < alive.get(camera, pulse + 1))
+    before = decide(
+        view_decider, story[:3]
+    )  # decides GOPs 0 and 1; the look-ahead of the second ends with GOP 2
     alive[A] = dies
     after = []
     for number in range(3, 8):  # its last words are lost with it
-        after += it.step(epoch_of(number, camera_tracks(B, number, story[number][B])))
+        after += view_decider.step(epoch_of(number, camera_tracks(B, number, story[number][B])))
     assert shown(before) == [A, A]
     assert shown(after) == [B, B, B, B, B], "no hole, and one cut"
     assert after[0].reasons.of(1).views[A].cost is None
@@ -246,26 +250,26 @@ def test_shots_have_the_minimum_length(min_shot_s: float, cuts: int) -> None:
     here: Seen = {A: {1: LARGE}, B: {1: SMALL}}
     there: Seen = {A: {1: SMALL}, B: {1: LARGE}}
     story = [here, here, there, there, here, here, there, there, here, here, here]
-    it = decider(view={"min_shot_s": min_shot_s})
-    views = shown(decide(it, story, end=11 * STRIDE - 1))
+    view_decider = decider(view={"min_shot_s": min_shot_s})
+    views = shown(decide(view_decider, story, end=11 * STRIDE - 1))
     changes = [n for n in range(1, len(views)) if views[n] != views[n - 1]]
     assert len(changes) == cuts
-    assert all(b - a >= it.min_shot_gops for a, b in itertools.pairwise(changes))
+    assert all(b - a >= view_decider.min_shot_gops for a, b in itertools.pairwise(changes))
 
 
 def test_a_shot_without_the_person_may_be_short() -> None:
     here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
-    it = decider(view={"min_shot_s": 2.0})
-    assert shown(decide(it, [here, here, *[gone] * 4])) == [A, A, B, B, B]
+    view_decider = decider(view={"min_shot_s": 2.0})
+    assert shown(decide(view_decider, [here, here, *[gone] * 4])) == [A, A, B, B, B]
 
 
 def test_a_track_that_changes_person_within_the_window_counts_for_each_in_their_frames() -> None:
-    it = decider()
+    view_decider = decider()
     changes = STRIDE + 2
-    it.people.numbers = lambda keys, first, frames: np.where(  # type: ignore[method-assign]
+    view_decider.people.numbers = lambda keys, first, frames: np.where(  # type: ignore[method-assign]
         first + np.arange(frames) < changes, 1, 2
     )[None].repeat(len(keys), axis=0)
-    decisions = decide(it, [{A: {1: LARGE}, B: {}}] * 4)
+    decisions = decide(view_decider, [{A: {1: LARGE}, B: {}}] * 4)
     assert [[number for number, *_ in frame] for frame in decisions[1].boxes[A]] == [[1], [1], [2], [2], [2]]
     assert decisions[1].reasons.of(1).views[A].seen == pytest.approx(2 / (2 * GOP))
 
@@ -282,8 +286,8 @@ def test_with_relative_quality_distance_makes_no_difference() -> None:
 @pytest.mark.parametrize(("presence_decay_s", "expected"), [(0.0, [A, B, A, A]), (1.0, [A, A, A, A])])
 def test_a_short_missed_detection_causes_no_cuts(presence_decay_s: float, expected: list[str]) -> None:
     here, missed = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
-    it = decider(view={"presence_decay_s": presence_decay_s})
-    assert shown(decide(it, [here, missed, here, here, here])) == expected
+    view_decider = decider(view={"presence_decay_s": presence_decay_s})
+    assert shown(decide(view_decider, [here, missed, here, here, here])) == expected
 
 
 def test_a_camera_that_keeps_missing_the_person_is_left_eventually() -> None:

@@ -92,7 +92,7 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     service.connect_cameras(*CAMERAS)
     shown: list[str | None] = []
-    service.on_decision.append(lambda it: shown.append(it.choices.get(1)))
+    service.on_decision.append(lambda choices: shown.append(choices.choices.get(1)))
     got: list[bytes] = []
 
     def take(piece: Chunk) -> bool:
@@ -113,7 +113,7 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
             viewer.direct_send = take
     if viewer is not None:
         assert viewer.lost_gops == 0
-        names = [it or "" for it in shown[begun:]]
+        names = [camera or "" for camera in shown[begun:]]
         assert got == [
             service.frame_buffers[name].gop((begun + n) * GOP, GOP) for n, name in enumerate(names)
         ]

@@ -27,7 +27,7 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 WINDOW, EPOCHS = 3 * STRIDE, 5
 BOX = st.tuples(*(st.integers(1, 20) for _ in "xywh")).map(
-    lambda it: (float(it[0]), float(it[1]), float(it[0] + it[2]), float(it[1] + it[3]))
+    lambda box: (float(box[0]), float(box[1]), float(box[0] + box[2]), float(box[1] + box[3]))
 )
 WORD = st.dictionaries(
     st.integers(1, 3), st.lists(BOX | st.none(), min_size=WINDOW, max_size=WINDOW), max_size=3
@@ -131,11 +131,13 @@ def test_the_window_has_every_view_once_with_relative_quality(
         if pulse >= 2 and (camera, pulse) not in missing and quality > 0
     }
     assert len(quality_of_view) == len(views.frame)
-    assert {it: quality for it, (quality, _) in quality_of_view.items()} == expected
+    assert {camera: quality for camera, (quality, _) in quality_of_view.items()} == expected
     for (pulse, camera, number), (quality, worth) in quality_of_view.items():
         best = max(expected.get((pulse, camera, number), 0.0) for camera in CAMERAS) if relative else 1.0
         assert worth == quality / best, camera
     for view, (quality, _) in enumerate(quality_of_view.values()):
         weights = config.view.quality.weights
         terms = dict(zip(config.view.quality.terms, outlook.terms(view).tolist(), strict=True))
-        assert np.prod([1 - weights[it] * (1 - term) for it, term in terms.items()]) == pytest.approx(quality)
+        assert np.prod(
+            [1 - weights[term_name] * (1 - term) for term_name, term in terms.items()]
+        ) == pytest.approx(quality)

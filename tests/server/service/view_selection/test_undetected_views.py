@@ -41,17 +41,17 @@ def at(x: float, y: float, camera: str = A) -> Box:
 
 
 def decider(ground: Mapping[str, np.ndarray | None] = GROUND, **view: Any) -> ViewDecider:
-    it = ViewDecider(small_config(view=view), ground, lambda _camera, _pulse: True)
-    it.people._registry = TrackNumbers()  # type: ignore[assignment]
-    return it
+    view_decider = ViewDecider(small_config(view=view), ground, lambda _camera, _pulse: True)
+    view_decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+    return view_decider
 
 
-def decide(it: ViewDecider, story: Sequence[CameraBoxes]) -> list[GopDecision]:
+def decide(view_decider: ViewDecider, story: Sequence[CameraBoxes]) -> list[GopDecision]:
     epochs = (
         epoch_of(number, *(camera_tracks(camera, number, boxes) for camera, boxes in boxes_of_camera.items()))
         for number, boxes_of_camera in enumerate(story)
     )
-    return [decision for epoch in epochs for decision in it.step(epoch)]
+    return [decision for epoch in epochs for decision in view_decider.step(epoch)]
 
 
 def shown(decisions: Sequence[GopDecision], number: int = 1) -> list[str | None]:
@@ -95,15 +95,15 @@ def test_no_view_is_inferred_where_a_camera_never_detects() -> None:
 
 @pytest.mark.parametrize("speaks", [False, True], ids=["is silent", "sees nothing"])
 def test_nothing_is_learned_about_a_disconnected_camera(speaks: bool) -> None:
-    it = decider()
-    decide(it, [FOUND] * 20)
-    trust = it._cross_view_inference._detection_probability._cell_rate.copy()
+    view_decider = decider()
+    decide(view_decider, [FOUND] * 20)
+    trust = view_decider._cross_view_inference._detection_probability._cell_rate.copy()
     for number in range(20, 40):
         away = camera_tracks(
             B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)]
         )
-        it.step(epoch_of(number, camera_tracks(A, number, FOUND[A]), *([away] if speaks else [])))
-    changed = np.abs(it._cross_view_inference._detection_probability._cell_rate - trust)
+        view_decider.step(epoch_of(number, camera_tracks(A, number, FOUND[A]), *([away] if speaks else [])))
+    changed = np.abs(view_decider._cross_view_inference._detection_probability._cell_rate - trust)
     assert changed.max() < 0.05, "but for forgetting"
 
 
@@ -133,18 +133,20 @@ def test_the_explanation_includes_undetected_views_and_their_quality() -> None:
 def test_a_test_counts_for_the_decided_frames_up_to_the_next_test(
     frames: int,
 ) -> None:
-    it = CrossViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
+    inference = CrossViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
     looks = np.array([0, 10, 20])
     cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
     tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
-    it.learn(replace(UndetectedViews.empty(), tested=tested), frames)
-    assert it._detection_probability._counts[0].sum() == frames, "the next window begins with an inference"
+    inference.learn(replace(UndetectedViews.empty(), tested=tested), frames)
+    assert inference._detection_probability._counts[0].sum() == frames, (
+        "the next window begins with an inference"
+    )
 
 
 def test_the_weight_scales_the_quality_of_undetected_views() -> None:
     story = [FOUND] * 20 + [COVERED] * 6
     whole, half = (
-        decide(decider(undetected_weight=it), story)[-1].reasons.of(1).views[B] for it in (1.0, 0.5)
+        decide(decider(undetected_weight=weight), story)[-1].reasons.of(1).views[B] for weight in (1.0, 0.5)
     )
     assert half.undetected_quality == pytest.approx(0.5 * (whole.undetected_quality or 0.0))
 
