@@ -19,10 +19,10 @@ _FU_A = 28
 
 
 class RtspCamera:
-    """Serves access units at a frame rate over TCP, up to the GOP number `let`."""
+    """Serves access units at a frame rate over TCP, up to the GOP number `gop_limit`."""
 
     def __init__(self, gops: Sequence[Sequence[AccessUnit]], fps: float) -> None:
-        self.gops, self.fps, self.let = gops, fps, 40
+        self.gops, self.fps, self.gop_limit = gops, fps, 40
         self.stop = threading.Event()
         self._server = _Server(self)
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
@@ -79,7 +79,7 @@ class _Handler(socketserver.StreamRequestHandler):
     def _play(self, camera: RtspCamera) -> None:
         number = 0
         for place, gop in enumerate(camera.gops):
-            while place >= camera.let:
+            while place >= camera.gop_limit:
                 if camera.stop.wait(0.002):
                     return
             for unit in gop:

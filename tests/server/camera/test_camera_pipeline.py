@@ -26,7 +26,7 @@ from synthetic import Scene, write_recording
 FRAMES = 48
 STRIDE = 5
 LIVE = {"prescan_frames": 0}
-"""The scene is learned as it goes."""
+"""The background is learned while tracking."""
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +51,9 @@ def offline(config: Config) -> list[EpochBatch]:
 
 
 def live(config: Config, missed: frozenset[int] = frozenset()) -> tuple[list[AccessUnit], list[CameraTracks]]:
-    """Call the pipeline as the camera's process does: video first, all tracking far behind."""
+    """Run the pipeline as a live camera's process does: all video first, tracking afterwards."""
     pipeline = CameraPipeline(config, "c0")
-    units, words, backlog = [], [], []
+    units, messages, backlog = [], [], []
     pulse = 0
     while True:
         if pulse not in missed:
@@ -66,38 +66,42 @@ def live(config: Config, missed: frozenset[int] = frozenset()) -> tuple[list[Acc
             backlog.append((pulse, image))
         pulse += 1
     for number, image in backlog:
-        words.append(pipeline.track(number, image))
-    words.append(pipeline.finish(pulse))
+        messages.append(pipeline.track(number, image))
+    messages.append(pipeline.finish(pulse))
     pipeline.close()
-    return units, [word for word in words if word is not None]
+    return units, [message for message in messages if message is not None]
 
 
 def test_live_and_offline_give_the_same_tracks_and_the_same_bytes(recording: Path) -> None:
     config = config_of(recording)
-    units, words = live(config)
+    units, messages = live(config)
     batches = offline(config)
-    assert words == [batch.tracks for batch in batches]
+    assert messages == [batch.tracks for batch in batches]
     assert units == [unit for batch in batches for unit in batch.units]
-    assert any(word.tracks for word in words), "there are people in it"
+    assert any(message.tracks for message in messages), "people are tracked"
 
 
-def test_epochs_follow_one_another_and_the_last_closes_the_recording(recording: Path) -> None:
+def test_epochs_are_consecutive_and_the_last_ends_the_recording(recording: Path) -> None:
     batches = offline(config_of(recording))
-    words = [batch.tracks for batch in batches if batch.tracks is not None]
-    assert [word.epoch for word in words] == list(range(FRAMES // STRIDE + 1))
-    assert [word.ended for word in words] == [False] * (len(words) - 1) + [True]
-    assert [batch.ended for batch in batches] == [word.ended for word in words]
-    assert words[-1].last == words[-1].final_to == FRAMES - 1
-    assert all(not word.shed for word in words)
+    messages = [batch.tracks for batch in batches if batch.tracks is not None]
+    assert [message.epoch for message in messages] == list(range(FRAMES // STRIDE + 1))
+    assert [message.ended for message in messages] == [False] * (len(messages) - 1) + [True]
+    assert [batch.ended for batch in batches] == [message.ended for message in messages]
+    assert messages[-1].last == messages[-1].final_to == FRAMES - 1
+    assert all(not message.shed for message in messages)
 
 
-def test_an_offset_moves_everything_by_so_many_pulses(recording: Path) -> None:
-    # Not ahead: who is there in the very first frame has no window of frames before it, moved they have.
-    plain, moved = (offline(config_of(recording, offset=offset, detect=LIVE)) for offset in (0, 2 * STRIDE))
-    boxes = [_boxes(batches) for batches in (plain, moved)]
+def test_an_offset_shifts_boxes_and_frames(recording: Path) -> None:
+    # Without a prescan: the shifted recording has a window of frames before its first, the other has none.
+    original, shifted = (
+        offline(config_of(recording, offset=offset, detect=LIVE)) for offset in (0, 2 * STRIDE)
+    )
+    boxes = [_boxes(batches) for batches in (original, shifted)]
     assert boxes[1] == {(pulse + 2 * STRIDE, track): box for (pulse, track), box in boxes[0].items()}
-    assert [unit.pulse for batch in moved for unit in batch.units] == list(range(10, FRAMES + 10))
-    assert all(not batch.tracks.shed for batch in moved if batch.tracks), "before it begins nothing is missed"
+    assert [unit.pulse for batch in shifted for unit in batch.units] == list(range(10, FRAMES + 10))
+    assert all(not batch.tracks.shed for batch in shifted if batch.tracks), (
+        "frames before the start are not missed"
+    )
 
 
 def _boxes(batches: list[EpochBatch]) -> dict[tuple[int, int], Box]:
@@ -111,24 +115,29 @@ def _boxes(batches: list[EpochBatch]) -> dict[tuple[int, int], Box]:
     }
 
 
-@pytest.mark.parametrize(("detect", "first"), [({}, 0), (LIVE, 24)], ids=["recording", "as if live"])
-def test_people_in_a_recording_are_looked_for_from_its_first_frame_on(
+@pytest.mark.parametrize(("detect", "first"), [({}, 0), (LIVE, 24)], ids=["recording", "live"])
+def test_recordings_are_searched_from_the_first_frame_on(
     recording: Path, detect: dict[str, Any], first: int
 ) -> None:
     pipeline = CameraPipeline(config_of(recording, detect=detect), "c0")
-    searched = [pipeline.detect(pulse, pipeline.take(pulse)) for pulse in range(30)]
-    words = [pipeline.track_detections(frame) for frame in searched]
+    frames = [pipeline.detect(pulse, pipeline.take(pulse)) for pulse in range(30)]
+    messages = [pipeline.track_detections(frame) for frame in frames]
     pipeline.close()
-    assert [frame.has_detection for frame in searched] == [pulse >= first for pulse in range(30)]
-    assert [pulse for word in words if word for pulse in word.without_detection] == list(range(first))
+    assert [frame.has_detection for frame in frames] == [pulse >= first for pulse in range(30)]
+    assert [pulse for message in messages if message for pulse in message.without_detection] == list(
+        range(first)
+    )
 
 
-def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_they_must(
+def test_missed_frames_are_reported_once_and_a_missed_keyframe_begins_a_new_gop(
     recording: Path,
 ) -> None:
     missed = frozenset({7, 10, 11, 12, 33})
-    units, words = live(config_of(recording), missed)
-    for reported in ([word.shed for word in words], [word.without_detection for word in words]):
+    units, messages = live(config_of(recording), missed)
+    for reported in (
+        [message.shed for message in messages],
+        [message.without_detection for message in messages],
+    ):
         assert sorted(pulse for frames in reported for pulse in frames) == sorted(missed)
     assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
 
@@ -136,33 +145,33 @@ def test_frames_that_were_missed_are_reported_once_and_begin_a_new_gop_where_the
 def test_only_the_end_of_a_very_long_gap_is_reported(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     late = 100_000 * STRIDE
-    words = [pipeline.track(pulse, None) for pulse in (*range(STRIDE), *range(late, late + STRIDE))]
+    messages = [pipeline.track(pulse, None) for pulse in (*range(STRIDE), *range(late, late + STRIDE))]
     pipeline.close()
-    shed = [word.shed for word in words if word]
+    shed = [message.shed for message in messages if message]
     assert max(map(len, shed)) <= 50_000 + 2 * STRIDE
     assert [pulse for reported in shed for pulse in reported][-STRIDE - 1 :] == [
         *range(late - 1, late + STRIDE)
     ]
 
 
-def test_a_frame_of_which_only_the_number_is_left_is_reported(recording: Path) -> None:
+def test_a_frame_whose_picture_was_shed_is_reported(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     for pulse in range(STRIDE):
         image = pipeline.take(pulse)
-        word = pipeline.track(pulse, None if pulse == 3 else image)
+        message = pipeline.track(pulse, None if pulse == 3 else image)
     pipeline.close()
-    assert word is not None
-    assert word.shed == word.without_detection == [3]
+    assert message is not None
+    assert message.shed == message.without_detection == [3]
 
 
 def test_a_camera_started_after_its_recording_reports_the_end(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     with pytest.raises(SourceEndedError):
         pipeline.take(1000)
-    word = pipeline.finish(1000)
+    message = pipeline.finish(1000)
     pipeline.close()
-    assert word.ended
-    assert (word.epoch, word.last, word.tracks) == (1000 // STRIDE, 999, [])
+    assert message.ended
+    assert (message.epoch, message.last, message.tracks) == (1000 // STRIDE, 999, [])
 
 
 def test_images_of_another_size_are_letterboxed_and_messages_have_the_size(tmp_path: Path) -> None:
@@ -172,28 +181,28 @@ def test_images_of_another_size_are_letterboxed_and_messages_have_the_size(tmp_p
     assert last.tracks.size == (WIDTH, HEIGHT)
 
 
-def test_detections_of_a_file_are_followed_in_the_sites_pixels(recording: Path) -> None:
+def test_detections_of_a_file_are_tracked_in_the_sites_pixels(recording: Path) -> None:
     config = config_of(recording, detections="gt/c0.txt")
     small = config.model_copy(update={"site": SiteSettings(width=96, height=80)})
     boxes = _boxes(offline(small))
-    assert boxes, "there are people in it"
+    assert boxes, "people are tracked"
     rows = np.loadtxt(recording / "gt" / "c0.txt", delimiter=",", ndmin=2)
     for (pulse, _), box in boxes.items():
-        left, top, right, bottom = box  # half as large, and 13 rows lower: the rest is black
-        own = (2 * left, 2 * (top - 13), 2 * (right - left), 2 * (bottom - top))
-        assert np.isclose(rows[rows[:, 0] == pulse + 1, 2:6], own).all(axis=1).any()
+        left, top, right, bottom = box  # scaled to a half, letterboxed by 13 rows
+        original = (2 * left, 2 * (top - 13), 2 * (right - left), 2 * (bottom - top))
+        assert np.isclose(rows[rows[:, 0] == pulse + 1, 2:6], original).all(axis=1).any()
 
 
 @pytest.mark.parametrize(
-    ("content", "why"), [(None, "No such file"), ("1,2,x\n", "det.txt"), (b"\xff\xfe\x00", "det.txt")]
+    ("content", "reason"), [(None, "No such file"), ("1,2,x\n", "det.txt"), (b"\xff\xfe\x00", "det.txt")]
 )
-def test_detections_that_cannot_be_read_are_refused(
-    tmp_path: Path, content: str | bytes | None, why: str
+def test_an_unreadable_detections_file_is_refused(
+    tmp_path: Path, content: str | bytes | None, reason: str
 ) -> None:
     write_video(tmp_path / "c0.mp4", 3)
     if content is not None:
         (tmp_path / "det.txt").write_bytes(content.encode() if isinstance(content, str) else content)
-    with pytest.raises(UserError, match=why) as caught:
+    with pytest.raises(UserError, match=reason) as caught:
         CameraPipeline(config_of(tmp_path, detections="det.txt"), "c0")
     assert str(caught.value).startswith("camera c0: detections: ")
     assert "\n" not in str(caught.value)
@@ -204,23 +213,23 @@ def test_a_recording_that_ends_before_the_first_pulse_is_refused_offline(recordi
         offline(config_of(recording, offset=-1000))
 
 
-def test_sharpness_is_measured_where_it_counts_alone(recording: Path) -> None:
+def test_sharpness_is_measured_only_if_it_has_a_weight(recording: Path) -> None:
     config = config_of(recording)
-    weighs = config.model_copy(
+    weighted = config.model_copy(
         update={"view": config.view.model_copy(update={"quality": QualitySettings(sharpness=0.5)})}
     )
-    for given, measured in ((config, False), (weighs, True)):
-        tracks = [track for word in live(given)[1] for track in word.tracks]
+    for tested, measured in ((config, False), (weighted, True)):
+        tracks = [track for message in live(tested)[1] for track in message.tracks]
         assert tracks, "there are tracks"
         assert any(track.sharpness is not None for track in tracks) == measured
-    assert live(weighs)[1] == [batch.tracks for batch in offline(weighs)]
+    assert live(weighted)[1] == [batch.tracks for batch in offline(weighted)]
 
 
-def test_a_homography_that_has_no_floor_in_the_picture_is_refused(recording: Path) -> None:
-    past_down = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 109.0]]  # the floor ends below the picture
+def test_a_homography_without_floor_in_the_picture_is_refused(recording: Path) -> None:
+    ground = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 109.0]]  # the floor ends below the picture
     with pytest.raises(UserError) as caught:
-        CameraPipeline(config_of(recording, ground=past_down), "c0")
+        CameraPipeline(config_of(recording, ground=ground), "c0")
     assert str(caught.value).startswith("camera c0: ground: its whole image, 192x108, lies above the horizon")
     assert "\n" not in str(caught.value)
-    past_down[2][2] = 107.0
-    CameraPipeline(config_of(recording, ground=past_down), "c0")
+    ground[2][2] = 107.0
+    CameraPipeline(config_of(recording, ground=ground), "c0")

@@ -31,7 +31,7 @@ FRAMES = 60
 
 
 def site(folder: Path, **cameras: str) -> Config:
-    """Return a small and fast site of recordings, on ports of its own."""
+    """Return a small and fast site of recordings, on free ports."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     content = {
         "site": {"name": "hall", "fps": FPS, "width": 128, "height": 72},
@@ -59,8 +59,8 @@ async def running() -> AsyncIterator[list[SiteInOneLoop]]:
         await site.stop()
 
 
-class Plain:
-    """A subscriber that knows zenoh and nothing of MyView."""
+class ZenohSubscriber:
+    """A zenoh subscriber without MyView's code."""
 
     def __init__(self, config: Config, key: str) -> None:
         settings = zenoh.Config()
@@ -68,28 +68,28 @@ class Plain:
         settings.insert_json5("connect/endpoints", f'["{config.zenoh.listen}"]')
         settings.insert_json5("scouting/multicast/enabled", "false")
         self.samples: list[tuple[str, bytes, bytes]] = []
-        self._came = threading.Condition()
+        self._received = threading.Condition()
         self._session = zenoh.open(settings)
         self._subscriber = self._session.declare_subscriber(key, self._receive)
 
     def _receive(self, sample: zenoh.Sample) -> None:
         head = sample.attachment.to_bytes() if sample.attachment is not None else b""
-        with self._came:
+        with self._received:
             self.samples.append((str(sample.key_expr), sample.payload.to_bytes(), head))
-            self._came.notify_all()
+            self._received.notify_all()
 
-    def wait_and_close(self, what: str, count: int) -> None:
-        with self._came:
-            assert self._came.wait_for(lambda: len(self.of(what)) >= count, PATIENCE)
+    def wait_and_close(self, key_end: str, count: int) -> None:
+        with self._received:
+            assert self._received.wait_for(lambda: len(self.of(key_end)) >= count, PATIENCE)
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._session.close()  # type: ignore[no-untyped-call]
 
-    def of(self, what: str) -> list[tuple[bytes, bytes]]:
-        return [(payload, head) for key, payload, head in self.samples if key.endswith(what)]
+    def of(self, key_end: str) -> list[tuple[bytes, bytes]]:
+        return [(payload, head) for key, payload, head in self.samples if key.endswith(key_end)]
 
 
-def rendered(config: Config, folder: Path) -> dict[str, bytes]:
-    """Run the same recordings the offline way."""
+def render_offline(config: Config, folder: Path) -> dict[str, bytes]:
+    """Render the same recordings offline; return the written files."""
     folder.mkdir()
     renderer = Renderer(config, folder)
     workers = [run_camera(CameraPipeline(config, camera), camera) for camera in config.camera_ids]
@@ -110,11 +110,11 @@ async def test_recordings_run_to_their_end_without_losses(
     gops: list[GopChoices] = []
     whole_site.service.on_decision.append(gops.append)
     over = await whole_site.start()
-    plain = await asyncio.to_thread(Plain, config, "myview/**")
+    subscriber = await asyncio.to_thread(ZenohSubscriber, config, "myview/**")
     cameras = [whole_site.camera(camera) for camera in config.camera_ids]
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(over, *cameras)
-    await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
+    await asyncio.to_thread(subscriber.wait_and_close, "bestview/choices", len(gops))
 
     for camera in config.camera_ids:
         frame_buffer = whole_site.service.frame_buffers[camera]
@@ -124,19 +124,21 @@ async def test_recordings_run_to_their_end_without_losses(
     assert sum(gop.frames for gop in gops) == FRAMES
     written = written_files(tmp_path / "out")
     assert written["late.csv"] == b"frame,camera,reason\n"
-    assert written["choices.csv"].count(b"\n") > 1, "somebody is shown"
-    assert written == rendered(config, tmp_path / "offline"), "live as offline, to the byte"
+    assert written["choices.csv"].count(b"\n") > 1, "a person is shown"
+    assert written == render_offline(config, tmp_path / "offline"), "live output equals offline output"
 
-    frames = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]
+    frames = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     assert [frame.pulse for frame in frames] == list(range(FRAMES))
     assert all(frame.due <= frame.encoded and frame.taken <= frame.encoded for frame in frames)
-    words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
-    assert [word.epoch for word in words] == list(range(FRAMES // 5 + 1))
-    assert words[-1].ended
-    assert words[0].solved_at > 0
-    told = [msgspec.json.decode(payload, type=GopChoices) for payload, _ in plain.of("bestview/choices")]
-    assert told == gops
-    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
+    messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
+    assert [message.epoch for message in messages] == list(range(FRAMES // 5 + 1))
+    assert messages[-1].ended
+    assert messages[0].solved_at > 0
+    published = [
+        msgspec.json.decode(payload, type=GopChoices) for payload, _ in subscriber.of("bestview/choices")
+    ]
+    assert published == gops
+    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
     assert statuses[-1].state == "ended"
     assert statuses[-1].missed == 0
 
@@ -164,10 +166,10 @@ async def test_a_disconnected_camera_is_detected_and_others_continue(
     assert states["c0"].label == "live"
 
 
-async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
+async def test_setting_the_wall_clock_does_not_affect_measurements(
     tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As of a machine that learns the time only when it has been running for a while."""
+    """Some machines get the time only minutes after the start."""
     whole_site = SiteInOneLoop(site(tmp_path, c0="scene:room?camera=0&objects=1"))
     running.append(whole_site)
     decided = asyncio.Event()
@@ -181,8 +183,8 @@ async def test_a_clock_that_is_set_changes_nothing_that_is_measured(
         for _ in range(4):
             decided.clear()
             await decided.wait()
-    gauge = whole_site.service.ingest.states["c0"].metrics
-    for spread in (gauge.sync_error, gauge.tracking_delay):
+    metrics = whole_site.service.ingest.states["c0"].metrics
+    for spread in (metrics.sync_error, metrics.tracking_delay):
         assert spread is not None
         assert abs(spread.worst) < PATIENCE
 
@@ -206,10 +208,10 @@ async def test_cameras_and_services_authenticate_to_the_pulse_server(
 
 
 @pytest.mark.parametrize(
-    "what", ["pipeline.CameraPipeline.track_detections", "status_meter.StatusMeter.status"]
+    "function", ["pipeline.CameraPipeline.track_detections", "status_meter.StatusMeter.status"]
 )
-async def test_a_camera_whose_work_fails_ends_with_that_error(
-    tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch, what: str
+async def test_an_internal_error_ends_the_camera(
+    tmp_path: Path, running: list[SiteInOneLoop], monkeypatch: pytest.MonkeyPatch, function: str
 ) -> None:
     config = site(tmp_path, c0="scene:room?objects=1")
     whole_site = SiteInOneLoop(config)
@@ -217,15 +219,15 @@ async def test_a_camera_whose_work_fails_ends_with_that_error(
     await whole_site.start()
 
     def fail(*_: object) -> None:
-        raise ArithmeticError("the camera's own mistake")
+        raise ArithmeticError("internal error")
 
-    monkeypatch.setattr(f"server.camera.{what}", fail)
+    monkeypatch.setattr(f"server.camera.{function}", fail)
     async with asyncio.timeout(PATIENCE):
         with pytest.raises(ArithmeticError):
             await whole_site.camera("c0")
 
 
-async def test_a_camera_started_after_its_recording_was_over_lets_everything_end(
+async def test_the_site_ends_with_a_camera_restarted_after_the_end_of_its_recording(
     tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     write_video(tmp_path / "short.mp4", 20)
@@ -236,9 +238,9 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
     over = await whole_site.start()
     first, second = whole_site.camera("c0"), whole_site.camera("c1")
     async with asyncio.timeout(PATIENCE):
-        while whole_site.service.frame_buffers["c0"].newest < 10:  # noqa: ASYNC110 — no event tells of frames
+        while whole_site.service.frame_buffers["c0"].newest < 10:  # noqa: ASYNC110 — no event reports frames
             await asyncio.sleep(0.01)
-        first.cancel()  # as if killed, before it could say that it has ended
+        first.cancel()  # killed before it reports its end
         await second
         await whole_site.camera("c0")
         await over
@@ -246,7 +248,7 @@ async def test_a_camera_started_after_its_recording_was_over_lets_everything_end
 
 
 class Overloaded(LoadMonitor):
-    """A camera's load that stands on the topmost rung."""
+    """A load monitor fixed at the highest level."""
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         super().__init__(config, camera_id, live=live)
@@ -269,24 +271,24 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
     gops: list[GopChoices] = []
     whole_site.service.on_decision.append(gops.append)
     over = await whole_site.start()
-    plain = await asyncio.to_thread(Plain, config, "myview/**")
+    subscriber = await asyncio.to_thread(ZenohSubscriber, config, "myview/**")
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(over, *(whole_site.camera(camera) for camera in config.camera_ids))
-    await asyncio.to_thread(plain.wait_and_close, "bestview/choices", len(gops))
+    await asyncio.to_thread(subscriber.wait_and_close, "bestview/choices", len(gops))
 
-    heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in plain.of("c0/video")]
+    heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     frames = [head.pulse for head in heads]
     assert frames[:6] == [0, 2, 4, 6, 8, 9]
     assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.encode.gop))
     pairs = [(before.pulse, head.after) for before, head in pairwise(heads) if not head.key]
-    assert all(before == after for before, after in pairs), "what was not taken costs only itself"
-    words = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in plain.of("c0/tracks")]
-    assert [word.epoch for word in words] == list(range(FRAMES // 5 + 1))
-    assert sorted(pulse for word in words for pulse in word.shed) == [
+    assert all(before == after for before, after in pairs), "a frame that was not captured affects no other"
+    messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
+    assert [message.epoch for message in messages] == list(range(FRAMES // 5 + 1))
+    assert sorted(pulse for message in messages for pulse in message.shed) == [
         number for number in range(FRAMES) if number % 5 != 4
-    ], "all but the last of every window, and it is told"
+    ], "all but the last of every window"
     assert sum(gop.frames for gop in gops) == FRAMES
     assert b"no detection" in written_files(tmp_path / "out")["late.csv"]
-    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in plain.of("c0/status")]
+    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
     assert statuses[-1].load_level == 4
     assert "detecting in every 5th frame" in statuses[-1].load

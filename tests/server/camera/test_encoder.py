@@ -17,13 +17,13 @@ SITE = SiteSettings(width=160, height=96, fps=25)
 FRAMES = 100
 SECOND = 25
 CAP = 400
-RESTLESS = range(33, 78)
-"""Pictures that are nothing but noise; it begins and ends in the middle of GOPs."""
+NOISY = range(33, 78)
+"""Pictures of pure noise, which begins and ends inside GOPs."""
 
 
 @cache
 def picture(pulse: int) -> NDArray[np.uint8]:
-    if pulse not in RESTLESS:
+    if pulse not in NOISY:
         return np.full((SITE.height, SITE.width, 3), 100, dtype=np.uint8)
     return np.random.default_rng(pulse).integers(0, 256, (SITE.height, SITE.width, 3), dtype=np.uint8)
 
@@ -33,8 +33,8 @@ def encoded(settings: EncodeSettings) -> list[AccessUnit]:
     return [encoder.encode(pulse, picture(pulse)) for pulse in range(FRAMES)]
 
 
-def most_kbps(units: list[AccessUnit]) -> float:
-    """Return the kilobits of the fullest second, wherever it begins."""
+def peak_kbps(units: list[AccessUnit]) -> float:
+    """Return the most kilobits in any second."""
     kilobits = np.array([len(unit.data) * 8 / 1000 for unit in units])
     return float(np.convolve(kilobits, np.ones(SECOND), "valid").max())
 
@@ -43,33 +43,33 @@ def most_kbps(units: list[AccessUnit]) -> float:
 @pytest.mark.parametrize("gop", [1, 10, 50])
 def test_no_second_of_a_noisy_scene_takes_more_than_the_cap(gop: int, preset: str) -> None:
     settings = EncodeSettings.model_validate({"gop": gop, "preset": preset, "max_kbps": CAP})
-    assert CAP / 2 < most_kbps(encoded(settings)) <= CAP
-    free = EncodeSettings.model_validate({"gop": gop, "preset": preset})
-    assert most_kbps(encoded(free)) > 2 * CAP, "or the cap would not be what holds it"
+    assert CAP / 2 < peak_kbps(encoded(settings)) <= CAP
+    uncapped = EncodeSettings.model_validate({"gop": gop, "preset": preset})
+    assert peak_kbps(encoded(uncapped)) > 2 * CAP, "the cap has an effect"
 
 
 @pytest.mark.parametrize(
     "settings", [EncodeSettings(gop=10, max_kbps=CAP), EncodeSettings(gop=10, codec="vp8")]
 )
-def test_keys_are_where_gops_begin_and_the_bytes_the_same_each_time(settings: EncodeSettings) -> None:
+def test_keyframes_are_at_gop_starts_and_bytes_are_reproducible(settings: EncodeSettings) -> None:
     units = encoded(settings)
     codec = "h264" if settings.codec == "h264" else "vp8"
     parser = av.CodecContext.create(codec, "r")
     assert isinstance(parser, av.VideoCodecContext)
     keys = [frame.key_frame for unit in units for frame in parser.decode(av.Packet(unit.data))]
-    assert keys == [unit.key for unit in units], "nor are there others, where noise begins and ends"
+    assert keys == [unit.key for unit in units], "no further ones where noise begins or ends"
     assert [unit.pulse for unit in units if unit.key] == list(range(0, FRAMES, 10))
     assert units == encoded(settings)
 
 
-def test_of_vp8_too_a_pulse_is_a_frame_and_less_is_better() -> None:
+def test_vp8_has_a_frame_for_every_pulse_and_a_higher_quantizer_is_smaller() -> None:
     fine, coarse = (
         encoded(EncodeSettings(codec="vp8", quantizer=8)),
         encoded(EncodeSettings(codec="vp8", quantizer=40)),
     )
     assert [unit.pulse for unit in fine] == [unit.pulse for unit in coarse] == list(range(FRAMES))
     assert all(unit.data for unit in [*fine, *coarse])
-    assert most_kbps(fine) > 1.5 * most_kbps(coarse)
+    assert peak_kbps(fine) > 1.5 * peak_kbps(coarse)
 
 
 def test_parameter_sets_do_not_depend_on_the_images() -> None:

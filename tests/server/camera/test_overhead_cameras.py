@@ -1,4 +1,4 @@
-"""Overhead cameras: people are detected, and are the same in two of them."""
+"""Overhead cameras: people are detected, and have one number in two of them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tracking.motchallenge import read_rows
 SIZE = (640, 480)
 _STRIDE = 5
 _TURNED = np.array([[-1.0, 0.0, SIZE[0]], [0.0, -1.0, SIZE[1]], [0.0, 0.0, 1.0]])
-"""The second camera hangs the other way round."""
+"""The second camera is turned by 180 degrees."""
 
 
 def _config(kind: str, **camera: object) -> Config:
@@ -38,11 +38,11 @@ def _config(kind: str, **camera: object) -> Config:
 
 
 _LEARNED, _SEARCHED = range(0, 80, 8), range(0, 60, 3)
-"""Frames of the room from above: those that the background is learned from, and those that are searched."""
+"""Frames that the background is learned from, and frames that are searched."""
 
 
 def _recall(kind: str, scene: Scene, pictures: dict[int, NDArray[np.uint8]]) -> float:
-    """Return the share of people whom the detector surely finds in the room from above."""
+    """Return the recall of confident detections in the room from above."""
     config = _config(kind)
     detector = make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
     assert isinstance(detector, BackgroundDetector)
@@ -50,14 +50,14 @@ def _recall(kind: str, scene: Scene, pictures: dict[int, NDArray[np.uint8]]) -> 
     found = []
     for frame in _SEARCHED:
         seen = detector.detect(pictures[frame])
-        sure = seen.boxes[seen.scores > 0.5]
+        confident = seen.boxes[seen.scores > 0.5]
         boxes = scene.truth(frame)[0].boxes
-        overlaps = iou(boxes[:, None], sure[None]) if len(sure) else np.zeros((len(boxes), 1))
+        overlaps = iou(boxes[:, None], confident[None]) if len(confident) else np.zeros((len(boxes), 1))
         found += (overlaps.max(axis=1) > 0.4).tolist()
     return float(np.mean(found))
 
 
-def test_people_are_found_from_straight_above() -> None:
+def test_people_are_detected_from_above() -> None:
     scene = Scene("overhead", 1, 2, 4, *SIZE, 2.0)
     pictures = {frame: scene.image(0, frame) for frame in {*_LEARNED, *_SEARCHED}}
     assert _recall("overhead", scene, pictures) > 0.5
@@ -70,7 +70,7 @@ def _turned(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.fixture(scope="module")
 def seen_by_two() -> NDArray[np.float64]:
-    """Where three people are in both cameras' pictures, frame by frame: `(2, 3, F, 4)`."""
+    """The boxes of three people in both cameras, `(2, 3, F, 4)`."""
     scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
     boxes = np.full((2, 3, 300, 4), np.nan)
     for frame in range(boxes.shape[2]):
@@ -79,16 +79,16 @@ def seen_by_two() -> NDArray[np.float64]:
     return boxes
 
 
-def _stream_format(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
-    """Return the share of the time in which people have one number in both cameras, by where they are."""
+def _share_with_same_number(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> float:
+    """Return the share of people and frames with one number in both cameras."""
     scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
     registry = IdentityRegistry(
         IdentitySettings(), {"c0": scene.homography(0), "c1": scene.homography(1) @ _TURNED}, overhead
     )
-    same = []
+    same_number = []
     for last in range(_STRIDE - 1, boxes.shape[2], _STRIDE):
         first = last - _STRIDE + 1
-        # Their numbers in the second camera are others.
+        # Local ids differ between the cameras.
         tracks = [
             TrackUpdate(f"c{camera}", (person + camera) % 3, first, boxes[camera, person, first : last + 1])
             for camera in range(2)
@@ -100,15 +100,15 @@ def _stream_format(boxes: NDArray[np.float64], overhead: tuple[str, ...]) -> flo
             pairs = [
                 (numbers.get(("c0", number)), numbers.get(("c1", (number + 1) % 3))) for number in range(3)
             ]
-            same += [one is not None and one == other for one, other in pairs]
-    return float(np.mean(same))
+            same_number += [one is not None and one == other for one, other in pairs]
+    return float(np.mean(same_number))
 
 
-def test_people_are_the_same_in_two_cameras_that_look_straight_down(
+def test_people_have_one_number_in_two_overhead_cameras(
     seen_by_two: NDArray[np.float64],
 ) -> None:
-    assert _stream_format(seen_by_two, ("c0", "c1")) > 0.95
-    assert _stream_format(seen_by_two, ()) < 0.9
+    assert _share_with_same_number(seen_by_two, ("c0", "c1")) > 0.95
+    assert _share_with_same_number(seen_by_two, ()) < 0.9
 
 
 def test_upright_and_overhead_cameras_are_not_peers() -> None:
@@ -117,7 +117,7 @@ def test_upright_and_overhead_cameras_are_not_peers() -> None:
     assert _config("overhead").overhead == {"c0", "c1"}
 
 
-def test_floor_is_measured_across_all_of_the_picture_that_is_looked_at() -> None:
+def test_the_room_width_covers_the_letterboxed_picture() -> None:
     # Six metres across a picture of 4 by 3, which has black columns at its sides in a site of 16 by 9.
     config = _config("overhead", ground=np.diag([0.0125, 0.0125, 1.0]).tolist(), ground_unit="m")
     across = [
@@ -127,12 +127,12 @@ def test_floor_is_measured_across_all_of_the_picture_that_is_looked_at() -> None
     assert across == pytest.approx([6.0, 8.0, 6.0])
 
 
-def test_another_kind_is_refused() -> None:
+def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(Exception, match="kind"):
         _config("sideways")
 
 
-def test_two_people_are_tracked_from_above_by_command_line(tmp_path: Path) -> None:
+def test_the_track_command_tracks_two_people_from_above(tmp_path: Path) -> None:
     scene = Scene("overhead", 1, 2, 4, 320, 240, 25.0)
     write_recording(scene, tmp_path / "room", 8.0)
     assert scene.homography(0) is not None
@@ -148,9 +148,9 @@ def test_two_people_are_tracked_from_above_by_command_line(tmp_path: Path) -> No
     for row in read_rows(out):
         box = [row.left, row.top, row.left + row.width, row.top + row.height]
         boxes_of.setdefault(row.frame - 1, []).append(box)
-    near = [
+    overlaps = [
         float(iou(box, np.array(boxes_of[frame])).max())
         for frame in range(0, 200, 5)
         for box in scene.truth(frame)[0].boxes
     ]
-    assert np.median(near) > 0.5
+    assert np.median(overlaps) > 0.5

@@ -25,14 +25,14 @@ def picture(blur: float = 0.0, contrast: float = 1.0) -> NDArray[np.uint8]:
     return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
 
 
-def test_the_more_blurred_the_less_sharp() -> None:
+def test_sharpness_falls_with_blur() -> None:
     values = [sharpness(picture(blur), BOX) or 0.0 for blur in (0.0, 2.0, 4.0, 8.0)]
     assert values == sorted(values, reverse=True)
     assert values[0] > 0.5 > values[2]
     assert all(0 <= value <= 1 for value in values)
 
 
-def test_light_and_size_make_little_difference_and_blur_makes_much() -> None:
+def test_sharpness_hardly_depends_on_contrast_and_size() -> None:
     plain, faint = sharpness(picture(), BOX), sharpness(picture(contrast=0.5), BOX)
     twice = cv2.resize(picture(), None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
     large = sharpness(twice, (40.0, 20.0, 168.0, 276.0))
@@ -58,8 +58,8 @@ def test_a_hidden_track_keeps_its_sharpness_and_an_ended_one_is_forgotten() -> N
     assert again.sharpness is None
 
 
-def test_the_rest_of_the_message_stays() -> None:
+def test_other_fields_of_the_message_are_unchanged() -> None:
     message = camera_tracks("c0", 0, {1: BOX})
     measured = SharpnessMemory().measure(message, picture())
-    bare = [msgspec.structs.replace(track, sharpness=None) for track in measured.tracks]
-    assert msgspec.structs.replace(measured, tracks=bare) == message
+    without_sharpness = [msgspec.structs.replace(track, sharpness=None) for track in measured.tracks]
+    assert msgspec.structs.replace(measured, tracks=without_sharpness) == message

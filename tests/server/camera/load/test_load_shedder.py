@@ -18,53 +18,53 @@ BOUNDS = LevelBounds(0.5, 0.2)
 BACKLOG_S = 2.0
 
 
-def simulated(seconds: float, carried: Callable[[float], float], *, live: bool = True) -> list[int]:
-    """Return the level at each frame of a camera that needs all of a machine; `carried` is what it is given.
+def simulate_levels(seconds: float, speed: Callable[[float], float], *, live: bool = True) -> list[int]:
+    """Return the level at each frame of a camera that needs a whole machine; `speed` is its share by time.
 
-    Searching a frame takes three quarters of a frame's time, all else the rest.
+    Detection takes three quarters of a frame's time, everything else a quarter.
     """
     shedder = LoadShedder(shed_levels(STRIDE, live=live), BOUNDS)
-    free, levels = 0.0, []
+    idle_at, levels = 0.0, []
     for pulse in range(round(seconds * FPS)):
         due, level = pulse / FPS, shedder.current
         work = 0.75 * level.detects(pulse, STRIDE) + 0.25 * level.captures(pulse, STRIDE, GOP)
-        start = max(due, free)
-        free = min(start + work / FPS / carried(start), due + BACKLOG_S)
-        shedder.measure_lag(free - due, free)
+        start = max(due, idle_at)
+        idle_at = min(start + work / FPS / speed(start), due + BACKLOG_S)
+        shedder.measure_lag(idle_at - due, idle_at)
         levels.append(shedder.level)
     return levels
 
 
-def changes(levels: list[int]) -> int:
-    return sum(one != other for one, other in pairwise(levels))
+def count_changes(levels: list[int]) -> int:
+    return sum(before != after for before, after in pairwise(levels))
 
 
-def test_a_camera_that_keeps_up_leaves_nothing_out() -> None:
-    assert set(simulated(120.0, lambda _: 1.05)) == {0}
+def test_a_camera_that_keeps_up_sheds_nothing() -> None:
+    assert set(simulate_levels(120.0, lambda _: 1.05)) == {0}
 
 
 @pytest.mark.parametrize("share", [0.9, 0.7, 0.6, 0.5, 0.4])
 def test_the_level_settles_where_the_camera_keeps_up(share: float) -> None:
-    levels = simulated(600.0, lambda _: share)
+    levels = simulate_levels(600.0, lambda _: share)
     level = shed_levels(STRIDE, live=True)[max(levels)]
     work = sum(
         0.75 * level.detects(number, STRIDE) + 0.25 * level.captures(number, STRIDE, GOP)
         for number in range(STRIDE * GOP)
     )
-    assert work / (STRIDE * GOP) < share  # so high as needed
+    assert work / (STRIDE * GOP) < share  # high enough to keep up
     assert levels.index(max(levels)) < 10 * FPS
-    assert changes(levels[-round(240 * FPS) :]) <= 18  # a lower level is tried now and then, no more
+    assert count_changes(levels[-round(240 * FPS) :]) <= 18  # a lower level is tried rarely
 
 
-def test_it_comes_back_by_itself() -> None:
-    levels = simulated(240.0, lambda now: 0.4 if 20.0 <= now < 60.0 else 1.2)
+def test_the_level_returns_to_zero_after_an_overload() -> None:
+    levels = simulate_levels(240.0, lambda now: 0.4 if 20.0 <= now < 60.0 else 1.2)
     assert max(levels[: round(20 * FPS)]) == 0
     assert levels[round(30 * FPS)] >= 2
     assert set(levels[round(180 * FPS) :]) == {0}
 
 
-def test_a_short_stall_is_caught_up_with() -> None:
-    levels = simulated(60.0, lambda now: 0.05 if 20.0 <= now < 20.3 else 2.0)
+def test_after_a_short_stall_the_level_returns_to_zero() -> None:
+    levels = simulate_levels(60.0, lambda now: 0.05 if 20.0 <= now < 20.3 else 2.0)
     assert max(levels) <= 1
     assert levels[-1] == 0
 
@@ -85,18 +85,18 @@ def test_every_level_sheds_more_and_a_recording_is_always_complete(stride: int, 
     levels = shed_levels(stride, live=live)
     assert levels[0] == ShedLevel()
     frames = range(stride * 60)
-    searched = [sum(level.detects(pulse, stride) for pulse in frames) for level in levels]
-    taken = [sum(level.captures(pulse, stride, 60) for pulse in frames) for level in levels]
-    assert all(one >= other for one, other in pairwise(searched))
+    detected = [sum(level.detects(pulse, stride) for pulse in frames) for level in levels]
+    captured = [sum(level.captures(pulse, stride, 60) for pulse in frames) for level in levels]
+    assert all(lower >= higher for lower, higher in pairwise(detected))
     assert (
-        len(set(zip(searched, taken, strict=True))) >= len(levels) - 1
-    )  # of a stride of 1, the last is alike
+        len(set(zip(detected, captured, strict=True))) >= len(levels) - 1
+    )  # with a stride of 1 the last two levels are equal
     if not live:
-        assert set(taken) == {len(frames)}
+        assert set(captured) == {len(frames)}
 
 
 @pytest.mark.parametrize("fps", [0.5, 1.0, 2.0, FPS])
-def test_a_frame_may_take_all_the_time_that_it_has_at_any_rate(fps: float) -> None:
+def test_a_frame_may_take_its_whole_interval_at_any_rate(fps: float) -> None:
     load = LoadMonitor(small_config(site={"fps": fps}), "c0", live=True)
     for pulse in range(200):
         load.measure_lag(0.95 / fps, pulse / fps)

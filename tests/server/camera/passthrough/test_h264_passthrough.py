@@ -52,8 +52,8 @@ def site(source: Path | str, h264: str = "pass", **changes: Any) -> Config:
     return small_config(cameras=[camera, other], **changes)
 
 
-def written(folder: Path, form: str, seed: int = 0) -> Path:
-    """Write what a camera of the site encoded, as another recorder would have written it."""
+def write_h264(folder: Path, form: str, seed: int = 0) -> Path:
+    """Write a video with the encoding of this site's cameras into a container."""
     units, path = encoded(seed)[:FRAMES], folder / f"own.{form}"
     if form == "h264":
         path.write_bytes(b"".join(unit.data for unit in units))
@@ -76,8 +76,8 @@ def written(folder: Path, form: str, seed: int = 0) -> Path:
     return path
 
 
-def passed(pipeline: CameraPipeline, pulses: range) -> list[AccessUnit]:
-    """Return what a camera's process sends."""
+def sent_units(pipeline: CameraPipeline, pulses: range) -> list[AccessUnit]:
+    """Return the access units that a camera's process sends."""
     sent = []
     for pulse in pulses:
         image = pipeline.take(pulse)
@@ -91,21 +91,21 @@ def nals(data: bytes) -> list[bytes]:
 
 
 @pytest.mark.parametrize("form", ["h264", "ts", "mp4", "mkv"])
-def test_access_units_come_out_as_they_went_in(tmp_path: Path, form: str) -> None:
-    pipeline = CameraPipeline(site(written(tmp_path, form)), "c0")
+def test_access_units_are_passed_through_unchanged(tmp_path: Path, form: str) -> None:
+    pipeline = CameraPipeline(site(write_h264(tmp_path, form)), "c0")
     assert pipeline.is_passthrough
-    sent = passed(pipeline, range(FRAMES))
+    sent = sent_units(pipeline, range(FRAMES))
     with pytest.raises(SourceEndedError):
         pipeline.take(FRAMES)
     pipeline.close()
-    for unit, own in zip(sent, encoded(0)[:FRAMES], strict=True):
-        assert (unit.pulse, unit.key, nals(unit.data)) == (own.pulse, own.key, nals(own.data))
+    for unit, original in zip(sent, encoded(0)[:FRAMES], strict=True):
+        assert (unit.pulse, unit.key, nals(unit.data)) == (original.pulse, original.key, nals(original.data))
         if form == "h264":
-            assert unit.data == own.data, "to the byte"
+            assert unit.data == original.data, "byte for byte"
 
 
-def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None:
-    pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
+def test_the_tracker_receives_the_pictures_that_are_sent(tmp_path: Path) -> None:
+    pipeline = CameraPipeline(site(write_h264(tmp_path, "mp4")), "c0")
     decoder = av.VideoCodecContext.create("h264", "r")
     for pulse, unit in enumerate(encoded(0)[:FRAMES]):
         (picture,) = decoder.decode(av.Packet(unit.data))
@@ -114,19 +114,21 @@ def test_the_tracker_is_given_the_pictures_that_are_sent(tmp_path: Path) -> None
 
 
 def test_passthrough_can_be_spliced_with_encoded_video(tmp_path: Path) -> None:
-    pipeline = CameraPipeline(site(written(tmp_path, "mp4")), "c0")
+    pipeline = CameraPipeline(site(write_h264(tmp_path, "mp4")), "c0")
     stream_format = StreamFormat()
     frame_buffers = [FrameBuffer(FPS, FRAMES, stream_format) for _ in range(2)]
-    for frame_buffer, units in zip(frame_buffers, (passed(pipeline, range(FRAMES)), encoded(1)), strict=True):
+    for frame_buffer, units in zip(
+        frame_buffers, (sent_units(pipeline, range(FRAMES)), encoded(1)), strict=True
+    ):
         for unit in units:
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
     pipeline.close()
 
 
-def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
+def test_passthrough_honors_offset_and_loop(tmp_path: Path) -> None:
     camera = {"offset": GOP, "at_end": "loop"}
-    pipeline = CameraPipeline(site(written(tmp_path, "ts"), camera=camera), "c0")
-    sent = passed(pipeline, range(2 * FRAMES + GOP))
+    pipeline = CameraPipeline(site(write_h264(tmp_path, "ts"), camera=camera), "c0")
+    sent = sent_units(pipeline, range(2 * FRAMES + GOP))
     pipeline.close()
     assert [unit.pulse for unit in sent] == list(range(GOP, 2 * FRAMES + GOP))
     assert [nals(unit.data) for unit in sent] == 2 * [nals(unit.data) for unit in encoded(0)[:FRAMES]]
@@ -134,15 +136,15 @@ def test_a_recording_begins_later_and_again(tmp_path: Path) -> None:
 
 @needs_ffmpeg
 def test_the_documented_camera_settings_are_compatible(tmp_path: Path) -> None:
-    """A camera that is set up as docs/how-to/run.md says passes through."""
+    """A camera with the settings of docs/how-to/run.md passes through."""
     manual = (DOCS / "how-to" / "run.md").read_text(encoding="utf-8")
-    (told,) = re.findall(r"^ffmpeg .* (-c:v libx264 .*?) \S+$", manual, re.MULTILINE)
-    gop, path = 10, tmp_path / "told.mp4"
+    (options,) = re.findall(r"^ffmpeg .* (-c:v libx264 .*?) \S+$", manual, re.MULTILINE)
+    gop, path = 10, tmp_path / "documented.mp4"
     test_picture = f"-f lavfi -i testsrc2=size={WIDTH}x{HEIGHT}:rate={FPS} -t 2 -pix_fmt yuv420p"
-    subprocess.run(f"ffmpeg -v error {test_picture} {told} {path}".split(), check=True)
+    subprocess.run(f"ffmpeg -v error {test_picture} {options} {path}".split(), check=True)
     config = site(path, encode={"gop": gop}, view={"lookahead": 2 * gop})
     pipeline = CameraPipeline(config, "c0")
-    assert len(passed(pipeline, range(2 * FPS))) == 2 * FPS
+    assert len(sent_units(pipeline, range(2 * FPS))) == 2 * FPS
     pipeline.close()
 
 
@@ -162,14 +164,14 @@ def test_the_documented_camera_settings_are_compatible(tmp_path: Path) -> None:
 def test_incompatible_video_is_encoded_or_refused_with_the_reason(
     tmp_path: Path, changes: dict[str, Any], reason: str
 ) -> None:
-    path = written(tmp_path, "mp4")
+    path = write_h264(tmp_path, "mp4")
     with pytest.raises(UserError, match=f"camera c0: h264: pass: {reason}") as refused:
         CameraPipeline(site(path, **changes), "c0")
     assert "\n" not in str(refused.value)
     pipeline = CameraPipeline(site(path, "auto", **changes), "c0")
     assert not pipeline.is_passthrough
     assert re.search(reason, pipeline.why_encoded)
-    assert passed(pipeline, range(GOP))[-1].data
+    assert sent_units(pipeline, range(GOP))[-1].data
     pipeline.close()
 
 
@@ -177,7 +179,9 @@ def test_incompatible_video_is_encoded_or_refused_with_the_reason(
     ("codec", "b_frames", "reason"),
     [("mpeg4", 0, "it is mpeg4, not H.264"), ("libx264", 2, "it has B frames")],
 )
-def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames: int, reason: str) -> None:
+def test_other_codecs_and_b_frames_are_encoded(
+    tmp_path: Path, codec: str, b_frames: int, reason: str
+) -> None:
     path = write_video(tmp_path / "other.mp4", 20, codec=codec, b_frames=b_frames)
     pipeline = CameraPipeline(site(path, "auto"), "c0")
     assert reason in pipeline.why_encoded
@@ -185,32 +189,32 @@ def test_other_codecs_and_orders_do_not_fit(tmp_path: Path, codec: str, b_frames
 
 
 @pytest.mark.parametrize(
-    ("h264", "gop", "said"),
+    ("h264", "gop", "text"),
     [
         ("auto", GOP, "camera c0: its own H.264 is passed through"),
         ("auto", 4, "camera c0 is re-encoded: its own H.264: frame 4 does not begin a GOP"),
         ("encode", GOP, ""),
     ],
 )
-def test_the_process_logs_once_whether_it_passes_through(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, h264: str, gop: int, said: str
+def test_the_process_logs_once_whether_video_is_passed_through(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, h264: str, gop: int, text: str
 ) -> None:
     caplog.set_level("INFO", "server.camera.process")
-    process = CameraProcess(site(written(tmp_path, "mp4"), h264, encode={"gop": gop}), "c0")
+    process = CameraProcess(site(write_h264(tmp_path, "mp4"), h264, encode={"gop": gop}), "c0")
     process._pipeline.close()
-    assert caplog.text.count("own H.264") == bool(said)
-    assert said in caplog.text
+    assert caplog.text.count("own H.264") == bool(text)
+    assert text in caplog.text
 
 
-def test_part_of_a_gop_cannot_begin_again(tmp_path: Path) -> None:
+def test_a_looped_recording_must_have_whole_gops(tmp_path: Path) -> None:
     path = tmp_path / "own.h264"
     path.write_bytes(b"".join(unit.data for unit in encoded(0)[: GOP + 2]))
     with pytest.raises(UserError, match="its 7 frames are not whole GOPs"):
         CameraPipeline(site(path, camera={"at_end": "loop"}), "c0")
 
 
-def test_where_all_cameras_pass_their_parameter_sets_are_their_own(tmp_path: Path) -> None:
-    path = written(tmp_path, "mp4")
+def test_sites_of_passthrough_cameras_accept_other_parameter_sets(tmp_path: Path) -> None:
+    path = write_h264(tmp_path, "mp4")
     camera = {"source": str(path), "h264": "pass"}
     config = small_config(cameras=[{"id": "c0", **camera}, {"id": "c1", **camera}], encode={"crf": 30})
     pipeline = CameraPipeline(config, "c0")
@@ -218,14 +222,14 @@ def test_where_all_cameras_pass_their_parameter_sets_are_their_own(tmp_path: Pat
     pipeline.close()
 
 
-def test_where_each_camera_may_have_its_own_parameter_sets_any_fit(tmp_path: Path) -> None:
+def test_with_own_parameters_any_parameter_sets_are_accepted(tmp_path: Path) -> None:
     encode = {"crf": 30, "parameters": "own"}
-    pipeline = CameraPipeline(site(written(tmp_path, "mp4"), encode=encode), "c0")
+    pipeline = CameraPipeline(site(write_h264(tmp_path, "mp4"), encode=encode), "c0")
     assert pipeline.is_passthrough
     pipeline.close()
 
 
-def test_images_do_not_fit_and_vp8_sites_have_no_such_thing(tmp_path: Path) -> None:
+def test_images_are_encoded_and_vp8_sites_have_no_passthrough(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site("scene:room", "auto"), "c0")
     assert "image files contain no H.264" in pipeline.why_encoded
     pipeline.close()
@@ -235,65 +239,63 @@ def test_images_do_not_fit_and_vp8_sites_have_no_such_thing(tmp_path: Path) -> N
 
 IMAGE = np.zeros((2, 2, 3), dtype=np.uint8)
 arrivals = st.lists(st.integers(0, 3) | st.just(40), min_size=1, max_size=120)
-"""Units at each pulse; now and then many at once, more than can wait."""
+"""The number of units that arrive at each pulse, sometimes more than the queue holds."""
 
 
 @settings(max_examples=200, deadline=None)
 @given(arrivals, st.integers(0, 9), st.integers(1, 6), st.sets(st.integers(0, 119), max_size=5))
-def test_gops_begin_where_the_sites_do_and_are_never_torn(
-    come: list[int], phase: int, gop: int, missed: set[int]
+def test_gops_begin_at_the_sites_and_are_never_incomplete_inside(
+    arriving: list[int], phase: int, gop: int, missed: set[int]
 ) -> None:
-    """However units come: each is given once and in order, and in a GOP none is left out."""
-    waiting, count = AccessUnitQueue(gop), 0
-    given: list[tuple[int, int]] = []
-    for pulse, some in enumerate(come):
-        for _ in range(some):
-            waiting.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
+    """For any arrivals: units leave once and in order, without gaps inside a GOP."""
+    queue, count = AccessUnitQueue(gop), 0
+    taken: list[tuple[int, int]] = []
+    for pulse, number in enumerate(arriving):
+        for _ in range(number):
+            queue.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
             count += 1
-        unit = None if pulse in missed else waiting.take(pulse)
+        unit = None if pulse in missed else queue.take(pulse)
         if unit is not None:
-            given.append((pulse, int.from_bytes(unit.data, "big")))
+            taken.append((pulse, int.from_bytes(unit.data, "big")))
             if pulse % gop == 0:
                 assert unit.key
-    assert all(one < other for (_, one), (_, other) in pairwise(given))
-    before = dict(given)
-    for pulse, number in given:
+    assert all(earlier < later for (_, earlier), (_, later) in pairwise(taken))
+    before = dict(taken)
+    for pulse, number in taken:
         if pulse % gop:
-            assert before.get(pulse - 1) == number - 1, "what it builds on was sent just before it"
+            assert before.get(pulse - 1) == number - 1, "its reference picture was sent just before it"
 
 
 @given(st.integers(0, 9), st.integers(3, 10), st.lists(st.integers(-1, 1), min_size=100, max_size=100))
-def test_of_a_camera_in_step_nothing_is_lost_however_uneven_the_network_is(
-    phase: int, gop: int, jitter: list[int]
-) -> None:
-    """A unit that comes up to a pulse early or late is there when it is needed."""
-    waiting, given, count = AccessUnitQueue(gop), [], 0
+def test_jitter_of_one_frame_loses_nothing(phase: int, gop: int, jitter: list[int]) -> None:
+    """A unit that arrives up to one pulse early or late is available when due."""
+    queue, taken, count = AccessUnitQueue(gop), [], 0
     for pulse in range(100):
         while count <= pulse + jitter[pulse]:
-            waiting.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
+            queue.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
             count += 1
-        unit = waiting.take(pulse)
-        given.append(None if unit is None else int.from_bytes(unit.data, "big"))
-    begun = next(pulse for pulse, number in enumerate(given) if number is not None)
-    assert begun <= 3 * gop
-    rest = [number for number in given[begun:] if number is not None]
-    assert rest == list(range(rest[0], rest[0] + 100 - begun)), "from the first on, one at every pulse"
-    assert begun - rest[0] <= gop + 2, "no later than a GOP and the cushion"
+        unit = queue.take(pulse)
+        taken.append(None if unit is None else int.from_bytes(unit.data, "big"))
+    start = next(pulse for pulse, number in enumerate(taken) if number is not None)
+    assert start <= 3 * gop
+    sent = [number for number in taken[start:] if number is not None]
+    assert sent == list(range(sent[0], sent[0] + 100 - start)), "one at every pulse from the first on"
+    assert start - sent[0] <= gop + 2, "later than a GOP and the buffer"
 
 
 class NetworkCamera:
-    """Serves a transport stream, GOP by GOP, as far as it is let."""
+    """Serves a transport stream over HTTP, up to the GOP number ``gops_allowed``."""
 
     def __init__(self, gops: list[bytes]) -> None:
         stop = self._stop = threading.Event()
-        camera, self.let = self, 40
+        camera, self.gop_limit = self, 40
 
         class Handler(http.server.BaseHTTPRequestHandler):
             def do_GET(self) -> None:
                 self.send_response(200)
                 self.end_headers()
                 for place, data in enumerate(gops):
-                    while place >= camera.let:
+                    while place >= camera.gop_limit:
                         if stop.wait(0.002):
                             return
                     try:
@@ -320,25 +322,24 @@ class NetworkCamera:
 
 @lru_cache
 def numbers() -> Mapping[tuple[bytes, ...], int]:
-    """Return the number of an access unit among those that the camera sends."""
+    """Return the number of each access unit of the camera, by its NAL units."""
     return {tuple(nals(unit.data)): unit.pulse for unit in encoded(0, 1000)}
 
 
-def until_some_wait(camera: NetworkCamera | RtspCamera, source: PassthroughStream) -> None:
-    """Let more come until there is enough for a pulse, wherever in a GOP that is.
+def wait_for_units(camera: NetworkCamera | RtspCamera, source: PassthroughStream) -> None:
+    """Let the camera send GOPs until the queue holds enough for a pulse, at any position in a GOP.
 
-    Never more than is on its way already: what a slow machine is late with would come all at once, and be
-    too much.
+    One GOP at a time: on a slow machine several would arrive together and overflow the queue.
     """
     end = time.monotonic() + PATIENCE
     while True:
         units = source._waiting._units
-        come = numbers()[tuple(nals(units[-1].data))] // GOP + 1 if units else 0
-        if come == camera.let:
+        arrived = numbers()[tuple(nals(units[-1].data))] // GOP + 1 if units else 0
+        if arrived == camera.gop_limit:
             if len(units) >= GOP + 2:
                 return
-            camera.let += 1
-        assert time.monotonic() < end, "nothing comes"
+            camera.gop_limit += 1
+        assert time.monotonic() < end, "no units arrive"
         time.sleep(0.002)
 
 
@@ -362,7 +363,7 @@ def network() -> Iterator[NetworkCamera]:
 
 
 @pytest.mark.parametrize("kind", ["network", "rtsp"])
-def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
+def test_a_network_cameras_video_is_passed_through_in_whole_gops(
     kind: str, request: pytest.FixtureRequest
 ) -> None:
     network = request.getfixturevalue(kind)
@@ -372,10 +373,10 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
     source = pipeline.source
     assert isinstance(source, PassthroughStream)
     assert pipeline.take(1) is None
-    assert not pipeline.away, "it waits for a GOP to begin"
+    assert not pipeline.away, "it waits for the start of a GOP"
     sent: list[AccessUnit] = []
     for pulse in range(2, 62):
-        until_some_wait(network, source)
+        wait_for_units(network, source)
         image = pipeline.take(pulse)
         if image is not None:
             sent.append(pipeline.encode(pulse, image))
@@ -387,7 +388,7 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
     assert pipeline.away
     pipeline.close()
     places = [numbers()[tuple(nals(unit.data))] for unit in sent]
-    assert places == sorted(set(places)), "each of them untouched, once and in order"
+    assert places == sorted(set(places)), "unchanged, once and in order"
     for unit, number in zip(sent, places, strict=True):
         assert unit.key == (number % GOP == 0)
         if unit.key:
@@ -397,50 +398,50 @@ def test_a_network_camera_passes_too_in_whole_gops_at_the_sites_pulses(
 
 
 @pytest.mark.parametrize("h264", ["pass", "auto"])
-def test_a_network_camera_that_falls_silent_while_it_is_looked_at_is_away(
+def test_a_network_camera_that_stops_during_the_check_is_unavailable(
     network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, h264: str
 ) -> None:
-    """That says nothing of what it sends: it is neither refused for good nor encoded for good."""
+    """Its format is unknown: it is neither refused nor encoded for good."""
     monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
-    network.let = 2
+    network.gop_limit = 2
     camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
     with pytest.raises(UnavailableError, match=r"stopped during the check: no answer within 0\.5 s$"):
         CameraPipeline(site(network.url, h264, camera=camera), "c0")
 
 
-def test_sound_beside_it_waits_as_long_as_the_pictures(network: NetworkCamera) -> None:
+def test_audio_is_delayed_as_much_as_the_video(network: NetworkCamera) -> None:
     options = {"probesize": "20000", "analyzeduration": "200000"}
     config = site(network.url, sound={"source": "c0"})
     listener = LiveAudioSource(config.sound, FPS)
     source = PassthroughStream(network.url, options, listener, required_format(config))
-    in_a_row, waited = 0, 0
+    equal_delays, delay = 0, 0
     for pulse in range(300):
-        until_some_wait(network, source)
+        wait_for_units(network, source)
         listener.at(pulse)
         if source.take(pulse) is None or source.current is None:
             continue
-        before, waited = waited, pulse - numbers()[tuple(nals(source.current.data))]
-        in_a_row = in_a_row + 1 if waited == before else 0
-        if in_a_row == 0:
-            listener._shifts.clear()  # a GOP was left out: it is another time, of which there is no mean yet
-        if in_a_row == 4 * GOP:
+        before, delay = delay, pulse - numbers()[tuple(nals(source.current.data))]
+        equal_delays = equal_delays + 1 if delay == before else 0
+        if equal_delays == 0:
+            listener._shifts.clear()  # a GOP was skipped: the delay is measured again
+        if equal_delays == 4 * GOP:
             break
     source.close()
-    assert in_a_row == 4 * GOP
-    assert float(listener._shift or 0) == pytest.approx(waited / FPS, abs=0.02), "to within half a frame"
+    assert equal_delays == 4 * GOP
+    assert float(listener._shift or 0) == pytest.approx(delay / FPS, abs=0.02), "to within half a frame"
 
 
-def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
+def test_a_network_camera_that_returns_with_another_size_is_unavailable(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     config = site("rtsp://camera", encode={"parameters": "own"})
     larger = config.site.model_copy(update={"width": 2 * WIDTH, "height": 2 * HEIGHT})
     encoder = Encoder(larger, config.encode)
     blank = np.zeros((2 * HEIGHT, 2 * WIDTH, 3), dtype=np.uint8)
-    own = written(tmp_path, "h264").read_bytes()
+    first_part = write_h264(tmp_path, "h264").read_bytes()
     other = b"".join(encoder.encode(pulse, blank).data for pulse in range(FRAMES))
     path = tmp_path / "own.h264"
-    path.write_bytes(own + other)  # it changes while it is read, and is changed when it is opened again
+    path.write_bytes(first_part + other)  # the size changes while it is read, and when it is reopened
     source = PassthroughStream(str(path), {}, None, required_format(config))
     (tmp_path / "other.h264").write_bytes(other)
     (tmp_path / "other.h264").replace(path)
@@ -450,6 +451,6 @@ def test_a_network_camera_that_comes_back_with_other_pictures_is_away(
         time.sleep(0.02)
     source.close()
     assert f"its frames are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT}" in caplog.text
-    waiting = source._waiting._units
-    assert waiting
-    assert {unit.image.shape for unit in waiting} == {(HEIGHT, WIDTH, 3)}
+    units = source._waiting._units
+    assert units
+    assert {unit.image.shape for unit in units} == {(HEIGHT, WIDTH, 3)}

@@ -31,7 +31,7 @@ from tracking import Detections
 
 FRAMES = 60
 FPS = 50.0
-WAIT = 1.0  # seconds that two cameras wait for each other, and for a third one that never comes
+WAIT = 1.0  # seconds that cameras wait for peers; the third one never connects
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def config_of(
     ahead: bool = True,
     **offsets: int,
 ) -> Config:
-    """Return a site of that room's views on ports of its own, some of them with an offset."""
+    """Return a site of the room's views on free ports, with offsets by camera."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     cameras = [
         {"id": f"c{n}", "source": f"c{n}.mp4", "offset": offsets.get(f"c{n}", 0)} for n in range(views)
@@ -69,8 +69,8 @@ def config_of(
     return build_config(content, where="hall", folder=recording)
 
 
-def by_itself(config: Config, folder: Path) -> dict[str, bytes]:
-    """Run all cameras in step in this process; give what was written."""
+def run_offline(config: Config, folder: Path) -> dict[str, bytes]:
+    """Run all cameras in step in this process; return the written files."""
     folder.mkdir()
     renderer = Renderer(config, folder)
     for batch in run_cameras({camera: CameraPipeline(config, camera) for camera in config.camera_ids}):
@@ -87,8 +87,8 @@ async def running() -> AsyncIterator[list[SiteInOneLoop]]:
         await site.stop()
 
 
-async def live(config: Config, out: Path, running: list[SiteInOneLoop]) -> dict[str, bytes]:
-    """Run a whole site to its end; give what was written."""
+async def run_live(config: Config, out: Path, running: list[SiteInOneLoop]) -> dict[str, bytes]:
+    """Run a whole site to its end; return the written files."""
     whole_site = SiteInOneLoop(config, out)
     running.append(whole_site)
     over = await whole_site.start()
@@ -103,10 +103,10 @@ async def test_live_equals_offline_for_any_message_order(
     recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
     config = config_of(recording, 2, c1=7)
-    told = await live(config, tmp_path / "live", running)
-    here = by_itself(config, tmp_path / "here")
-    assert told == here
-    assert told["late.csv"] == b"frame,camera,reason\n"
+    live = await run_live(config, tmp_path / "live", running)
+    offline = run_offline(config, tmp_path / "offline")
+    assert live == offline
+    assert live["late.csv"] == b"frame,camera,reason\n"
 
 
 def test_peer_detections_change_scores_and_piped_workers_agree(recording: Path) -> None:
@@ -117,11 +117,11 @@ def test_peer_detections_change_scores_and_piped_workers_agree(recording: Path) 
         piped = list(workers)
     finally:
         workers.close()
-    assert sorted(piped, key=_order) == here_in_step(config)
-    assert sorted(piped, key=_order) != here_in_step(config_of(recording, 2, use=False, c1=7))
+    assert sorted(piped, key=_order) == batches_in_step(config)
+    assert sorted(piped, key=_order) != batches_in_step(config_of(recording, 2, use=False, c1=7))
 
 
-def here_in_step(config: Config) -> list[EpochBatch]:
+def batches_in_step(config: Config) -> list[EpochBatch]:
     batches = run_cameras({camera: CameraPipeline(config, camera) for camera in config.camera_ids})
     return sorted(batches, key=_order)
 
@@ -173,19 +173,19 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
-def word(camera: str, pulse: int) -> FrameDetections:
+def detections(camera: str, pulse: int) -> FrameDetections:
     return FrameDetections(
         camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[(1.5, 2.0, 20.25, 60.0, 0.5)]
     )
 
 
-async def both(
+async def exchange_both(
     one: PeerDetectionExchange, two: PeerDetectionExchange, pulse: int = 0, *, needed: bool = True
 ) -> list[PeerDetections]:
-    """Let both say what they found in a frame, and hear the other."""
+    """Let two cameras exchange the detections of a frame."""
     pair = (("c0", one), ("c1", two))
     return await asyncio.gather(
-        *(exchange.exchange(pulse, word(name, pulse), now(), needed=needed) for name, exchange in pair)
+        *(exchange.exchange(pulse, detections(name, pulse), now(), needed=needed) for name, exchange in pair)
     )
 
 
@@ -194,35 +194,35 @@ async def test_detections_are_exchanged_from_the_first_frame(
 ) -> None:
     _, one, two = pair
     for pulse in range(5):
-        first, second = await both(one, two, pulse)
-        assert first.messages == (word("c1", pulse),)
-        assert second.messages == (word("c0", pulse),)
+        first, second = await exchange_both(one, two, pulse)
+        assert first.messages == (detections("c1", pulse),)
+        assert second.messages == (detections("c0", pulse),)
 
 
 async def test_an_unexpected_error_on_joining_ends_the_camera(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def hearing(*_: object) -> Bus:
+    def fail(*_: object) -> Bus:
         raise MemoryError("no memory")
 
-    monkeypatch.setattr(Bus, "listener", hearing)
+    monkeypatch.setattr(Bus, "listener", fail)
     config = config_of(recording, wait=WAIT)
-    alone = PeerDetectionExchange(config, "c0", CrossViewScorer(config, "c0", (192, 108), 1), 100)
-    await alone.join()
+    exchange = PeerDetectionExchange(config, "c0", CrossViewScorer(config, "c0", (192, 108), 1), 100)
+    await exchange.join()
     with pytest.raises(MemoryError, match="no memory"):
-        await alone.exchange(0, word("c0", 0), now(), needed=True)
-    await alone.leave()
+        await exchange.exchange(0, detections("c0", 0), now(), needed=True)
+    await exchange.leave()
 
 
-async def test_a_camera_that_is_gone_is_waited_for_once(
+async def test_a_disconnected_camera_is_waited_for_once(
     pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
 ) -> None:
     _, one, two = pair
-    await both(one, two, needed=True)
+    await exchange_both(one, two, needed=True)
     await two.leave()
     began = asyncio.get_running_loop().time()
     for pulse in range(1, 100):
-        assert (await one.exchange(pulse, word("c0", pulse), now(), needed=True)).is_incomplete
+        assert (await one.exchange(pulse, detections("c0", pulse), now(), needed=True)).is_incomplete
     assert asyncio.get_running_loop().time() - began < 50 * WAIT
 
 
@@ -230,14 +230,14 @@ async def test_invalid_messages_are_counted_and_ignored(
     pair: tuple[Bus, PeerDetectionExchange, PeerDetectionExchange],
 ) -> None:
     _, one, two = pair
-    await both(one, two, needed=False)
+    await exchange_both(one, two, needed=False)
     key = ZenohKeys("hall").camera("c1", "detections")
     assert two._bus is not None
-    far = msgspec.json.encode(word("c0", 1))
-    for nonsense in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
-        two._bus.publish(key, nonsense)
-    await two.exchange(1, word("c1", 1), now(), needed=False)
-    assert (await one.exchange(1, word("c0", 1), now(), needed=True)).messages == (word("c1", 1),)
+    far = msgspec.json.encode(detections("c0", 1))
+    for payload in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
+        two._bus.publish(key, payload)
+    await two.exchange(1, detections("c1", 1), now(), needed=False)
+    assert (await one.exchange(1, detections("c0", 1), now(), needed=True)).messages == (detections("c1", 1),)
     assert one.bad_messages == 6
 
 
@@ -255,17 +255,17 @@ ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
 def test_every_decoded_message_can_be_used_for_scoring(message: dict[str, Any], boxes: list[Any]) -> None:
     config = _room()
     cross_view = CrossViewScorer(config, "c0", (640, 360), 1)
-    seen = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
+    found = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
     good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
     for content in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
         try:
-            read = msgspec.json.decode(msgspec.json.encode(content), type=FrameDetections)
+            decoded = msgspec.json.decode(msgspec.json.encode(content), type=FrameDetections)
         except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
             assert content is not good
             continue
-        if not cross_view.sees_same_ground(read):
+        if not cross_view.sees_same_ground(decoded):
             continue
-        [score] = cross_view.rescore(seen, [read]).scores
+        [score] = cross_view.rescore(found, [decoded]).scores
         assert 0.0 <= score <= 1.0
 
 
@@ -282,54 +282,54 @@ def test_only_the_most_confident_boxes_are_sent_in_order() -> None:
     config = _room()
     boxes = np.arange(4 * 150, dtype=np.float64).reshape(150, 4)
     scores = np.arange(150) % 101 / 100
-    said = CrossViewScorer(config, "c0", (640, 360), 1).build_message(
+    message = CrossViewScorer(config, "c0", (640, 360), 1).build_message(
         5, Detections(boxes, scores, np.empty((150, 0)))
     )
-    assert said.boxes is not None
-    assert len(said.boxes) == FRAME_DETECTIONS_MAX
-    assert [row[0] for row in said.boxes] == sorted(row[0] for row in said.boxes)
+    assert message.boxes is not None
+    assert len(message.boxes) == FRAME_DETECTIONS_MAX
+    assert [row[0] for row in message.boxes] == sorted(row[0] for row in message.boxes)
     left_out = sorted(scores)[: 150 - FRAME_DETECTIONS_MAX]
-    assert sorted(scores) == sorted([*(row[4] for row in said.boxes), *left_out])
+    assert sorted(scores) == sorted([*(row[4] for row in message.boxes), *left_out])
 
 
 def test_frames_without_detection_are_not_sent_as_empty(recording: Path) -> None:
     config = config_of(recording, ahead=False)
     pipeline = CameraPipeline(config, "c0")
-    said = []
+    has_boxes = []
     for pulse in range(40):
         searched = pipeline.detect(pulse, None if pulse == 35 else pipeline.take(pulse))
         assert searched.message is not None
-        said.append(searched.message.boxes is not None)
+        has_boxes.append(searched.message.boxes is not None)
         pipeline.track_detections(searched, PeerDetections())
     pipeline.close()
-    first = said.index(True)
-    assert 0 < first < 35, "the background is not known at once"
-    assert [pulse for pulse, looked in enumerate(said) if not looked] == [*range(first), 35]
+    first = has_boxes.index(True)
+    assert 0 < first < 35, "the background is learned first"
+    assert [pulse for pulse, is_detected in enumerate(has_boxes) if not is_detected] == [*range(first), 35]
 
 
 def test_frames_without_peer_detections_are_reported(recording: Path) -> None:
     config = config_of(recording)
     pipeline = CameraPipeline(config, "c0")
-    asked, told = [], []
+    needing_peers, reported = [], []
     for pulse in range(FRAMES):
         searched = pipeline.detect(pulse, pipeline.take(pulse))
         if searched.needs_peers:
-            asked.append(pulse)
+            needing_peers.append(pulse)
         tracks = pipeline.track_detections(searched, PeerDetections(is_incomplete=True))
-        told += tracks.without_peers if tracks else []
-    told += pipeline.finish(FRAMES).without_peers
+        reported += tracks.without_peers if tracks else []
+    reported += pipeline.finish(FRAMES).without_peers
     pipeline.close()
-    assert asked
-    assert told == asked
+    assert needing_peers
+    assert reported == needing_peers
 
 
 def test_a_site_with_fewer_than_two_homographies_has_no_peers(recording: Path) -> None:
     config = config_of(recording)
-    plain = [camera.model_copy(update={"ground": None}) for camera in config.cameras]
-    for cameras in (plain, [config.cameras[0], *plain[1:]]):
-        lone = config.model_copy(update={"cameras": cameras})
-        assert not any(lone.peers_of(camera) for camera in lone.camera_ids)
-        pipeline = CameraPipeline(lone, "c0")
+    uncalibrated = [camera.model_copy(update={"ground": None}) for camera in config.cameras]
+    for cameras in (uncalibrated, [config.cameras[0], *uncalibrated[1:]]):
+        single = config.model_copy(update={"cameras": cameras})
+        assert not any(single.peers_of(camera) for camera in single.camera_ids)
+        pipeline = CameraPipeline(single, "c0")
         assert pipeline.detect(0, pipeline.take(0)).message is None
         assert pipeline.end_message(1) is None
         pipeline.close()

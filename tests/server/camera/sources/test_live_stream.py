@@ -31,7 +31,7 @@ from server.system.errors import UnavailableError, UserError
 
 
 class MotionJpeg:
-    """A network camera by hand: shows the picture it is told to, until it is unplugged."""
+    """A motion JPEG camera that shows a given picture until it is unplugged."""
 
     def __init__(self) -> None:
         self.frame, self.width = 0, WIDTH
@@ -83,10 +83,10 @@ def camera() -> Iterator[MotionJpeg]:
 
 
 def until(condition: Callable[[], bool]) -> None:
-    """Wait for what a thread does; there is no event for it from outside."""
+    """Wait until a condition holds."""
     end = time.monotonic() + PATIENCE
     while not condition():
-        assert time.monotonic() < end, "it has not come"
+        assert time.monotonic() < end, "not within the timeout"
         time.sleep(0.01)
 
 
@@ -102,12 +102,12 @@ def test_the_newest_picture_is_shown(camera: MotionJpeg) -> None:
         until(lambda: shown(source) == 0)
         camera.frame = 7
         until(lambda: shown(source) == 7)
-        assert shown(source) == 7, "a picture may be taken more than once"
+        assert shown(source) == 7, "the newest picture is returned again"
     finally:
         source.close()
 
 
-def test_a_camera_that_was_away_is_shown_again_and_nothing_old_meanwhile(
+def test_a_camera_is_shown_again_after_an_absence_and_no_old_picture_meanwhile(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
@@ -142,22 +142,22 @@ def test_a_long_absence_is_logged_once_and_so_is_the_return(
     finally:
         source.close()
     *away, back = caplog.records
-    whys = [record.getMessage() for record in away]
+    reasons = [record.getMessage() for record in away]
     assert {record.levelname for record in away} == {"WARNING"}
-    assert "Connection refused" in whys[-1]
-    assert len(whys) == len(set(whys)) <= 3, "one for each reason, not for each attempt"
+    assert "Connection refused" in reasons[-1]
+    assert len(reasons) == len(set(reasons)) <= 3, "once for each reason, not for each attempt"
     assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: frames arrive again, after ")
     assert not [message for message in caplog.messages if "hunter2" in message]
 
 
-class Halting:
-    """A camera that sends MPEG-TS up to a frame, and the rest when it is told to go on."""
+class PausingCamera:
+    """A camera that sends MPEG-TS up to a frame, and the rest after ``resume`` is set."""
 
-    def __init__(self, film: Path, halt: int) -> None:
+    def __init__(self, film: Path, pause_at: int) -> None:
         with av.open(str(film)) as container:
             places = [packet.pos or 0 for packet in container.demux(video=0) if packet.size]
-        data, at = film.read_bytes(), places[halt]
-        self._parts, self.goes_on = (data[:at], data[at:]), threading.Event()
+        data, at = film.read_bytes(), places[pause_at]
+        self._parts, self.resume = (data[:at], data[at:]), threading.Event()
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._server.getsockname()[1])
         self._thread = threading.Thread(target=self._serve)
@@ -168,7 +168,7 @@ class Halting:
         with connection:
             connection.recv(65536)
             connection.sendall(b"HTTP/1.0 200 OK\r\n\r\n" + self._parts[0])
-            assert self.goes_on.wait(PATIENCE)
+            assert self.resume.wait(PATIENCE)
             connection.sendall(self._parts[1])
 
     def close(self) -> None:
@@ -176,8 +176,8 @@ class Halting:
         self._server.close()
 
 
-class Frames:
-    """Notes which frames became the newest: what a camera's sound goes by."""
+class FrameListener:
+    """Records which frames became the newest, as the audio source does."""
 
     def __init__(self) -> None:
         self.shown: list[int] = []
@@ -189,32 +189,30 @@ class Frames:
         self.shown.append(round(float(time) * 25))
 
 
-def test_a_picture_of_before_a_silence_is_not_shown_after_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_after_a_silence_no_earlier_picture_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
-    camera = Halting(write_video(tmp_path / "film.ts", 25), halt=20)
-    frames = Frames()
+    camera = PausingCamera(write_video(tmp_path / "film.ts", 25), pause_at=20)
+    frames = FrameListener()
     quick = {"analyzeduration": "100000", "probesize": "5000"}
     source = LiveStream(f"http://127.0.0.1:{camera.port}/", quick, frames)
     try:
-        until(lambda: len(frames.shown) == 18)  # where the others end is not known yet
+        until(lambda: len(frames.shown) == 18)  # the decoder still holds the others
         until(lambda: source.take(0) is None)
-        camera.goes_on.set()
+        camera.resume.set()
         until(lambda: len(frames.shown) > 20)
         assert frames.shown[:20] == [*range(18), 20, 21]
     finally:
-        camera.goes_on.set()
+        camera.resume.set()
         camera.close()
         source.close()
 
 
 @pytest.mark.timeout(PATIENCE)
 @pytest.mark.parametrize("connected", [True, False])
-def test_pictures_of_another_size_are_no_pictures_of_this_camera(
+def test_a_change_of_the_picture_size_ends_the_camera(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, connected: bool
 ) -> None:
-    """Where people stand goes by the size: the camera's process ends, and begins anew with the other one."""
+    """Positions depend on the size: the camera's process restarts with the new one."""
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
     source = LiveStream(f"http://127.0.0.1:{port}/", {})
@@ -239,10 +237,10 @@ def test_pictures_of_another_size_are_no_pictures_of_this_camera(
 
 
 @pytest.mark.parametrize("kind", [av.error.PatchWelcomeError, av.error.ArgumentError])
-def test_a_picture_that_cannot_be_decoded_cuts_no_connection(
+def test_an_undecodable_picture_does_not_end_the_connection(
     camera: MotionJpeg, kind: type[av.error.FFmpegError]
 ) -> None:
-    """What damage makes FFmpeg say differs from codec to codec."""
+    """FFmpeg's error for damage depends on the codec."""
     damaged = threading.Event()
 
     class Damaging(LiveStream):
@@ -279,24 +277,24 @@ def test_a_read_error_ends_the_connection_but_not_the_camera(
 ) -> None:
     monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
 
-    class Stumbling(LiveAudioSource):
+    class FailingOnce(LiveAudioSource):
         connections = 0
 
         def opened(self, stream: AudioStream | None) -> None:
             self.connections += 1
             if self.connections == 1:
-                raise ValueError("nobody has thought of this")
+                raise ValueError("unexpected error")
             super().opened(stream)
 
-    listener = Stumbling(SoundSettings(source="c0"), 25)
+    listener = FailingOnce(SoundSettings(source="c0"), 25)
     source = LiveStream(f"http://127.0.0.1:{camera.plug_in()}/", {}, listener)
     try:
         until(lambda: shown(source) == 0)
     finally:
         source.close()
     assert listener.connections == 2
-    (mistake,) = [record for record in caplog.records if record.exc_info]
-    assert "nobody has thought of this" in str(mistake.exc_info)
+    (record,) = [record for record in caplog.records if record.exc_info]
+    assert "unexpected error" in str(record.exc_info)
 
 
 def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
@@ -306,7 +304,7 @@ def test_closing_ends_the_thread(camera: MotionJpeg) -> None:
 
 
 @pytest.mark.parametrize("url", ["http://127.0.0.1:1/", "rtsp://127.0.0.1:1/", "nonsense://door"])
-def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
+def test_an_unreachable_camera_is_refused_in_one_line(url: str) -> None:
     with pytest.raises(UserError, match="camera door: ") as caught:
         open_source(CameraSettings(id="door", source=url), SiteSettings())
     assert "\n" not in str(caught.value)
@@ -314,7 +312,7 @@ def test_a_camera_that_is_not_there_is_refused_in_one_line(url: str) -> None:
 
 
 @pytest.mark.parametrize("login", ["me:pa@ss:w@", ""])
-def test_a_password_is_in_no_error(login: str) -> None:
+def test_no_error_contains_the_password(login: str) -> None:
     with pytest.raises(UserError, match="cannot open this video") as caught:
         open_video(f"rtsp://{login}127.0.0.1:1/user=me_password=w0rd_channel=1", {}, (5.0, 5.0))
     assert "pa@ss" not in str(caught.value)
@@ -329,7 +327,7 @@ def test_options_are_passed_on(camera: MotionJpeg) -> None:
 
 
 def test_an_unknown_host_is_distinguished_from_a_failing_camera(monkeypatch: pytest.MonkeyPatch) -> None:
-    """FFmpeg says the same of both."""
+    """FFmpeg reports the same error for both."""
 
     def refused(*_: object, **__: object) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO))

@@ -78,7 +78,7 @@ def test_a_looped_recording_returns_the_exact_frame_despite_missed_pulses(
 
 @pytest.mark.parametrize("at_end", ["stop", "loop"])
 @pytest.mark.parametrize("offset", [0, 3, -20])
-def test_looking_ahead_shows_the_recording_s_own_frames_and_moves_nothing(
+def test_looking_ahead_does_not_move_the_recording(
     video: str, offset: int, at_end: Literal["stop", "loop"]
 ) -> None:
     source = Recording(video, offset, at_end)
@@ -97,7 +97,7 @@ def test_ahead_skips_unreadable_images(folder: Path, tmp_path: Path) -> None:
     assert shown(source, 2) == 0
 
 
-def test_a_skip_to_beyond_the_end_is_the_end(video: str) -> None:
+def test_a_pulse_beyond_the_end_ends_the_source(video: str) -> None:
     recording = Recording(video, 0, "stop")
     for _ in range(2):
         with pytest.raises(SourceEndedError):
@@ -107,28 +107,28 @@ def test_a_skip_to_beyond_the_end_is_the_end(video: str) -> None:
 
 @pytest.mark.parametrize("b_frames", [0, 2])
 @pytest.mark.parametrize("packets", [[3], [10], [0], [0, 1, 2], [7, 8, 9, 20], [FRAMES - 1]])
-def test_damage_moves_no_frame_from_its_place(tmp_path: Path, packets: list[int], b_frames: int) -> None:
+def test_damage_shifts_no_other_frame(tmp_path: Path, packets: list[int], b_frames: int) -> None:
     path = write_video(tmp_path / "damaged.mp4", FRAMES, b_frames=b_frames)
     frames = all_shown(Recording(str(damage(path, packets)), 0, "stop"))
     assert len(frames) == FRAMES
-    broken = {packet // 10 for packet in packets}  # a GOP that follows on damage may be anything
+    broken = {packet // 10 for packet in packets}  # a GOP with damage may show anything
     whole = [number for number in range(FRAMES) if number // 10 not in broken]
-    # A decoder that loses its thread may take the last picture before it along, and find it two later.
-    sure = [number for number in whole if 1 < number % 10 < 9]
-    assert [frames[number] for number in sure] == sure
+    # Pictures next to a damaged GOP may be affected.
+    unaffected = [number for number in whole if 1 < number % 10 < 9]
+    assert [frames[number] for number in unaffected] == unaffected
 
 
-def test_damage_to_single_pictures_shows_the_ones_before_them(tmp_path: Path) -> None:
+def test_a_damaged_picture_is_replaced_by_the_one_before_it(tmp_path: Path) -> None:
     path = damage(write_video(tmp_path / "damaged.avi", 8, codec="mjpeg"), [0, 4, 7])
     assert all_shown(Recording(str(path), 0, "stop")) == [1, 1, 2, 3, 3, 5, 6, 6]
 
 
-def test_a_file_that_was_cut_off_ends_there(tmp_path: Path) -> None:
+def test_a_truncated_file_ends_early(tmp_path: Path) -> None:
     path = write_video(tmp_path / "cut.avi", FRAMES, codec="mjpeg")
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     frames = all_shown(Recording(str(path), 0, "stop"))
     assert 0 < len(frames) < FRAMES
-    assert frames[:-1] == list(range(len(frames) - 1)), "the last picture may be half of one"
+    assert frames[:-1] == list(range(len(frames) - 1)), "the last picture may be incomplete"
 
 
 def refusal(source: str) -> str:
@@ -151,13 +151,13 @@ def test_files_without_video_are_refused(tmp_path: Path, content: bytes) -> None
     assert "cannot open this video" in refusal(str(path))
 
 
-def test_a_video_without_its_end_is_refused(tmp_path: Path) -> None:
+def test_a_truncated_mp4_is_refused(tmp_path: Path) -> None:
     path = write_video(tmp_path / "half.mp4", FRAMES)
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     assert "half.mp4: cannot" in refusal(str(path))
 
 
-def test_a_video_of_which_no_picture_can_be_decoded_is_refused(tmp_path: Path) -> None:
+def test_a_video_without_decodable_pictures_is_refused(tmp_path: Path) -> None:
     path = damage(write_video(tmp_path / "noise.mp4", 5), [0, 1, 2, 3, 4])
     assert "has no frames" in refusal(str(path))
 
@@ -179,7 +179,7 @@ def test_a_folder_is_a_recording_of_its_images(folder: Path) -> None:
     assert [shown(repeated, pulse) for pulse in (0, 4, 5, 13)] == [0, 4, 0, 3]
 
 
-def test_an_image_that_cannot_be_read_shows_as_the_one_before_it(tmp_path: Path, folder: Path) -> None:
+def test_an_unreadable_image_is_replaced_by_the_one_before_it(tmp_path: Path, folder: Path) -> None:
     for file in folder.glob("*.png"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     (tmp_path / "002.png").write_bytes(b"")
