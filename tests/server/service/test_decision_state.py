@@ -1,4 +1,4 @@
-"""What is told about a decision: cuts, and what turned out about numbers."""
+"""The published decision: cuts, and merged and split numbers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_decision_is_published_with_its_cuts_and_corrections() -> None:
 
 
 def decided(state: DecisionState, first: int, numbers: tuple[int, ...] = (1, 2)) -> Counted:
-    """Put a GOP of ten frames; give what explains it."""
+    """Add a GOP of ten frames; return its reasons."""
     choices = tuple(ObjectChoice(number, "c0", "c0", departed=False) for number in numbers)
     why = Counted()
     state.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("SelectionReasons", why)))

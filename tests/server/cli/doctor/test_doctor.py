@@ -187,7 +187,7 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
     cameras = [{"id": "door", "source": camera.url, "options": {"rtsp_transport": "tcp"}}]
     site_of = load_site(tmp_path, cameras=cameras, site={"name": "hall", "width": 128, "height": 96})
     try:
-        camera.let = 1000
+        camera.gop_limit = 1000
         found = camera_findings(site_of, probe_cameras(site_of, 4.0), runs=False)
     finally:
         camera.close()

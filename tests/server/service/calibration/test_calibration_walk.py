@@ -1,4 +1,4 @@
-"""The calibration walk at the operator's addresses: covered as it goes, calibrated from beside it all."""
+"""The calibration walk over HTTP: coverage while walking, calibration in a process of its own."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ async def test_a_walk_yields_the_scenes_homographies(wide: ServedSite, tmp_path:
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="walk", folder=tmp_path)
     errors = errors_on_floor([np.array(camera.ground) for camera in config.cameras])
     assert np.median(errors) < 0.15  # metres
-    assert wide.service.config == before  # nothing in force has changed
+    assert wide.service.config == before  # the active configuration is unchanged
     async with wide.session.delete(WALK, headers=MINE) as answer:
         assert (await answer.json())["state"] == "none"
     assert await wide.get(f"{WALK}/ground.json") == (404, {"error": "there is no calibration result yet"})
@@ -107,7 +107,7 @@ async def test_an_insufficient_walk_is_reported_and_can_be_resumed(wide: ServedS
 
 async def test_uncovered_areas_are_reported_during_the_walk(wide: ServedSite) -> None:
     await do(wide, action="start")
-    assert len((await wide.get_json(WALK))["uncovered"]) == 2  # nothing of either camera
+    assert len((await wide.get_json(WALK))["uncovered"]) == 2  # no camera has windows
     walk(wide, 100, wide=0.01)
     losses = (await wide.get_json(WALK))["uncovered"]
     assert f"walk also nearer to camera {A}, and farther from it" in losses
@@ -131,7 +131,7 @@ async def test_invalid_steps_are_refused(served: ServedSite, step: Any, status: 
 
 
 async def task_of(tasks: list[CalibrationTask], config: Any, *parts: Any) -> CalibrationTask:
-    """Walk by hand; give what the process would be told."""
+    """Simulate a walk; return the task of the calibration process."""
 
     async def note(task: CalibrationTask) -> CalibrationResult:
         tasks.append(task)
@@ -153,12 +153,12 @@ async def test_every_final_box_is_recorded_once_and_counted_from_the_start_of_th
 
     def before_and_on(active_walk: WalkSession) -> None:
         active_walk.discard()
-        for walk_epoch in walk_epochs(config, places[:50]):  # nobody has started yet
+        for walk_epoch in walk_epochs(config, places[:50]):  # no walk has started
             active_walk.add(walk_epoch)
         active_walk.start()
         for walk_epoch in walk_epochs(config, places[50:], epoch=10):
             active_walk.add(walk_epoch)
-            active_walk.add(walk_epoch)  # what was said before is not counted again
+            active_walk.add(walk_epoch)  # earlier boxes are not counted again
 
     task = await task_of([], config, before_and_on)
     assert task.person == 1.7

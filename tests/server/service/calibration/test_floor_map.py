@@ -1,4 +1,4 @@
-"""What a camera covers of the floor is what its picture shows of it, up to some distance."""
+"""A camera covers the floor in its picture, up to some distance."""
 
 from __future__ import annotations
 

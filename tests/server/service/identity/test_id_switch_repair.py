@@ -1,4 +1,4 @@
-"""Which tracks have exchanged their people is seen by what is said of the same frames before and after."""
+"""Identity switches are found by compacycle a revised window with the published one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLACE = np.array([0.0, 0.0, 10.0, 30.0])
 
 
 def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
-    """Return a camera's word on some frames, of the boxes (T, F, 4)."""
+    """Return a camera's window of the boxes (T, F, 4)."""
     tracks = range(1, len(boxes) + 1)
     last = first + boxes.shape[1] - 1
     message = camera_tracks("c0", 0, dict.fromkeys(tracks, (1.0, 1.0, 2.0, 2.0)), first=first, last=last)
@@ -29,7 +29,7 @@ def window(boxes: NDArray[np.float64], first: int) -> CameraWindow:
 
 
 def paths(tracks: int) -> NDArray[np.float64]:
-    """Let everybody walk in a lane of their own, (T, FRAMES, 4)."""
+    """Return boxes of people who walk in separate lanes, (T, FRAMES, 4)."""
     step, lane = np.arange(FRAMES)[None, :, None], np.arange(tracks)[:, None, None]
     return PLACE + step * np.array([1.0, 0.0, 1.0, 0.0]) + lane * np.array([0.0, 40.0, 0.0, 40.0])
 
@@ -45,14 +45,14 @@ def test_two_tracks_that_swap_positions_have_switched_identities(
     tracks: int, order: list[int], since: int, newer: int, forgotten: int
 ) -> None:
     one, two = sorted([number for number in order if number < tracks][:2])
-    old, now = paths(tracks), paths(tracks)
-    now[[one, two], since:] = now[[two, one], since:]
-    # Some of the newest frames are spoken of for the first time, and the oldest words may be forgotten.
+    old, revised = paths(tracks), paths(tracks)
+    revised[[one, two], since:] = revised[[two, one], since:]
+    # The newest frames were not published yet, and the oldest may be forgotten.
     known = FRAMES - 1 - newer
-    said = HistorySpan(window(old, FIRST), FIRST + forgotten, FIRST + known)
-    found = find_id_switches(window(now, FIRST), [said])
-    seen = known + 1 - max(since, forgotten)
-    if seen < 2:
+    published = HistorySpan(window(old, FIRST), FIRST + forgotten, FIRST + known)
+    found = find_id_switches(window(revised, FIRST), [published])
+    overlap = known + 1 - max(since, forgotten)
+    if overlap < 2:
         assert found == []
         return
     frame = FIRST + (since if since > forgotten else 0)
@@ -63,9 +63,9 @@ def test_unchanged_hidden_and_cyclic_tracks_have_not_switched() -> None:
     old = paths(3)
     assert find_id_switches(window(old, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
     assert find_id_switches(window(old, FIRST), []) == []
-    ring = old.copy()
-    ring[:, 5:] = ring[[1, 2, 0], 5:]
-    assert find_id_switches(window(ring, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
+    cycle = old.copy()
+    cycle[:, 5:] = cycle[[1, 2, 0], 5:]
+    assert find_id_switches(window(cycle, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 9)]) == []
     hidden = old.copy()
     hidden[0, 5:] = hidden[1, 5:]
     hidden[1, 5:] = np.nan
@@ -75,7 +75,7 @@ def test_unchanged_hidden_and_cyclic_tracks_have_not_switched() -> None:
 def test_in_a_crowd_a_track_switches_with_one_other_only() -> None:
     old = paths(3)
     old[2] = old[1] + 2.0
-    now = old.copy()
-    now[[0, 1], 5:] = now[[1, 0], 5:]
-    found = find_id_switches(window(now, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 12)])
+    revised = old.copy()
+    revised[[0, 1], 5:] = revised[[1, 0], 5:]
+    found = find_id_switches(window(revised, FIRST), [HistorySpan(window(old, FIRST), FIRST, FIRST + 12)])
     assert found == [IdSwitch(TrackKey("c0", 1), TrackKey("c0", 2), FIRST + 5)]

@@ -1,4 +1,4 @@
-"""What is said of people by hand holds, whatever is worked out afterwards."""
+"""Manual merges and splits hold against later automatic decisions."""
 
 from __future__ import annotations
 
@@ -19,37 +19,39 @@ numbers = st.integers(1, 6)
 @given(st.lists(st.tuples(st.booleans(), numbers, numbers), max_size=12))
 def test_a_manual_merge_is_permanent(steps: list[tuple[bool, int, int]]) -> None:
     overrides = ManualOverrides()
-    one: list[set[int]] = [{number} for number in range(1, 7)]
-    for by_hand, first, second in steps:
+    groups: list[set[int]] = [{number} for number in range(1, 7)]
+    for is_manual, first, second in steps:
         kept, lost = overrides.current(first), overrides.current(second)
         if kept == lost:
             continue
-        if by_hand:
+        if is_manual:
             overrides.merge(kept, lost)
         else:
-            read = overrides.apply(identity_update({}, Merge(first, second)))
-            gone = {merge.lost for merge in read.merged}
-            assert not gone & {overrides.current(number) for number in range(1, 7) if number not in gone}
+            update = overrides.apply(identity_update({}, Merge(first, second)))
+            lost_numbers = {merge.lost for merge in update.merged}
+            assert not lost_numbers & {
+                overrides.current(number) for number in range(1, 7) if number not in lost_numbers
+            }
             if overrides.current(first) != overrides.current(second):
-                continue  # nobody's word was about the lost one: it is never heard of again
-        together = next(group for group in one if kept in group) | next(
-            group for group in one if lost in group
+                continue  # the merge was about a number that is already merged
+        together = next(group for group in groups if kept in group) | next(
+            group for group in groups if lost in group
         )
-        one = [group for group in one if not group & together] + [together]
-    for group in one:
+        groups = [group for group in groups if not group & together] + [together]
+    for group in groups:
         assert len({overrides.current(number) for number in group}) == 1
     for number in range(1, 7):
         assert overrides.current(overrides.current(number)) == overrides.current(number)
         assert number in overrides.automatic_numbers(overrides.current(number))
 
 
-def dictated(*updates: IdentityUpdate) -> PersonTracker:
+def scripted_tracker(*updates: IdentityUpdate) -> PersonTracker:
     tracker = people(departed_after=10)
     tracker._registry = ScriptedRegistry(*updates)  # type: ignore[assignment]
     return tracker
 
 
-def seen(tracker: PersonTracker, epoch: int) -> None:
+def push_epoch(tracker: PersonTracker, epoch: int) -> None:
     tracker.update(
         epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL}), camera_tracks("c1", epoch, {1: LARGE}))
     )
@@ -59,10 +61,10 @@ TWO = identity_update({("c0", 1): 1, ("c1", 1): 2})
 
 
 def test_a_manual_merge_holds_against_the_evidence() -> None:
-    tracker = dictated(
+    tracker = scripted_tracker(
         TWO, TWO, replace(TWO, split=(Split(1, 2, "c1"),)), replace(TWO, merged=(Merge(2, 1),))
     )
-    seen(tracker, 0)
+    push_epoch(tracker, 0)
     tracker.registry.set_name(2, "Ann")
     tracker.merge(1, 2)
     assert tracker.known == [1]
@@ -70,7 +72,7 @@ def test_a_manual_merge_holds_against_the_evidence() -> None:
     assert (tracker.registry.first_seen, tracker.registry.last_seen) == ({1: 0}, {1: STRIDE - 1})
     assert tracker.take_corrections() == (Merge(1, 2),)
     for epoch in (1, 2, 3):
-        seen(tracker, epoch)
+        push_epoch(tracker, epoch)
         assert tracker.known == [1]
         assert tracker.registry.merged == {2: 1}
         assert boxes(tracker, "c0", epoch * STRIDE) == {1: SMALL}
@@ -80,10 +82,10 @@ def test_a_manual_merge_holds_against_the_evidence() -> None:
 
 def test_a_manual_merge_follows_later_automatic_merges() -> None:
     three = identity_update({("c0", 1): 1, ("c1", 1): 2, ("c1", 2): 3})
-    tracker = dictated(three, replace(three, merged=(Merge(3, 1),)), identity_update({("c0", 2): 2}))
-    seen(tracker, 0)
+    tracker = scripted_tracker(three, replace(three, merged=(Merge(3, 1),)), identity_update({("c0", 2): 2}))
+    push_epoch(tracker, 0)
     tracker.merge(1, 2)
-    seen(tracker, 1)
+    push_epoch(tracker, 1)
     tracker.update(epoch_of(2, camera_tracks("c0", 2, {2: SMALL})))
     assert tracker.registry.all_numbers == [3]
     assert tracker.registry.merged == {1: 3, 2: 3}
@@ -91,19 +93,19 @@ def test_a_manual_merge_follows_later_automatic_merges() -> None:
 
 
 def test_a_manually_merged_person_is_away_when_both_parts_are() -> None:
-    tracker = dictated(
+    tracker = scripted_tracker(
         TWO, replace(TWO, departed=(1,)), replace(TWO, departed=(2,)), replace(TWO, returned=(2,))
     )
-    seen(tracker, 0)
+    push_epoch(tracker, 0)
     tracker.merge(1, 2)
     for epoch, away in ((1, set()), (2, {1}), (3, set())):
-        seen(tracker, epoch)
+        push_epoch(tracker, epoch)
         assert tracker.registry.departed == away
 
 
 def test_of_two_names_the_kept_persons_remains() -> None:
-    tracker = dictated(TWO)
-    seen(tracker, 0)
+    tracker = scripted_tracker(TWO)
+    push_epoch(tracker, 0)
     tracker.registry.set_name(1, "Ann")
     tracker.registry.set_name(2, "Bob")
     tracker.merge(1, 2)

@@ -1,4 +1,4 @@
-"""Who was where: numbers that outlive a camera's restarts, merges, and forgetting."""
+"""Person numbers of tracks, over restarts of cameras, merges, and forgetting."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from server.service.ingest.window_history import WindowHistory
 
 
 class RecordingRegistry:
-    """An identity registry that notes what it is given."""
+    """An identity registry that records its input."""
 
     def __init__(self, track_updates: list[TrackUpdate]) -> None:
         self._track_updates = track_updates
@@ -89,9 +89,11 @@ def test_the_registry_receives_picture_sizes_and_boxes_in_the_cameras_own_pixels
             0, camera_tracks("c0", 0, {1: SMALL}, size=(WIDTH // 2, HEIGHT // 2)), camera_tracks("c1", 0, {})
         )
     )
-    assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, "also who sees none"
+    assert registry.pictures == {"c0": (WIDTH // 2, HEIGHT // 2), "c1": (WIDTH, HEIGHT)}, (
+        "of cameras without tracks, too"
+    )
     [track] = track_updates
-    assert track.picture_height == HEIGHT // 2, "of the camera's own picture, as its boxes"
+    assert track.picture_height == HEIGHT // 2, "in the camera's own pixels, as its boxes"
     np.testing.assert_allclose(track.boxes, np.tile(np.array(SMALL) / 2, (STRIDE, 1)))
 
 
@@ -100,12 +102,14 @@ def test_a_camera_without_detection_is_no_evidence_of_absence() -> None:
     has_picture = []
     for epoch in range(8):
         tracker._registry = registry = RecordingRegistry([])  # type: ignore[assignment]
-        away = range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
+        without_detection = (
+            range(epoch * STRIDE + (epoch == 6), (epoch + 1) * STRIDE) if 3 <= epoch < 7 else ()
+        )
         tracker.update(
             epoch_of(
                 epoch,
                 camera_tracks("c0", epoch, {1: SMALL}),
-                camera_tracks("c1", epoch, {}, without_detection=[*away]),
+                camera_tracks("c1", epoch, {}, without_detection=[*without_detection]),
             )
         )
         has_picture.append("c1" in registry.pictures)
@@ -192,9 +196,9 @@ def test_undecided_frames_keep_their_numbers_after_the_registry_has_settled_them
     tracker.forget_boxes_before(second)
     tracker.update(epoch_of(5, camera_tracks("c0", 5, {1: SMALL})))
     assert current_numbers() == [-1, 2, 3]
-    assert len(tracker._parts[TrackKey("c0", 1)]) == 2, "what is not asked for any more is let go"
+    assert len(tracker._parts[TrackKey("c0", 1)]) == 2, "parts before the needed frames are dropped"
     tracker.update(epoch_of(6, camera_tracks("c0", 6, {1: SMALL})))
-    assert current_numbers() == [-1, 4, 4], "merges hold for what is settled, too"
+    assert current_numbers() == [-1, 4, 4], "merges apply to settled frames, too"
 
 
 def test_a_restarted_cameras_tracks_do_not_inherit_earlier_boxes() -> None:
@@ -207,7 +211,7 @@ def test_a_restarted_cameras_tracks_do_not_inherit_earlier_boxes() -> None:
 
 
 def test_only_the_newest_merged_numbers_are_remembered() -> None:
-    """Whoever stays all day has many short tracks merged into them."""
+    """A person who stays all day has many short tracks merged into them."""
     tracker = people(maximum_departed_people=5)
     for lost in range(2, 40):
         tracker.merge(1, lost)
@@ -229,7 +233,7 @@ def test_merged_numbers_resolve_through_chains() -> None:
         )
     assert tracker.known == [1]
     assert tracker.registry.merged == {3: 1, 2: 1}
-    assert boxes(tracker, "c1", 0) == {1: LARGE}, "in frames past, too"
+    assert boxes(tracker, "c1", 0) == {1: LARGE}, "in past frames, too"
     assert tracker.registry.aliases(1) == [2, 3]
 
 

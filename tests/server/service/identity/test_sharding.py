@@ -1,4 +1,4 @@
-"""Several best-view services of one site decide for all of its people, each for its own, and as one would."""
+"""Shards: several best-view services of a site together decide as a single one."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from server.service.view_selection.decider import ViewDecider
 from server.system.errors import UserError
 
 
-def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
+def shard_settings(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
     return {"view": {"share": {"of": of, "index": index, **more}}}
 
 
@@ -48,25 +48,27 @@ def shared(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
 def test_shards_together_decide_as_a_single_service(of: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     deciders = [
-        ViewDecider(small_config(**shared(index, of)), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
+        ViewDecider(
+            small_config(**shard_settings(index, of)), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True
+        )
         for index in range(of)
     ]
-    alone = ViewDecider(small_config(), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
-    for view_decider in [*deciders, alone]:
+    single_decider = ViewDecider(small_config(), dict.fromkeys(CAMERAS), lambda _camera, _pulse: True)
+    for view_decider in [*deciders, single_decider]:
         view_decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     for number in range(6):
-        words = []
+        messages = []
         for camera in CAMERAS:
             size = {track: float(rng.uniform(5, 40)) for track in range(1, 8) if rng.random() < 0.7}
             boxes: dict[int, Box | None] = {number: (0.0, 0.0, s / 2, s) for number, s in size.items()}
-            words.append(camera_tracks(camera, number, boxes))
-        epoch = epoch_of(number, *words)
+            messages.append(camera_tracks(camera, number, boxes))
+        epoch = epoch_of(number, *messages)
         answers = [decider.step(epoch) for decider in deciders]
-        for place, whole in enumerate(alone.step(epoch)):
+        for place, single in enumerate(single_decider.step(epoch)):
             parts = [answer[place] for answer in answers]
             together = [choice for part in parts for choice in part.choices]
-            assert sorted(together, key=lambda choice: choice.number) == list(whole.choices)
-            assert all(part.boxes == whole.boxes for part in parts)
+            assert sorted(together, key=lambda choice: choice.number) == list(single.choices)
+            assert all(part.boxes == single.boxes for part in parts)
             for index, part in enumerate(parts):
                 assert all(choice.number % of == index for choice in part.choices)
 
@@ -80,25 +82,25 @@ def test_viewers_of_a_merged_number_stay_at_their_service() -> None:
 
 
 def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
-    class Merging:
-        """First two people, then one."""
+    class MergingRegistry:
+        """An identity registry that merges two people."""
 
         next_id = 3
 
         def reserve_below(self, number: int) -> None:
-            """Nobody remembers more."""
+            """Ignore the reservation."""
 
-        def update(self, given: Sequence[TrackUpdate], last_frame: int, _: object) -> IdentityUpdate:
+        def update(self, updates: Sequence[TrackUpdate], last_frame: int, _: object) -> IdentityUpdate:
             if last_frame < 15:
                 return IdentityUpdate(
-                    {TrackletKey(*track.key, 0): track.local_id for track in given}, (), (), (), (), ()
+                    {TrackletKey(*track.key, 0): track.local_id for track in updates}, (), (), (), (), ()
                 )
             merged = (Merge(1, 2),) if last_frame < 20 else ()
             numbers = dict.fromkeys((TrackletKey("c0", 1, 0), TrackletKey("c0", 2, 0)), 1)
             return IdentityUpdate(numbers, (), (), (), merged, ())
 
-    service = FedService(small_config(**shared(0)))
-    service.decider.people._registry = Merging()  # type: ignore[assignment]
+    service = FedService(small_config(**shard_settings(0)))
+    service.decider.people._registry = MergingRegistry()  # type: ignore[assignment]
     service.connect_cameras(*CAMERAS)
     for epoch in range(6):
         service.feed(epoch, {"c0": {1: SMALL, 2: LARGE}, "c1": {}})
@@ -112,7 +114,7 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "why"),
+    ("share", "reason"),
     [
         ({"of": 2, "index": 2}, "index is 2, but of 2 services the last is 1"),
         ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2"),
@@ -120,10 +122,10 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
         ({"of": 0}, "view.share.of"),
     ],
 )
-def test_an_invalid_share_is_refused_in_one_line(share: dict[str, Any], why: str) -> None:
+def test_an_invalid_share_is_refused_in_one_line(share: dict[str, Any], reason: str) -> None:
     with pytest.raises(UserError, match="share") as refusal:
         small_config(view={"share": share})
-    assert why in str(refusal.value)
+    assert reason in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
@@ -135,8 +137,8 @@ def test_shard_addresses_are_normalized_to_base_urls() -> None:
 
 @pytest.fixture(params=[["http://one:1/", "http://two/x"], []])
 async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
-    """Serve the second of two services, which are configured to know each other's address, or not."""
-    service = FedService(small_config(**shared(1, servers=request.param)))
+    """Serve the second of two shards, with and without configured addresses."""
+    service = FedService(small_config(**shard_settings(1, servers=request.param)))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     service.connect_cameras(*CAMERAS)
     for epoch in range(4):
@@ -149,7 +151,7 @@ async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
 async def test_people_of_another_service_are_listed_and_redirected(
     second: str, request: pytest.FixtureRequest
 ) -> None:
-    told = bool(request.node.callspec.params["second"])
+    has_address = bool(request.node.callspec.params["second"])
     async with aiohttp.ClientSession() as session:
 
         async def get(path: str) -> tuple[int, str | None, Any]:
@@ -159,11 +161,11 @@ async def test_people_of_another_service_are_listed_and_redirected(
 
         _, _, objects = await get("/api/objects")
         assert [person["object"] for person in objects["objects"]] == [1, 3]
-        assert objects["elsewhere"] == [{"object": 2, "server": "http://one:1/" if told else None}]
+        assert objects["elsewhere"] == [{"object": 2, "server": "http://one:1/" if has_address else None}]
         assert (await get("/api/objects/1/choice"))[0] == 200
         for path in ("objects/2/best.mp4?a=b", "api/objects/2/choice", "objects/2/thumb.jpg"):
             status, location, content = await get(f"/{path}")
-            if told:
+            if has_address:
                 assert (status, location) == (307, f"http://one:1/{path}")
             else:
                 assert status == 404
@@ -173,10 +175,10 @@ async def test_people_of_another_service_are_listed_and_redirected(
 
 @pytest.fixture
 def pair() -> Iterator[list[BestViewPipeline]]:
-    """Open two services of one site on a bus of their own."""
+    """Two services of one site on a private bus."""
     address = f"tcp/127.0.0.1:{free_port()}"
-    ways = {"zenoh": {"listen": address, "connect": address}}
-    services = [BestViewPipeline(small_config(**shared(index), **ways)) for index in range(2)]
+    zenoh = {"zenoh": {"listen": address, "connect": address}}
+    services = [BestViewPipeline(small_config(**shard_settings(index), **zenoh)) for index in range(2)]
     for service in services:
         service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     yield services
@@ -184,21 +186,21 @@ def pair() -> Iterator[list[BestViewPipeline]]:
         service.close()
 
 
-async def test_both_services_receive_all_cameras_and_publish_under_own_keys(
+async def test_both_services_receive_all_cameras_and_publish_under_their_keys(
     pair: list[BestViewPipeline],
 ) -> None:
     for service in pair:
         service.open()
     keys, camera = ZenohKeys("hall"), Bus.client(pair[0].config.zenoh)
-    alive, heard = Heard(), Heard()
+    alive, published = KeyRecorder(), KeyRecorder()
     try:
         camera.watch_alive(keys.bestview("**/alive"), lambda key, _: alive.add(key))
-        camera.subscribe(keys.bestview("**/choices"), lambda message: heard.add(message.key))
+        camera.subscribe(keys.bestview("**/choices"), lambda message: published.add(message.key))
         await alive.all_of("myview/hall/bestview/alive", "myview/hall/bestview/1/alive")
         camera.declare_alive(keys.camera("c0", "alive"))
         camera.declare_alive(keys.camera("c1", "alive"))
         sending = asyncio.create_task(send(camera, pair))
-        await heard.all_of("myview/hall/bestview/choices", "myview/hall/bestview/1/choices")
+        await published.all_of("myview/hall/bestview/choices", "myview/hall/bestview/1/choices")
         sending.cancel()
         assert [list(service.decision_state.selected_views) for service in pair] == [[2], [1]]
     finally:
@@ -206,21 +208,21 @@ async def test_both_services_receive_all_cameras_and_publish_under_own_keys(
 
 
 async def send(camera: Bus, services: Sequence[BestViewPipeline]) -> None:
-    """Send epoch after epoch: what comes before a subscription has arrived is lost."""
+    """Send epochs until cancelled: those before a subscription is active are lost."""
     for epoch in range(1000):
         for name in CAMERAS:
             for unit in encoded(0)[5 * (epoch % 8) : 5 * (epoch % 8) + 5]:
                 message = video(name, unit)
                 camera.publish(message.key, message.payload, message.attachment)
-            said = tracks(camera_tracks(name, epoch, {1: SMALL, 2: LARGE}))
-            camera.publish(said.key, said.payload)
+            track_message = tracks(camera_tracks(name, epoch, {1: SMALL, 2: LARGE}))
+            camera.publish(track_message.key, track_message.payload)
         await asyncio.sleep(0.02)
         for service in services:
             service.decide()
 
 
-class Heard:
-    """Keys that were heard of."""
+class KeyRecorder:
+    """Records keys."""
 
     def __init__(self) -> None:
         self._keys: set[str] = set()

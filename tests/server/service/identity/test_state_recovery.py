@@ -1,4 +1,4 @@
-"""A service that begins anew knows who is who, as far as cameras' tracks go on: the cameras remember it."""
+"""A restarted service recovers person numbers from the snapshots that the cameras retain."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ A, B = CAMERAS
 KEYS = ZenohKeys("hall")
 Seen = Mapping[str, Mapping[int, Box]]
 ALL: Seen = {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}}
-"""By camera the tracks that are there."""
+"""The visible tracks by camera."""
 
 
 class Site:
-    """Cameras that outlast the service, and run after run of it."""
+    """Cameras that keep running while the service is restarted."""
 
     def __init__(self, **changes: object) -> None:
         self._changes = changes
@@ -62,7 +62,7 @@ class Site:
         self.service = FedService(small_config())
 
     def start(self, *, without_snapshot: str | None = None) -> FedService:
-        """Start the service anew: the cameras hear of it, but for one."""
+        """Restart the service; all cameras but one notice it and send their snapshots."""
         self.service = service = FedService(small_config(**self._changes))
         service.state_replication._send = self._send_identities
         for camera in CAMERAS:
@@ -73,7 +73,7 @@ class Site:
         return service
 
     def track_epochs(self, epochs: Iterable[int], seen: Seen = ALL, boot: int = 1) -> None:
-        """Push an epoch with these tracks; pictures do not matter here."""
+        """Push epochs with these tracks, without pictures."""
         for epoch in epochs:
             for camera in CAMERAS:
                 self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera], boot=boot)))
@@ -81,7 +81,7 @@ class Site:
             self.service.decide()
 
     def person_of(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:
-        """Return who is behind a track."""
+        """Return the person number of a track."""
         number = self.service.decider.people.person_of(camera, boot, track, end_of_epoch(epoch, STRIDE))
         assert number is not None
         return number
@@ -94,7 +94,7 @@ class Site:
 
 
 def tracked_site(*, merge: bool = False, **changes: object) -> Site:
-    """Run a service in which camera A's track 2 is Ann, and who is followed by its track 1, too, maybe."""
+    """Run a service in which camera A's track 2 is Ann; ``merge``: its track 1 is merged into her."""
     site = Site(**changes)
     site.start()
     site.track_epochs(range(4))
@@ -106,19 +106,17 @@ def tracked_site(*, merge: bool = False, **changes: object) -> Site:
     return site
 
 
-ONLY_LATE: Seen = {A: {9: SMALL, 2: LARGE}, B: {3: LARGE}}
-"""Of who was there A's track 1 is gone; somebody new has come, who is heard of first."""
+AFTER_RESTART: Seen = {A: {9: SMALL, 2: LARGE}, B: {3: LARGE}}
+"""A's track 1 has ended, and a new one comes first."""
 
 
 def test_a_person_tracked_through_a_restart_keeps_number_and_name() -> None:
     site = tracked_site()
     before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
     site.start()
-    site.track_epochs(range(7, 9), ONLY_LATE)
+    site.track_epochs(range(7, 9), AFTER_RESTART)
     assert [site.person_of(A, 2, 8), site.person_of(B, 3, 8)] == before[1:]
-    assert site.person_of(A, 9, 8) > max(before), (
-        "numbers are not used twice, not of those who have left either"
-    )
+    assert site.person_of(A, 9, 8) > max(before), "no number is used twice"
     assert site.service.decider.people.registry.names == {before[1]: "Ann"}
     assert site.service.decider.people.manual_merges == {}
 
@@ -138,10 +136,10 @@ def test_manual_merges_survive_a_restart() -> None:
     kept, (old,) = site.person_of(A, 2, 5), site.service.decider.people.registry.merged
     site.start()
     site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
-    site.track_epochs(range(8, 12))  # the other track comes later
+    site.track_epochs(range(8, 12))  # the other track reappears later
     people = site.service.decider.people
     assert site.person_of(A, 1, 11) == site.person_of(A, 2, 11) == kept
-    assert people.registry.merged[old] == kept, "an address with the old number goes on"
+    assert people.registry.merged[old] == kept, "links with the old number stay valid"
     assert people.registry.names == {kept: "Ann"}
 
 
@@ -177,33 +175,33 @@ def test_a_number_too_large_to_retain_does_not_affect_others() -> None:
 
 def test_numbering_begins_with_the_first_number_however_late_a_camera_connects() -> None:
     site = Site()
-    service = site.service = FedService(small_config())  # no camera's token has come
-    assert service.state_replication.numbers_since == 0, "nobody has a number"
+    service = site.service = FedService(small_config())  # no camera has connected
+    assert service.state_replication.numbers_since == 0, "no number was assigned"
     before = time.time() - 60
     site.track_epochs(range(4))
     assert site.person_of(A, 1, 3)
-    assert service.state_replication.numbers_since > before, "a token of before is for somebody else, maybe"
+    assert service.state_replication.numbers_since > before, "an older token may be for another person"
 
 
 def test_without_a_cameras_snapshot_only_its_tracks_get_new_numbers() -> None:
     site = tracked_site()
     ann, other = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
-    site.cameras[B] = RetainedState(lambda snapshot: site._receive(B, snapshot))  # it was started anew, too
+    site.cameras[B] = RetainedState(lambda snapshot: site._receive(B, snapshot))  # restarted as well
     site.start()
     site.track_epochs(range(7, 9))
     assert site.person_of(A, 2, 8) == ann
-    assert site.person_of(B, 3, 8) not in {ann, other}, "nobody knows who that is: it is a new number"
+    assert site.person_of(B, 3, 8) not in {ann, other}, "it is unknown, so it has a new number"
 
 
-LONG_AGO = 6 + int(MAX_DOWNTIME_S * FPS / STRIDE)
+LONG_AFTER = 6 + int(MAX_DOWNTIME_S * FPS / STRIDE)
 
 
 @pytest.mark.parametrize(
     ("epochs", "boot"),
     [
-        (range(7, 9), 2),  # the camera began anew: its tracks are other people's
-        (range(LONG_AGO, LONG_AGO + 2), 1),  # too long ago
-        (range(2), 1),  # pulses began anew
+        (range(7, 9), 2),  # the camera restarted: its tracks are other people
+        (range(LONG_AFTER, LONG_AFTER + 2), 1),  # after a long downtime
+        (range(2), 1),  # pulses restarted
     ],
 )
 def test_no_number_or_name_is_assigned_that_may_be_another_persons(epochs: range, boot: int) -> None:
@@ -233,7 +231,7 @@ def test_a_late_snapshot_is_used() -> None:
     ann, b = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
-    assert site.service.state_replication.may_recover(b), "camera B may still come"
+    assert site.service.state_replication.may_recover(b), "camera B may still connect"
     site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
     assert [site.person_of(A, 2, 11), site.person_of(B, 3, 11)] == [ann, b]
@@ -245,7 +243,7 @@ def test_numbers_of_a_late_snapshot_that_may_be_reassigned_are_ignored() -> None
     site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
-    assert site.person_of(A, 1, 7) in before, "nobody had said that it was taken"
+    assert site.person_of(A, 1, 7) in before, "no snapshot listed it as used"
     site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(8, 12))
     assert site.person_of(B, 3, 11) > max(before)
@@ -285,7 +283,7 @@ def test_the_first_service_replicates_and_all_services_recover() -> None:
     assert site.service.decider.people.known
     site.start()
     site.track_epochs(range(7, 9))
-    assert site.service.decider.people.registry.names == {}, "the second one told nobody"
+    assert site.service.decider.people.registry.names == {}, "the second service sends no snapshots"
     first = tracked_site()
     first._changes = {"view": {"share": {"of": 2, "index": 1}}}
     ann = first.person_of(A, 2, 5)
@@ -308,7 +306,7 @@ def test_decisions_wait_for_the_snapshots_of_connected_cameras() -> None:
     clock, service = Clock(), FedService(small_config())
     replication = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     replication.begin(4)
-    assert not replication.is_waiting, "nobody is there"
+    assert not replication.is_waiting, "no camera is connected"
     replication.alive(KEYS.camera(A, "alive"), is_present=True)
     replication.alive(KEYS.camera("cellar", "alive"), is_present=True)
     replication.alive(KEYS.camera(B, "alive"), is_present=True)
@@ -317,13 +315,13 @@ def test_decisions_wait_for_the_snapshots_of_connected_cameras() -> None:
     assert replication.is_waiting
     replication.alive(KEYS.camera(A, "alive"), is_present=True)
     replication.alive(KEYS.camera(B, "alive"), is_present=False)
-    assert not replication.is_waiting, "a camera's token may come after its word"
+    assert not replication.is_waiting, "a snapshot may arrive before the liveliness token"
     replication.alive(KEYS.camera(B, "alive"), is_present=True)
     clock.now += SNAPSHOT_WAIT_S
-    assert not replication.is_waiting, "one that is frozen keeps nobody waiting for longer"
+    assert not replication.is_waiting, "a frozen camera is waited for only so long"
     replication.begin(9)
     replication.alive(KEYS.camera(A, "alive"), is_present=True)
-    assert not replication.is_waiting, "only at the beginning"
+    assert not replication.is_waiting, "only at the start"
 
 
 async def test_a_number_that_may_be_recovered_is_not_reported_as_unknown() -> None:
@@ -332,15 +330,15 @@ async def test_a_number_that_may_be_recovered_is_not_reported_as_unknown() -> No
     service = site.start()
     async with TestClient(TestServer(make_app(BestViewService(service)))) as client:
         path = f"/objects/{number}/best.mp4"
-        for asked in (path, f"/objects/{number}/hls/index.m3u8", f"/api/objects/{number}/choice"):
-            answer = await client.get(asked)
-            assert answer.status == 503, asked
+        for url in (path, f"/objects/{number}/hls/index.m3u8", f"/api/objects/{number}/choice"):
+            answer = await client.get(url)
+            assert answer.status == 503, url
             assert int(answer.headers["Retry-After"]) > 0
         site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
         assert (await client.get(path)).status == 503
         assert (await client.get("/objects/77/best.mp4")).status == 404
-        site.track_epochs([LONG_AGO], {A: {2: LARGE}, B: {}})
-        assert (await client.get(path)).status == 404, "they are not waited for for ever"
+        site.track_epochs([LONG_AFTER], {A: {2: LARGE}, B: {}})
+        assert (await client.get(path)).status == 404, "recovery has ended"
 
 
 NESTED = b'{"more": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
@@ -369,7 +367,7 @@ def test_a_snapshot_is_limited_in_size() -> None:
 
 
 numbers = st.integers(1, 8)
-known = st.builds(
+person_snapshots = st.builds(
     PersonSnapshot,
     number=numbers,
     tracks=st.lists(st.integers(0, 4), max_size=3),
@@ -377,24 +375,24 @@ known = st.builds(
     name=st.sampled_from(["", "Ann", "Bob"]),
     manual=st.booleans(),
 )
-remembered = st.builds(
+identity_snapshots = st.builds(
     IdentitySnapshot,
     pulse=st.integers(0, 60),
     boot=st.integers(1, 2),
     next_number=st.integers(1, 12),
     numbered_since=st.floats(0, 1e12),
-    people=st.lists(known, max_size=4),
+    people=st.lists(person_snapshots, max_size=4),
 )
 
 
 @settings(max_examples=40)
-@given(remembered, remembered)
+@given(identity_snapshots, identity_snapshots)
 def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
     one: IdentitySnapshot, other: IdentitySnapshot
 ) -> None:
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
-        people = [msgspec.structs.replace(them, manual=False) for them in retained.people]
+        people = [msgspec.structs.replace(person, manual=False) for person in retained.people]
         snapshot = msgspec.json.encode(msgspec.structs.replace(retained, people=people))
         site.cameras[camera].put(Message("", snapshot, b""))
     site.start()
@@ -403,7 +401,7 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
 
 
 @settings(max_examples=40)
-@given(remembered, remembered)
+@given(identity_snapshots, identity_snapshots)
 def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, other: IdentitySnapshot) -> None:
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
@@ -415,8 +413,8 @@ def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, othe
     assert set(people.registry.merged).isdisjoint(people.registry.all_numbers)
 
 
-def lying(site: Site, camera: str, **changes: object) -> None:
-    """Let a camera remember something else than what it was told."""
+def falsify_snapshot(site: Site, camera: str, **changes: object) -> None:
+    """Change the snapshot that a camera retains."""
     snapshot = msgspec.json.decode(site.cameras[camera]._state, type=IdentitySnapshot)
     site.cameras[camera].put(
         Message("", msgspec.json.encode(msgspec.structs.replace(snapshot, **changes)), b"")
@@ -431,15 +429,15 @@ def lying(site: Site, camera: str, **changes: object) -> None:
         {"people": [PersonSnapshot(number=5, tracks=[3], aliases=[PERSON_NUMBER_MAX])]},
     ],
 )
-@pytest.mark.parametrize("again", [False, True])
-def test_no_single_camera_can_raise_the_next_number_far(lie: dict[str, object], again: bool) -> None:
+@pytest.mark.parametrize("after_restart", [False, True])
+def test_no_single_camera_can_raise_the_next_number_far(lie: dict[str, object], after_restart: bool) -> None:
     site = tracked_site()
     ann = site.person_of(A, 2, 5)
-    if not again:
-        lying(site, B, **lie)
+    if not after_restart:
+        falsify_snapshot(site, B, **lie)
     site.start()
     site.track_epochs(range(7, 9))
-    lying(site, B, **lie)
+    falsify_snapshot(site, B, **lie)
     for _ in range(3):
         site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
@@ -452,33 +450,38 @@ def test_no_single_camera_can_raise_the_next_number_far(lie: dict[str, object], 
 def test_large_numbers_confirmed_by_two_cameras_continue() -> None:
     site = tracked_site()
     for camera in CAMERAS:
-        lying(site, camera, next_number=50_000_000 + len(camera))
+        falsify_snapshot(site, camera, next_number=50_000_000 + len(camera))
     site.start()
     site.track_epochs(range(7, 9))
     assert site.service.decider.people.next_number >= 50_000_000
 
 
 @given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))
-def test_a_single_cameras_first_free_number_is_bounded_by_the_others(others: list[int], lie: int) -> None:
-    most = max([trusted_first_free(others), SINGLE_CAMERA_NUMBER_MAX])
-    assert trusted_first_free([*others, lie]) <= max(most, max(others, default=0) + 10_000)
+def test_a_single_cameras_first_free_number_is_bounded_by_the_others(
+    other_numbers: list[int], lie: int
+) -> None:
+    most = max([trusted_first_free(other_numbers), SINGLE_CAMERA_NUMBER_MAX])
+    assert trusted_first_free([*other_numbers, lie]) <= max(most, max(other_numbers, default=0) + 10_000)
 
 
-def remembers(since: float, pulse: int = 90) -> IdentitySnapshot:
+def snapshot_since(since: float, pulse: int = 90) -> IdentitySnapshot:
     return IdentitySnapshot(pulse=pulse, boot=1, next_number=5, numbered_since=since, people=[])
 
 
 @pytest.mark.parametrize("lie", [0.0, 1e12])
 def test_no_single_camera_determines_when_numbering_began(lie: float) -> None:
-    snapshot = {"c0": remembers(lie), "c1": remembers(1000.0), "c2": remembers(1000.0)}
+    snapshot = {"c0": snapshot_since(lie), "c1": snapshot_since(1000.0), "c2": snapshot_since(1000.0)}
     assert StateRecovery(snapshot, 100, 50).numbered_since == 1000.0
 
 
 def test_of_two_numbering_times_the_later_counts() -> None:
-    assert StateRecovery({"c0": remembers(900.0), "c1": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
-    long_ago = {"c0": remembers(900.0, pulse=1), "c1": remembers(900.0, pulse=1)}
-    assert StateRecovery({**long_ago, "c2": remembers(1000.0)}, 100, 50).numbered_since == 1000.0
-    assert StateRecovery(long_ago, 100, 50).numbered_since == 900.0
+    assert (
+        StateRecovery({"c0": snapshot_since(900.0), "c1": snapshot_since(1000.0)}, 100, 50).numbered_since
+        == 1000.0
+    )
+    old_snapshots = {"c0": snapshot_since(900.0, pulse=1), "c1": snapshot_since(900.0, pulse=1)}
+    assert StateRecovery({**old_snapshots, "c2": snapshot_since(1000.0)}, 100, 50).numbered_since == 1000.0
+    assert StateRecovery(old_snapshots, 100, 50).numbered_since == 900.0
     assert StateRecovery({}, 100, 50).numbered_since == float("inf")
 
 

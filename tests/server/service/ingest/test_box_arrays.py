@@ -1,4 +1,4 @@
-"""Boxes read in one go are the boxes that were told."""
+"""Boxes are converted to arrays exactly."""
 
 from __future__ import annotations
 

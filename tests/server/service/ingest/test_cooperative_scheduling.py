@@ -1,4 +1,4 @@
-"""However much there is to decide, others have their turn; what is decided is the same."""
+"""Decisions yield to other tasks, and are the same."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
 
     service._step = slow  # type: ignore[method-assign]
     await service.decide_cooperatively()
-    assert decided[-1] == EPOCHS - 1, "it goes on with the newest"
+    assert decided[-1] == EPOCHS - 1, "it continues with the newest"
     assert service.skipped_epochs == EPOCHS - len(decided) > 0
     assert "do not catch up" in caplog.text
     assert service.aligner.waiting == 0

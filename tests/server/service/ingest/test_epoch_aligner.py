@@ -1,4 +1,4 @@
-"""Epochs come out in order, complete where they can be, and never wait for the dead."""
+"""Epochs are aligned in order, complete if possible, and without waiting for disconnected cameras."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_an_epoch_waits_for_every_connected_camera() -> None:
 
 
 @given(st.permutations([(camera, epoch) for camera in CAMERAS for epoch in range(4)]))
-def test_the_epochs_are_the_same_in_whatever_order_the_cameras_messages_mix(
+def test_epochs_do_not_depend_on_the_order_of_the_cameras_messages(
     order: list[tuple[str, int]],
 ) -> None:
     aligner = connected_aligner(*CAMERAS)
@@ -71,11 +71,11 @@ def test_a_late_camera_is_not_waited_for_until_it_is_in_time_again() -> None:
     assert aligner.ready(now=4 + GRACE) == []
     assert summary(aligner.ready(now=5 + GRACE)) == [(0, ("c0",), ("c1",))]
     aligner.add_tracks(window("c0", 1))
-    assert summary(aligner.ready(now=10)) == [(1, ("c0",), ())], "no waiting for the late one"
+    assert summary(aligner.ready(now=10)) == [(1, ("c0",), ())], "the late camera is not waited for"
     aligner.add_tracks(window("c1", 0))
     assert aligner.late_messages["c1"] == 1
     aligner.add_tracks(window("c1", 2))
-    assert aligner.ready(now=15) == [], "in time again: c0 is waited for as c1 would be"
+    assert aligner.ready(now=15) == [], "in time again, so c0 is waited for"
     aligner.add_tracks(window("c0", 2))
     assert summary(aligner.ready(now=15)) == [(2, ("c0", "c1"), ())]
 
@@ -128,8 +128,8 @@ def test_a_camera_whose_window_was_lost_is_not_waited_for_and_reported_as_late()
 FAR = 300
 
 
-def taken(aligner: EpochAligner, now: int, count: int) -> list[Epoch]:
-    """Take out the next epochs; with nobody to wait for there may be one for each of the last pulses."""
+def take_epochs(aligner: EpochAligner, now: int, count: int) -> list[Epoch]:
+    """Take out the next epochs, at most ``count``."""
     return [epoch for _ in range(count) if (epoch := aligner.next_ready(now)) is not None]
 
 
@@ -142,8 +142,8 @@ def test_long_past_epochs_without_windows_are_skipped_at_once() -> None:
     aligner.add_tracks(window("c0", 2))
     aligner.add_tracks(window("c1", 1_000_000))
     aligner.add_tracks(window("c0", 1_000_001, ended=True))
-    (leap,) = taken(aligner, 5_000_020, 2)
-    (after,) = taken(aligner, 5_000_021 + GRACE, 1)
+    (leap,) = take_epochs(aligner, 5_000_020, 2)
+    (after,) = take_epochs(aligner, 5_000_021 + GRACE, 1)
     assert summary([leap, after]) == [(1_000_000, ("c1",), ("c0",)), (1_000_001, ("c0",), ("c1",))]
     assert (leap.skipped, after.skipped) == (999_999, 0)
     assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 0}
@@ -163,12 +163,12 @@ def test_recent_epochs_and_those_with_windows_are_not_skipped() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []
-    one_by_one = (FAR - GRACE) // STRIDE
-    assert [epoch.number for epoch in aligner.ready(now=FAR)] == list(range(one_by_one))
-    aligner.add_tracks(window("c0", one_by_one))
-    (spoken,) = taken(aligner, 1000 * FAR, 2)
-    (leap,) = taken(aligner, 1000 * FAR + STRIDE + GRACE, 1)
-    assert (spoken.number, spoken.skipped) == (one_by_one, 0)
+    not_skipped = (FAR - GRACE) // STRIDE
+    assert [epoch.number for epoch in aligner.ready(now=FAR)] == list(range(not_skipped))
+    aligner.add_tracks(window("c0", not_skipped))
+    (reported,) = take_epochs(aligner, 1000 * FAR, 2)
+    (leap,) = take_epochs(aligner, 1000 * FAR + STRIDE + GRACE, 1)
+    assert (reported.number, reported.skipped) == (not_skipped, 0)
     assert leap.skipped
 
 
@@ -177,22 +177,22 @@ def test_windows_far_from_the_present_do_not_determine_the_first_epoch() -> None
     for camera, epoch in (("c0", 3), ("c1", 1_000_000), ("c2", 9_000_000)):
         aligner.frame_received(camera, 1, epoch * STRIDE)
         aligner.add_tracks(window(camera, epoch))
-    assert taken(aligner, 5_000_004, 1) == [], "c0 may still come to its senses"
-    assert summary(taken(aligner, 5_000_005 + GRACE, 1)) == [(1_000_000, ("c1",), ("c0",))]
+    assert take_epochs(aligner, 5_000_004, 1) == [], "c0 may still be right"
+    assert summary(take_epochs(aligner, 5_000_005 + GRACE, 1)) == [(1_000_000, ("c1",), ("c0",))]
     assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 1}
 
 
 def test_no_epoch_of_recordings_is_skipped() -> None:
     aligner = connected_aligner("c0")
     aligner.add_tracks(window("c0", 1000))
-    assert [epoch.number for epoch in taken(aligner, 10**9, 1001)] == list(range(1001))
+    assert [epoch.number for epoch in take_epochs(aligner, 10**9, 1001)] == list(range(1001))
 
 
 BEHIND = 50
 
 
 def test_cameras_that_are_all_behind_are_waited_for() -> None:
-    """As on a machine with too much to do: everybody speaks two seconds late."""
+    """On a busy machine all cameras are two seconds late."""
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, BEHIND)
     for camera in CAMERAS:
         aligner.camera_connected(camera)
@@ -216,7 +216,7 @@ def test_cameras_are_waited_for_no_longer_than_the_backlog_limit() -> None:
     assert summary(aligner.ready(now=5 + GRACE + BEHIND)) == [(0, (), ("c0",))]
     aligner.camera_disconnected("c0")
     assert aligner.ready(now=9 + GRACE) == []
-    assert summary(aligner.ready(now=10 + GRACE)) == [(1, (), ())], "nobody is there to be behind"
+    assert summary(aligner.ready(now=10 + GRACE)) == [(1, (), ())], "no camera is connected"
 
 
 def test_the_grace_period_begins_with_the_first_window() -> None:
@@ -234,7 +234,7 @@ def test_skipping_goes_to_the_newest_reported_epoch() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE)
     for camera in CAMERAS:
         aligner.camera_connected(camera)
-    for epoch in (0, 1, 2, 3, 4, 90):  # the last one is of a camera that has counted too far
+    for epoch in (0, 1, 2, 3, 4, 90):  # the last one is far ahead of the pulses
         for camera in CAMERAS:
             aligner.add_tracks(window(camera, epoch))
     now = end_of_epoch(4, STRIDE)

@@ -1,4 +1,4 @@
-"""What cameras send is taken in, or counted and dropped: nothing from outside raises."""
+"""The cameras' messages are accepted, or counted and dropped; none raises an error."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ KEYS = ZenohKeys("hall")
 
 
 class Hall:
-    """An ingest and what it fills."""
+    """An ingest with its buffers."""
 
     def __init__(self) -> None:
         stream_format = StreamFormat()

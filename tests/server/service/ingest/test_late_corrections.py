@@ -1,4 +1,4 @@
-"""Words that mend the past, and come too late for their own epochs, may come several at once."""
+"""Several revisions of the past may arrive late, in one epoch."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.service.ingest.epoch_aligner import Epoch
 LEFT: Box = (10.0, 20.0, 40.0, 110.0)
 RIGHT: Box = (100.0, 20.0, 130.0, 110.0)
 MENDED = STRIDE
-"""The first frame in which the camera had taken each for the other."""
+"""The first frame with exchanged identities."""
 
 
 def late_revision(epoch: int) -> CameraTracks:
@@ -37,4 +37,4 @@ def test_tracks_exchange_their_keys_once_however_many_late_revisions_report_it(l
     revisions = tuple(late_revision(epoch) for epoch in range(4, now))
     newest = {"c0": camera_tracks("c0", now, {1: RIGHT, 2: LEFT})}
     for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, late_revisions=revisions)):
-        assert window.keys == (right, left), "a name stays where it was: on the left, or on the right"
+        assert window.keys == (right, left), "keys stay on their sides"

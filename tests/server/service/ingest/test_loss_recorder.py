@@ -38,7 +38,7 @@ def test_a_spell_of_late_tracks_is_logged_when_it_begins_and_when_it_ends(
 ) -> None:
     caplog.set_level("INFO")
     lossy, minute = LossyEpochs(), round(60 * FPS / STRIDE)
-    for ten in range(0, 100, 10):  # some come in time in between
+    for ten in range(0, 100, 10):  # some arrive in time in between
         lossy.epochs(range(ten, ten + 4), late=B)
         lossy.epochs(range(ten + 4, ten + 10))
     lossy.epochs(range(100, 100 + minute))

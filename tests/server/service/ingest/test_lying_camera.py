@@ -1,4 +1,4 @@
-"""A camera that lies harms its own pictures: whatever it says, the other's people and streams go on."""
+"""Implausible messages of one camera do not affect the people and streams of another."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ KEYS = ZenohKeys("hall")
 LIAR, OTHER = CAMERAS
 EPOCHS = 8
 FAR = 500_000_000_000
-"""Half a million million: within what a pulse may be."""
+"""A pulse within the allowed range, far in the future."""
 LyingMessages = Callable[[int], Sequence[Message]]
-"""What the camera says at an epoch."""
+"""The messages that the camera sends at an epoch."""
 
 
 def frames(epoch: int, /, **changes: Any) -> list[Message]:
-    """Return an epoch's frames of the liar; their heads say something else."""
+    """Return an epoch's frames of the lying camera with changed headers."""
     sent = [video(LIAR, unit) for unit in encoded(0)[epoch * STRIDE : (epoch + 1) * STRIDE]]
     return [
         Message(
@@ -68,20 +68,22 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
 
 
 def altered_tracks(epoch: int, /, **changes: Any) -> list[Message]:
-    """Return its word on an epoch, as it is not."""
-    right = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))
-    return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(right | changes).encode(), b"")]
+    """Return its track message of an epoch with changed fields."""
+    fields = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))
+    return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(fields | changes).encode(), b"")]
 
 
-def of_one(epoch: int, /, **changes: Any) -> list[Message]:
+def altered_track(epoch: int, /, **changes: Any) -> list[Message]:
     (track,) = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))["tracks"]
     return altered_tracks(epoch, tracks=[track | changes])
 
 
-def very_many(epoch: int) -> list[Message]:
+def too_many_tracks(epoch: int) -> list[Message]:
     boxes = [SMALL] * STRIDE
-    many = [TrackMessage(id=number, boxes=[*boxes], confidence=1.0) for number in range(TRACKS_MAX + 1)]
-    return altered_tracks(epoch, tracks=msgspec.to_builtins(many))
+    track_messages = [
+        TrackMessage(id=number, boxes=[*boxes], confidence=1.0) for number in range(TRACKS_MAX + 1)
+    ]
+    return altered_tracks(epoch, tracks=msgspec.to_builtins(track_messages))
 
 
 SOLVED = {"objective": 1.0, "bound": 1.0, "gap": 0.0, "integral": True, "rounds": 1}
@@ -89,53 +91,56 @@ REFUSED: dict[str, LyingMessages] = {
     "frames far ahead": lambda epoch: frames(epoch, pulse=FAR + epoch),
     "frames of 2^53": lambda epoch: frames(epoch, pulse=2**53 + epoch),
     "frames of 2^63": lambda epoch: frames(epoch, pulse=2**63 + epoch),
-    "decoded by frames that are none": lambda epoch: frames(epoch, after=2**63),
-    "taken at no time": lambda epoch: frames(epoch, due=-1e308, taken=1e308),
+    "reference to an impossible frame": lambda epoch: frames(epoch, after=2**63),
+    "impossible capture time": lambda epoch: frames(epoch, due=-1e308, taken=1e308),
     "windows far ahead": lambda epoch: altered_tracks(
         epoch, epoch=FAR, first=FAR * STRIDE, last=FAR * STRIDE - 1, final_to=FAR * STRIDE - 1, tracks=[]
     ),
-    "final for ever": lambda epoch: altered_tracks(epoch, final_to=FAR),
+    "final far ahead": lambda epoch: altered_tracks(epoch, final_to=FAR),
     "final to 2^63": lambda epoch: altered_tracks(epoch, final_to=2**63, revised_from=epoch * STRIDE),
-    "not searched for ever": lambda epoch: altered_tracks(
+    "without detection far ahead": lambda epoch: altered_tracks(
         epoch, without_detection=list(range(FAR, FAR + 1000))
     ),
-    "shed in times to come": lambda epoch: altered_tracks(epoch, shed=[FAR]),
-    "alone in times to come": lambda epoch: altered_tracks(epoch, without_peers=[FAR]),
-    "solved at no time": lambda epoch: altered_tracks(epoch, solved_at=1e308),
-    "a gap without measure": lambda epoch: altered_tracks(epoch, solve=SOLVED | {"gap": 1e308}),
-    "sure without measure": lambda epoch: of_one(epoch, confidence=1e308),
-    "more people than there is room for": very_many,
-    "a status that no metric can say": lambda _: [status(LIAR, fps=1e308)],
-    "a clock that no metric can say": lambda _: [status(LIAR, clock_offset=-1e308)],
+    "shed far ahead": lambda epoch: altered_tracks(epoch, shed=[FAR]),
+    "without peers far ahead": lambda epoch: altered_tracks(epoch, without_peers=[FAR]),
+    "impossible solution time": lambda epoch: altered_tracks(epoch, solved_at=1e308),
+    "infinite gap": lambda epoch: altered_tracks(epoch, solve=SOLVED | {"gap": 1e308}),
+    "infinite confidence": lambda epoch: altered_track(epoch, confidence=1e308),
+    "too many tracks": too_many_tracks,
+    "infinite frame rate": lambda _: [status(LIAR, fps=1e308)],
+    "infinite clock offset": lambda _: [status(LIAR, clock_offset=-1e308)],
     "at pulse 10^18": lambda _: [status(LIAR, pulse=10**18)],
-    "in a state of a million letters": lambda _: [status(LIAR, state="x" * 10**6)],
-    "looks beyond all measure": lambda epoch: of_one(
+    "state of a million characters": lambda _: [status(LIAR, state="x" * 10**6)],
+    "infinite histogram": lambda epoch: altered_track(
         epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e308] * 8}]
     ),
-    "looks of very many colours": lambda epoch: of_one(
+    "histogram of too many colors": lambda epoch: altered_track(
         epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [0.1] * 10_000}]
     ),
-    "small pictures far ahead": lambda _: [thumbnail(LIAR, 1, b"jpeg", pulse=FAR)],
-    "small pictures that are none": lambda _: [thumbnail(LIAR, 1, bytes(10**6))],
+    "thumbnails far ahead": lambda _: [thumbnail(LIAR, 1, b"jpeg", pulse=FAR)],
+    "thumbnails that are too large": lambda _: [thumbnail(LIAR, 1, bytes(10**6))],
 }
-TAKEN: dict[str, LyingMessages] = {
+ACCEPTED: dict[str, LyingMessages] = {
     "nothing": lambda _: [],
-    "frames long past": lambda epoch: frames(epoch, pulse=epoch),
+    "frames of the past": lambda epoch: frames(epoch, pulse=epoch),
     "frames a minute ahead": lambda epoch: frames(epoch, pulse=1400 + epoch),
     "windows a minute ahead": lambda epoch: [
         track for ahead in range(40) for track in correct_tracks(epoch + ahead)
     ],
-    "another run each time": lambda epoch: [*frames(epoch, boot=epoch), *altered_tracks(epoch, boot=epoch)],
-    "ended, again and again": lambda epoch: [*frames(epoch), *altered_tracks(epoch, ended=True)],
+    "a new boot at every epoch": lambda epoch: [
+        *frames(epoch, boot=epoch),
+        *altered_tracks(epoch, boot=epoch),
+    ],
+    "ended at every epoch": lambda epoch: [*frames(epoch), *altered_tracks(epoch, ended=True)],
     "pictures of any size": lambda epoch: altered_tracks(epoch, size=[1 + epoch * 997, 1 + epoch * 31]),
-    "boxes as far as can be": lambda epoch: of_one(epoch, boxes=[[-1e6, -1e6, 1e6, 1e6]] * STRIDE),
-    "boxes of nothing": lambda epoch: of_one(epoch, boxes=[[1e6, 1e6, -1e6, -1e6]] * STRIDE),
-    "looks of any length": lambda epoch: of_one(
+    "largest boxes": lambda epoch: altered_track(epoch, boxes=[[-1e6, -1e6, 1e6, 1e6]] * STRIDE),
+    "inverted boxes": lambda epoch: altered_track(epoch, boxes=[[1e6, 1e6, -1e6, -1e6]] * STRIDE),
+    "histograms of changing length": lambda epoch: altered_track(
         epoch,
         appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e6] * (8 + epoch)}],
     ),
-    "tracks of any number": lambda epoch: of_one(epoch, id=2**62 - epoch),
-    "small pictures without end": lambda epoch: [
+    "changing track ids": lambda epoch: altered_track(epoch, id=2**62 - epoch),
+    "endless thumbnails": lambda epoch: [
         thumbnail(LIAR, epoch * 1000 + number, b"jpeg", pulse=epoch) for number in range(400)
     ],
 }
@@ -146,14 +151,14 @@ def correct_tracks(epoch: int) -> list[Message]:
 
 
 def deliver(service: FedService, message: Message) -> None:
-    what = message.key.split("/")[4]
+    kind = message.key.split("/")[4]
     ingest = service.ingest
     handlers = {"video": ingest.video, "tracks": ingest.tracks, "status": ingest.status}
-    handlers.get(what, ingest.thumbnail)(message)
+    handlers.get(kind, ingest.thumbnail)(message)
 
 
 class LyingSite:
-    """Both cameras send for a while, one of them lies, and all of it is decided."""
+    """Two cameras send some epochs, one of them implausible messages; all is decided."""
 
     def __init__(self, lying_messages: LyingMessages) -> None:
         self.service = service = FedService(small_config())
@@ -162,7 +167,7 @@ class LyingSite:
         service.connect_cameras(*CAMERAS)
         self._viewer = service.splicer.decided_cameras[OTHER].subscribe()
         self.shown: list[MediaChunk] = []
-        """What those are sent who watch the other camera."""
+        """The chunks sent to viewers of the other camera."""
         service.pulse = 0
         service.ingest.video(video(OTHER, encoded(1)[0]))
         for epoch in range(EPOCHS):
@@ -171,8 +176,8 @@ class LyingSite:
                 deliver(service, message)
             self._pass(end_of_epoch(epoch, STRIDE))
         self.last = end_of_epoch(EPOCHS - 2, STRIDE)
-        """The last pulse of which all that there is to look ahead to has come."""
-        # It may be waited for, but not for ever.
+        """The last pulse whose look-ahead is complete."""
+        # The lying camera is waited for only so long.
         self._pass(service.pulse + service.aligner._grace + service.aligner._backlog + 1)
 
     def _send(self, epoch: int) -> None:
@@ -192,7 +197,7 @@ class LyingSite:
 
 
 def check_reported_values(service: FedService) -> None:
-    """Ask for all that is told of cameras: numbers that are none would take it from everybody."""
+    """Check that diagnostics and metrics have only finite numbers."""
     facade = BestViewService(service)
     for camera in facade.cameras.diagnose_cameras():
         json.loads(msgspec.json.encode(camera), parse_constant=pytest.fail)
@@ -200,24 +205,24 @@ def check_reported_values(service: FedService) -> None:
         assert line.startswith("#") or line.rpartition(" ")[2] not in {"NaN", "+Inf", "-Inf"}, line
 
 
-@pytest.mark.parametrize("name", [*REFUSED, *TAKEN])
+@pytest.mark.parametrize("name", [*REFUSED, *ACCEPTED])
 async def test_implausible_messages_of_one_camera_do_not_affect_the_other(name: str) -> None:
-    lying_messages = (REFUSED | TAKEN)[name]
+    lying_messages = (REFUSED | ACCEPTED)[name]
     site = LyingSite(lying_messages)
     service, people = site.service, site.service.decider.people
     number = people.person_of(OTHER, 1, 7, site.last)
-    assert number is not None, "its person is somebody"
+    assert number is not None, "its person has a number"
     assert number < 20
     decisions = [decision for decision in site.decided if STRIDE <= decision.first <= site.last]
     assert [decision.first for decision in decisions] == list(range(STRIDE, site.last, GOP)), (
-        "all is decided, and in order"
+        "every GOP is decided in order"
     )
     assert all(decision.choices.get(number) in CAMERAS for decision in decisions), (
-        "they are shown all the time"
+        "the person is always shown"
     )
     sent = [picture.pulse for chunk in site.shown for picture in chunk.pictures]
     assert [pulse for pulse in sent if pulse <= site.last] == list(range(site.last + 1)), (
-        "and the stream goes on"
+        "the stream continues"
     )
     assert any(camera == OTHER for camera, *_ in service.ingest.thumbnails)
     states = service.ingest.states
@@ -228,7 +233,7 @@ async def test_implausible_messages_of_one_camera_do_not_affect_the_other(name: 
 
 
 def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
-    """Before the first pulse nobody can tell that a frame is far ahead."""
+    """Before the first pulse a frame far ahead cannot be recognized."""
     service = FedService(small_config())
     service.connect_cameras(*CAMERAS)
     service.ingest.video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
@@ -240,8 +245,8 @@ def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
     service.pulse = 2 * STRIDE - 1
     service.decide()
     assert service.aligner.all_ended
-    left = list(itertools.islice(service.finish(), 10))
-    assert left[-1].first + left[-1].frames == 2 * STRIDE
+    decisions = list(itertools.islice(service.finish(), 10))
+    assert decisions[-1].first + decisions[-1].frames == 2 * STRIDE
 
 
 def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
@@ -254,10 +259,10 @@ def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
     assert len(frame_buffer._frames) == 469
 
 
-def test_the_scripted_messages_here_are_like_a_cameras() -> None:
-    right = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
+def test_unaltered_scripted_messages_equal_a_cameras() -> None:
+    messages = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
     assert [msgspec.json.decode(frame.attachment) for frame in frames(0)] == [
-        msgspec.json.decode(message.attachment) for message in right
+        msgspec.json.decode(message.attachment) for message in messages
     ]
     assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == camera_tracks(
         LIAR, 1, {1: SMALL}

@@ -1,4 +1,4 @@
-"""A service that the present has left behind goes on with the present, and so does all that hangs on it."""
+"""A service that was suspended skips to the present, with its streams and recordings."""
 
 from __future__ import annotations
 
@@ -32,34 +32,36 @@ from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.media_chunk import MediaChunk
 
 HOUR = 3600 * FPS // STRIDE
-"""Epochs."""
+"""Epochs per hour."""
 ENCODED = 40 // STRIDE
-"""Epochs after which pictures are repeated, which begin with a key picture."""
+"""Epochs of encoded pictures; then they repeat, from a keyframe on."""
 BEFORE = 6
 
 
-def sent(service: FedService, epoch: int, *cameras: str) -> None:
-    """Send an epoch's frames and words of some cameras."""
+def send_epoch(service: FedService, epoch: int, *cameras: str) -> None:
+    """Send an epoch's frames and track messages of some cameras."""
     for seed, camera in enumerate(CAMERAS):
         if camera not in cameras:
             continue
-        again = epoch % ENCODED
-        for unit in encoded(seed)[again * STRIDE : (again + 1) * STRIDE]:
-            service.ingest.video(video(camera, replace(unit, pulse=unit.pulse + (epoch - again) * STRIDE)))
+        encoded_epoch = epoch % ENCODED
+        for unit in encoded(seed)[encoded_epoch * STRIDE : (encoded_epoch + 1) * STRIDE]:
+            service.ingest.video(
+                video(camera, replace(unit, pulse=unit.pulse + (epoch - encoded_epoch) * STRIDE))
+            )
         service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: LARGE if seed else SMALL})))
 
 
-def lived(service: FedService, epochs: range) -> None:
+def run_epochs(service: FedService, epochs: range) -> None:
     """Let all cameras send some epochs, and decide them."""
     for epoch in epochs:
         service.pulse = end_of_epoch(epoch, STRIDE)
-        sent(service, epoch, *CAMERAS)
+        send_epoch(service, epoch, *CAMERAS)
         service.decide()
 
 
 @pytest.fixture
 def service(tmp_path: Path) -> FedService:
-    """A service that records and writes decisions, and has lived for some epochs."""
+    """A service that records and writes decisions."""
     service = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
     service._decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
     service.recorder.open()
@@ -72,19 +74,17 @@ def test_a_service_that_was_suspended_skips_to_the_present(
     service: FedService, tmp_path: Path, hours: int
 ) -> None:
     decided = collect_decisions(service)
-    lived(service, range(BEFORE))
+    run_epochs(service, range(BEFORE))
     before = decided[-1].first + GOP
-    then = hours * HOUR
-    lived(service, range(then, then + BEFORE))
+    resumed = hours * HOUR
+    run_epochs(service, range(resumed, resumed + BEFORE))
     firsts = [decision.first for decision in decided]
-    assert firsts == [*range(0, before, GOP), *range(then * STRIDE, (then + BEFORE - 1) * STRIDE, GOP)]
-    assert all(decision.choices[0].camera == "c1" for decision in decided[-3:]), (
-        "all is known of what is of now"
-    )
+    assert firsts == [*range(0, before, GOP), *range(resumed * STRIDE, (resumed + BEFORE - 1) * STRIDE, GOP)]
+    assert all(decision.choices[0].camera == "c1" for decision in decided[-3:]), "the present is fully known"
     assert service.decision_state.end == decided[-1].first + GOP
     service.close()
     rows = (tmp_path / "late.csv").read_text(encoding="utf-8").splitlines()[1:]
-    assert f"{before + 1},,not decided up to {then * STRIDE}" in rows
+    assert f"{before + 1},,not decided up to {resumed * STRIDE}" in rows
     assert len(rows) < 50
     assert service.recorder.writer is not None
     assert (service.recorder.writer.written, service.recorder.writer.lost) == (len(decided), 0)
@@ -96,20 +96,20 @@ def test_a_service_that_was_suspended_skips_to_the_present(
 def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
     service: FedService, minutes: int
 ) -> None:
-    lived(service, range(BEFORE))
+    run_epochs(service, range(BEFORE))
     channels = [service.splicer.decided_cameras["c0"], *service.splicer.persons.values()]
     viewers = [channel.subscribe() for channel in channels]
-    until, then = service.decision_state.end, minutes * HOUR // 60 // ENCODED * ENCODED
-    lived(service, range(then, then + BEFORE))
+    until, resumed = service.decision_state.end, minutes * HOUR // 60 // ENCODED * ENCODED
+    run_epochs(service, range(resumed, resumed + BEFORE))
     for viewer in viewers:
-        footage = [chunk for chunk in viewer._queue if isinstance(chunk, MediaChunk) and chunk.until > until]
-        first, *more = [(chunk.first, chunk.until) for chunk in footage]
+        chunks = [chunk for chunk in viewer._queue if isinstance(chunk, MediaChunk) and chunk.until > until]
+        first, *more = [(chunk.first, chunk.until) for chunk in chunks]
         expected = [
-            (number, number + GOP) for number in range(then * STRIDE, service.decision_state.end, GOP)
+            (number, number + GOP) for number in range(resumed * STRIDE, service.decision_state.end, GOP)
         ]
         if minutes < 60:
-            assert first == (until, then * STRIDE)
-            assert len(footage[0].pictures) == 1
+            assert first == (until, resumed * STRIDE)
+            assert len(chunks[0].pictures) == 1
         else:
             assert first == expected.pop(0)
         assert more == expected
@@ -118,17 +118,17 @@ def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
 
 def test_a_backlog_of_a_minute_is_decided_epoch_by_epoch(service: FedService) -> None:
     decided = collect_decisions(service)
-    lived(service, range(BEFORE))
-    then = HOUR // 60
-    lived(service, range(then, then + BEFORE))
+    run_epochs(service, range(BEFORE))
+    resumed = HOUR // 60
+    run_epochs(service, range(resumed, resumed + BEFORE))
     assert [decision.first for decision in decided] == list(range(0, service.decision_state.end, GOP)), (
-        "nothing is left out"
+        "no epoch is skipped"
     )
     service.close()
 
 
-class Started(FedService):
-    """One that runs, and is told of pulses when the test says so."""
+class RunningService(FedService):
+    """A running service whose pulses come from the test."""
 
     def __init__(self) -> None:
         super().__init__(small_config())
@@ -140,33 +140,33 @@ class Started(FedService):
             self.pulse = await self.pulses.get()
             self._changed.set()
 
-    async def says(self, epoch: int, *cameras: str) -> None:
-        """Let cameras speak of an epoch, and the service do what it does then."""
-        sent(self, epoch, *cameras)
+    async def receive(self, epoch: int, *cameras: str) -> None:
+        """Send an epoch of some cameras, and let the service process it."""
+        send_epoch(self, epoch, *cameras)
         self._changed.set()
-        await self.does()
+        await self.process()
 
-    async def does(self) -> None:
-        """Let it do what it does."""
+    async def process(self) -> None:
+        """Let the service's tasks run."""
         for _ in range(50):
             await asyncio.sleep(0)
 
 
 @pytest.mark.parametrize("other", [3, 3000 * HOUR], ids=["behind", "ahead"])
 async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(other: int) -> None:
-    service, now = Started(), 720 * HOUR
+    service, now = RunningService(), 720 * HOUR
     decided = collect_decisions(service)
     running = asyncio.create_task(service.run())
-    await service.does()
-    await service.says(other, "c0")
-    await service.says(now, "c1")
-    assert service.aligner._next is None, "nobody knows yet what is now"
+    await service.process()
+    await service.receive(other, "c0")
+    await service.receive(now, "c1")
+    assert service.aligner._next is None, "the present is not known yet"
     service.pulses.put_nowait(end_of_epoch(now, STRIDE))
     for epoch in range(now + 1, now + 4):
-        sent(service, other + epoch - now, "c0")
-        await service.says(epoch, "c1")
+        send_epoch(service, other + epoch - now, "c0")
+        await service.receive(epoch, "c1")
         service.pulses.put_nowait(end_of_epoch(epoch, STRIDE))
-    await service.does()
+    await service.process()
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
     assert [decision.first for decision in decided[:2]] == [now * STRIDE, now * STRIDE + GOP]
@@ -175,11 +175,11 @@ async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(oth
 
 async def test_a_site_without_a_pulse_server_is_decided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.service.pipeline._FIRST_PULSE_S", 0.0)
-    service = Started()
+    service = RunningService()
     decided = collect_decisions(service)
     running = asyncio.create_task(service.run())
     for epoch in range(4):
-        await service.says(epoch, *CAMERAS)
+        await service.receive(epoch, *CAMERAS)
     assert [decision.first for decision in decided] == [0, GOP, 2 * GOP]
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
@@ -190,8 +190,8 @@ def test_a_suspended_cameras_gap_is_not_filled_with_hours_of_pictures() -> None:
     following = AudioFollower(AudioBuffer(AudioFormat(48_000, 2), FPS, 10.0))
     following.next_audio(0, FPS)
     hours = 8 * 3600 * FPS
-    heard = following.next_audio(hours, hours + FPS)
-    assert (heard.first, len(heard.frames)) == (
+    audio = following.next_audio(hours, hours + FPS)
+    assert (audio.first, len(audio.frames)) == (
         hours // FPS * 48_000 // SAMPLES,
         pytest.approx(47 / 2, abs=1),
     )

@@ -1,4 +1,4 @@
-"""What is measured of a camera is of its present run, of late, and by its own clock."""
+"""Camera metrics are recent, of the current run, and by the camera's own clock."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> N
 def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
     measured = CameraMetrics()
     said = camera_tracks("c0", 0, {1: SMALL}, solved_at=100.5)
-    measured.window(said)  # of a frame that did not come
+    measured.window(said)  # of a missed frame
     assert measured.tracking_delay is None
     measured.frame(head(said.last, 0.1))
     measured.window(said)
@@ -46,7 +46,7 @@ def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float 
     for gap in gaps:
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
         measured.window(msgspec.structs.replace(camera_tracks("c0", 0, {}), solve=solve))
-    measured.window(camera_tracks("c0", 1, {}))  # nobody there, nothing solved
+    measured.window(camera_tracks("c0", 1, {}))  # no detection, nothing solved
     assert (measured.optimal, measured.solved_windows) == (share, len(gaps))
 
 

@@ -1,4 +1,4 @@
-"""Where somebody points mends a camera's past, and numbers follow the people; a stream never goes back."""
+"""After an operator's position correction the numbers follow the right people."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ WIDTH, HEIGHT = 640, 360
 WINDOW = WindowSettings()
 ASSIST = InteractiveSettings(enabled=True)
 MET = 60
-"""The frame in which two who are dressed alike meet, and turn back."""
+"""The frame in which two people of the same appearance meet and turn back."""
 FRAMES = 150
 
 
 def places(frame: int) -> list[float]:
-    """Where the two are, left of their boxes: they come, meet, and go back where they came from."""
-    off = 4.0 * abs(frame - MET)
-    return [300.0 - off, 300.0 + off]
+    """Return the left edges of the boxes of two people who meet and turn back."""
+    distance = 4.0 * abs(frame - MET)
+    return [300.0 - distance, 300.0 + distance]
 
 
 def detections_in(frame: int) -> Detections:
     left = np.clip(np.array(places(frame)), 0, WIDTH - 40)
     boxes = np.stack([left, np.full(2, 100.0), left + 40.0, np.full(2, 220.0)], axis=1)
     if abs(frame - MET) < 6:
-        boxes = boxes[:1]  # one hides the other
-    looks = np.full((len(boxes), 4), 0.25)
-    return Detections(boxes, np.ones(len(boxes)), looks)
+        boxes = boxes[:1]  # one occludes the other
+    histograms = np.full((len(boxes), 4), 0.25)
+    return Detections(boxes, np.ones(len(boxes)), histograms)
 
 
 class Camera:
-    """One camera's tracker, and what it says."""
+    """One camera's tracker and its messages."""
 
     def __init__(self) -> None:
         solver = create_solver("columns")
@@ -57,18 +57,18 @@ class Camera:
 
 
 def at(people: PersonTracker, pulse: int) -> dict[int, float]:
-    """Return where everybody is shown, by number: the left side."""
+    """Return the left edge of each person's box, by number."""
     [rows] = people.boxes("c0", pulse, 1)
     return {number: left for number, left, *_ in rows}
 
 
-def played(
-    corrected_at: int, of: Sequence[int], *, late: bool = False, frames: int = FRAMES
+def run_meeting(
+    corrected_at: int, pulses: Sequence[int], *, late: bool = False, frames: int = FRAMES
 ) -> tuple[PersonTracker, dict[int, dict[int, float]]]:
-    """Let the two meet; say at a window's end where the first was in some frames.
+    """Simulate the meeting, with a correction at a window's end of the first person's positions.
 
     Returns:
-        Who is who, and by pulse who was shown where when that frame was told, 20 frames later.
+        The person tracker, and by pulse the published positions of people.
     """
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
     people.published.frames = ASSIST.memory_frames
@@ -77,9 +77,12 @@ def played(
     for frame in range(frames):
         marked: list[PositionCorrection] = []
         if frame == corrected_at:
-            [left] = [number for number, where in positions[20].items() if where < 300]
+            [left] = [number for number, edge in positions[20].items() if edge < 300]
             request = corrections_for_tracker(
-                people, "c0", left, [MarkedPosition(pulse, places(pulse)[0] + 20, 160, 10) for pulse in of]
+                people,
+                "c0",
+                left,
+                [MarkedPosition(pulse, places(pulse)[0] + 20, 160, 10) for pulse in pulses],
             )
             assert request is not None
             marked = [
@@ -91,7 +94,7 @@ def played(
         message = camera.take(frame, marked)
         if message is None:
             continue
-        assert (message.revised_from is not None) == bool(marked), "only then the past has changed"
+        assert (message.revised_from is not None) == bool(marked), "only corrections revise the past"
         missed = late and bool(marked)
         tracks, late_messages = {} if missed else {"c0": message}, tuple(pending)
         pending = [message] if missed else []
@@ -104,12 +107,12 @@ def played(
 
 
 def sides(positions: dict[int, dict[int, float]], pulse: int) -> list[int]:
-    """Return who is shown left and right."""
+    """Return the numbers from left to right."""
     return sorted(positions[pulse], key=positions[pulse].__getitem__)
 
 
 def test_similar_people_who_meet_and_turn_back_are_confused() -> None:
-    people, positions = played(corrected_at=-1, of=[])
+    people, positions = run_meeting(corrected_at=-1, pulses=[])
     assert sides(positions, 30) == list(reversed(sides(positions, 110)))
     assert people.take_corrections() == ()
 
@@ -117,26 +120,24 @@ def test_similar_people_who_meet_and_turn_back_are_confused() -> None:
 @pytest.mark.parametrize("late", [False, True], ids=["in time", "too late for its epoch"])
 @pytest.mark.parametrize("corrected_at", [84, 99, 124])
 def test_numbers_follow_a_correction_in_later_frames(corrected_at: int, *, late: bool) -> None:
-    people, positions = played(corrected_at, range(MET + 8, MET + 14), late=late)
+    people, positions = run_meeting(corrected_at, range(MET + 8, MET + 14), late=late)
     left, right = sides(positions, 30)
     behind = WINDOW.stride if late else 0
     if corrected_at - 20 > MET + 10:
-        assert sides(positions, corrected_at - 20 - WINDOW.stride) == [right, left], (
-            "what was told before stays"
-        )
+        assert sides(positions, corrected_at - 20 - WINDOW.stride) == [right, left], "published frames stay"
     for pulse in range(max(corrected_at - 19 + behind, MET + 10), FRAMES - 20):
         assert sides(positions, pulse) == [left, right]
-    splits, all_ = people.take_corrections(), (Split(left, right, "c0"), Split(right, left, "c0"))
-    assert splits == all_ or (splits == () and corrected_at == 84), (
-        "soon after, nobody was told to be anybody"
+    splits, expected = people.take_corrections(), (Split(left, right, "c0"), Split(right, left, "c0"))
+    assert splits == expected or (splits == () and corrected_at == 84), (
+        "soon after the meeting no wrong number was published"
     )
 
 
 @pytest.mark.parametrize("corrected_at", [249, 299])
 def test_numbers_follow_a_correction_of_the_distant_past(corrected_at: int) -> None:
-    """Of that time nobody is asked any more who was who; what was seen in it is remembered for as long."""
+    """The frames of the meeting are settled, but their tracks are still remembered."""
     frames = corrected_at + 51
-    people, positions = played(corrected_at, range(MET + 8, MET + 14), frames=frames)
+    people, positions = run_meeting(corrected_at, range(MET + 8, MET + 14), frames=frames)
     left, right = sides(positions, 30)
     assert sides(positions, corrected_at - 20 - WINDOW.stride) == [right, left]
     for pulse in range(corrected_at - 19, frames - 20):
@@ -145,12 +146,12 @@ def test_numbers_follow_a_correction_of_the_distant_past(corrected_at: int) -> N
 
 
 def test_points_after_a_correction_still_refer_to_the_same_person() -> None:
-    people, positions = played(99, range(MET + 8, MET + 14))
+    people, positions = run_meeting(99, range(MET + 8, MET + 14))
     left, right = sides(positions, 30)
     before, after = (people.published.of("c0", [left], pulse) for pulse in (40, 120))
     assert before is not None
     assert after is not None
-    assert before.track == after.track, "the tracker's own number stays with the person"
+    assert before.track == after.track, "the track id stays with the person"
     assert corrections_for_tracker(people, "c0", left, [MarkedPosition(-1, 0, 0, 1)]) is None
     assert corrections_for_tracker(people, "c0", 99, [MarkedPosition(120, 0, 0, 1)]) is None
     assert corrections_for_tracker(people, "c1", left, [MarkedPosition(120, 0, 0, 1)]) is None

@@ -1,4 +1,4 @@
-"""Flags are spent on what is likeliest to fail."""
+"""Flags are raised for the likeliest failures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SAME, OTHER, LATE = frozenset({1, 2}), frozenset({3, 4}), frozenset({5, 6})
 
 
 def raised(per_minute: int, risks: list[tuple[int, int, float]]) -> list[int]:
-    """Return when flags are raised for troubles of (pulse, who, risk)."""
+    """Return the pulses of raised flags for risks (pulse, person, risk)."""
     budget, flagged = FlagBudget(FlagSettings(per_minute=per_minute, risk=0.0), FPS), []
     for now, person, risk in risks:
         people = frozenset({2 * person, 2 * person + 1})
@@ -44,19 +44,19 @@ def test_flags_are_limited_by_the_rate_and_the_saved_budget(
 
 
 def test_of_many_risks_the_likeliest_failures_are_flagged() -> None:
-    """Thirty a minute, of which two are very risky: chance would find one in fifteen of these."""
+    """Thirty risks a minute, two of them high; random flags would hit one in fifteen."""
     rng = np.random.default_rng(3)
     risks = []
     for n in range(30 * 20):
-        bad = n % 15 == rng.integers(15)
-        risks.append((n * MINUTE // 30, n, 0.6 + 0.2 * rng.random() if bad else 0.3 * rng.random()))
+        is_high = n % 15 == rng.integers(15)
+        risks.append((n * MINUTE // 30, n, 0.6 + 0.2 * rng.random() if is_high else 0.3 * rng.random()))
     flags = set(raised(2, risks))
     risky = [now for now, _, risk in risks if risk >= 0.6 and now > 2 * MINUTE]
     assert sum(now in flags for now in risky) > 0.6 * len(risky)
 
 
 def test_a_lasting_risk_does_not_use_up_the_flags() -> None:
-    """For three hours two people are in little trouble; once a minute others are in much more."""
+    """Two people are at low risk for three hours; once a minute others are at high risk."""
     hours, risks, rng = 3, [], np.random.default_rng(5)
     for second in range(hours * 3600):
         risks.append((second * round(FPS), 0, 0.2))
@@ -75,7 +75,7 @@ def test_scaling_all_risks_changes_no_flags() -> None:
 
 
 def test_a_repeated_risk_counts_once() -> None:
-    """Else one long trouble would make everything else look rare."""
+    """Otherwise one long risk would make all others look rare."""
     budget = FlagBudget(FlagSettings(per_minute=1, risk=0.0), FPS)
     for now in range(0, 40, 5):
         budget.record_risk(now, SAME, 0.9)
@@ -83,7 +83,7 @@ def test_a_repeated_risk_counts_once() -> None:
     assert not budget.is_worth_flag(45, OTHER, 0.5)
     assert budget.is_worth_flag(45, SAME, 0.9)
     budget.record_risk(3 * MINUTE, LATE, 0.5)
-    assert budget.is_worth_flag(3 * MINUTE, LATE, 0.5), "one in the first minute leaves two for the others"
+    assert budget.is_worth_flag(3 * MINUTE, LATE, 0.5), "the budget is saved"
 
 
 def test_a_risk_below_the_threshold_is_never_flagged() -> None:

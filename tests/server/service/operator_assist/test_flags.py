@@ -1,4 +1,4 @@
-"""Flags: one for the same people, few and the most urgent, seen through to their end."""
+"""The flag queue: one flag for the same people, few and the most urgent, until answered or expired."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def risk_event(*objects: int, pulse: int, camera: str = "c0", risk: float = 0.5)
 
 
 class FlagRecorder:
-    """Flags, and what was told of them."""
+    """A flag queue and its published flags."""
 
     def __init__(self, per_minute: int = 2, answer_s: float = 2.0) -> None:
         self.flags = FlagQueue(FlagSettings(per_minute=per_minute, answer_s=answer_s), FPS)
@@ -44,7 +44,7 @@ def test_repeated_events_of_several_cameras_are_one_flag() -> None:
     [flag] = recorder.flags.open
     assert (flag.objects, flag.cameras, flag.state) == ([7, 9], ["c0", "c1"], "raised")
     assert [flag.cameras for flag in recorder.published] == [["c0"], ["c0", "c1"]], (
-        "a frame's difference is not told"
+        "a shift by one frame is not published"
     )
     assert recorder.flags.counts["raised"] == 1
 
@@ -59,7 +59,7 @@ def test_of_too_many_events_the_riskiest_are_flagged() -> None:
     )
     assert [flag.objects for flag in recorder.flags.open] == [[3, 4], [5, 6]]
     recorder.step(700, risk_event(1, 2, pulse=710, risk=0.95))
-    assert [flag.objects for flag in recorder.flags.open] == [], "there is one each half a minute"
+    assert [flag.objects for flag in recorder.flags.open] == [], "one every half minute"
     recorder.step(10 + 30 * 25, risk_event(1, 2, pulse=780, risk=0.95))
     assert [flag.objects for flag in recorder.flags.open] == [[1, 2]]
 
@@ -77,7 +77,7 @@ def test_a_flag_is_answered_once_the_failure_has_passed() -> None:
     recorder.step(10, risk_event(7, 9, pulse=40))
     assert recorder.flags.pointed(9, "c0", [30, 31]) == [1]
     assert recorder.flags.pointed(9, "c0", [40, 41]) == [1]
-    assert recorder.flags.pointed(9, "c1", [60]) == [], "which has not asked"
+    assert recorder.flags.pointed(9, "c1", [60]) == [], "not a camera of the flag"
     assert recorder.flags.open[0].state == "followed"
     assert recorder.flags.pointed(9, "c0", [49, 50]) == [1]
     assert recorder.states == [(1, "raised"), (1, "followed"), (1, "answered")]

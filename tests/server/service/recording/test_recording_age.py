@@ -68,9 +68,7 @@ def test_setting_the_clock_during_recording_neither_deletes_nor_delays_deletion(
     assert segments_on_disk(tmp_path) == list(range(20))
     clocks.now += KEEP_S - 10.5 * STEP_S
     records(store, clocks, range(20, 21))
-    assert segments_on_disk(tmp_path) == list(range(10, 21)), (
-        "ten have had their time, whatever the clock says"
-    )
+    assert segments_on_disk(tmp_path) == list(range(10, 21)), "ten have expired, despite the clock"
     store.close()
 
 
@@ -119,7 +117,7 @@ def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
     assert segments_on_disk(tmp_path) == list(range(18)), "as long as it is not synchronized"
     clocks.now += KEEP_S
     records(store, clocks, range(20, 21))
-    assert not set(range(8)) & set(segments_on_disk(tmp_path)), "but it is not kept for ever"
+    assert not set(range(8)) & set(segments_on_disk(tmp_path)), "but not kept forever"
     store.close()
 
 
@@ -203,7 +201,7 @@ def test_a_killed_service_continues_the_age_clock_from_its_last_segment(
 ) -> None:
     store = opened(tmp_path, clocks)
     records(store, clocks, range(10))
-    (tmp_path / ".lock").unlink()  # as if its process had ended without a word
+    (tmp_path / ".lock").unlink()  # as when its process is killed
     clocks.now += KEEP_S - 4.5 * STEP_S
     opened(tmp_path, clocks).close()
     assert segments_on_disk(tmp_path) == list(range(5, 10))
@@ -227,11 +225,9 @@ def test_a_machine_without_a_battery_clock_counts_time_off_once_synchronized(
     store = opened(tmp_path, clocks, bounds)
     clocks.now += TRIAL_S
     records(store, clocks, range(11, 12))
-    assert segments_on_disk(tmp_path) == [10, 11], (
-        "it was there for a week, as the clock says that is right now"
-    )
+    assert segments_on_disk(tmp_path) == [10, 11], "a week has passed by the synchronized clock"
     records(store, clocks, range(12, 14))
-    assert segments_on_disk(tmp_path) == [10, 11, 12, 13], "but for what was recorded since the machine is on"
+    assert segments_on_disk(tmp_path) == [10, 11, 12, 13], "except what was recorded since boot"
     store.close()
 
 

@@ -42,7 +42,7 @@ from server.service.time_shift.playback_audio import read_audio_frames
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 FORM = AudioFormat(48_000, 2)
-PATIENT = {"viewer_queue_gops": 100}  # with who reads slowly
+PATIENT = {"viewer_queue_gops": 100}  # with a slow reader
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ async def until_written(service: FedService, gops: int) -> None:
 
 
 def forget(service: FedService) -> None:
-    """Let nothing be in memory any more, but the last GOPs' pictures and sound."""
+    """Drop all but the last GOPs' pictures and audio from memory."""
     assert service.audio_buffer is not None
     service.recorder.recent._frames = GOP
     for number in list(service.audio_buffer._frames)[:-20]:
@@ -182,7 +182,7 @@ async def test_audio_that_was_deleted_or_not_recorded_is_silent(served: ServedSi
     assert not samples[(gone + 1) * 1920 + FRAME : (gone + 2 * GOP) * 1920 - 2 * FRAME].any()
     silent = {*range(round(30 * FRAME / 1920), round(60 * FRAME / 1920)), *range(gone, gone + 2 * GOP)}
     kept = [at for at in BEEP_TIMES if round(at * FPS) not in silent]
-    # The frame before what is gone has the beginning of a beep: frames of AAC overlap.
+    # The frame before the deleted part has the start of a beep: AAC frames overlap.
     assert [beep for beep in beeps(data) if abs(beep - gone / FPS) > MAX_AV_OFFSET_S] == pytest.approx(
         kept, abs=MAX_AV_OFFSET_S
     )

@@ -33,7 +33,7 @@ Harm = Callable[[Path, Path], None]
 """Damage to a folder and the session in it."""
 
 
-def gone(name: str) -> Harm:
+def removed(name: str) -> Harm:
     """Remove something below the folder: ``RUN`` stands for the session's folder."""
 
     def harm(folder: Path, session: Path) -> None:
@@ -43,10 +43,10 @@ def gone(name: str) -> Harm:
     return harm
 
 
-def made_a_file(name: str) -> Harm:
+def replaced_by_file(name: str) -> Harm:
     def harm(folder: Path, session: Path) -> None:
-        gone(name)(folder, session)
-        Path(str(folder / name).replace("RUN", session.name)).write_text("somebody's\n")
+        removed(name)(folder, session)
+        Path(str(folder / name).replace("RUN", session.name)).write_text("of another program\n")
 
     return harm
 
@@ -59,17 +59,17 @@ def moved(name: str) -> Harm:
     return harm
 
 
-def made_anew(name: str) -> Harm:
-    """Remove a folder and make an empty one: so looks one whose disk was unmounted."""
+def made_empty(name: str) -> Harm:
+    """Replace a folder by an empty one, as when its disk is unmounted."""
 
     def harm(folder: Path, session: Path) -> None:
-        gone(name)(folder, session)
+        removed(name)(folder, session)
         Path(str(folder / name).replace("RUN", session.name)).mkdir()
 
     return harm
 
 
-def cut_short(name: str) -> Harm:
+def truncated(name: str) -> Harm:
     def harm(folder: Path, session: Path) -> None:
         Path(str(folder / name).replace("RUN", session.name)).write_bytes(b"")
 
@@ -87,7 +87,7 @@ FILES = [
 ]
 
 
-def records(store: RecordingFolder, gops: range) -> None:
+def write_gops(store: RecordingFolder, gops: range) -> None:
     for gop in gops:
         try:
             store.write(gop_record(gop, {1: A, 2: B}), session_info(), InitSegments(filled_buffers()[1]))
@@ -95,13 +95,13 @@ def records(store: RecordingFolder, gops: range) -> None:
             store.abandon()  # as the writer does
 
 
-def nothing_is_orphaned(folder: Path) -> None:
-    """Check that whatever is on the disk is known to a service that begins, which takes it away some day."""
+def check_no_orphaned_files(folder: Path) -> None:
+    """Check that all files on the disk are known after a restart, so that they will be deleted in time."""
     before = {path for path in folder.rglob("*") if path.is_file()}
     store = RecordingFolder(folder, UNLIMITED)
     store.open()
     store.close()
-    assert {path for path in folder.rglob("*") if path.is_file()} == before, "nothing had to be tidied up"
+    assert {path for path in folder.rglob("*") if path.is_file()} == before, "the restart deleted nothing"
     named = {
         file
         for session in store.earlier
@@ -118,12 +118,12 @@ def nothing_is_orphaned(folder: Path) -> None:
         for session in store.earlier
         for file in ("session.json", "cameras/init.mp4", "sound/init.mp4")
     }
-    strange = before - named - lists - fixed - {folder / ".lock", folder / "clock.json"}
-    assert {path for path in strange if path.read_bytes() != b"somebody's\n"} == set()
+    unknown = before - named - lists - fixed - {folder / ".lock", folder / "clock.json"}
+    assert {path for path in unknown if path.read_bytes() != b"of another program\n"} == set()
 
 
-def shown(folder: Path) -> list[int]:
-    """Play what is on the disk of camera c0: give its pulses."""
+def recorded_pulses(folder: Path) -> list[int]:
+    """Return the recorded pulses of camera c0, by playing its files."""
     store = RecordingFolder(folder, UNLIMITED)
     store.open()
     store.close()
@@ -134,12 +134,12 @@ def shown(folder: Path) -> list[int]:
 @pytest.mark.parametrize(
     "harm",
     [
-        *(pytest.param(gone(level), id=f"gone {level}") for level in [*LEVELS, *FILES]),
+        *(pytest.param(removed(level), id=f"removed {level}") for level in [*LEVELS, *FILES]),
         *(pytest.param(moved(level), id=f"moved {level}") for level in LEVELS),
-        *(pytest.param(made_anew(level), id=f"anew {level}") for level in LEVELS),
-        *(pytest.param(made_a_file(level), id=f"a file {level}") for level in LEVELS[1:]),
+        *(pytest.param(made_empty(level), id=f"emptied {level}") for level in LEVELS),
+        *(pytest.param(replaced_by_file(level), id=f"a file {level}") for level in LEVELS[1:]),
         *(
-            pytest.param(cut_short(file), id=f"short {file}")
+            pytest.param(truncated(file), id=f"truncated {file}")
             for file in ["RUN/cameras/c0.m3u8", "RUN/session.json"]
         ),
     ],
@@ -148,13 +148,13 @@ def test_recording_continues_at_once_and_leaves_no_orphaned_files(tmp_path: Path
     folder = tmp_path / "kept"
     store = RecordingFolder(folder, UNLIMITED)
     store.open()
-    records(store, range(3))
+    write_gops(store, range(3))
     assert store.session is not None
     harm(folder, store.session.folder)
-    records(store, range(3, 9))
+    write_gops(store, range(3, 9))
     store.close()
-    assert set(range(3 * GOP, 9 * GOP)) <= set(shown(folder)), "nothing is lost but what was taken away"
-    nothing_is_orphaned(folder)
+    assert set(range(3 * GOP, 9 * GOP)) <= set(recorded_pulses(folder)), "later GOPs are complete"
+    check_no_orphaned_files(folder)
 
 
 def test_recording_fails_cleanly_while_a_file_is_in_the_folders_place_and_then_continues(
@@ -163,52 +163,52 @@ def test_recording_fails_cleanly_while_a_file_is_in_the_folders_place_and_then_c
     folder = tmp_path / "kept"
     store = RecordingFolder(folder, UNLIMITED)
     store.open()
-    records(store, range(3))
+    write_gops(store, range(3))
     shutil.rmtree(folder)
-    folder.write_text("somebody's\n")
-    records(store, range(3, 6))
+    folder.write_text("of another program\n")
+    write_gops(store, range(3, 6))
     assert sorted(tmp_path.iterdir()) == [folder]
     folder.unlink()
-    records(store, range(6, 9))
+    write_gops(store, range(6, 9))
     store.close()
-    assert shown(folder) == list(range(6 * GOP, 9 * GOP))
-    nothing_is_orphaned(folder)
+    assert recorded_pulses(folder) == list(range(6 * GOP, 9 * GOP))
+    check_no_orphaned_files(folder)
 
 
 def test_a_disk_that_is_mounted_again_is_recorded_to_and_its_sessions_are_known(tmp_path: Path) -> None:
     folder, away = tmp_path / "kept", tmp_path / "unmounted"
     store = RecordingFolder(folder, UNLIMITED)
     store.open()
-    records(store, range(3))
+    write_gops(store, range(3))
     folder.rename(away)
-    records(store, range(3, 6))
+    write_gops(store, range(3, 6))
     assert store.session is not None
     assert store.earlier == []
     shutil.rmtree(folder)
     away.rename(folder)
-    records(store, range(6, 9))
+    write_gops(store, range(6, 9))
     (earlier,) = store.earlier
     assert [(entry.first, entry.end) for entry in earlier.objects[1].index.all] == [(0, 3 * GOP)]
     store.close()
-    assert shown(folder) == [*range(3 * GOP), *range(6 * GOP, 9 * GOP)]
-    nothing_is_orphaned(folder)
+    assert recorded_pulses(folder) == [*range(3 * GOP), *range(6 * GOP, 9 * GOP)]
+    check_no_orphaned_files(folder)
 
 
 def test_a_folder_that_another_process_locked_meanwhile_is_left_to_it(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
     store, other = RecordingFolder(folder, UNLIMITED), RecordingFolder(folder, UNLIMITED)
     store.open()
-    records(store, range(3))
+    write_gops(store, range(3))
     shutil.rmtree(folder)
     other.open()
-    records(other, range(3))
+    write_gops(other, range(3))
     with pytest.raises(BlockingIOError, match="another process records there"):
         store.write(gop_record(3, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     store.abandon()
     other.close()
-    records(store, range(4, 6))
+    write_gops(store, range(4, 6))
     store.close()
-    assert shown(folder) == [*range(3 * GOP), *range(4 * GOP, 6 * GOP)]
+    assert recorded_pulses(folder) == [*range(3 * GOP), *range(4 * GOP, 6 * GOP)]
 
 
 @pytest.mark.parametrize("closed", [".", "RUN", "RUN/cameras", "RUN/cameras/c0", "RUN/index", "RUN/objects"])
@@ -217,19 +217,19 @@ def test_recording_fails_cleanly_without_permission_and_then_continues(closed: s
         folder = tmp_path / "kept"
         store = RecordingFolder(folder, RetentionLimits(1e6, 1e6, 2 * GOP / FPS))
         store.open()
-        records(store, range(3))
+        write_gops(store, range(3))
         assert store.session is not None
         path = Path(str(folder / closed).replace("RUN", store.session.folder.name))
         path.chmod(0o500)
-        records(store, range(3, 8))
+        write_gops(store, range(3, 8))
         path.chmod(0o700)
-        records(store, range(8, 10))
+        write_gops(store, range(8, 10))
         store.close()
-        recorded = shown(folder)
+        recorded = recorded_pulses(folder)
         assert set(recorded) >= {*range(3 * GOP), *range(8 * GOP, 10 * GOP)}
         if closed != ".":
-            assert set(recorded) == set(range(10 * GOP)), "it went on in a new folder meanwhile"
-        nothing_is_orphaned(folder)
+            assert set(recorded) == set(range(10 * GOP)), "it continued in a new folder"
+        check_no_orphaned_files(folder)
 
 
 def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
@@ -238,14 +238,14 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
     with unprivileged_folder() as tmp_path:
         first = RecordingFolder(tmp_path, UNLIMITED)
         first.open()
-        records(first, range(12))
+        write_gops(first, range(12))
         first.close()
         closed = [path for path in tmp_path.rglob("*") if path.is_dir()]
         for file in closed:
             file.chmod(0o500)
         store = RecordingFolder(tmp_path, RetentionLimits(1e-9, 1e6, 1.0))
         store.open()
-        records(store, range(20, 24))
+        write_gops(store, range(20, 24))
         for file in closed:
             file.chmod(0o700)
         assert store.session is not None
@@ -259,16 +259,16 @@ def test_old_recordings_that_cannot_be_deleted_do_not_stop_the_recording(
 def test_a_full_disk_leaves_no_files_at_any_try_and_then_recording_continues(tmp_path: Path) -> None:
     store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
-    records(store, range(3))
+    write_gops(store, range(3))
     before = {path for path in tmp_path.rglob("*") if path.is_file()}
     for size in (0, 100, len(filled_buffers()[1]) + 100):
         with files_of_at_most(size):
-            records(store, range(5, 8))
+            write_gops(store, range(5, 8))
         assert {path for path in tmp_path.rglob("*") if path.is_file()} == before
-    records(store, range(8, 10))
+    write_gops(store, range(8, 10))
     store.close()
-    assert shown(tmp_path) == [*range(3 * GOP), *range(8 * GOP, 10 * GOP)]
-    nothing_is_orphaned(tmp_path)
+    assert recorded_pulses(tmp_path) == [*range(3 * GOP), *range(8 * GOP, 10 * GOP)]
+    check_no_orphaned_files(tmp_path)
 
 
 def test_remains_without_media_are_removed_and_media_without_session_info_are_logged(
@@ -277,8 +277,8 @@ def test_remains_without_media_are_removed_and_media_without_session_info_are_lo
     RecordingSession.create(tmp_path / "20260101T000000Z", session_info(), InitSegments(b"x"), 1.0)
     (tmp_path / "20260101T000000Z" / "session.json").unlink()
     media = tmp_path / "20260102T000000Z" / "cameras" / "c0" / "000000000000.mp4"
-    mine = tmp_path / "holiday" / "notes.txt"
-    for folder in (media, mine):
+    foreign = tmp_path / "holiday" / "notes.txt"
+    for folder in (media, foreign):
         folder.parent.mkdir(parents=True)
         folder.write_bytes(b"")
     store = RecordingFolder(tmp_path, UNLIMITED)
@@ -286,22 +286,22 @@ def test_remains_without_media_are_removed_and_media_without_session_info_are_lo
     store.close()
     assert not (tmp_path / "20260101T000000Z").exists()
     assert media.exists()
-    assert mine.exists()
+    assert foreign.exists()
     assert "20260102T000000Z has no session.json" in caplog.text
 
 
 def test_a_session_without_decision_files_stays_and_ages(tmp_path: Path) -> None:
     store = RecordingFolder(tmp_path, UNLIMITED)
     store.open()
-    records(store, range(12))
+    write_gops(store, range(12))
     store.close()
     assert store.session is not None
     shutil.rmtree(store.session.folder / "index")
-    again = RecordingFolder(tmp_path, UNLIMITED)
-    again.open()
-    again.close()
-    assert [segment.first for segment in again.earlier[0].segments] == [0, 25, 50]
-    assert set(shown(tmp_path)) == set(range(12 * GOP))
+    restarted = RecordingFolder(tmp_path, UNLIMITED)
+    restarted.open()
+    restarted.close()
+    assert [segment.first for segment in restarted.earlier[0].segments] == [0, 25, 50]
+    assert set(recorded_pulses(tmp_path)) == set(range(12 * GOP))
 
 
 def test_starting_a_new_session_folder_is_logged_once(
@@ -310,7 +310,7 @@ def test_starting_a_new_session_folder_is_logged_once(
     store = RecordingFolder(tmp_path / "kept", UNLIMITED)
     store.open()
     for gop in range(20):
-        records(store, range(gop, gop + 1))
+        write_gops(store, range(gop, gop + 1))
         assert store.session is not None
         shutil.rmtree(store.session.folder / "cameras" / "c0")
     store.close()
@@ -322,13 +322,13 @@ def test_starting_a_new_session_folder_is_logged_once(
 @pytest.fixture
 async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Person 1 is in c0 for six GOPs, of which only the last is in memory."""
-    async for site_served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        await shows(site_served)
-        yield site_served
+    async for site in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
+        await record_gops(site)
+        yield site
 
 
-async def shows(served: ServedSite) -> None:
-    """Let six GOPs of person 1 be recorded."""
+async def record_gops(served: ServedSite) -> None:
+    """Record six GOPs of person 1."""
     served.service.recorder.recent._frames = GOP
     served.service.recorder.open()
     served.service.connect_cameras(*CAMERAS)
@@ -339,7 +339,7 @@ async def shows(served: ServedSite) -> None:
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    while not condition():  # noqa: ASYNC110 — of what another thread does
+    while not condition():  # noqa: ASYNC110 — another thread writes
         await asyncio.sleep(0.001)
 
 
@@ -348,17 +348,19 @@ def written(served: ServedSite) -> int:
     return served.service.recorder.writer.written
 
 
-async def asked(served: ServedSite, path: str) -> tuple[int, bytes]:
+async def fetch(served: ServedSite, path: str) -> tuple[int, bytes]:
     async with served.session.get(path) as answer:
         return answer.status, await answer.read()
 
 
-@pytest.mark.parametrize("harm", [gone("."), gone("RUN"), moved("."), made_anew("RUN"), made_a_file("RUN")])
+@pytest.mark.parametrize(
+    "harm", [removed("."), removed("RUN"), moved("."), made_empty("RUN"), replaced_by_file("RUN")]
+)
 async def test_lost_recordings_are_not_offered(served: ServedSite, harm: Harm) -> None:
     store = served.service.recorder.folder
     assert store is not None
     assert store.session is not None
-    assert (await asked(served, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
+    assert (await fetch(served, "/objects/1/best.mp4?from=p0&to=p10"))[0] == 200
     harm(store.folder, store.session.folder)
     for path in (
         "/objects/1/best.mp4?from=p0&to=p10",
@@ -368,13 +370,13 @@ async def test_lost_recordings_are_not_offered(served: ServedSite, harm: Harm) -
         "/cameras/c0/hls/index.m3u8?from=p0&to=p10",
         "/api/past?from=p0&to=p10",
     ):
-        status, body = await asked(served, path)
+        status, body = await fetch(served, path)
         assert status == 416, path
         assert b"recorded from" in body
         assert body.count(b"\n") == 0
     for path in ("/api/objects/1/past", "/api/cameras/c0/past"):
         spans = (await served.get_json(path))["spans"]
-        assert [span["first"] for span in spans] == [spans[0]["first"]], "what is in memory"
+        assert [span["first"] for span in spans] == [spans[0]["first"]], "only frames in memory"
         assert spans[0]["first"] >= 4 * GOP, path
 
 
@@ -387,7 +389,7 @@ async def test_lost_recordings_are_not_offered(served: ServedSite, harm: Harm) -
         ("/objects/1/hls/0.m4s", 404, "no segment 0: expired, or not available yet"),
     ],
 )  # fmt: skip
-async def test_a_person_known_only_from_lost_recordings_is_gone_with_them(
+async def test_a_person_known_only_from_lost_recordings_is_unknown(
     served: ServedSite, path: str, status: int, error: str
 ) -> None:
     store = served.service.recorder.folder
@@ -410,7 +412,7 @@ async def test_a_lost_segment_is_a_gap(served: ServedSite) -> None:
     spans = (await served.get_json("/api/cameras/c0/past"))["spans"]
     assert [span["first"] for span in spans] == [4 * GOP]
     assert [span["first"] for span in (await served.get_json("/api/cameras/c1/past"))["spans"]] == [0]
-    status, body = await asked(served, "/cameras/c0/live.mp4?from=p0&to=p30")
+    status, body = await fetch(served, "/cameras/c0/live.mp4?from=p0&to=p30")
     assert status == 200
     assert len(body) > 1000
 
@@ -418,7 +420,7 @@ async def test_a_lost_segment_is_a_gap(served: ServedSite) -> None:
 async def test_requests_for_unreadable_recordings_are_answered_with_an_error() -> None:
     with unprivileged_folder() as tmp_path:
         async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-            await shows(served)
+            await record_gops(served)
             store = served.service.recorder.folder
             assert store is not None
             assert store.session is not None
@@ -427,27 +429,27 @@ async def test_requests_for_unreadable_recordings_are_answered_with_an_error() -
             assert await served.get("/cameras/c0/live.mp4?from=p0&to=p10") == (503, error)
             assert await served.get("/api/cameras/c0/past") == (503, error)
             (store.session.folder / "cameras" / "c0").chmod(0o700)
-            assert (await asked(served, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
+            assert (await fetch(served, "/cameras/c0/live.mp4?from=p0&to=p10"))[0] == 200
 
 
-async def test_that_recording_stops_and_that_it_continues_is_reported(served: ServedSite) -> None:
+async def test_stopped_and_resumed_recording_is_reported(served: ServedSite) -> None:
     store, writer = served.service.recorder.folder, served.service.recorder.writer
     assert store is not None
     assert writer is not None
     writer._retry_s = 0.0
     shutil.rmtree(store.folder)
-    store.folder.write_text("somebody's\n")
+    store.folder.write_text("of another program\n")
     served.service.feed(7, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: writer.lost == 1)
-    assert b"myview_recording 0.0" in (await asked(served, "/metrics"))[1]
+    assert b"myview_recording 0.0" in (await fetch(served, "/metrics"))[1]
     served.service.pulse = served.service.decision_state.end
     served.service._pulse_received_at = asyncio.get_running_loop().time()
-    assert await asked(served, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
+    assert await fetch(served, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
     store.folder.unlink()
     served.service.feed(8, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: written(served) == 7)
-    assert b"myview_recording 1.0" in (await asked(served, "/metrics"))[1]
-    assert await asked(served, "/readyz") == (200, b"2 of 2 cameras\n")
-    status, body = await asked(served, f"/objects/1/best.mp4?from=p{7 * GOP}&to=p{8 * GOP}")
+    assert b"myview_recording 1.0" in (await fetch(served, "/metrics"))[1]
+    assert await fetch(served, "/readyz") == (200, b"2 of 2 cameras\n")
+    status, body = await fetch(served, f"/objects/1/best.mp4?from=p{7 * GOP}&to=p{8 * GOP}")
     assert status == 200
     assert body

@@ -52,7 +52,7 @@ def leave(store: RecordingFolder) -> None:
 
 
 def refused(store: RecordingFolder, clock: ManualClocks, gop: int) -> None:
-    """Try to write a GOP on a disk that takes not a byte; it is given up, as the writer does."""
+    """Try to write a GOP on a full disk; abandon it as the writer does."""
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         record(store, clock, range(gop, gop + 1))
     store.abandon()
@@ -84,7 +84,7 @@ def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: Manu
     refused(store, clock, 27)
     session = store.session
     assert session is not None
-    assert on_disk(tmp_path) == [50, 75], "those before ended more than three seconds ago"
+    assert on_disk(tmp_path) == [50, 75], "earlier ones have expired"
     assert [segment.first for segment in session.segments if segment.bytes] == [50, 75]
     assert files_in(session) == {50, 75}
     assert files_in_playlists(session) == {0, 25, 50, 75}, "the playlists could not be written"
@@ -156,7 +156,7 @@ def test_files_that_cannot_be_deleted_are_not_forgotten(
         record(store, clock, range(27, 28))
     assert on_disk(tmp_path) == [0, 50, 75, 135], "and it is recorded all the same"
     assert [segment.first for segment in session.segments] == [0, 50, 75, 135]
-    assert files_in(session) == {50, 75, 135}, "its pictures are not played any more"
+    assert files_in(session) == {50, 75, 135}, "its pictures are no longer played"
     assert f"{session.paths.camera_file(A, 0)}: Operation not permitted" in caplog.text
     record(store, clock, range(33, 34))
     assert on_disk(tmp_path) == [75, 135, 165]
@@ -186,7 +186,7 @@ def test_a_playlist_that_could_not_be_written_stays_stale(tmp_path: Path, clock:
         playlist.rewrite()
     assert playlist.is_stale
     playlist.append(IndexEntry(A, 50, 9_999, 10, 100, 5))
-    assert playlist.is_stale, "what was added stands behind what is gone"
+    assert playlist.is_stale, "new entries follow the dropped ones"
     playlist.rewrite()
     assert not playlist.is_stale
     store.close()

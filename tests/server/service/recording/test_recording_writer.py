@@ -120,7 +120,7 @@ def test_a_disk_that_is_full_repeatedly_is_not_logged_each_time(
 
 
 def until(condition: Callable[[], bool]) -> None:
-    """Wait for what the writer's thread does."""
+    """Wait for the writer's thread."""
     while not condition():
         threading.Event().wait(0.001)
 

@@ -68,7 +68,7 @@ def decide(service: FedService, gop: int, camera: str | None) -> None:
 async def watched(
     served: ServedSite, recording: Path, ways: list[str], lost: frozenset[int] = frozenset()
 ) -> list[bytes]:
-    """Show the recording's pictures as either camera in turn; give what is received on these ways."""
+    """Show the recording's pictures as alternating cameras; return the streams of these paths."""
     service = served.service
     service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:

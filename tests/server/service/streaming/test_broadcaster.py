@@ -98,7 +98,7 @@ async def test_chunks_keep_their_order_whether_sent_directly_or_queued(
     async def send() -> None:
         async for data in viewer:
             sent.append(data)
-            await asyncio.sleep(0)  # what is put now has to wait, although nothing else does
+            await asyncio.sleep(0)  # the next chunk is queued although the queue is empty
 
     viewer.direct_send = send_directly
     sending = asyncio.create_task(send())

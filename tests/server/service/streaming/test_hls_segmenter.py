@@ -160,7 +160,7 @@ def test_every_segment_decodes_by_itself_and_together_they_have_no_gap(
 def check(
     pictures: list[tuple[float, float, NDArray[np.uint8]]], shown: list[NDArray[np.uint8]], first: int
 ) -> None:
-    """Compare with what is to be shown at every pulse; a picture of a tick or two is not seen."""
+    """Compare the shown pictures with the expected ones; pictures of one or two ticks are ignored."""
     assert pictures[0][0] == pytest.approx(first)
     for (_, until, _), (begin, _, _) in pairwise(pictures):
         assert until == pytest.approx(begin), "no gap"

@@ -179,7 +179,7 @@ async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> N
     splicer.close()
     pictures = shown(head, await received(viewer))
     assert [picture.pulse for picture in pictures] == list(range(13 * GOP - 2 * FPS)), (
-        "what comes late is not shown"
+        "late pictures are not shown"
     )
     for picture in pictures[GOP + 2 :]:
         np.testing.assert_array_equal(picture.picture, alone(units)[GOP + 1])

@@ -89,7 +89,7 @@ async def read(served: ServedSite, path: str) -> list[tuple[int, Picture]]:
 
 
 async def read_up_to(served: ServedSite, path: str, pulse: int, then: int) -> list[tuple[int, Picture]]:
-    """Read a stream; when a pulse has come, feed one more epoch, and read that too."""
+    """Read a stream up to a pulse, then feed one more epoch and read the rest."""
     data, fed = b"", False
     async with served.session.get(path) as answer:
         while True:
@@ -376,7 +376,7 @@ async def test_a_person_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path,
     stream_format, header = site_of(store)
     stream = TimeShiftStream(
         source, GaplessTimeline(stream_format, FPS, GOP), FPS, Broadcaster
-    )  # in which nothing comes
+    )  # without a GOP
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, end))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
 
@@ -394,7 +394,7 @@ async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(t
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: broadcaster)
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))
-    assert len(fragments(data)) == 2 * GOP, "and nothing that lasts up to then"
+    assert len(fragments(data)) == 2 * GOP, "no picture that lasts until then"
 
 
 async def test_a_few_seconds_are_sent_at_once_and_the_rest_in_real_time(
@@ -455,7 +455,7 @@ async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbe
     folder, since = tmp_path / "kept", PULSE0 - 9.0
     store = RecordingFolder(folder, UNLIMITED)
     written_folder(store, [gop_record(gop, {}) for gop in range(1)])
-    for gop in range(1, 4):  # numbers began when the first camera came
+    for gop in range(1, 4):  # numbering began with the first camera
         store.write(
             gop_record(gop, {1: A}), session_info(numbers_since=since), InitSegments(filled_buffers()[1])
         )

@@ -1,4 +1,4 @@
-"""Who is shown by which camera: bigger boxes win, cuts wait for GOPs, what is not there is not chosen."""
+"""View selection: larger boxes win, cuts are at GOP starts, missing frames are not selected."""
 
 from __future__ import annotations
 

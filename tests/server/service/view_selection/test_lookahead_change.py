@@ -1,4 +1,4 @@
-"""A look-ahead that is changed while the service runs: no stream has a hole, nothing is decided too soon."""
+"""A change of the look-ahead at run time: no stream has a gap, no GOP is decided too early."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_every_gop_is_decided_once_in_order_with_known_frames(
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
         epoch = epoch_of(number, camera_tracks(A, number, {1: one}), camera_tracks(B, number, {1: other}))
         new = decider.step(epoch)
-        assert len(new) <= -(-STRIDE // gop) + 1, "who watches is not overrun"
+        assert len(new) <= -(-STRIDE // gop) + 1, "viewers lose nothing"
         for decision in new:
             assert decision.reasons.of(1).frames == decider.view.lookahead
             assert decision.first + decider.view.lookahead - 1 <= epoch.last

@@ -1,4 +1,4 @@
-"""Who is not found by a camera, but stands before it as another knows, may still be shown by it."""
+"""A person whom one camera misses may still be shown by it if another camera locates them."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 A, B = CAMERAS
 GROUND = {A: np.eye(3), B: np.diag([0.5, 0.5, 1.0])}
-"""Both look straight down, B from half as high: everybody is twice as large in it."""
-NOWHERE: dict[str, np.ndarray | None] = {A: np.eye(3), B: None}
+"""Both look straight down, B from half the height: people appear twice as large."""
+UNCALIBRATED: dict[str, np.ndarray | None] = {A: np.eye(3), B: None}
 CameraBoxes = Mapping[str, Mapping[int, Box | None]]
 
 
 def at(x: float, y: float, camera: str = A) -> Box:
-    """Return the box of somebody whose feet are at a place of A's picture."""
+    """Return the box of a person whose feet are at a point of A's picture."""
     scale = 1.0 if camera == A else 2.0
     return scale * (x - 2.0), scale * (y - 10.0), scale * (x + 2.0), scale * y
 
@@ -60,18 +60,18 @@ def shown(decisions: Sequence[GopDecision], number: int = 1) -> list[str | None]
 
 PLACE = 15.0, 20.0
 LOST = {3: at(26.0, 14.0)}
-"""Somebody whom B never finds where A sees them stand: it misses people, then."""
+"""A person whom B never detects: evidence that B misses people."""
 FOUND: CameraBoxes = {A: {1: at(*PLACE), **LOST}, B: {1: at(*PLACE, B)}}
 COVERED: CameraBoxes = {A: FOUND[A], B: {1: None, 2: at(17.0, 20.0, B)}}
-"""Somebody else's box is there."""
+"""Another person's box covers person 1 in B."""
 GONE: CameraBoxes = {A: FOUND[A], B: {1: None}}
 
 
 def test_a_person_missed_beside_another_is_still_shown_where_larger() -> None:
     story = [FOUND] * 20 + [COVERED] * 12
-    assert shown(decide(decider(undetected_weight=0.0), story))[-1] == A, "missed for longer than a moment"
+    assert shown(decide(decider(undetected_weight=0.0), story))[-1] == A, "missed for too long"
     assert shown(decide(decider(), story)) == [B] * 31
-    assert shown(decide(decider(NOWHERE), story))[-1] == A, "nobody knows where the other camera looks"
+    assert shown(decide(decider(UNCALIBRATED), story))[-1] == A, "without a homography the view is unknown"
 
 
 def test_without_any_box_the_person_is_assumed_occluded() -> None:
@@ -93,23 +93,23 @@ def test_no_view_is_inferred_where_a_camera_never_detects() -> None:
     assert shown(decide(decider(presence_decay_s=0.0), [FOUND] * 60 + learned[:12]))[-1] == B
 
 
-@pytest.mark.parametrize("speaks", [False, True], ids=["is silent", "sees nothing"])
-def test_nothing_is_learned_about_a_disconnected_camera(speaks: bool) -> None:
+@pytest.mark.parametrize("reports", [False, True], ids=["silent", "without detection"])
+def test_nothing_is_learned_about_a_disconnected_camera(reports: bool) -> None:
     view_decider = decider()
     decide(view_decider, [FOUND] * 20)
     trust = view_decider._cross_view_inference._detection_probability._cell_rate.copy()
     for number in range(20, 40):
-        away = camera_tracks(
+        empty = camera_tracks(
             B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)]
         )
-        view_decider.step(epoch_of(number, camera_tracks(A, number, FOUND[A]), *([away] if speaks else [])))
+        view_decider.step(epoch_of(number, camera_tracks(A, number, FOUND[A]), *([empty] if reports else [])))
     changed = np.abs(view_decider._cross_view_inference._detection_probability._cell_rate - trust)
-    assert changed.max() < 0.05, "but for forgetting"
+    assert changed.max() < 0.05, "only forgetting changes it"
 
 
 def test_a_person_outside_the_picture_is_not_expected_in_it() -> None:
-    there = {A: {1: at(*PLACE), 2: at(60.0, 40.0)}, B: {1: at(*PLACE, B)}}
-    decisions = decide(decider(), [there] * 20)
+    boxes = {A: {1: at(*PLACE), 2: at(60.0, 40.0)}, B: {1: at(*PLACE, B)}}
+    decisions = decide(decider(), [boxes] * 20)
     assert shown(decisions, 2) == [A] * 19
     assert decisions[-1].reasons.of(2).views[B].undetected == 0.0
 
@@ -120,27 +120,27 @@ def test_the_explanation_includes_undetected_views_and_their_quality() -> None:
     assert (why.views[A].seen, why.views[A].undetected) == (1.0, 0.0)
     assert (why.views[B].seen, why.views[B].undetected) == (0.0, 1.0)
     assert why.views[B].quality is None
-    alone = why.views[A].quality
-    worth = why.views[B].undetected_quality
-    assert alone is not None
-    assert worth is not None
-    assert worth == pytest.approx(2.0 * alone), "twice as large, and people are always found there"
+    seen_quality = why.views[A].quality
+    undetected_quality = why.views[B].undetected_quality
+    assert seen_quality is not None
+    assert undetected_quality is not None
+    assert undetected_quality == pytest.approx(2.0 * seen_quality), (
+        "twice as large, and B detects people reliably"
+    )
     assert why.views[B].cost == pytest.approx(0.0)
     assert reason(decisions[-1].choices[0], why).startswith("c1 does not detect this person, but")
 
 
 @pytest.mark.parametrize("frames", [1, 4, 10, 13, 25])
-def test_a_test_counts_for_the_decided_frames_up_to_the_next_test(
+def test_an_observation_counts_for_the_frames_up_to_the_next_one(
     frames: int,
 ) -> None:
     inference = CrossViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
-    looks = np.array([0, 10, 20])
+    frames_tested = np.array([0, 10, 20])
     cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
-    tested = Looked(looks, cameras, feet, np.ones(3, dtype=np.bool_))
+    tested = Looked(frames_tested, cameras, feet, np.ones(3, dtype=np.bool_))
     inference.learn(replace(UndetectedViews.empty(), tested=tested), frames)
-    assert inference._detection_probability._counts[0].sum() == frames, (
-        "the next window begins with an inference"
-    )
+    assert inference._detection_probability._counts[0].sum() == frames, "each decided frame counts once"
 
 
 def test_the_weight_scales_the_quality_of_undetected_views() -> None:
@@ -152,8 +152,8 @@ def test_the_weight_scales_the_quality_of_undetected_views() -> None:
 
 
 PLACES = st.sampled_from([(10.0, 15.0), (14.0, 18.0), (26.0, 22.0), (40.0, 30.0)])
-SOMEBODY = st.tuples(PLACES, st.booleans(), st.booleans())
-STORY = st.lists(st.tuples(SOMEBODY, SOMEBODY, SOMEBODY), min_size=6, max_size=20)
+PERSON = st.tuples(PLACES, st.booleans(), st.booleans())
+STORY = st.lists(st.tuples(PERSON, PERSON, PERSON), min_size=6, max_size=20)
 
 
 def boxes_at(moment: Sequence[tuple[tuple[float, float], bool, bool]]) -> CameraBoxes:
@@ -172,11 +172,11 @@ def test_shards_select_views_as_a_single_service(
     story: list[tuple[tuple[tuple[float, float], bool, bool], ...]],
 ) -> None:
     moments = [boxes_at(moment) for moment in story]
-    alone = decide(decider(), moments)
+    single = decide(decider(), moments)
     for index in range(2):
         part = decide(decider(share={"of": 2, "index": index}), moments)
-        for one, mine in zip(alone, part, strict=True):
-            expected = [choice for choice in one.choices if choice.number % 2 == index]
-            assert list(mine.choices) == expected
-            for choice in mine.choices:
-                assert mine.reasons.of(choice.number) == one.reasons.of(choice.number)
+        for expected, actual in zip(single, part, strict=True):
+            choices = [choice for choice in expected.choices if choice.number % 2 == index]
+            assert list(actual.choices) == choices
+            for choice in actual.choices:
+                assert actual.reasons.of(choice.number) == expected.reasons.of(choice.number)
