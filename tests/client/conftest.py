@@ -16,7 +16,7 @@ from fakes.http.scripted_server import ScriptedSite
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
 async def browser() -> AsyncIterator[Browser]:
-    """Start one for all tests; each has pages of its own, which share nothing."""
+    """Start one browser for all tests; each test has isolated pages."""
     async with chromium() as running:
         yield running
 

@@ -42,7 +42,7 @@ async def test_an_unknown_object_is_reported_with_the_servers_text(site_url: str
 
 
 async def test_an_unreachable_server_is_an_away_error() -> None:
-    with socket.socket() as held:  # bound and not listening: nobody can be there
+    with socket.socket() as held:  # bound and not listening
         held.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{held.getsockname()[1]}"
         with pytest.raises(client.AwayError, match=f"^{url}: Connection refused$"):

@@ -29,7 +29,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def write_stream(part: Path, source: Path, lost: range = range(0), early: int = 0, late: int = 0) -> Path:
-    """Write a stream whose sound begins so many frames before the pictures, and ends so many after them."""
+    """Write a stream whose audio begins some frames before the pictures and ends some after them."""
     stream_format, sound = StreamFormat(), AudioFormat(RATE, 2)
     units = access_units(source)
     stream_format.accept(units[0].data)

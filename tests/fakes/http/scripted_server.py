@@ -97,7 +97,7 @@ async def send_nothing(_: web.StreamResponse) -> None:
 
 @dataclass
 class ScriptedSite:
-    """Answers as the API does; each connection consumes one script of ``plays`` or ``tells``; then 503."""
+    """Answers like the API; each connection consumes one script of its kind; without one, 503."""
 
     video_scripts: list[StreamScript] = field(default_factory=list)
     event_scripts: list[StreamScript] = field(default_factory=list)

@@ -18,7 +18,7 @@ from fakes.running.stream_frames import FPS
 MEETING = 80
 """The pulse at which the two people meet."""
 FRAMES = 6000
-"""Ten minutes, as long as a test may take on a busy machine."""
+"""Ten minutes, the longest that a test may take."""
 _SIZE = 180, 320
 _WIDTH, _HEIGHT, _TOP = 20, 60, 60
 _FAR, _STEP = 100, 2

@@ -131,7 +131,7 @@ def decoded(camera: int, frames: int) -> Iterator[Image]:
 
 
 async def read_film(answer: aiohttp.ClientResponse, frames: int) -> bytes:
-    """Read a stream until it has so many whole frames."""
+    """Read a stream until it has at least ``frames`` complete frames."""
     data = b""
     while whole_frames(data) < frames:
         data += await answer.content.readany()

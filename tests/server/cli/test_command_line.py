@@ -192,7 +192,7 @@ def test_a_port_in_use_is_refused_and_nothing_is_written(
 def test_the_port_on_the_command_line_overrides_the_configuration(
     run: RunCommand, tmp_path: Path, taken: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("MYVIEW_HTTP__PORT", "1")  # so that what the command sets is undone
+    monkeypatch.setenv("MYVIEW_HTTP__PORT", "1")  # so that the command's settings are undone
     assert f"127.0.0.1:{taken}" in input_error(run("up", site(tmp_path), "--port", taken))
     assert f"127.0.0.1:{taken}" in input_error(run("demo", "--port", taken, "--no-browser"))
 

@@ -1,4 +1,4 @@
-"""A full disk: no empty or incomplete files are left; live recordings keep what came before."""
+"""A full disk: no empty or incomplete files are left; live recordings keep earlier pictures."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ async def test_a_recording_without_room_for_sidecar_files_is_kept_without_them(
     served: ServedSite, tmp_path: Path
 ) -> None:
     out = tmp_path / "one.mp4"
-    (tmp_path / "one.ass").mkdir()  # nothing can be written there
+    (tmp_path / "one.ass").mkdir()  # nothing can be written
     with pytest.raises(UserError, match=r"kept$"):
         await recorded(served, out)
     (tmp_path / "one.ass").rmdir()

@@ -66,7 +66,7 @@ def peak(film: Path, frames: int) -> int:
 
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path: Path) -> None:
     film = tmp_path / "one.mp4"
-    peak(film, 10)  # whatever is there but once
+    peak(film, 10)  # allocated only once
     few, many = peak(film, 100), peak(film, 1000)
     assert film.with_suffix(".ass").stat().st_size > 500_000
     assert many < few + 50_000
@@ -78,7 +78,7 @@ def gop_event(gop: int) -> Gop:
 
 
 def held(folder: Path, gops: int) -> int:
-    """Return the bytes of memory in use after so many events."""
+    """Return the bytes of memory in use after some events."""
     spool = Spool(folder)
     history = ViewHistory(1, spool=spool)
     history.take(gop_event(0))
@@ -97,7 +97,7 @@ def held(folder: Path, gops: int) -> int:
 def test_boxes_are_spooled_to_disk(tmp_path: Path) -> None:
     packed = GOP * 5 * 30  # bytes of a GOP's boxes, at least
     assert held(tmp_path, 500) < 500 * packed / 2
-    assert not list(tmp_path.iterdir()), "the file has no name: it goes with the process"
+    assert not list(tmp_path.iterdir()), "the file is unnamed, so it ends with the process"
 
 
 def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMA
 from fakes.service.scripted_recordings import A, B, own_pictures, pictures
 from server.cli.main import app
 
-FIRST = 2 * GOP  # of what is watched here
+FIRST = 2 * GOP  # of the watched stream
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from server.service.service import BestViewService
 
 
 class Failing:
-    """Something that fails so many times, and is then done; each time counts."""
+    """A step that fails some times before it succeeds; counts its calls."""
 
     def __init__(self, *errors: Exception) -> None:
         self._errors, self.times = list(errors), 0
@@ -47,7 +47,7 @@ async def test_a_failing_step_is_logged_once_and_retried(caplog: pytest.LogCaptu
 
 
 async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
-    """Return whether what failed is done again."""
+    """Return whether a failed step is retried."""
     await asyncio.wait([task, asyncio.create_task(failing.done.wait())], return_when="FIRST_COMPLETED")
     ended = task.done()
     task.cancel()
@@ -114,4 +114,4 @@ def test_a_half_done_renewal_is_loaded_when_it_is_complete(
     assert "No such file or directory" in caplog.messages[0]
     gone.clear()
     certificate.reload_if_changed()
-    assert certificate._newest is not before, "though nothing has changed since"
+    assert certificate._newest is not before, "although the file is unchanged"

@@ -93,7 +93,7 @@ async def test_overlay_and_time_shift_are_described_where_supported(site_with_pe
     ],
 )
 async def test_no_file_outside_the_page_is_served(served: ServedSite, path: str) -> None:
-    # By hand: a client library would tidy the path up before sending it.
+    # A raw request: a client library would normalize the path.
     reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
     writer.write(f"GET {path} HTTP/1.0\r\n\r\n".encode())
     answer = await reader.read()

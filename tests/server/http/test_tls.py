@@ -1,4 +1,4 @@
-"""HTTPS: certificates are reloaded without a restart, and invalid ones change nothing."""
+"""HTTPS: certificates are reloaded without a restart; invalid ones are ignored."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[TlsSettings, TlsSett
 
 @pytest.fixture
 def tls(made: tuple[TlsSettings, TlsSettings], tmp_path: Path) -> TlsSettings:
-    """Return the first certificate, in files that the test may change."""
+    """Return a certificate in files that the test may change."""
     return copied(made[0], TlsSettings(certificate=tmp_path / "c.pem", key=tmp_path / "k.pem"))
 
 
@@ -126,7 +126,7 @@ async def test_a_renewed_certificate_is_used_for_new_connections(
     certificate.reload_if_changed()
     assert "stays in force" in caplog.messages[-1]
     assert "\n" not in caplog.messages[-1]
-    assert await is_proven(port, made[0]), "half of a pair changes nothing"
+    assert await is_proven(port, made[0]), "half of a pair is ignored"
     copied(made[1], tls)
     certificate.reload_if_changed()
     assert await is_proven(port, made[1])

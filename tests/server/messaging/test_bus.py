@@ -27,7 +27,7 @@ def settings() -> ZenohSettings:
 
 
 class Heard:
-    """What came, awaitable."""
+    """Received items, awaitable."""
 
     def __init__(self) -> None:
         self.queue: asyncio.Queue[Message] = asyncio.Queue()
@@ -38,7 +38,7 @@ class Heard:
 
 
 class Presence:
-    """Who is there, awaitable."""
+    """Present sessions, awaitable."""
 
     def __init__(self) -> None:
         self.there: set[str] = set()
@@ -77,7 +77,7 @@ async def test_an_oversized_message_is_dropped_and_others_arrive(settings: Zenoh
     client.watch_alive("router", there.note)
     router.declare_alive("router")
     await there.until("router")
-    key, wait = "myview/hall/camera/c0/video", zenoh.CongestionControl.BLOCK  # whoever sends it may wait
+    key, wait = "myview/hall/camera/c0/video", zenoh.CongestionControl.BLOCK  # the sender may block
     for payload in (bytes(40_000_000), b"picture"):
         await asyncio.to_thread(client._session.put, key, payload, congestion_control=wait)
     assert (await heard.next()).payload == b"picture"

@@ -52,7 +52,7 @@ def settings(folder: Path) -> ZenohSettings:
 
 
 class Heard:
-    """What came, and waiting for it."""
+    """Received texts, awaitable."""
 
     def __init__(self) -> None:
         self.texts: list[str] = []
@@ -63,7 +63,7 @@ class Heard:
         self._new.set()
 
     async def until(self, text: str, again: Callable[[], None]) -> None:
-        """Wait for a text; it is sent again and again, as what is published to nobody is lost."""
+        """Wait for a text, sending it repeatedly: without a subscriber it is lost."""
         async with asyncio.timeout(PATIENCE):
             while text not in self.texts:
                 self._new.clear()
@@ -107,7 +107,7 @@ async def test_a_camera_publishes_under_its_own_key_only(settings: ZenohSettings
             c1.publish(SITE.camera("c1", "video"), b"true")
 
         await heard.until("c1/video true", false_and_true)
-        assert "c0/video false" not in heard.texts, "one session keeps its order: it would have come before"
+        assert "c0/video false" not in heard.texts, "a session keeps its order: it would have arrived before"
 
 
 async def test_audio_is_published_by_the_audio_camera_only(settings: ZenohSettings) -> None:
@@ -150,11 +150,11 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
             client.subscribe("**", overheard)
             client.declare_alive(SITE.camera("c0", "alive"))
         c1.declare_alive(SITE.camera("c1", "alive"))
-        for number in range(10):  # time enough for who would have been let in
+        for number in range(10):  # time enough to be admitted
             await heard.until(f"c1/video {number}", partial(_all, [*them, c1], number))
         assert not [text for text in heard.texts if text.startswith("c0")]
         assert alive == [SITE.camera("c1", "alive")]
-        assert not [text for text in overheard.texts if text.startswith("c1")]  # they hear themselves
+        assert not [text for text in overheard.texts if text.startswith("c1")]  # they receive their own
         for stranger in strangers:
             with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at"):
                 await asyncio.to_thread(Bus.listener, stranger, "c0")
@@ -190,10 +190,10 @@ async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
 
         await heard.until(f"c0/{what} there", all_of_it)
         await overheard.until(f"c1/{what} here", all_of_it)
-        for number in range(5):  # time enough for what would have come
+        for number in range(5):  # time enough for it to arrive
             await heard.until(f"c0/{what} {number}", partial(_tell, bestview, c1, what, number))
         assert f"c0/{what} false" not in heard.texts
-        assert set(overheard.texts) - {f"c0/{what} false"} == {f"c1/{what} here"}, "but what it says itself"
+        assert set(overheard.texts) - {f"c0/{what} false"} == {f"c1/{what} here"}, "except its own"
 
 
 def _tell(bestview: Bus, other: Bus, what: str, number: int) -> None:
@@ -220,11 +220,11 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
             c0.publish(SITE.camera("c0", "detections"), b"detections")
 
         await heard.until("c0/detections detections", all_of_it)
-        await everything.until("c0/video seen", all_of_it)  # it may come in mid-round
+        await everything.until("c0/video seen", all_of_it)  # it may arrive within a round
         await everything.until("c0/detections detections", all_of_it)
         assert set(heard.texts) == {"c0/detections detections"}
         assert set(everything.texts) == {"c0/video seen", "c0/detections detections"}, (
-            "who listens sends nothing"
+            "a subscriber sends nothing"
         )
 
 

@@ -31,7 +31,7 @@ LIVE = {"camera": "c0", "state": "live", "fps": 25.0, "message": ""}
 
 
 class Service(http.server.ThreadingHTTPServer):
-    """What a best-view service answers to health checks."""
+    """A best-view service's answers to health checks."""
 
     def __init__(self, secrets: Path | None = None) -> None:
         super().__init__(("127.0.0.1", 0), _Answer)
@@ -100,13 +100,13 @@ async def test_the_pulse_server_is_healthy_while_it_sends_its_greeting(
     async with PulseServer(25.0, users=users) as server:
         monkeypatch.setenv("MYVIEW_SYNC__PORT", str(server.port))
         assert await _apart("sync") == 0
-        assert server.refused == 0, "whoever looks every few seconds is no stranger who is told of"
+        assert server.refused == 0, "repeated health checks are not logged as strangers"
     monkeypatch.setenv("MYVIEW_SYNC__PORT", str(free_port()))
     assert await _apart("sync") == 1
 
 
 async def _apart(*words: str) -> int:
-    """Check as the engine does: in a process of its own."""
+    """Check as the container engine does, in a separate process."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
@@ -171,7 +171,7 @@ def test_https_checks_use_the_certificate_and_the_token(
 
 @needs_openssl
 def test_generated_secrets_make_a_working_site(secrets: Path) -> None:
-    assert (secrets.stat().st_mode & 0o777) == 0o700, "nobody else of the host looks in"
+    assert (secrets.stat().st_mode & 0o777) == 0o700, "no other user of the host may read it"
     operator, health = read_tokens(secrets / "web" / "tokens.yaml")
     assert (operator.role, operator.camera) == ("operate", None)
     assert (health.role, health.camera) == ("watch", "c0")
@@ -182,7 +182,7 @@ def test_generated_secrets_make_a_working_site(secrets: Path) -> None:
     assert users(secrets / "pulses") == users(secrets / "web" / "pulses") | users(c0 / "pulses")
     assert set(users(secrets / "pulses")) == {"bestview", "c0"}
     assert all(map(is_password, users(secrets / "pulses").values()))
-    assert users(c0 / "bus") != users(c0 / "pulses"), "who has one of them has not the other"
+    assert users(c0 / "bus") != users(c0 / "pulses"), "each client has its own"
 
 
 def users(path: Path) -> dict[str, str]:

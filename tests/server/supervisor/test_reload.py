@@ -59,7 +59,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "zenoh.lease_s": (SITE, 2.0),
     "sync.port": (SITE, 7412),
 }
-"""Settings, what a change of each takes, and another value."""
+"""Settings, the restart that a change needs, and another value."""
 
 
 def changed(keys: set[str]) -> Config:
@@ -222,7 +222,7 @@ async def until_said(terminal: int, text: bytes) -> None:
 
 @asynccontextmanager
 async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subprocess.Process, int]]:
-    """Run pulses whose log goes to a terminal; give the terminal's other end, too, once they are sent."""
+    """Run a pulse server that logs to a terminal; return it and the terminal's other end once it sends."""
     port = free_port()
     write(path, sync={"port": port})
     ours, theirs = pty.openpty()

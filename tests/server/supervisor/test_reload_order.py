@@ -47,6 +47,6 @@ def test_an_active_configuration_of_another_user_is_ignored(
     monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(link))
     assert ActiveConfig(path).now.camera_ids == ("c0",)
     monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(theirs))
-    assert ActiveConfig(path).now.camera_ids == ("c9",), "the supervisor's own"
+    assert ActiveConfig(path).now.camera_ids == ("c9",), "of the supervisor"
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     assert ActiveConfig(path).now.camera_ids == ("c0",)

@@ -29,7 +29,7 @@ def handled(request: pytest.FixtureRequest) -> Iterator[tuple[signal.Signals, li
 
 @pytest.fixture
 def other_thread() -> Iterator[int]:
-    """A thread that may take every signal, as a library's threads do; gives its identity."""
+    """A thread that may receive every signal, as a library's threads do; yields its identity."""
     over = threading.Event()
     thread = threading.Thread(target=over.wait, args=(PATIENCE,))
     thread.start()
@@ -57,8 +57,8 @@ def test_a_signal_is_deferred_even_if_another_thread_receives_it(
             pass
         assert seen == []
     until(seen, 1)
-    # The last of them may reach a thread that does not get to run only now.
-    assert seen in ([number], [number] * 2), "once, however often it came"
+    # The last signal may reach a thread that does not run now.
+    assert seen in ([number], [number] * 2), "once for repeated signals"
     count = len(seen)
     signal.pthread_kill(other_thread, number)
     until(seen, count + 1)  # and it is not put off afterwards
@@ -118,9 +118,9 @@ class CtrlC:
 
 sys.meta_path.insert(0, CtrlC())
 """
-"""What presses Ctrl-C while a command still loads."""
+"""Code that presses Ctrl-C while a command still loads."""
 _COMMANDS, _WHAT_IT_NEEDS = "server.cli.site_commands", "server.config.loader"
-"""Modules that are loaded before it is known what to do, and when it is."""
+"""Modules that are loaded before and after the command is known."""
 
 
 @pytest.mark.parametrize(

@@ -70,15 +70,15 @@ class Machine:
         return process
 
     async def processes(self, count: int) -> dict[str, Process]:
-        """Return the next processes by what they are."""
+        """Return the next started processes by role."""
         found = [await self.started.get() for _ in range(count)]
         return {
             process.arguments[-1 if process.arguments[0] == "camera" else 0]: process for process in found
         }
 
     async def nothing_more(self) -> None:
-        """Make sure that nothing else is started as things stand."""
-        for _ in range(20):  # turns of the loop: nothing here waits for anything else
+        """Check that no other process is started."""
+        for _ in range(20):  # turns of the event loop
             await asyncio.sleep(0)
         assert self.started.empty()
 
@@ -138,7 +138,7 @@ async def test_at_most_one_camera_per_processor_loads_at_a_time(
     processes["c0"].loaded()
     processes |= await machine.processes(1)
     await machine.nothing_more()
-    processes["c1"].end(-9)  # it will not load any more, and asks for another turn behind those that wait
+    processes["c1"].end(-9)  # it ends before it has loaded, and queues again behind the others
     processes |= await machine.processes(1)
     await machine.nothing_more()
     assert list(processes) == ["c0", "c1", "c2", "c3"]
@@ -155,7 +155,7 @@ async def test_a_restarted_best_view_does_not_wait_for_loading_cameras(machine: 
     await machine.processes(1)
     processes["bestview"].end(-9)
     found = await machine.processes(1)
-    while "bestview" not in found:  # the other camera, where there are more processors
+    while "bestview" not in found:  # the other camera, with more processors
         found |= await machine.processes(1)
 
 
@@ -179,7 +179,7 @@ async def test_only_the_process_that_died_or_was_terminated_is_restarted(
         processes |= await machine.processes(1)
         assert processes["c0"].returncode is None
     assert machine.started.empty()
-    assert len(caplog.messages) == 1, "told of once for one cause"
+    assert len(caplog.messages) == 1, "logged once for each cause"
 
 
 async def test_the_callback_runs_before_every_start(machine: Machine) -> None:

@@ -43,7 +43,7 @@ class Lines(logging.Handler):
 
 @dataclass
 class Site:
-    """One camera's process, whose network camera does not answer yet."""
+    """A camera process whose network camera does not answer yet."""
 
     process: asyncio.Task[None]
     told: Lines
@@ -53,7 +53,7 @@ class Site:
 
 @pytest.fixture
 async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
-    """Begin one by the site's width and how the camera's own H.264 is used."""
+    """Start a camera process with the site's width and the setting ``h264``."""
     write_video(tmp_path / "c0.mp4", 25)
     told, log = Lines(), logging.getLogger("server")
     log.addHandler(told)
@@ -106,7 +106,7 @@ async def test_an_unreachable_camera_is_logged_once_and_runs_when_it_answers(
 async def test_an_error_of_a_camera_that_answers_late_does_not_end_others(
     begin: Callable[..., Site],
 ) -> None:
-    """A mistake at the start ends the site, but the others have begun long ago."""
+    """An error at the start ends the site, but here the others already run."""
     site = begin(128, "pass")
     await site.told.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()

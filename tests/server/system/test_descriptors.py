@@ -51,7 +51,7 @@ def test_every_command_raises_the_limit_for_itself_and_its_children(low: int, my
 def test_descriptors_are_reserved_for_other_uses(descriptors: int, record: dict[str, Any]) -> None:
     config = small_config(record=record, http={"viewers_max": 300, "connections_max": 2000})
     taken = connection_limit(config, descriptors)
-    files = min(config.http.viewers_max, taken) if record else 0  # of the past: one for each who watches
+    files = min(config.http.viewers_max, taken) if record else 0  # time shift: one for each viewer
     assert 0 < taken <= 2000
     assert taken == 2000 or taken + files + FOR_OPERATORS + 128 <= descriptors
     assert (taken == 2000) == (descriptors >= 4096)
@@ -87,7 +87,7 @@ def test_the_doctor_includes_the_check_of_open_files(myview: RunCommand, tmp_pat
 def test_failures_to_accept_are_logged_once_and_connections_are_accepted_later(tmp_path: Path) -> None:
     port, log = free_port(), tmp_path / "log"
     with running(f"{MYVIEW} sync {write_site(tmp_path, port)}", log), ExitStack() as silent:
-        for _ in range(FEW_DESCRIPTORS + 16):  # and no more than wait in the system
+        for _ in range(FEW_DESCRIPTORS + 16):  # within the listen backlog
             silent.enter_context(connect(port))
         wait_for_log(log, b"Too many open files")
         silent.close()

@@ -27,7 +27,7 @@ def niceness(pid: int) -> int:
 
 
 def nicer_by(*steps: int) -> int:
-    """Return the niceness of a process after so many calls."""
+    """Return the niceness of a process after some calls."""
     calls = "; ".join(f"lower_own_priority({by})" for by in steps)
     script = f"import os; from server.system.niceness import lower_own_priority; {calls}; print(os.nice(0))"
     return int(subprocess.run([sys.executable, "-c", script], capture_output=True, check=True).stdout)

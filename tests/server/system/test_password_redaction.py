@@ -32,8 +32,8 @@ from server.system.log_format import JsonLines, TextLines
 
 HARMLESS = "0000"
 NAIVE = ("QXZ/JKV7", "QXZ JKV7", "QXZ@JKV7", "QXZ#JKV7", "QXZ?JKV7", "QXZJKV7")
-"""Read without care, an address with one of these ends in the midst of it. The users below are hosts of this
-machine: FFmpeg reads so, and would look for others."""
+"""A careless parser ends the address at one of these. The users below are hosts of this machine, because
+FFmpeg parses like this and would look up others."""
 SOURCES = (
     "rtsp://127.0.0.1:{}@127.0.0.1:1/x",
     "rtsp://127.0.0.1:1/x/{}",
@@ -46,7 +46,7 @@ SOURCES = (
     "rtsp:127.0.0.1:{}@127.0.0.1:1/x",
     "rtsp//127.0.0.1:{}@127.0.0.1:1/x",
 )
-"""Where nobody answers, or FFmpeg has no such protocol, or it is no address."""
+"""Sources that do not answer, have an unknown protocol, or are not addresses."""
 
 
 def built(**changes: Any) -> Config:
@@ -78,7 +78,7 @@ def test_the_operators_page_shows_no_password_of_a_source(place: str, password: 
 def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
     def told(secret: str) -> str:
         options = {"headers": f"Authorization: Basic {secret}", "rtsp_transport": secret}
-        file = f"{secret}.password"  # who misunderstands the setting writes the password itself
+        file = f"{secret}.password"  # the password itself instead of a file
         cameras = [door("rtsp://viewer:{password}@192.0.2.11/", options=options, password=file)]
         servers = [f"http://viewer:{secret}@192.0.2.11/"]
         zenoh = {"connect": f"tls/bus:7447#key={secret}"}
@@ -91,7 +91,7 @@ def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
 
 
 def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
-    """Return configurations in which an address or a secret is where it does not belong."""
+    """Return configurations with an address or a secret in a wrong place."""
     camera = door("door.mp4")
     return [
         {"cameras": [{**camera, address: None}]},

@@ -1,4 +1,4 @@
-"""`myview doctor` reports what will not work in a configuration, with remedies."""
+"""`myview doctor` reports problems of a configuration, with remedies."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ async def test_a_pulse_server_that_accepts_a_password_of_this_site_is_its_own(
     tmp_path: Path,
 ) -> None:
     users = {"c0": "0" * 32, "bestview": "1" * 32}
-    (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has its own line alone
+    (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has only its own line
     there = load_site(tmp_path, sync={"port": free_port(), "users": "users"})
     credentials = Credentials("bestview", users["bestview"])
     async with (
@@ -159,7 +159,7 @@ async def test_a_pulse_server_that_accepts_a_password_of_this_site_is_its_own(
         (tmp_path / "users").write_text(f"c0:{'2' * 32}\n")
         found, _ = await port_findings(there)
         assert only(found, "sync.port").level is Level.BAD
-        assert server.clients()[0].name == "bestview", "who asks takes nobody's place"
+        assert server.clients()[0].name == "bestview", "the query takes no camera's place"
 
 
 async def test_a_server_of_another_protocol_is_not_a_pulse_server(
@@ -169,7 +169,7 @@ async def test_a_server_of_another_protocol_is_not_a_pulse_server(
     there, left = load_site(tmp_path), asyncio.Event()
 
     async def endless(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        writer.write(b"a" * 100_000)  # no line has so many
+        writer.write(b"a" * 100_000)  # more than any connection
         with contextlib.suppress(ConnectionError):
             await reader.read()
         writer.close()

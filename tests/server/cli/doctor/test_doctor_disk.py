@@ -110,11 +110,11 @@ if not os.geteuid():
 for it in disk_findings(config, {}):
     print(it.check, it.level.value, it.text)
 """
-"""As somebody who is not root, who may enter every folder."""
+"""As an unprivileged user: root may enter every folder."""
 
 
 def test_an_inaccessible_parent_folder_is_named_in_one_line(tmp_path: Path) -> None:
-    with tempfile.TemporaryDirectory() as outside:  # tests' own folders are closed to others themselves
+    with tempfile.TemporaryDirectory() as outside:  # pytest's folders are closed to others
         Path(outside).chmod(0o755)
         closed = Path(outside) / "closed"
         closed.mkdir()

@@ -128,7 +128,7 @@ async def test_an_address_of_this_machine_must_lead_to_a_listener(tmp_path: Path
     text = f"nothing listens at 127.0.0.1:{other}, where cameras connect; zenoh.listen is 127.0.0.1:{port}"
     assert of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
     with socket.create_server(("127.0.0.1", other)):
-        answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # something may pass it on
+        answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # a proxy may forward it
         assert of(await reachability_findings(astray), "zenoh.connect") == answered
     narrow = load_site(tmp_path, sync={"host": "127.0.0.2", "port": other})
     assert of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD

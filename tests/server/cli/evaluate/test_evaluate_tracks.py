@@ -18,7 +18,7 @@ Printed = Callable[..., str]
 
 @pytest.fixture
 def run(myview: RunCommand) -> Printed:
-    """Return a function that runs `myview evaluate` and gives what it prints."""
+    """Return a function that runs `myview evaluate` and returns its output."""
 
     def command(*arguments: object) -> str:
         ended = myview("evaluate", *arguments)
@@ -54,7 +54,7 @@ def each(option: str, paths: Iterable[Path]) -> list[str | Path]:
 
 
 def rows(printed: str) -> dict[str, list[str]]:
-    """Return the table's rows by what stands first in them."""
+    """Return the table's rows by their first cell."""
     return {line.split()[0]: line.split() for line in printed.splitlines() if line.strip()}
 
 
@@ -76,7 +76,7 @@ def test_a_rendered_folder_against_packed_truth(run: Printed, tmp_path: Path) ->
     table = rows(run("--tracks", tmp_path / "seen", "--gt", tmp_path / "hall", "--json", out))
     assert list(table) == ["camera", "c0", "c1", "mean,", "joint"]
     assert table["mean,"][2:][4] == "100.0"
-    assert table["joint"][5] == "50.0"  # the two are taken for each other in the second camera
+    assert table["joint"][5] == "50.0"  # the identities are exchanged in the second camera
     numbers = json.loads(out.read_text(encoding="utf-8"))
     assert numbers["iou"] == 0.5
     assert list(numbers["cameras"]) == ["c0", "c1"]

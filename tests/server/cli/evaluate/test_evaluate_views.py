@@ -51,7 +51,7 @@ def served(tmp_path: Path) -> Path:
 
 
 def judged(printed: str) -> dict[str, list[str]]:
-    """Return the table's rows by what stands first in them."""
+    """Return the table's rows by their first cell."""
     return {line.split()[0]: line.split() for line in printed.splitlines()}
 
 
@@ -133,7 +133,7 @@ def test_rate_and_sizes_are_read_from_a_rendering(evaluate: RunCommand, served: 
     assert evaluate("--gt", served, "--views", path, "--json", out)[0] == 0
     content = json.loads(out.read_text())["views"]
     assert content["switch_cost_s"] == 0.3
-    # 20 pixels of c1's 50 are four fifths of what 50 of c0's 100 are.
+    # 20 pixels of 50 in c1 are four fifths of 50 pixels of 100 in c0.
     assert content["people"]["1"]["cost"] == pytest.approx(20 * 0.2)
 
 

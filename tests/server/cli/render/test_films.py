@@ -117,7 +117,7 @@ def test_a_film_ends_with_the_last_gop_of_the_person(tmp_path: Path) -> None:
         writer.write(decision(gop, choice(1, A, away=away)))
     writer.close()
     with av.open(str(tmp_path / "best" / "object-1.mp4"), "r") as film:
-        assert len(list(film.decode(video=0))) == 3 * GOP, "who comes back is shown all the way"
+        assert len(list(film.decode(video=0))) == 3 * GOP, "a person who returns is shown to the end"
 
 
 @pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])

@@ -111,7 +111,7 @@ def test_an_error_while_rendering_leaves_nothing(tmp_path: Path) -> None:
 
 @contextmanager
 def begun(folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """Begin a long rendering, and go on once it has begun to write."""
+    """Start a long rendering; return once it has begun to write."""
     (folder / "many").mkdir()
     cv2.imwrite(str(folder / "one.jpg"), np.zeros((90, 160, 3), np.uint8))
     for number in range(2000):

@@ -21,7 +21,7 @@ FIRST = (20, 40)
 
 @pytest.fixture
 def video(tmp_path: Path) -> Path:
-    """Write a video in which a patch goes right before a smooth ground."""
+    """Write a video of a patch that moves right before a smooth background."""
     rng = np.random.default_rng(0)
     coarse = [rng.integers(0, 256, shape, dtype=np.uint8) for shape in ((6, 9, 3), (5, 5, 3))]
     ground = cv2.resize(coarse[0], (192, 128), interpolation=cv2.INTER_CUBIC)

@@ -76,7 +76,7 @@ WHO = {
         )
     },
 }
-"""Who may GET what; all that is below /api/operator/ is the operator's."""
+"""The roles that may GET each route; those below /api/operator/ need an operator."""
 REFUSED = {401, 403}
 
 
@@ -117,7 +117,7 @@ def filled(path: str, number: int = 1, camera: str = A) -> str:
 
 
 async def status(served: ServedSite, method: str, path: str, who: str) -> int:
-    """Ask for an answer and do not wait for its body, which may have no end."""
+    """Send a request without waiting for the body, which may be endless."""
     heads = {CSRF_HEADER: "1", **({} if who == NOBODY else bearer(who))}
     async with served.session.request(
         method,
@@ -137,7 +137,7 @@ async def test_every_route_admits_exactly_the_permitted_tokens(site: ServedSite)
     for method, path in routes:
         for who in sorted(ANYBODY):
             if who in who_may(method, path) and method == "GET" and path.endswith((".mjpeg", ".jpg")):
-                continue  # a picture takes a process that draws it; HEAD asks the same
+                continue  # HEAD avoids starting a render worker
             code = await status(site, method, filled(path), who)
             may = who in who_may(method, path)
             if (code in REFUSED) == may or (who == NOBODY and not may and code != 401):

@@ -127,7 +127,7 @@ async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pyt
     assert len((await get(site, "/api/flags", "door"))["flags"]) == 2
     async with site.session.get("/api/events", headers=bearer("family")) as later:
         names = [name for name, _ in await events(later, 0)]
-        assert names.index("flag") < names.index("gop"), "who comes is told what is open"
+        assert names.index("flag") < names.index("gop"), "a new subscriber receives the open flags"
 
 
 async def test_recorded_decisions_are_limited_to_the_scoped_person(site: ServedSite) -> None:
@@ -174,7 +174,7 @@ async def test_no_token_is_logged(site: ServedSite, caplog: pytest.LogCaptureFix
                 assert token not in str(answer.headers)
                 if answer.status >= 400:
                     assert token not in await answer.text()
-    site.service.frame_buffers = {}  # a mistake of the server's own is logged, too
+    site.service.frame_buffers = {}  # internal errors are logged, too
     async with site.session.get("/api/cameras", params={"token": token_of("lead")}) as answer:
         assert answer.status == 500
     log = [

@@ -47,7 +47,7 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
         decisions += feed_epochs(served, range(3, EPOCHS))
         narrow, full = map(decoded, await finish_streams(served, theirs, all_of_it))
     right = expected_pictures(decisions, codec)
-    if form == "ts":  # which begins at some time of its own
+    if form == "ts":  # which begins at another time
         narrow, full = (
             {pulse - max(pictures) + max(right): shown for pulse, shown in pictures.items()}
             for pictures in (narrow, full)
@@ -58,7 +58,7 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
     assert grey == list(range(grey[0], grey[-1] + 1))
     assert len(grey) > 3 * GOP
     assert np.array_equal(narrow[grey[0] - 1], narrow[grey[0] - 2]), "before it is grey, it stands"
-    assert grey[-1] < max(narrow), "who comes back is shown again"
+    assert grey[-1] < max(narrow), "a returned person is shown again"
 
 
 async def test_a_stream_opened_while_the_person_is_away_begins_with_gray(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> 
 
 
 async def listed(served: ServedSite, pattern: str, who: str) -> bytes:
-    """Fetch what a playlist names, behind what a player needs first."""
+    """Fetch the segments of a playlist, after its init segment."""
     text = (await fetch(served, "/objects/1/hls/index.m3u8", who)).decode()
     names = ["init.mp4", *re.findall(pattern, text, re.MULTILINE)]
     return b"".join([await fetch(served, f"/objects/1/hls/{name}", who) for name in names])
@@ -98,7 +98,7 @@ async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: P
         narrow, full = [decoded(await listed(served, pattern, who)) for who in ("family", "desk")]
     until = max(full) + 1
     right = expected_pictures(decisions)
-    for pulse in range(min(narrow), until):  # what stands all segment long lasts
+    for pulse in range(min(narrow), until):  # a picture held for a whole segment has its duration
         standing = narrow[max(earlier for earlier in narrow if earlier <= pulse)]
         np.testing.assert_array_equal(standing, right[pulse], str(pulse))
     assert_equal_pictures(

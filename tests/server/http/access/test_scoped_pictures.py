@@ -17,7 +17,7 @@ from fakes.service.drawn_site import DrawnSite, Image, drawn_room, jpeg_parts, r
 from fakes.service.scripted_cameras import GOP
 
 NEARLY = 3
-"""Levels that a picture may be off when it was encoded."""
+"""Tolerance of an encoded picture, in gray levels."""
 
 
 def is_nearly_grey(image: Image) -> bool:
@@ -65,7 +65,7 @@ async def test_only_the_box_of_the_scoped_person_is_drawn(tmp_path: Path) -> Non
         boxes = decision.boxes[decision.choices[1]][-1]
         plain = await still(room, "", "desk")
         theirs, all_of_it = [await still(room, "?overlay=1", who) for who in ("family", "desk")]
-    assert len(boxes) > 1, "somebody else is in the picture"
+    assert len(boxes) > 1, "another person is in the picture"
     for number, *box in boxes:
         assert has_box(all_of_it, plain, box)
         assert has_box(theirs, plain, box) == (number == 1)

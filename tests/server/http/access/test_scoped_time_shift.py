@@ -36,7 +36,7 @@ HLS = {**PATIENT_HTTP, "hls_segment_s": 0.4, "hls_window_s": 0.8}
 
 
 async def written(served: ServedSite, gops: int) -> None:
-    """Let the disk alone know what was, but for the newest GOP."""
+    """Drop all but the newest GOP from memory."""
     recorder = served.service.recorder
     while recorder.writer is not None and recorder.writer.written < gops:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
@@ -47,7 +47,7 @@ async def written(served: ServedSite, gops: int) -> None:
 
 @pytest.fixture(params=["memory", "disk"])
 async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[Kept]:
-    """A site that keeps what was, in memory or on the disk, and what it decided."""
+    """A site that records in memory or on the disk, and its decisions."""
     on_disk = request.param == "disk"
     record = {"folder": str(tmp_path / "kept") if on_disk else None, "segment_s": 1.0}
     async with departure_site(tmp_path, record=record, http=HLS) as served:

@@ -1,4 +1,4 @@
-"""Access without tokens, and signing in with one; pages of other sites can do nothing."""
+"""Access without tokens, and signing in with one; pages of other sites have no access."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ HEADS_OF_PROXIES = (
     ),
     *("X-Envoy-External-Address", "Front-End-Https", "X-Amzn-Trace-Id", "X-Scheme", "WL-Proxy-Client-IP"),
 )
-"""What one proxy or another sends as the only sign of itself; docs/how-to/secure.md asks for the first."""
+"""Headers that reveal a proxy; docs/how-to/secure.md requires the first."""
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_opera
         ("Forwarded", "for=127.0.0.1"),
         ("Via", "1.1 proxy"),
         *((head, "https") for head in HEADS_OF_PROXIES),
-        ("Host", "cameras.example"),  # a name that somebody made lead to this machine
+        ("Host", "cameras.example"),  # a foreign name that resolves to this machine
         ("Origin", "https://cameras.example"),
         ("Referer", "https://cameras.example/operator"),
     ],
@@ -280,7 +280,7 @@ async def test_wrong_tokens_are_rate_limited_but_known_valid_ones_are_not(
         seconds = int(answer.headers["Retry-After"])
         assert 1 <= seconds <= 12
         assert (await answer.json())["error"] == f"too many wrong tokens; try again in {seconds} s"
-    assert (await asked(site, **bearer("desk")))[0] == 200, "behind one address there may be others"
+    assert (await asked(site, **bearer("desk")))[0] == 200, "others may share the address"
     async with site.session.get("/metrics", headers=bearer("desk")) as answer:
         assert "myview_wrong_tokens_total 5.0" in (await answer.text()).splitlines()
 

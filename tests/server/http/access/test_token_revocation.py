@@ -49,7 +49,7 @@ async def stream(served: ServedSite, path: str, **heads: str) -> aiohttp.ClientR
 
 async def ended(answer: aiohttp.ClientResponse) -> None:
     """Read until the server ends the stream."""
-    with contextlib.suppress(aiohttp.ClientError):  # torn off, or with an end that says so
+    with contextlib.suppress(aiohttp.ClientError):  # aborted, or ended regularly
         while await answer.content.readany():
             pass
     answer.close()
@@ -104,7 +104,7 @@ async def test_streams_outside_a_narrowed_scope_end(
 async def test_a_persons_stream_ends_when_its_token_becomes_limited_to_that_person(
     site: ServedSite, tmp_path: Path, path: str
 ) -> None:
-    """It would go on with the room when the person has left."""
+    """Otherwise it would show the room after the person has left."""
     answer = await stream(site, path, **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", object=1, made=IN_FUTURE))
     await ended(answer)
@@ -188,7 +188,7 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
                 if answer.status == 200:
                     break
         async with served.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
-            assert answer.status == 503, "nobody can tell yet"
+            assert answer.status == 503, "not known yet"
         served.service.feed(0, {camera: {} for camera in CAMERAS})
         async with served.session.get("/objects/1/best.mp4", headers=bearer("family")) as answer:
             assert answer.status == then
@@ -198,7 +198,7 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
 
 
 class Looked:
-    """A file of tokens that is looked at by hand."""
+    """A token file that is checked by the test."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -236,7 +236,7 @@ def test_an_invalid_token_file_keeps_the_old_tokens_and_is_logged_once(
 
 def test_a_token_file_is_reloaded_only_when_it_stays_unchanged(looked: Looked) -> None:
     looked.file.reload_if_changed()
-    write_tokens(looked.path)  # as far as it has come: a list of nobody
+    write_tokens(looked.path)  # half written: an empty list
     looked.file.reload_if_changed()
     assert looked.has("desk")
     write_tokens(looked.path, token_entry("desk"), token_entry("lead"))

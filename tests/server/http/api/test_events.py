@@ -78,7 +78,7 @@ async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(
     reader = received.join(ALL)
     for epoch in range(3, 120):
         site_with_people.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
-    assert reader.lost_gops, "some of what was told, maybe a list"
+    assert reader.lost_gops, "some events, and perhaps a list"
     speaking = asyncio.create_task(received.run())
     lists: set[str] = set()
     try:

@@ -26,7 +26,7 @@ from server.http.connections.connection_limiter import Connection, ConnectionLim
 Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
 ELSEWHERE = {"X-Forwarded-For": "10.0.0.7"}
-"""Of somebody who does not sit at this machine, and so does not operate."""
+"""Headers of a viewer at another machine, who may not operate."""
 SOON = 0.2  # seconds
 GET = "GET {} HTTP/1.1\r\nHost: localhost\r\n{}\r\n"
 
@@ -61,14 +61,14 @@ async def over(pair: Pair) -> bytes:
 async def stream(
     served: ServedSite, path: str = "/objects/1/best.ts", heads: str = "X-Forwarded-For: x\r\n"
 ) -> Pair:
-    """Watch; give the connection once the stream has begun."""
+    """Open a stream; return the connection once it has begun."""
     pair = await silent(served, GET.format(path, heads))
     assert (await pair[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
     return pair
 
 
 async def status(served: ServedSite, path: str, **heads: str) -> int:
-    """Ask by a connection of its own."""
+    """Send a request on a new connection."""
     lines = "".join(f"{name}: {value}\r\n" for name, value in {**heads, "Connection": "close"}.items())
     said = await over(await silent(served, GET.format(path, lines)))
     return int(said.split(maxsplit=2)[1]) if said else 0
@@ -111,9 +111,9 @@ async def test_a_missing_tls_handshake_times_out(tmp_path: Path) -> None:
 async def test_a_connection_with_an_endless_answer_is_not_idle(path: str) -> None:
     async with small(request_timeout_s=1.0, keepalive_timeout_s=SOON) as served:
         reader, writer = await stream(served, path)
-        await over(await silent(served))  # that one was as quiet, and came later
+        await over(await silent(served))  # equally idle, and newer
         while len(await reader.read(1 << 20)) == 1 << 20:
-            pass  # what there is by now
+            pass  # the currently open ones
         served.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {}})
         assert await reader.read(1)
         writer.close()

@@ -20,7 +20,7 @@ from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare, Slot
 
 DOOR = "/cameras/c0/hls/index.m3u8"
-"""What the smallest token may see."""
+"""The stream that the most limited token may watch."""
 
 
 class Viewer:
@@ -58,7 +58,7 @@ async def fetched(served: ServedSite, path: str, name: str, player: str) -> int:
 
 
 async def joined(stack: AsyncExitStack, served: ServedSite, path: str, **heads: str) -> Viewer | int:
-    """Watch or listen until the stack is left; give the status where that is not let."""
+    """Open a stream or events until the stack closes; return the status if refused."""
     session = await stack.enter_async_context(aiohttp.ClientSession(f"http://127.0.0.1:{served.port}"))
     answer = await session.get(path, headers=heads)
     stack.callback(answer.close)
@@ -74,10 +74,12 @@ async def test_a_token_with_many_players_does_not_take_others_streams(tmp_path: 
             assert [await fetched(served, path, name, f"{name} {number}") for number in range(3)] == [
                 200
             ] * 3, name
-        assert await fetched(served, DOOR, "door", "player 0") == 200, "who came first stays"
-        assert await fetched(served, DOOR, "door", "player 19") == 503, "who came last made way"
+        assert await fetched(served, DOOR, "door", "player 0") == 200, "the oldest connection stays"
+        assert await fetched(served, DOOR, "door", "player 19") == 503, "the newest was evicted"
         for name in ("desk", "family", "lead"):
-            assert await fetched(served, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, "and goes on"
+            assert await fetched(served, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, (
+                "and continues"
+            )
 
 
 @pytest.mark.parametrize(
@@ -99,11 +101,11 @@ async def test_a_token_with_many_connections_does_not_take_others_streams(
         assert refused == 503
         assert isinstance(newest, Viewer)
         async with served.session.head(path, headers=desk) as answer:
-            assert answer.status == 503, "who does not take the place does not take it away"
+            assert answer.status == 503, "a refused request evicts none"
         mine = await joined(stack, served, path, **desk)
         assert isinstance(mine, Viewer)
         await newest.ends()
-        assert await joined(stack, served, path, **desk) == 503, "that would be more than the others have"
+        assert await joined(stack, served, path, **desk) == 503, "more than the others' share"
         assert await joined(stack, served, path, **door) == 503
         for _ in range(3):
             assert isinstance(await joined(stack, served, path, **lead), Viewer), "operators always get in"

@@ -108,7 +108,7 @@ async def test_a_segment_is_immutable_and_cacheable(site_with_people: ServedSite
 
 
 def entries_without_time(text: str) -> list[str]:
-    assert "PROGRAM-DATE-TIME" not in text, "no pulse has come that would tell the time"
+    assert "PROGRAM-DATE-TIME" not in text, "without a pulse the time is unknown"
     return [line for line in text.splitlines() if not line.startswith("#")]
 
 

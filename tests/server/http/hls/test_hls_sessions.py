@@ -77,7 +77,7 @@ def test_players_that_fetched_recently_or_wait_are_counted(
             last_request[who] = clock.now
         else:
             clock.now += seconds
-        # whoever waits for nothing in particular is answered at once: here they are kept as long as they wait
+        # requests without a part number are answered at once; here all block
         everybody = [reader(one, other) for one in (0, 1) for other in (0, 1)]
         assert [readers.of(f"object {number}") for number in (0, 1)] == [
             sum(least(who) for who in everybody if who.stream == f"object {number}") for number in (0, 1)
@@ -94,7 +94,7 @@ def test_players_that_fetched_recently_or_wait_are_counted(
 
 @pytest.fixture
 async def served() -> AsyncIterator[ServedSite]:
-    """Two viewers at most; two people, whose first segment is whole."""
+    """A limit of two viewers; two people whose first segment is complete."""
     async for served in serve_site(http={"viewers_max": 2, "hls_segment_s": 0.4}):
         served.service.connect_cameras(*CAMERAS)
         for epoch in range(5):
@@ -126,7 +126,7 @@ async def test_hls_players_take_slots_and_one_more_gets_503(served: ServedSite, 
     async with served.session.get("/objects/1/best.mp4") as answer:
         assert answer.status == 503
     for other in PATHS:
-        assert await status(served, f"/objects/1/hls/{other}", "two") == 200, "who is there goes on"
+        assert await status(served, f"/objects/1/hls/{other}", "two") == 200, "existing viewers continue"
 
 
 async def test_connected_viewers_reduce_the_slots_for_hls_players(served: ServedSite) -> None:
@@ -156,7 +156,7 @@ async def test_blocked_players_of_one_address_and_user_agent_are_counted_separat
     for epoch in range(5, 16):
         served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
     assert await asyncio.gather(*waiting) == [200, 200]
-    assert await viewers_in_metrics(served) == 1, "they cannot be told apart any more"
+    assert await viewers_in_metrics(served) == 1, "they are indistinguishable now"
 
 
 async def test_the_viewer_limit_of_one_stream_includes_hls_players() -> None:

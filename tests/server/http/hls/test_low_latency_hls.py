@@ -40,7 +40,7 @@ async def served() -> AsyncIterator[ServedSite]:
 
 
 def shows(served: ServedSite, gops: range, nobody: frozenset[int] = frozenset()) -> None:
-    """Decide GOPs: person 1 is in either camera in turn; in some no pictures come."""
+    """Decide GOPs of person 1 in alternating cameras, some without pictures."""
     for gop in gops:
         for seed, camera in enumerate(CAMERAS if gop not in nobody else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
@@ -129,12 +129,12 @@ async def test_playlists_follow_the_draft_and_grow_part_by_part(served: ServedSi
         shows(served, range(gop, gop + 1))
         now = read(await text_of(served))
         newest = [part for its in now.parts.values() for part in its]
-        assert newest[-1].uri == before.hint, "what was hinted at is what came"
+        assert newest[-1].uri == before.hint, "the hinted part is the next one"
         assert now.sequence >= before.sequence
         for number, seconds in before.whole.items():
             assert now.whole.get(number, seconds) == seconds
         for number, its in before.parts.items():
-            assert now.parts.get(number, its)[: len(its)] == its, "6.2.1: nothing changes"
+            assert now.parts.get(number, its)[: len(its)] == its, "6.2.1: immutable"
         before = now
     served.service.splicer.close()
     assert read(await text_of(served)).hint is None
@@ -218,7 +218,7 @@ def decoded(data: bytes) -> dict[int, NDArray[np.uint8]]:
 
 
 def at(shown: dict[int, NDArray[np.uint8]], pulse: int) -> NDArray[np.uint8]:
-    """Return the picture that is seen at a pulse: it may stand for longer."""
+    """Return the picture displayed at a pulse; it may be an earlier one."""
     return shown[max(earlier for earlier in shown if earlier <= pulse)]
 
 
@@ -244,7 +244,7 @@ async def test_parts_equal_their_segments_and_independent_ones_are_decodable(
     alone = [
         (uri, gop) for uri, gop in uris if (part := reel.part(gop // PARTS, gop % PARTS)) and part.independent
     ]
-    assert len(alone) == len(uris) - 4, "what is bridged within a segment is not"
+    assert len(alone) == len(uris) - 4, "not after a gap inside a segment"
     for uri, gop in alone:
         for pulse, picture in decoded(init + await data_of(served, uri)).items():
             assert gop * GOP <= pulse < (gop + 1) * GOP

@@ -51,7 +51,7 @@ async def served(tmp_path: Path) -> AsyncIterator[ServedSite]:
 
 
 async def played(served: ServedSite, stream: str, listed: list[int]) -> list[tuple[int, Picture]]:
-    """Decode segments: each pulse and the last picture in it; what that is decoded by may come before."""
+    """Decode segments, after their init segment; return the last picture of each pulse."""
     parts = [
         await fetch(served, f"{stream}/hls/{file}") for file in ("init.mp4", *(f"{n}.m4s" for n in listed))
     ]
@@ -68,7 +68,7 @@ async def test_a_time_range_is_a_complete_playlist_of_its_segments(served: Serve
     listed = await fetch_text(served, "/objects/1/hls/index.m3u8?from=p13&to=p55")
     assert segment_numbers(listed) == [1, 2, 3, 4, 5], "whole segments, which hold these moments"
     assert "#EXT-X-MEDIA-SEQUENCE:1\n" in listed
-    assert "#EXT-X-PLAYLIST-TYPE" not in listed, "that would promise that nothing is ever taken from it"
+    assert "#EXT-X-PLAYLIST-TYPE" not in listed, "EVENT would promise that no segment is removed"
     assert listed.endswith("#EXT-X-ENDLIST\n")
     shown = await played(served, "/objects/1", segment_numbers(listed))
     assert [pulse for pulse, _ in shown] == list(range(SEGMENT_FRAMES, 6 * SEGMENT_FRAMES))

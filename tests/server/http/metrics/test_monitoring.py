@@ -21,7 +21,7 @@ SEVERITIES = {"critical", "warning", "info"}
 
 
 async def printed(served: ServedSite) -> ExportedMetrics:
-    """Read what /metrics prints of a site in which everything has happened."""
+    """Return the metrics of a site in which all of them have values."""
     for camera in CAMERAS:
         served.service.ingest.status(status(camera))
         served.service.ingest.tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))

@@ -68,7 +68,7 @@ async def operating(
     async with aclosing(serve_site(patience=patience, **changes)) as halls:
         served = await anext(halls)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
-        await page.add_init_script(axe)  # where the site's policy does not hold
+        await page.add_init_script(axe)  # without the site's content policy
         page.set_default_timeout(PATIENCE_MS)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
@@ -203,7 +203,7 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
         await expect(line).to_have_text(re.compile(r": expired without an answer"))
         await page.reload()
         await expect(line).to_have_text(re.compile(r": expired without an answer"))
-        # Another run of the service knows nothing of it; the page sees that its connection ends.
+        # A restarted service has no flags; the page sees the end of its connection.
         served.service.assist.flags._ended.clear()
         [events] = [callback.__self__ for callback in served.service.assist.flags.on_flag]  # type: ignore[attr-defined]
         connections, events._by_scope = events._by_scope, {}
@@ -238,7 +238,7 @@ async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browse
 async def test_a_late_picture_of_another_camera_does_not_replace_the_selected_one(
     browser: Browser,
 ) -> None:
-    async with operating(browser, "#configuration") as (served, page):  # which asks for no picture
+    async with operating(browser, "#configuration") as (served, page):  # without requesting a picture
         show_people(served)
         late = asyncio.Event()
 
@@ -352,7 +352,7 @@ async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browse
         await expect(page.locator("#walk-pairs li")).to_have_text(re.compile(rf"{A} and {B}: \d+ s"))
         await expect(page.locator("#walk-cameras tr")).to_have_text([re.compile(r"(\d+ %){3}")] * 2)
         await page.get_by_role("button", name="Finish").click()
-        # A process of its own calibrates, with less right to the machine than all else has.
+        # Calibration runs in a process of lower priority.
         first = page.locator("#walk-lines li").first
         await expect(first).to_contain_text("feet that two cameras see are", timeout=200_000)
         plan = await page.locator("#walk-plan").element_handle()

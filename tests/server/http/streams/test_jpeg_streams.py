@@ -122,7 +122,7 @@ async def test_a_cameras_boxes_belong_to_decided_frames(drawn: DrawnSite) -> Non
         x, y = round((left + right) / 2), round((top + bottom) / 2)
         for at in ((y, round(left)), (y, round(right) - 1), (round(bottom) - 1, x)):
             beside = changed[max(0, at[0] - 1) : at[0] + 2, max(0, at[1] - 1) : at[1] + 2]
-            assert beside.any(), "a line where the edge of the box is"
+            assert beside.any(), "a line at the edge of the box"
 
 
 async def test_multipart_jpeg_continues_with_the_newest_picture(drawn: DrawnSite) -> None:
@@ -136,7 +136,7 @@ async def test_multipart_jpeg_continues_with_the_newest_picture(drawn: DrawnSite
                 break
             if part.pulse % GOP == GOP - 1:
                 drawn.advance()
-    assert pulses[0] == 19, "the newest there is comes at once"
+    assert pulses[0] == 19, "the newest picture is sent at once"
     assert pulses == sorted(set(pulses))
 
 
@@ -154,7 +154,7 @@ async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn
     assert (steps == 1).mean() > 0.8, "most pictures are shown, not only one of each GOP"
     # A busy machine may hand over some GOPs in bursts; test_pictures_parts.py has a clock of its own.
     gops = [[came[n] for n in range(first, first + GOP) if n in came] for first in range(0, max(came), GOP)]
-    assert max(max(gop) - min(gop) for gop in gops[1:] if gop) > 0.4 * GOP / FPS, "they do not come in bursts"
+    assert max(max(gop) - min(gop) for gop in gops[1:] if gop) > 0.4 * GOP / FPS, "no bursts"
 
 
 async def test_the_requested_rate_limits_pictures(drawn: DrawnSite) -> None:
@@ -189,7 +189,7 @@ async def test_one_worker_renders_a_stream_for_all_viewers(drawn: DrawnSite) -> 
 async def test_a_killed_worker_is_replaced_and_its_streams_continue(
     drawn: DrawnSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # nobody waits for that
+    monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # no viewer waits for it
     pictures: RenderPool = drawn.app[SERVICE].rendering
     going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with (
@@ -258,7 +258,7 @@ async def test_the_number_of_rendered_streams_is_limited() -> None:
         while drawn.app[SERVICE].rendering.viewers:  # noqa: ASYNC110 — the server notices when the connection closes
             await asyncio.sleep(0.01)
         async with drawn.session.get("/cameras/c1/live.jpg") as other:
-            assert other.status == 200, "one that nobody watches any more makes place"
+            assert other.status == 200, "an unwatched stream frees its place"
 
 
 async def test_rendered_streams_count_towards_the_viewer_limit() -> None:

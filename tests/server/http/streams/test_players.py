@@ -39,12 +39,12 @@ from server.messaging.epochs import end_of_epoch
 EPOCHS = 48
 PATHS = ("/objects/1/best.mp4", "/objects/1/best.ts", "/cameras/c0/live.ts", "/objects/1/hls/index.m3u8")
 STREAMS = len(PATHS) - 1
-# ffmpeg reads the init segment again with each playlist, of its own live HLS too, and wonders about it.
+# ffmpeg rereads the init segment with each playlist, even of its own live HLS, and warns about it.
 OF_EVERY_PLAYLIST = re.compile(
     r"(\[.*\] Found duplicated MOOV Atom. Skipped it|    Last message repeated .*)\n"
 )
 NEVER = re.compile(r"$^")
-# VLC wonders about its sound, its settings and the graphics card as well, where there are none.
+# VLC also warns about missing audio devices, settings and graphics cards.
 OF_A_STREAM = re.compile(
     r"^.* (?:access|stream|demux|packetizer|input|adaptive\S*) (?:warning|error): .*$", re.MULTILINE
 )
@@ -78,7 +78,7 @@ async def live() -> AsyncIterator[ServedSite]:
 
 @dataclass(frozen=True)
 class Played:
-    """What a player gave."""
+    """The output of a player."""
 
     code: int | None
     output: bytes
@@ -125,7 +125,7 @@ def check_pictures(served: ServedSite, path: str, output: bytes) -> None:
     pictures = np.frombuffer(output, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
     last = end_of(served, path)
     first = last - len(pictures)
-    assert first <= 20 * STRIDE, f"{path}: from where the player came, to the end"
+    assert first <= 20 * STRIDE, f"{path}: from its first picture to the end"
     cameras = [int(np.array_equal(picture, alone[1, first + n])) for n, picture in enumerate(pictures)]
     for n, picture in enumerate(pictures):
         np.testing.assert_array_equal(picture, alone[cameras[n], first + n], f"{path}: pulse {first + n}")
@@ -161,7 +161,7 @@ async def test_mpv_plays_to_the_end_without_a_warning(live: ServedSite) -> None:
 
 @pytest.fixture
 def shared() -> Iterator[Path]:
-    """A folder that everybody may write to: VLC does not run as root."""
+    """A world-writable folder: VLC does not run as root."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder).chmod(0o777)
         yield Path(folder)
@@ -200,7 +200,7 @@ def pictures_of(film: bytes) -> list[bytes]:
 
 
 @needs_vlc
-@pytest.mark.slow  # it plays at its own rate: at a higher one it loses pictures when the machine is busy
+@pytest.mark.slow  # plays in real time: faster, it drops pictures on a busy machine
 async def test_vlc_plays_across_cuts_without_a_warning(live: ServedSite, shared: Path) -> None:
     files = [shared / f"{number}.yuv" for number in range(len(PATHS))]
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]

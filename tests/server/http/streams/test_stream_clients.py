@@ -19,14 +19,14 @@ STREAMS = {
     "/cameras/c0/live.ts": "video/mp2t",
 }
 NOT_HERE = {"Host": "hall"}
-"""Of somebody who is no operator: it is no name of this machine."""
+"""Not a name of this machine, so not an operator."""
 GET = "GET {} HTTP/1.1\r\nHost: hall\r\n\r\n"
 
 
 async def send_request(
     served: ServedSite, request: str
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, str]:
-    """Ask by hand; give the connection and the answer's head, in small letters."""
+    """Send a raw request; return the connection and the response head in lower case."""
     reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
     writer.write(request.encode())
     return reader, writer, (await reader.readuntil(b"\r\n\r\n")).decode().lower()
@@ -49,7 +49,7 @@ async def test_head_takes_no_slot_and_keeps_the_connection_usable(
         assert "access-control-allow-origin: *" in head
         assert site_with_people.service.splicer.viewers == 0
         writer.write(b"HEAD /healthz HTTP/1.1\r\nHost: hall\r\n\r\n")
-        assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200"), "no body came before"
+        assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200"), "no body before"
         writer.write(GET.format(path).replace("GET", "HEAD").encode())
         head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
     writer.close()
@@ -139,19 +139,17 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(site_with
     slow = next(viewer for viewer in channel._subscribers if viewer.lost_gops)
     assert len(slow._queue) <= site_with_people.service.config.http.viewer_queue_gops
     assert sum(viewer.lost_gops for viewer in channel._subscribers) == slow.lost_gops, (
-        "only who does not read loses"
+        "only the slow reader loses"
     )
     if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-        assert slow.lost_gops > len(gops) - 50, (
-            "the system keeps little: what waits there would be shown late"
-        )
+        assert slow.lost_gops > len(gops) - 50, "small socket buffers: queued data would be shown late"
     channel.close()
     loop, got = asyncio.get_running_loop(), b""
     stalled.setblocking(False)  # noqa: FBT003 — the name of the method says it
     while data := await loop.sock_recv(stalled, 1 << 20):
         got += data
     kept = [gop for gop in gops if gop in got]
-    assert got.endswith(gops[-1]), "it goes on with the newest"
+    assert got.endswith(gops[-1]), "it continues with the newest"
     assert got.count(b"<GOP") == len(kept) == len(gops) - slow.lost_gops, "and not one is cut"
     stalled.close()
     writer.close()

@@ -22,7 +22,7 @@ async def read_stream(answer: aiohttp.ClientResponse, fragments: int) -> bytes:
 
 
 def last_fragment(data: bytes) -> bytes:
-    """Return the last fragment in full, or what nothing ends with."""
+    """Return the last complete fragment, or a value that no stream ends with."""
     start = data.rfind(b"mdat") - 4
     size = int.from_bytes(data[start : start + 4], "big") if start >= 0 else 0
     return data[start:] if size and len(data) - start == size else b"\x00never"

@@ -87,15 +87,15 @@ async def test_mpv_plays_to_the_end_without_a_warning(vp8_site: ServedSite) -> N
 
 GOPS = 8
 SILENT = (2, 3, 6)
-"""GOPs of which nothing comes, as if no camera could be shown."""
+"""GOPs without pictures, as when no camera can be shown."""
 LOST = 22
-"""A pulse whose picture is lost, in a GOP of which the others have come."""
+"""A pulse whose picture is lost, in an otherwise complete GOP."""
 
 
 @needs_chromium
 async def test_chromium_plays_across_cuts_and_gaps_to_the_end(vp8_site: ServedSite) -> None:
     splicer, frame_buffers = vp8_site.service.splicer, vp8_site.service.frame_buffers
-    splicer.forget([], [])  # begin with somebody new
+    splicer.forget([], [])  # begin with another person
     for seed, camera in enumerate((A, B)):
         for unit in encoded(seed, codec="vp8"):
             if unit.pulse // GOP not in SILENT and unit.pulse != LOST:
@@ -192,7 +192,7 @@ async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(vp8_site: Served
     for path in ("/objects/1/best.jpg", "/cameras/c1/live.jpg"):
         picture, pulse = pictures[path]
         off = [np.abs(picture.astype(float) - own_picture).mean() for own_picture in alone]
-        assert int(np.argmin(off)) == pulse, "the picture of its own pulse, of the camera that is chosen"
+        assert int(np.argmin(off)) == pulse, "the picture of its pulse, of the chosen camera"
     plain, boxed = (pictures[f"/objects/1/best.jpg{query}"][0] for query in ("", "?overlay=1"))
     assert np.abs(plain.astype(float) - boxed).max() > 50, "there are boxes in it"
 

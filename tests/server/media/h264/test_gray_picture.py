@@ -39,7 +39,7 @@ def is_gray(picture: NDArray[np.uint8]) -> bool:
 
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from(PRESETS), Sizes)
-def test_it_is_gray_and_the_pictures_around_it_are_unchanged(preset: str, blocks: tuple[int, int]) -> None:
+def test_a_gray_picture_leaves_its_neighbors_unchanged(preset: str, blocks: tuple[int, int]) -> None:
     units = encoded((16 * blocks[0], 16 * blocks[1] + 2), preset, 3)
     samples = [join_sample(nal_units(unit.data)) for unit in units]
     parameters, writer = parameter_sets(nal_units(units[0].data)), slice_header_format(units[0])
@@ -54,7 +54,7 @@ def test_it_is_gray_and_the_pictures_around_it_are_unchanged(preset: str, blocks
 
 @settings(max_examples=10, deadline=None)
 @given(Sizes)
-def test_it_is_gray_in_vp8(blocks: tuple[int, int]) -> None:
+def test_a_vp8_picture_is_gray(blocks: tuple[int, int]) -> None:
     width, height = 16 * blocks[0], 16 * blocks[1] + 2
     encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(gop=GOP, codec="vp8"))
     noise = np.random.default_rng(0).integers(0, 255, (3, height, width, 3), dtype=np.uint8)
@@ -113,7 +113,7 @@ def test_a_gray_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> Non
 
 
 def with_explicit_order(parameters: ParameterSets) -> ParameterSets:
-    """Change baseline parameter sets so that each picture says its place in the order of showing."""
+    """Change baseline parameter sets so that each picture has a display order count."""
     sps = BitWriter()
     sps.u(8, 66)
     sps.u(16, int.from_bytes(parameters.sps[2:4], "big"))
@@ -123,7 +123,7 @@ def with_explicit_order(parameters: ParameterSets) -> ParameterSets:
     sps.ue(WIDTH // 16 - 1)
     sps.ue(HEIGHT // 16 - 1)
     sps.u(1, 1)
-    for value in (1, 0, 0):  # direct_8x8_inference, no cropping, nothing about how to show it
+    for value in (1, 0, 0):  # direct_8x8_inference, no cropping, no VUI
         sps.u(1, value)
     sps.u(1, 1)
     sps.align(0)
@@ -147,7 +147,7 @@ def test_an_unsupported_format_has_no_gray_picture() -> None:
     assert stream_format.blank(None, 0, 5, FPS) == []
 
 
-@settings(deadline=None)  # some say that they are very large
+@settings(deadline=None)  # some claim to be very large
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10), st.integers(0, 1))
 def test_parameter_sets_of_arbitrary_bytes_are_used_or_unsupported(
     sps: bytes, pps: bytes, number: int

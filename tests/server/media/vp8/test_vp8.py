@@ -60,7 +60,7 @@ def test_a_repetition_shows_the_picture_before_and_changes_none_after(
     frames = [
         data for unit, count in zip(units, repeats, strict=True) for data in [unit.data, *[again] * count]
     ]
-    for decoder in ("vp8", "libvpx"):  # FFmpeg's own, and that of browsers
+    for decoder in ("vp8", "libvpx"):  # FFmpeg's decoder, and that of browsers
         np.testing.assert_array_equal(decoded(frames, decoder), [plain[n] for n in expected], decoder)
 
 
@@ -111,7 +111,7 @@ def read(data: bytes) -> list[tuple[float, Pixels]]:
 def test_a_stream_has_a_picture_for_every_pulse_despite_losses(
     missed: set[int], lost: set[int], first: int
 ) -> None:
-    """What was not taken costs itself; after what was lost the stream stands up to the next key picture."""
+    """An uncaptured frame affects no other; after a lost one the picture freezes until a keyframe."""
     first -= first % GOP
     units = {unit.pulse: unit for unit in encoded(64, 48, missed=frozenset(missed))}
     plain = dict(zip(units, decoded([unit.data for unit in units.values()], "vp8"), strict=True))

@@ -1,4 +1,4 @@
-"""Identity switches are found by compacycle a revised window with the published one."""
+"""Identity switches are found by comparing a revised window with the published one."""
 
 from __future__ import annotations
 
