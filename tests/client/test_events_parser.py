@@ -44,8 +44,8 @@ def test_events_are_the_same_however_the_bytes_arrive(
     text = "".join(f"event: {name}{end}data: {data}{end}{end}" for name, data in events)
     stream = text.encode() + b":\n"  # the comment ends a last lone CR
     parser = SseParser()
-    heard = [event for at in range(0, len(stream), step) for event in parser.feed(stream[at : at + step])]
-    assert [(event.name, event.data) for event in heard] == [
+    parsed = [event for at in range(0, len(stream), step) for event in parser.feed(stream[at : at + step])]
+    assert [(event.name, event.data) for event in parsed] == [
         (name or "message", data) for name, data in events
     ]
 

@@ -80,7 +80,7 @@ async def test_other_answers_are_reported_in_one_line(status: int, body: str, er
 
 
 @pytest.mark.parametrize(
-    ("typed", "meant"),
+    ("entered", "normalized"),
     [
         ("http://host:8080", "http://host:8080"),
         ("host:8080", "http://host:8080"),
@@ -88,12 +88,12 @@ async def test_other_answers_are_reported_in_one_line(status: int, body: str, er
         ("https://host/myview/", "https://host/myview/"),
     ],
 )
-def test_a_link_to_the_page_is_a_valid_address(typed: str, meant: str) -> None:
-    assert str(server_url(typed)) == meant
-    assert str(server_url(typed) / "api/objects").startswith(meant.rstrip("/") + "/api/")
+def test_a_link_to_the_page_is_a_valid_address(entered: str, normalized: str) -> None:
+    assert str(server_url(entered)) == normalized
+    assert str(server_url(entered) / "api/objects").startswith(normalized.rstrip("/") + "/api/")
 
 
-@pytest.mark.parametrize("typed", ["", "ftp://host/", "http://", "http://host:port/"])
-def test_an_invalid_address_is_refused(typed: str) -> None:
+@pytest.mark.parametrize("entered", ["", "ftp://host/", "http://", "http://host:port/"])
+def test_an_invalid_address_is_refused(entered: str) -> None:
     with pytest.raises(ValueError, match="not an address"):
-        server_url(typed)
+        server_url(entered)

@@ -12,6 +12,6 @@ PAGE = (ROOT / "client/page/operator.html").read_text(encoding="utf-8")
 DOCS = (ROOT / "docs/how-to/operate.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("words", re.findall(r"<(?:button|a) [^>]*>([^<]+)<", PAGE))
-def test_every_section_and_button_is_described(words: str) -> None:
-    assert f"**{words}**" in DOCS or f"\n## {words}\n" in DOCS
+@pytest.mark.parametrize("text", re.findall(r"<(?:button|a) [^>]*>([^<]+)<", PAGE))
+def test_every_section_and_button_is_described(text: str) -> None:
+    assert f"**{text}**" in DOCS or f"\n## {text}\n" in DOCS

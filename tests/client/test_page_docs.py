@@ -19,6 +19,6 @@ def test_every_key_is_described(key: str) -> None:
     assert KEYS.get(key, key.upper() if len(key) == 1 else key) in " ".join(named).split()
 
 
-@pytest.mark.parametrize("words", re.findall(r"<button[^>]*>([^<]+)<", PAGE))
-def test_every_button_is_described(words: str) -> None:
-    assert words in DOCS
+@pytest.mark.parametrize("text", re.findall(r"<button[^>]*>([^<]+)<", PAGE))
+def test_every_button_is_described(text: str) -> None:
+    assert text in DOCS

@@ -57,27 +57,27 @@ async def test_the_requested_seconds_are_recorded_unchanged(
 ) -> None:
     scripted_site.video_scripts.append(plays(header(), frames(5000, 100), stays=True))
     out = tmp_path / "one.mp4"
-    done = await client.record(site_url, 1, out, seconds=2.0)
+    result = await client.record(site_url, 1, out, seconds=2.0)
     assert out.read_bytes() == header() + frames(5000, 50)
-    assert (done.complete, done.fragments, done.bytes) == (True, 50, out.stat().st_size)
-    assert done.seconds == pytest.approx(49 / FPS)
+    assert (result.complete, result.fragments, result.bytes) == (True, 50, out.stat().st_size)
+    assert result.seconds == pytest.approx(49 / FPS)
     assert only(tmp_path) == ["one.mp4"]
 
 
 async def test_progress_names_the_camera_and_counts_the_cuts(
     scripted_site: ScriptedSite, site_url: str
 ) -> None:
-    told = asyncio.Event()
+    reported = asyncio.Event()
 
     async def tell(response: web.StreamResponse) -> None:
         cameras = ("c0", "c1", "c1", "c0")
         stream = b"".join(sse_event("gop", gop(100 + GOP * i, camera)) for i, camera in enumerate(cameras))
         await response.write(sse_event("site", SITE) + stream)
-        told.set()
+        reported.set()
         await send_nothing(response)
 
     async def play(response: web.StreamResponse) -> None:
-        await told.wait()
+        await reported.wait()
         await plays(header(), stays=False)(response)
         for pulse in range(100, 121):
             await response.write(fragment(pulse))
@@ -94,11 +94,11 @@ async def test_progress_names_the_camera_and_counts_the_cuts(
         reported.release()
 
     async with asyncio.timeout(PATIENCE):
-        done = await client.watch(site_url, 1, None, 20 / FPS, report)
+        result = await client.watch(site_url, 1, None, 20 / FPS, report)
     assert [progress.camera for progress in reports[-10:]] == ["c1"] * 5 + ["c0"] * 5
     assert [progress.seconds for progress in reports] == sorted(progress.seconds for progress in reports)
-    assert done.cuts == 2
-    assert done.out is None
+    assert result.cuts == 2
+    assert result.out is None
 
 
 async def test_a_recording_continues_after_an_interruption(
@@ -109,17 +109,17 @@ async def test_a_recording_continues_after_an_interruption(
         [plays(header(), frames(100, 10), half), plays(header(), frames(105, 45), stays=True)]
     )
     out = tmp_path / "one.mp4"
-    done = await client.watch(site_url, 1, out, 1.0, settings=HASTY)
+    result = await client.watch(site_url, 1, out, 1.0, settings=HASTY)
     assert out.read_bytes() == header() + frames(100, 25)
-    assert (done.complete, done.reconnections) == (True, 1)
+    assert (result.complete, result.reconnections) == (True, 1)
 
 
 async def test_a_server_that_stays_away_leaves_the_recording_so_far(
     scripted_site: ScriptedSite, site_url: str, tmp_path: Path
 ) -> None:
     scripted_site.video_scripts.append(plays(header(), frames(100, 10)))
-    done = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
-    assert not done.complete
+    result = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
+    assert not result.complete
     assert (tmp_path / "one.mp4").read_bytes() == header() + frames(100, 10)
     assert scripted_site.opened == 1 + HASTY.retries
 
@@ -129,8 +129,8 @@ async def test_a_stream_of_another_format_ends_the_recording(
 ) -> None:
     other = header(picture=b"640x480")
     scripted_site.video_scripts.extend([plays(header(), frames(100, 10)), plays(other, frames(110, 10))])
-    done = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
-    assert not done.complete
+    result = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
+    assert not result.complete
     assert (tmp_path / "one.mp4").read_bytes() == header() + frames(100, 10)
 
 

@@ -62,16 +62,16 @@ async def ask_events(url: str) -> object:
 
 
 @pytest.mark.parametrize(
-    ("asking", "words"),
+    ("asking", "error"),
     [
         (ask, r"the answer is larger than \d+ bytes"),
         (ask_past, r"a line of the answer is larger than \d+ bytes"),
         (ask_events, r"a line is larger than \d+ bytes"),
     ],
 )
-async def test_an_endless_answer_is_refused(asking: Callable[[str], Awaitable[object]], words: str) -> None:
+async def test_an_endless_answer_is_refused(asking: Callable[[str], Awaitable[object]], error: str) -> None:
     async with answering(endless(PIECE)) as url:
-        with pytest.raises(client.ContractError, match=words):
+        with pytest.raises(client.ContractError, match=error):
             await asking(url)
 
 
@@ -120,18 +120,18 @@ async def test_endless_headers_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("body", "words"),
+    ("body", "error"),
     [
         (b'{"objects": [], "later": ' + b"[" * 100_000, "nested too deeply"),
         (json.dumps(OBJECTS).encode().replace(b"c0", b"\xff"), "does not answer like MyView"),
     ],
 )
-async def test_invalid_json_is_reported_in_one_line(body: bytes, words: str) -> None:
+async def test_invalid_json_is_reported_in_one_line(body: bytes, error: str) -> None:
     async def answer(_: web.Request) -> web.Response:
         return web.Response(body=body)
 
     async with answering(answer) as url:
-        with pytest.raises(client.ContractError, match=words) as caught:
+        with pytest.raises(client.ContractError, match=error) as caught:
             await ask(url)
     assert len(str(caught.value).splitlines()) == 1
 
@@ -145,10 +145,12 @@ async def test_an_error_response_without_text_is_reported_by_its_status() -> Non
             await ask(url)
 
 
-@pytest.mark.parametrize("said", [b"SSH-2.0-OpenSSH\r\n\r\n", b"HTTP/1.1 200 OK\r\nX: " + b"x" * 20_000])
-async def test_another_protocol_is_reported_in_one_line(said: bytes) -> None:
+@pytest.mark.parametrize(
+    "response_bytes", [b"SSH-2.0-OpenSSH\r\n\r\n", b"HTTP/1.1 200 OK\r\nX: " + b"x" * 20_000]
+)
+async def test_another_protocol_is_reported_in_one_line(response_bytes: bytes) -> None:
     async def say(writer: asyncio.StreamWriter) -> None:
-        writer.write(said)
+        writer.write(response_bytes)
         await writer.drain()
 
     async with saying(say) as url:
@@ -168,21 +170,21 @@ async def test_too_many_redirects_are_an_error() -> None:
 
 
 async def test_a_token_is_not_sent_to_another_server_after_a_redirect() -> None:
-    came: list[str | None] = []
+    received: list[str | None] = []
 
     async def list_nobody(request: web.Request) -> web.Response:
-        came.append(request.headers.get("Authorization"))
+        received.append(request.headers.get("Authorization"))
         return web.json_response({"objects": []})
 
     async with answering(list_nobody) as other:
 
         async def lead(request: web.Request) -> web.Response:
-            came.append(request.headers.get("Authorization"))
+            received.append(request.headers.get("Authorization"))
             raise web.HTTPFound(other + "api/objects")
 
         async with answering(lead) as url:
             assert await client.objects(url, client.HttpSettings(token="secret")) == ()  # noqa: S106
-    assert came == ["Bearer secret", None]
+    assert received == ["Bearer secret", None]
 
 
 async def test_an_invalid_status_is_reported_in_one_line() -> None:

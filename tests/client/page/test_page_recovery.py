@@ -65,8 +65,8 @@ async def test_a_gap_in_the_stream_is_skipped(browser: Browser) -> None:
     site.skipped = range(site.edge + 2 * FPS, site.edge + 2 * FPS + 8)
     async with visiting(browser, site) as visit:
         await visit.until(f"myview.pulse > {site.skipped.stop + FPS}")
-        seen = await visit.get("myview.delays.map((delay) => delay.pulse)")
-        assert not set(seen) & set(site.skipped)
+        pulses = await visit.get("myview.delays.map((delay) => delay.pulse)")
+        assert not set(pulses) & set(site.skipped)
 
 
 async def test_a_broken_stream_is_requested_again(browser: Browser) -> None:

@@ -19,29 +19,31 @@ async def test_the_why_button_shows_the_costs_of_every_camera(browser: Browser) 
     async with visiting(browser, query="?object=2") as visit:
         await visit.playing(2)
         await visit.page.keyboard.press("w")
-        why = visit.page.locator("#why")
-        await expect(why).to_contain_text("Now: c2.")
-        await expect(why.locator("tbody tr")).to_have_count(3)
-        await expect(why.locator("tr[aria-current]")).to_have_text("c20.001.001.001.00")
-        await expect(why.locator("tbody tr").nth(1)).to_contain_text("0.500.501.00")
-        await expect(why).to_contain_text("A cut costs as much as 7.5 frames of not seeing the person.")
-        await expect(why).to_contain_text("Over 10 frames: staying with c2 0, c0 9.3 with its cut.")
-        table = await why.bounding_box()
+        costs_button = visit.page.locator("#why")
+        await expect(costs_button).to_contain_text("Now: c2.")
+        await expect(costs_button.locator("tbody tr")).to_have_count(3)
+        await expect(costs_button.locator("tr[aria-current]")).to_have_text("c20.001.001.001.00")
+        await expect(costs_button.locator("tbody tr").nth(1)).to_contain_text("0.500.501.00")
+        await expect(costs_button).to_contain_text(
+            "A cut costs as much as 7.5 frames of not seeing the person."
+        )
+        await expect(costs_button).to_contain_text("Over 10 frames: staying with c2 0, c0 9.3 with its cut.")
+        table = await costs_button.bounding_box()
         legend = await visit.page.locator(".legend").bounding_box()
         assert table is not None
         assert legend is not None
         assert table["y"] + table["height"] <= legend["y"], "it covers no controls"
         await visit.page.get_by_role("button", name="Why").click()
-        await expect(why).to_be_hidden()
+        await expect(costs_button).to_be_hidden()
 
 
 async def test_undetected_shares_have_their_own_column(browser: Browser) -> None:
     async with visiting(browser, FakeSite(undetected=0.25), query="?object=2") as visit:
         await visit.playing(2)
         await visit.page.keyboard.press("w")
-        why = visit.page.locator("#why")
-        await expect(why.locator("thead")).to_have_text("cameracostseesundetectedsizetruncation")
-        await expect(why.locator("tr[aria-current]")).to_have_text("c20.001.000.251.001.00")
+        costs_button = visit.page.locator("#why")
+        await expect(costs_button.locator("thead")).to_have_text("cameracostseesundetectedsizetruncation")
+        await expect(costs_button.locator("tr[aria-current]")).to_have_text("c20.001.000.251.001.00")
 
 
 async def test_the_mouse_on_the_timeline_shows_the_costs_of_that_moment(browser: Browser) -> None:
@@ -53,12 +55,12 @@ async def test_the_mouse_on_the_timeline_shows_the_costs_of_that_moment(browser:
         box = await strip.bounding_box()
         assert box is not None
         await strip.hover(position={"x": box["width"] * (60 - 3) / 62, "y": 5})
-        why = visit.page.locator("#why")
-        await expect(why).to_contain_text("s before: c")
-        text = await why.locator("p").first.text_content() or ""
+        costs_button = visit.page.locator("#why")
+        await expect(costs_button).to_contain_text("s before: c")
+        text = await costs_button.locator("p").first.text_content() or ""
         assert 2 < float(text.split(maxsplit=1)[0]) < 15
         await visit.page.mouse.move(5, 5)
-        await expect(why).to_be_hidden()
+        await expect(costs_button).to_be_hidden()
 
 
 async def test_with_slow_answers_the_costs_are_of_the_last_mouse_position(browser: Browser) -> None:

@@ -17,11 +17,11 @@ _NODE = Path(sys.executable).parent / "node"
 
 @pytest.mark.parametrize("file", sorted(_UNITS.glob("*.test.js")), ids=lambda file: file.name.split(".")[0])
 def test_page_module(file: Path) -> None:
-    done = subprocess.run(
+    completed = subprocess.run(
         [_NODE, "--test", "--test-reporter=tap", file],
         capture_output=True,
         check=False,
         text=True,
         timeout=PATIENCE,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert completed.returncode == 0, completed.stdout + completed.stderr

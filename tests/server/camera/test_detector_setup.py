@@ -74,8 +74,8 @@ def test_the_unit_of_the_file_is_that_of_its_homographies(tmp_path: Path) -> Non
 @pytest.mark.parametrize("kind", ["background", "boxes", "hog"])
 def test_frames_with_and_without_a_picture_have_histograms_of_one_length(tmp_path: Path, kind: str) -> None:
     one = observer(tmp_path, {"kind": kind})
-    seen = one.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))
-    assert seen.histograms.shape == (0, one.bins)
+    found = one.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))
+    assert found.histograms.shape == (0, one.bins)
 
 
 def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:

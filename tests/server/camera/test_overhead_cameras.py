@@ -49,8 +49,8 @@ def _recall(kind: str, scene: Scene, pictures: dict[int, NDArray[np.uint8]]) -> 
     detector.prepare([pictures[frame] for frame in _LEARNED], 10)
     found = []
     for frame in _SEARCHED:
-        seen = detector.detect(pictures[frame])
-        confident = seen.boxes[seen.scores > 0.5]
+        detections = detector.detect(pictures[frame])
+        confident = detections.boxes[detections.scores > 0.5]
         boxes = scene.truth(frame)[0].boxes
         overlaps = iou(boxes[:, None], confident[None]) if len(confident) else np.zeros((len(boxes), 1))
         found += (overlaps.max(axis=1) > 0.4).tolist()

@@ -47,15 +47,15 @@ def test_tiny_boxes_have_no_sharpness(box: Box) -> None:
 
 def test_a_hidden_track_keeps_its_sharpness_and_an_ended_one_is_forgotten() -> None:
     memory = SharpnessMemory()
-    [seen] = memory.measure(camera_tracks("c0", 0, {1: BOX}), picture()).tracks
-    assert seen.sharpness == sharpness(picture(), BOX)
+    [visible] = memory.measure(camera_tracks("c0", 0, {1: BOX}), picture()).tracks
+    assert visible.sharpness == sharpness(picture(), BOX)
     hidden = memory.measure(camera_tracks("c0", 1, {1: None, 2: None}), picture(blur=5.0)).tracks
-    assert [track.sharpness for track in hidden] == [seen.sharpness, None]
-    [ended] = memory.measure(camera_tracks("c0", 2, {1: BOX}), None).tracks
-    assert ended.sharpness == seen.sharpness
+    assert [track.sharpness for track in hidden] == [visible.sharpness, None]
+    [undecoded] = memory.measure(camera_tracks("c0", 2, {1: BOX}), None).tracks
+    assert undecoded.sharpness == visible.sharpness
     memory.measure(camera_tracks("c0", 3, {}), picture())
-    [again] = memory.measure(camera_tracks("c0", 4, {1: None}), picture()).tracks
-    assert again.sharpness is None
+    [reappeared] = memory.measure(camera_tracks("c0", 4, {1: None}), picture()).tracks
+    assert reappeared.sharpness is None
 
 
 def test_other_fields_of_the_message_are_unchanged() -> None:

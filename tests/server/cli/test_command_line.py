@@ -52,7 +52,7 @@ def site(folder: Path, **changes: Any) -> Path:
 
 
 @pytest.fixture
-def taken() -> Iterator[int]:
+def used_port() -> Iterator[int]:
     """Yield a port in use."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield int(server.getsockname()[1])
@@ -63,7 +63,7 @@ COMMANDS = ["sync", "bestview", "up"]
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize(
-    ("changes", "why"),
+    ("changes", "reason"),
     [
         ({"htp": {"port": 1}}, "htp: unknown key; did you mean 'http'?"),
         ({"cameras": [{"id": "a", "source": "x"}] * 2}, "two cameras are called 'a'"),
@@ -76,9 +76,9 @@ COMMANDS = ["sync", "bestview", "up"]
     ],
 )
 def test_an_invalid_configuration_is_refused(
-    run: RunCommand, tmp_path: Path, command: str, changes: dict[str, Any], why: str
+    run: RunCommand, tmp_path: Path, command: str, changes: dict[str, Any], reason: str
 ) -> None:
-    assert why in input_error(run(command, site(tmp_path, **changes)))
+    assert reason in input_error(run(command, site(tmp_path, **changes)))
 
 
 @pytest.mark.parametrize("command", [["sync"], ["camera"], ["bestview"], ["up"]])
@@ -107,7 +107,7 @@ DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200
 
 
 @pytest.mark.parametrize(
-    ("words", "why"),
+    ("command_words", "reason"),
     [
         (["track", "--det", "det.txt", "--out", "det.txt"], "is an input, and would be replaced"),
         (["track", "--det", "det.txt", "--out", "sub/../det.txt"], "is an input, and would be replaced"),
@@ -125,14 +125,14 @@ DETECTIONS = "".join(f"{n},-1,{n},10,20,40,0.9,-1,-1,-1\n" for n in range(1, 200
     ids=lambda arguments: " ".join(arguments)[:40] if isinstance(arguments, list) else "",
 )
 def test_inputs_and_special_files_are_not_replaced_and_invalid_options_are_refused(
-    run: RunCommand, tmp_path: Path, words: list[str], why: str
+    run: RunCommand, tmp_path: Path, command_words: list[str], reason: str
 ) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "det.txt").write_text(DETECTIONS)
     (tmp_path / "points.json").write_text('{"cameras": {}}')
     os.mkfifo(tmp_path / "pipe")
     before = written(tmp_path)
-    assert why in input_error(run(*words))
+    assert reason in input_error(run(*command_words))
     assert written(tmp_path) == before
     assert (tmp_path / "det.txt").read_text() == DETECTIONS
 
@@ -176,11 +176,11 @@ def test_a_missing_or_broken_video_is_refused(
 
 @pytest.mark.parametrize("section", ["http", "sync", "zenoh"])
 def test_a_port_in_use_is_refused_and_nothing_is_written(
-    run: RunCommand, tmp_path: Path, taken: int, section: str
+    run: RunCommand, tmp_path: Path, used_port: int, section: str
 ) -> None:
     write_video(tmp_path / "c0.mp4", 3)
-    address = dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}")
-    path = site(tmp_path, **{section: address if section == "zenoh" else {"port": taken}})
+    address = dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{used_port}")
+    path = site(tmp_path, **{section: address if section == "zenoh" else {"port": used_port}})
     assert f"{section}." in input_error(run("up", path, "--out", "out"))
     if section != "sync":
         assert f"{section}." in input_error(run("bestview", path, "--out", "out"))
@@ -190,11 +190,11 @@ def test_a_port_in_use_is_refused_and_nothing_is_written(
 
 
 def test_the_port_on_the_command_line_overrides_the_configuration(
-    run: RunCommand, tmp_path: Path, taken: int, monkeypatch: pytest.MonkeyPatch
+    run: RunCommand, tmp_path: Path, used_port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_HTTP__PORT", "1")  # so that the command's settings are undone
-    assert f"127.0.0.1:{taken}" in input_error(run("up", site(tmp_path), "--port", taken))
-    assert f"127.0.0.1:{taken}" in input_error(run("demo", "--port", taken, "--no-browser"))
+    assert f"127.0.0.1:{used_port}" in input_error(run("up", site(tmp_path), "--port", used_port))
+    assert f"127.0.0.1:{used_port}" in input_error(run("demo", "--port", used_port, "--no-browser"))
 
 
 @pytest.mark.parametrize("command", ["up", "bestview"])
@@ -208,16 +208,16 @@ def test_an_output_folder_that_is_not_empty_is_refused(run: RunCommand, tmp_path
 def test_scene_lists_the_scenes_and_their_default_cameras(run: RunCommand, tmp_path: Path) -> None:
     shown = run("scene", "--help").out
     assert all(f"{name}:" in shown for name in scene_names())
-    ended = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
-    assert (ended.code, ended.err) == (0, "")
-    assert ended.out.splitlines()[-1] == "fish: 1 view, gt/"
+    result = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.splitlines()[-1] == "fish: 1 view, gt/"
     assert written(tmp_path / "fish") == {"c0.mp4", "gt"}
 
 
 def test_scene_writes_a_recording_or_refuses(run: RunCommand, tmp_path: Path) -> None:
     small = ["--cameras", 1, "--objects", 1, "--size", "128x72"]
-    ended = run("scene", "room", "--out", "room", "--seconds", 0.2, *small)
-    assert (ended.code, ended.err) == (0, "")
+    result = run("scene", "room", "--out", "room", "--seconds", 0.2, *small)
+    assert (result.code, result.err) == (0, "")
     assert written(tmp_path / "room") == {"c0.mp4", "gt", "ground.json"}
     assert "not an empty folder" in input_error(run("scene", "room", "--out", "room", *small))
     assert "there is no scene 'cellar'" in input_error(run("scene", "cellar", "--out", "new", *small))
@@ -245,8 +245,8 @@ def test_an_interrupted_scene_leaves_no_incomplete_files(
         return image(scene, camera, frame)
 
     monkeypatch.setattr(Scene, "image", interrupted)
-    ended = run("scene", "room", "--out", "room", "--cameras", 1, "--objects", 1, "--size", "128x72")
-    assert ended.code == 130
+    result = run("scene", "room", "--out", "room", "--cameras", 1, "--objects", 1, "--size", "128x72")
+    assert result.code == 130
     assert drawn == [0, 1, 2, 3]
     assert written(tmp_path) == set()
 
@@ -267,8 +267,8 @@ def test_track_writes_a_file_or_refuses(run: RunCommand, tmp_path: Path) -> None
     assert "is a folder" in input_error(run("track", "--det", "det.txt", "--out", tmp_path))
     assert "cannot write there" in input_error(run("track", "--det", "det.txt", "--out", "det.txt/t.txt"))
     assert written(tmp_path) == before
-    ended = run("track", "--det", "det.txt", "--out", "t.txt")
-    assert (ended.code, ended.out, ended.err) == (0, "t.txt: 1 people\n", "")
+    result = run("track", "--det", "det.txt", "--out", "t.txt")
+    assert (result.code, result.out, result.err) == (0, "t.txt: 1 people\n", "")
     assert len((tmp_path / "t.txt").read_text().splitlines()) == 30
     assert run("track", "my view (1).mp4", "--out", "v.txt").code == 0
 
@@ -286,20 +286,20 @@ def test_track_reads_settings_from_a_configuration_in_any_folder(run: RunCommand
 @pytest.mark.parametrize("seconds", ["nan", "-1"])
 @pytest.mark.parametrize("command", [["demo", "--no-browser"], ["watch", "http://127.0.0.1:1"]], ids=" ".join)
 def test_invalid_seconds_are_refused(run: RunCommand, command: list[str], seconds: str) -> None:
-    done = run(*command, "--seconds", seconds)
-    assert done.code == 2
-    assert "--seconds" in done.err
+    result = run(*command, "--seconds", seconds)
+    assert result.code == 2
+    assert "--seconds" in result.err
 
 
 def test_watch_reports_an_unreachable_server_in_one_line(run: RunCommand) -> None:
-    done = run("watch", f"http://127.0.0.1:{free_port()}")
-    assert (done.code, done.out) == (UnavailableError.code, "")
-    (line,) = done.err.splitlines()
+    result = run("watch", f"http://127.0.0.1:{free_port()}")
+    assert (result.code, result.out) == (UnavailableError.code, "")
+    (line,) = result.err.splitlines()
     assert line.startswith("myview: watch: ")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "why"),
+    ("arguments", "reason"),
     [
         (["none.mp4"], "none.mp4: no such file or folder"),
         (["c0.mp4", "none.mp4"], "none.mp4: no such file or folder"),
@@ -316,7 +316,7 @@ def test_watch_reports_an_unreachable_server_in_one_line(run: RunCommand) -> Non
     ],
 )
 def test_render_refuses_and_leaves_nothing(
-    run: RunCommand, tmp_path: Path, arguments: list[str], why: str
+    run: RunCommand, tmp_path: Path, arguments: list[str], reason: str
 ) -> None:
     write_video(tmp_path / "c0.mp4", 5)
     (tmp_path / "sub").mkdir()
@@ -324,21 +324,21 @@ def test_render_refuses_and_leaves_nothing(
     (tmp_path / "empty.mp4").write_bytes(b"")
     (tmp_path / "wrong.yaml").write_text("sight: {}\n")
     before = written(tmp_path)
-    assert why in input_error(run("render", "--out", "out", *arguments))
+    assert reason in input_error(run("render", "--out", "out", *arguments))
     assert written(tmp_path) == before
 
 
 def test_help_lists_every_command(run: RunCommand) -> None:
-    ended = run("--help")
-    assert ended.code == 0
+    result = run("--help")
+    assert result.code == 0
     for command in ("demo", "up", "sync", "camera", "bestview", "render", "track", "scene", "watch"):
-        assert command in ended.out
+        assert command in result.out
 
 
 def test_the_version_is_printed(run: RunCommand) -> None:
-    ended = run("--version")
-    assert ended.code == 0
-    assert ended.out == f"myview {version('myview')}\n"
+    result = run("--version")
+    assert result.code == 0
+    assert result.out == f"myview {version('myview')}\n"
 
 
 def test_help_does_not_import_modules_of_commands() -> None:

@@ -16,10 +16,10 @@ THERE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os
 
 
 @pytest.mark.parametrize(
-    ("there", "fps"), [(0.5, 6.25), (1, 6.25), (2, 12.5), (3.9, 12.5), (4, 25), (64, 25)]
+    ("processors", "fps"), [(0.5, 6.25), (1, 6.25), (2, 12.5), (3.9, 12.5), (4, 25), (64, 25)]
 )
-def test_the_rate_depends_on_the_processors(there: float, fps: float) -> None:
-    assert demo_fps(there) == fps
+def test_the_rate_depends_on_the_processors(processors: float, fps: float) -> None:
+    assert demo_fps(processors) == fps
 
 
 def test_the_environment_overrides_the_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -118,9 +118,9 @@ def test_a_command_without_disk_space_reports_it_in_one_line_and_leaves_nothing(
     points = tmp_path / "given" / "points.csv"
     pairs = "c0,212,300,0,0\nc0,430,296,2.5,0\nc0,390,200,2.5,4\nc0,250,202,0,4\n"
     points.write_text(f"camera,image_x,image_y,floor_x,floor_y\n{pairs}", encoding="ascii")
-    words = command.format(video=video, det=det, points=points).split()
+    arguments = command.format(video=video, det=det, points=points).split()
     with files_of_at_most(most):
-        done = myview(*words, "--out", tmp_path / "out")
-    assert done.code == 2
-    assert [line.rpartition(": ")[2] for line in done.err.splitlines()] == ["File too large"]
+        result = myview(*arguments, "--out", tmp_path / "out")
+    assert result.code == 2
+    assert [line.rpartition(": ")[2] for line in result.err.splitlines()] == ["File too large"]
     assert [path.name for path in tmp_path.iterdir()] == ["given"]

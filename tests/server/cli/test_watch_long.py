@@ -55,10 +55,10 @@ def test_the_sidecar_files_have_these_bytes(tmp_path: Path) -> None:
 
 def peak(film: Path, frames: int) -> int:
     """Return the bytes that writing takes at most."""
-    everything: Iterator[Frame] = (Frame(pulse, "c0", (BOX,) * 5) for pulse in range(frames))
+    all_frames: Iterator[Frame] = (Frame(pulse, "c0", (BOX,) * 5) for pulse in range(frames))
     tracemalloc.start()
     try:
-        write_sidecars(film, everything, 0, 1, SITE)
+        write_sidecars(film, all_frames, 0, 1, SITE)
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -105,8 +105,8 @@ def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path:
     history = ViewHistory(1, spool=spool)
     for gop in (2, 0, 1):
         history.take(gop_event(gop))
-    again = tuple((BOX,) for _ in range(GOP))
-    history.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": again}, cuts=()))
+    repeated = tuple((BOX,) for _ in range(GOP))
+    history.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": repeated}, cuts=()))
     frames = list(history.frames(0, 3 * GOP))
     assert [frame.pulse for frame in frames] == list(range(3 * GOP))
     assert [len(frame.boxes) for frame in frames] == [5] * GOP + [1] * GOP + [5] * GOP

@@ -35,8 +35,8 @@ async def served() -> AsyncIterator[ServedSite]:
     async for site_served in serve_site():
         site_served.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
-            here, there = (LARGE, SMALL) if epoch < 3 else (SMALL, LARGE)
-            site_served.service.feed(epoch, {A: {1: here, 2: SMALL}, B: {1: there}})
+            in_a, in_b = (LARGE, SMALL) if epoch < 3 else (SMALL, LARGE)
+            site_served.service.feed(epoch, {A: {1: in_a, 2: SMALL}, B: {1: in_b}})
         yield site_served
 
 
@@ -55,8 +55,8 @@ def chosen(served: ServedSite) -> dict[int, str]:
 
 async def test_the_recording_begins_at_0_with_unchanged_pictures(served: ServedSite, tmp_path: Path) -> None:
     out = tmp_path / "one.mp4"
-    done = await watched(served, out)
-    assert (done.complete, done.cuts, done.fragments) == (True, 1, 28 - FIRST)
+    result = await watched(served, out)
+    assert (result.complete, result.cuts, result.fragments) == (True, 1, 28 - FIRST)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ass", "one.mp4", "one.vtt"]
     shown = list(pictures(out))
     assert [place for place, _ in shown] == list(range(28 - FIRST))
@@ -82,8 +82,8 @@ async def test_a_live_stream_is_recorded_like_the_past(tmp_path: Path) -> None:
             await asyncio.sleep(0.001)
         for epoch in range(4, 8):
             served.service.feed(epoch, {A: {1: LARGE}, B: {1: SMALL}})
-        done = await watching
-        assert (done.complete, done.fragments) == (True, 3 * GOP)
+        result = await watching
+        assert (result.complete, result.fragments) == (True, 3 * GOP)
         assert [place for place, _ in pictures(out)] == list(range(3 * GOP))
         assert (tmp_path / "one.vtt").read_text().count("\np") == 3 * GOP
 
@@ -95,7 +95,7 @@ async def test_a_browser_plays_the_recording_with_its_duration(served: ServedSit
     async with chromium() as browser:
         page = await browser.new_page()
         await page.goto(f"file://{tmp_path}/page.html")
-        ended = await page.evaluate("""async () => {
+        played = await page.evaluate("""async () => {
             const video = document.querySelector('video');
             const over = new Promise((done, failed) => {
                 video.onended = done;
@@ -105,17 +105,17 @@ async def test_a_browser_plays_the_recording_with_its_duration(served: ServedSit
             await over;
             return [video.duration, video.currentTime, video.videoWidth, video.buffered.start(0)];
         }""")
-    assert ended == pytest.approx([(28 - FIRST) / FPS, (28 - FIRST) / FPS, WIDTH, 0.0])
+    assert played == pytest.approx([(28 - FIRST) / FPS, (28 - FIRST) / FPS, WIDTH, 0.0])
 
 
 @needs_ffprobe
 async def test_ffprobe_reports_no_problem_of_the_recording(served: ServedSite, tmp_path: Path) -> None:
     await watched(served, tmp_path / "one.mp4")
     options = ["-v", "warning", "-show_entries", "format=start_time,duration", "-of", "csv=p=0"]
-    done = subprocess.run(
+    result = subprocess.run(
         ["ffprobe", *options, str(tmp_path / "one.mp4")], capture_output=True, check=True, text=True
     )
-    assert (done.stderr, done.stdout.strip()) == ("", "0.000000,0.720000")
+    assert (result.stderr, result.stdout.strip()) == ("", "0.000000,0.720000")
 
 
 async def test_every_frame_has_its_boxes_in_the_sidecar(served: ServedSite, tmp_path: Path) -> None:
@@ -131,8 +131,8 @@ async def test_every_frame_has_its_boxes_in_the_sidecar(served: ServedSite, tmp_
         assert (begin, end) == pytest.approx((place / FPS, (place + 1) / FPS))
         content = json.loads(text)
         assert content["camera"] == chosen(served)[FIRST + place]
-        everybody = {number: tuple(box) for number, *box in content["boxes"]}
-        assert everybody == {1: LARGE, 2: SMALL} if content["camera"] == A else {1: LARGE}
+        boxes_by_number = {number: tuple(box) for number, *box in content["boxes"]}
+        assert boxes_by_number == {1: LARGE, 2: SMALL} if content["camera"] == A else {1: LARGE}
 
 
 def test_drawn_boxes_have_the_right_positions(tmp_path: Path) -> None:

@@ -35,8 +35,8 @@ async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(
         feed(vp8_site, epoch)
         await asyncio.sleep(0.02)
     vp8_site.service.splicer.close()
-    done = await watching
-    assert (done.complete, done.fragments) == (True, 3 * GOP)
+    result = await watching
+    assert (result.complete, result.fragments) == (True, 3 * GOP)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ass", "one.vtt", "one.webm"]
     with av.open(str(out)) as film:
         assert film.duration == round(seconds * av.time_base)
@@ -44,9 +44,9 @@ async def test_a_recording_spans_cuts_and_has_sidecar_files_with_boxes(
     assert [time for time, _ in shown] == pytest.approx([n / FPS for n in range(3 * GOP)])
     alone = [decoded_alone(camera) for camera in range(2)]
     firsts = range(0, EPOCHS * STRIDE, GOP)
-    (begun,) = [n for n in firsts if any(np.array_equal(shown[0][1], camera[n]) for camera in alone)]
+    (start,) = [n for n in firsts if any(np.array_equal(shown[0][1], camera[n]) for camera in alone)]
     for n, (_, picture) in enumerate(shown):
-        assert any(np.array_equal(picture, camera[begun + n]) for camera in alone), f"frame {n}"
+        assert any(np.array_equal(picture, camera[start + n]) for camera in alone), f"frame {n}"
 
 
 async def test_a_file_name_of_another_container_is_refused_with_one_line(

@@ -83,10 +83,13 @@ def test_homographies_of_a_ground_file_are_validated(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "meant"), [("M", "m"), ("metres", "m"), ("meteres", "m"), ("Cm", "cm"), ("millimeter", "mm")]
+    ("unit", "suggestion"),
+    [("M", "m"), ("metres", "m"), ("meteres", "m"), ("Cm", "cm"), ("millimeter", "mm")],
 )
-def test_a_misspelled_metric_unit_is_refused_with_a_suggestion(unit: str, meant: str, tmp_path: Path) -> None:
-    reason = f"{unit!r} is not understood; did you mean {meant!r}?"
+def test_a_misspelled_metric_unit_is_refused_with_a_suggestion(
+    unit: str, suggestion: str, tmp_path: Path
+) -> None:
+    reason = f"{unit!r} is not understood; did you mean {suggestion!r}?"
     cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
     assert f"cameras.0.ground_unit: {reason}" in complaint({"cameras": cameras})
     (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
@@ -109,14 +112,14 @@ def test_a_mirrored_homography_is_refused_with_its_camera() -> None:
     level = [[3.0, 0.0, -960.0], [0.0, 0.0, 1200.0], [0.0, 1.0, -240.0]]
     down = [[0.02, 0.0, 0.0], [0.0, -0.02, 0.0], [0.0, 0.0, 1.0]]
     past = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 900.0]]
-    ways = {"c0": level, "c1": down, "c2": [[-value for value in row] for row in level]}
+    grounds_by_camera = {"c0": level, "c1": down, "c2": [[-value for value in row] for row in level]}
 
     def cameras(grounds: dict[str, Any]) -> dict[str, Any]:
         return {"cameras": [{"id": camera, "source": "a", "ground": of} for camera, of in grounds.items()]}
 
-    build_config(cameras(ways), where="", folder=Path())
+    build_config(cameras(grounds_by_camera), where="", folder=Path())
     assert "ground: camera c9 has the floor mirrored against camera c0: " in complaint(
-        cameras(ways | {"c9": past})
+        cameras(grounds_by_camera | {"c9": past})
     )
 
 

@@ -65,7 +65,7 @@ def test_every_service_of_a_site_needs_a_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("users", "words"),
+    ("users", "error"),
     [
         (None, r"sync\.users: cannot read .*sync\.users: No such file"),
         ("c0\n", "line 1 is not name:password"),
@@ -75,10 +75,10 @@ def test_every_service_of_a_site_needs_a_line(tmp_path: Path) -> None:
     ],
 )
 def test_a_server_with_missing_or_invalid_passwords_fails_with_one_line(
-    myview: RunCommand, tmp_path: Path, users: str | None, words: str
+    myview: RunCommand, tmp_path: Path, users: str | None, error: str
 ) -> None:
     path = site(tmp_path, users)
-    with pytest.raises(UserError, match=words) as caught:
+    with pytest.raises(UserError, match=error) as caught:
         pulse_users(load_config(path))
     line = input_error(myview("sync", path))
     assert line == f"myview: {caught.value}"

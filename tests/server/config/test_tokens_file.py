@@ -114,9 +114,9 @@ def test_a_missing_token_file_is_reported_in_one_line(tmp_path: Path) -> None:
 def test_a_new_token_is_printed_with_its_line_for_the_file(
     myview: RunCommand, tmp_path: Path, options: list[str], limits: tuple[Any, ...]
 ) -> None:
-    done = myview("token", "Ann's parents", *options)
-    assert done.code == 0
-    lines = done.out.splitlines()
+    result = myview("token", "Ann's parents", *options)
+    assert result.code == 0
+    lines = result.out.splitlines()
     token, line = lines[1].strip(), lines[-1]
     assert len(token) == 43
     assert token not in line

@@ -49,10 +49,10 @@ async def test_a_failing_step_is_logged_once_and_retried(caplog: pytest.LogCaptu
 async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
     """Return whether a failed step is retried."""
     await asyncio.wait([task, asyncio.create_task(failing.done.wait())], return_when="FIRST_COMPLETED")
-    ended = task.done()
+    is_done = task.done()
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
-    return not ended and failing.times > 1
+    return not is_done and failing.times > 1
 
 
 async def test_lists_are_published_after_a_failed_step(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,10 +95,10 @@ def test_a_half_done_renewal_is_loaded_when_it_is_complete(
 
         def load_cert_chain(self, certificate: Path, key: Path, password: object) -> None:
             del key, password
-            if gone:
+            if outcomes:
                 raise FileNotFoundError(2, "No such file or directory", str(certificate))
 
-    gone: list[bool] = []
+    outcomes: list[bool] = []
     monkeypatch.setattr(ssl, "create_default_context", lambda _: Context())
     files = [tmp_path / "c.pem", tmp_path / "k.pem"]
     for file in files:
@@ -106,12 +106,12 @@ def test_a_half_done_renewal_is_loaded_when_it_is_complete(
     certificate = Certificate(*files)
     before = certificate._newest
     files[0].write_text("newer", encoding="utf-8")
-    gone.append(True)  # after it was read, before it was loaded
+    outcomes.append(True)  # after it was read, before it was loaded
     certificate.reload_if_changed()
     certificate.reload_if_changed()
     assert certificate._newest is before
     assert [message for message in caplog.messages if "stays in force" in message] == caplog.messages[:1]
     assert "No such file or directory" in caplog.messages[0]
-    gone.clear()
+    outcomes.clear()
     certificate.reload_if_changed()
     assert certificate._newest is not before, "although the file is unchanged"

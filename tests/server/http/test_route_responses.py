@@ -67,15 +67,15 @@ async def test_overlay_and_time_shift_are_described_where_supported(site_with_pe
     for path, item in described["paths"].items():
         queries = {parameter["name"] for parameter in item["get"]["parameters"] if parameter["in"] == "query"}
         if path.startswith(("/objects/", "/cameras/")):
-            asked = (
+            url = (
                 path.replace("{object}", "1")
                 .replace("{camera}", A)
                 .replace("{segment}", "0")
                 .replace("{part}", "0")
             )
             for query in ("overlay=1", "from=p0", "camera=c0"):
-                async with site_with_people.session.head(f"{asked}?{query}") as answer:
-                    assert (answer.status == 400) == (query.split("=")[0] not in queries), asked
+                async with site_with_people.session.head(f"{url}?{query}") as answer:
+                    assert (answer.status == 400) == (query.split("=")[0] not in queries), url
 
 
 @pytest.mark.parametrize(
@@ -173,11 +173,11 @@ async def test_the_description_has_every_route_except_the_page(site_with_people:
         assert item["get"]["summary"], path
         inside = {parameter["name"] for parameter in item["get"]["parameters"] if parameter["in"] == "path"}
         assert inside == set(re.findall(r"\{(\w+)\}", path))
-    asked = {
+    requests = {
         parameter["name"]: parameter["required"]
         for parameter in described["paths"]["/api/past"]["get"]["parameters"]
     }
-    assert asked == {"from": True, "to": False}
+    assert requests == {"from": True, "to": False}
 
 
 async def test_the_description_is_built_once(

@@ -84,7 +84,7 @@ async def test_watch_trusts_the_authority_of_the_environment_and_sends_its_token
         for epoch in range(3):
             served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
         trusted = {**os.environ, "SSL_CERT_FILE": str(tls.certificate)}
-        for environment, said in (
+        for environment, text in (
             ({**trusted, "MYVIEW_TOKEN": token_of("family")}, "1       yes"),
             (trusted, "myview: watch: watching needs a token"),
         ):
@@ -95,8 +95,8 @@ async def test_watch_trusts_the_authority_of_the_environment_and_sends_its_token
                 stderr=subprocess.STDOUT,
             )
             out, _ = await process.communicate()
-            assert said in out.decode()
-            assert (process.returncode == 0) == ("yes" in said)
+            assert text in out.decode()
+            assert (process.returncode == 0) == ("yes" in text)
 
 
 async def is_proven(port: int, trusted: TlsSettings) -> bool:
@@ -131,9 +131,9 @@ async def test_a_renewed_certificate_is_used_for_new_connections(
     certificate.reload_if_changed()
     assert await is_proven(port, made[1])
     assert not await is_proven(port, made[0])
-    said = len(caplog.messages)
+    count = len(caplog.messages)
     certificate.reload_if_changed()
-    assert len(caplog.messages) == said
+    assert len(caplog.messages) == count
     server.close()
     await server.wait_closed()
 

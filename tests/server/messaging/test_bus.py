@@ -26,7 +26,7 @@ def settings() -> ZenohSettings:
     return ZenohSettings(connect=address, listen=address)
 
 
-class Heard:
+class ReceivedItems:
     """Received items, awaitable."""
 
     def __init__(self) -> None:
@@ -41,61 +41,61 @@ class Presence:
     """Present sessions, awaitable."""
 
     def __init__(self) -> None:
-        self.there: set[str] = set()
+        self.names: set[str] = set()
         self._changed = asyncio.Event()
 
-    def note(self, key: str, there: bool) -> None:
-        (self.there.add if there else self.there.discard)(key)
+    def note(self, key: str, present: bool) -> None:
+        (self.names.add if present else self.names.discard)(key)
         self._changed.set()
 
     async def until(self, *keys: str) -> None:
         async with asyncio.timeout(PATIENCE):
-            while self.there != set(keys):
+            while self.names != set(keys):
                 await self._changed.wait()
                 self._changed.clear()
 
 
 async def test_a_message_arrives_with_its_key_and_attachment(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
-    heard, there = Heard(), Presence()
-    router.subscribe("myview/hall/*/video", heard.queue.put_nowait)
-    client.watch_alive("myview/hall/bestview", there.note)
+    received, present = ReceivedItems(), Presence()
+    router.subscribe("myview/hall/*/video", received.queue.put_nowait)
+    client.watch_alive("myview/hall/bestview", present.note)
     router.declare_alive("myview/hall/bestview")
-    await there.until("myview/hall/bestview")
+    await present.until("myview/hall/bestview")
     client.publish("myview/hall/c0/video", b"picture", b"head")
-    assert await heard.next() == Message("myview/hall/c0/video", b"picture", b"head")
+    assert await received.next() == Message("myview/hall/c0/video", b"picture", b"head")
     client.publish("myview/hall/c0/video", b"picture")
-    assert (await heard.next()).attachment == b""
+    assert (await received.next()).attachment == b""
     client.close()
     router.close()
 
 
 async def test_an_oversized_message_is_dropped_and_others_arrive(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
-    heard, there = Heard(), Presence()
-    router.subscribe("myview/hall/camera/*/video", heard.queue.put_nowait)
-    client.watch_alive("router", there.note)
+    received, present = ReceivedItems(), Presence()
+    router.subscribe("myview/hall/camera/*/video", received.queue.put_nowait)
+    client.watch_alive("router", present.note)
     router.declare_alive("router")
-    await there.until("router")
+    await present.until("router")
     key, wait = "myview/hall/camera/c0/video", zenoh.CongestionControl.BLOCK  # the sender may block
     for payload in (bytes(40_000_000), b"picture"):
         await asyncio.to_thread(client._session.put, key, payload, congestion_control=wait)
-    assert (await heard.next()).payload == b"picture"
+    assert (await received.next()).payload == b"picture"
     client.close()
     router.close()
 
 
 async def test_messages_of_one_session_stay_in_order(settings: ZenohSettings) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
-    heard, there = Heard(), Presence()
-    router.subscribe("a/**", heard.queue.put_nowait)
-    client.watch_alive("router", there.note)
+    received, present = ReceivedItems(), Presence()
+    router.subscribe("a/**", received.queue.put_nowait)
+    client.watch_alive("router", present.note)
     router.declare_alive("router")
-    await there.until("router")
+    await present.until("router")
     for number in range(200):
         client.publish(f"a/{'bc'[number % 2]}", str(number).encode() + bytes(1000 * (number % 7)))
         await asyncio.sleep(0)
-    got = [int((await heard.next()).payload.split(b"\0")[0]) for _ in range(200)]
+    got = [int((await received.next()).payload.split(b"\0")[0]) for _ in range(200)]
     assert got == list(range(200))
     client.close()
     router.close()
@@ -105,17 +105,17 @@ async def test_publishers_are_bounded_and_all_messages_arrive(
     settings: ZenohSettings,
 ) -> None:
     router, client = Bus.router(settings), Bus.client(settings)
-    heard, there = Heard(), Presence()
-    router.subscribe("thumbs/**", heard.queue.put_nowait)
-    client.watch_alive("router", there.note)
+    received, present = ReceivedItems(), Presence()
+    router.subscribe("thumbs/**", received.queue.put_nowait)
+    client.watch_alive("router", present.note)
     router.declare_alive("router")
-    await there.until("router")
+    await present.until("router")
     keys = [f"thumbs/{number}" for number in range(200)]
     for key in keys:
         client.publish(key, b"jpeg")
         client.publish("thumbs/often", b"jpeg")
         await asyncio.sleep(0)
-    got = [(await heard.next()).key for _ in range(400)]
+    got = [(await received.next()).key for _ in range(400)]
     assert [key for key in got if key != "thumbs/often"] == keys
     assert len(client._publishers) <= 64
     assert list(client._publishers)[-2:] == ["thumbs/199", "thumbs/often"]
@@ -125,21 +125,21 @@ async def test_publishers_are_bounded_and_all_messages_arrive(
 
 async def test_a_client_may_start_before_the_router_and_survives_its_restart(settings: ZenohSettings) -> None:
     client = Bus.client(settings)
-    there = Presence()
-    client.watch_alive("router", there.note)
+    present = Presence()
+    client.watch_alive("router", present.note)
     client.declare_alive("client")
     for _ in range(2):
         router = Bus.router(settings)
-        heard, clients = Heard(), Presence()
-        router.subscribe("word", heard.queue.put_nowait)
+        received, clients = ReceivedItems(), Presence()
+        router.subscribe("word", received.queue.put_nowait)
         router.watch_alive("client", clients.note)
         router.declare_alive("router")
-        await there.until("router")
+        await present.until("router")
         await clients.until("client")
         client.publish("word", b"hello")
-        assert (await heard.next()).payload == b"hello"
+        assert (await received.next()).payload == b"hello"
         router.close()
-        await there.until()
+        await present.until()
     client.close()
 
 
@@ -148,19 +148,19 @@ async def test_two_clients_exchange_messages_through_the_router_until_one_unsubs
 ) -> None:
     router = Bus.router(settings)
     one, two = Bus.listener(settings), Bus.listener(settings)
-    heard, ended, there = Heard(), Heard(), Presence()
-    two.subscribe("found/*", heard.queue.put_nowait)
-    end = two.listen("found/one", ended.queue.put_nowait)
-    one.watch_alive("ready", there.note)
+    received, second_received, present = ReceivedItems(), ReceivedItems(), Presence()
+    two.subscribe("found/*", received.queue.put_nowait)
+    end = two.listen("found/one", second_received.queue.put_nowait)
+    one.watch_alive("ready", present.note)
     two.declare_alive("ready")
-    await there.until("ready")
+    await present.until("ready")
     one.publish("found/one", b"first")
-    assert (await ended.next()).payload == b"first"
+    assert (await second_received.next()).payload == b"first"
     end()
     end()
     one.publish("found/one", b"second")
-    assert [(await heard.next()).payload for _ in range(2)] == [b"first", b"second"]
-    assert ended.queue.empty()
+    assert [(await received.next()).payload for _ in range(2)] == [b"first", b"second"]
+    assert second_received.queue.empty()
     for bus in (one, two, router):
         bus.close()
 
@@ -226,26 +226,26 @@ asyncio.run(main())
 
 
 def test_a_process_that_closes_its_sessions_exits() -> None:
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", SCRIPT.format(port=free_port())], timeout=PATIENCE, check=False
     )
-    assert done.returncode == 0
+    assert completed.returncode == 0
 
 
 async def test_items_from_threads_are_handled_on_the_loop_in_order() -> None:
     got: list[tuple[int, int]] = []
-    done = asyncio.Event()
+    completed = asyncio.Event()
 
     def handle(number: int) -> None:
         got.append((number, threading.get_ident()))
         if number == 999:
-            done.set()
+            completed.set()
 
     inbox = Inbox(handle)
     thread = threading.Thread(target=lambda: deque(map(inbox.put, range(1000)), maxlen=0))
     thread.start()
     async with asyncio.timeout(PATIENCE):
-        await done.wait()
+        await completed.wait()
     thread.join()
     assert got == [(number, threading.get_ident()) for number in range(1000)]
 

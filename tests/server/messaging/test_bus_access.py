@@ -51,7 +51,7 @@ def settings(folder: Path) -> ZenohSettings:
     return ZenohSettings(connect=address, listen=address, users=folder / "zenoh.users", tls=tls)
 
 
-class Heard:
+class ReceivedTexts:
     """Received texts, awaitable."""
 
     def __init__(self) -> None:
@@ -62,12 +62,12 @@ class Heard:
         self.texts.append(f"{message.key.rpartition('camera/')[2]} {message.payload.decode()}")
         self._new.set()
 
-    async def until(self, text: str, again: Callable[[], None]) -> None:
+    async def until(self, text: str, send: Callable[[], None]) -> None:
         """Wait for a text, sending it repeatedly: without a subscriber it is lost."""
         async with asyncio.timeout(PATIENCE):
             while text not in self.texts:
                 self._new.clear()
-                again()
+                send()
                 try:
                     async with asyncio.timeout(0.05):
                         await self._new.wait()
@@ -95,36 +95,38 @@ def router(settings: ZenohSettings) -> Bus:
 
 
 async def test_a_camera_publishes_under_its_own_key_only(settings: ZenohSettings) -> None:
-    heard = Heard()
+    received = ReceivedTexts()
     with opened(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
     ) as (bestview, c0, c1):
-        bestview.subscribe(SITE.camera("*", "video"), heard)
-        await heard.until("c0/video own", lambda: c0.publish(SITE.camera("c0", "video"), b"own"))
+        bestview.subscribe(SITE.camera("*", "video"), received)
+        await received.until("c0/video own", lambda: c0.publish(SITE.camera("c0", "video"), b"own"))
 
         def false_and_true() -> None:
             c1.publish(SITE.camera("c0", "video"), b"false")
             c1.publish(SITE.camera("c1", "video"), b"true")
 
-        await heard.until("c1/video true", false_and_true)
-        assert "c0/video false" not in heard.texts, "a session keeps its order: it would have arrived before"
+        await received.until("c1/video true", false_and_true)
+        assert "c0/video false" not in received.texts, (
+            "a session keeps its order: it would have arrived before"
+        )
 
 
 async def test_audio_is_published_by_the_audio_camera_only(settings: ZenohSettings) -> None:
-    heard = Heard()
+    received = ReceivedTexts()
     with opened(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
     ) as (bestview, c0, c1):
-        bestview.subscribe(SITE.sound, heard)
-        bestview.subscribe(SITE.camera("*", "status"), heard)
-        await heard.until(f"{SITE.sound} c1", lambda: c1.publish(SITE.sound, b"c1"))
+        bestview.subscribe(SITE.sound, received)
+        bestview.subscribe(SITE.camera("*", "status"), received)
+        await received.until(f"{SITE.sound} c1", lambda: c1.publish(SITE.sound, b"c1"))
 
         def both() -> None:
             c0.publish(SITE.sound, b"c0")
             c0.publish(SITE.camera("c0", "status"), b"after")
 
-        await heard.until("c0/status after", both)
-        assert f"{SITE.sound} c0" not in heard.texts
+        await received.until("c0/status after", both)
+        assert f"{SITE.sound} c0" not in received.texts
 
 
 async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
@@ -137,24 +139,26 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         settings.model_copy(update={"connect": settings.connect.replace("tls/", "tcp/")}),
         settings.model_copy(update={"tls": ProcessTlsSettings()}),
     ]
-    heard, overheard = Heard(), Heard()
+    received, received_by_other = ReceivedTexts(), ReceivedTexts()
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c1"),
         *(partial(Bus.client, stranger, "c0") for stranger in strangers),
     ) as (bestview, c1, *them):
-        bestview.subscribe(SITE.camera("*", "*"), heard)
+        bestview.subscribe(SITE.camera("*", "*"), received)
         alive: list[str] = []
         bestview.watch_alive(SITE.camera("*", "alive"), lambda key, _: alive.append(key))
         for client in them:
-            client.subscribe("**", overheard)
+            client.subscribe("**", received_by_other)
             client.declare_alive(SITE.camera("c0", "alive"))
         c1.declare_alive(SITE.camera("c1", "alive"))
         for number in range(10):  # time enough to be admitted
-            await heard.until(f"c1/video {number}", partial(_all, [*them, c1], number))
-        assert not [text for text in heard.texts if text.startswith("c0")]
+            await received.until(f"c1/video {number}", partial(_all, [*them, c1], number))
+        assert not [text for text in received.texts if text.startswith("c0")]
         assert alive == [SITE.camera("c1", "alive")]
-        assert not [text for text in overheard.texts if text.startswith("c1")]  # they receive their own
+        assert not [
+            text for text in received_by_other.texts if text.startswith("c1")
+        ]  # they receive their own
         for stranger in strangers:
             with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at"):
                 await asyncio.to_thread(Bus.listener, stranger, "c0")
@@ -167,42 +171,42 @@ def _all(buses: Sequence[Bus], number: int) -> None:
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
 
-@pytest.mark.parametrize("what", ["position_corrections", "identities"])
+@pytest.mark.parametrize("topic", ["position_corrections", "identities"])
 async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
-    settings: ZenohSettings, what: str
+    settings: ZenohSettings, topic: str
 ) -> None:
-    heard, overheard = Heard(), Heard()
+    received, received_by_other = ReceivedTexts(), ReceivedTexts()
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.client(settings, "c1"),
         lambda: Bus.listener(settings, "auditor"),
     ) as (bestview, c0, c1, auditor):
-        c0.subscribe(SITE.camera("c0", what), heard)
-        c1.subscribe(SITE.camera("c0", what), overheard)
-        c1.subscribe(SITE.camera("c1", what), overheard)
+        c0.subscribe(SITE.camera("c0", topic), received)
+        c1.subscribe(SITE.camera("c0", topic), received_by_other)
+        c1.subscribe(SITE.camera("c1", topic), received_by_other)
 
         def all_of_it() -> None:
-            c1.publish(SITE.camera("c0", what), b"false")
-            auditor.publish(SITE.camera("c0", what), b"false")
-            bestview.publish(SITE.camera("c0", what), b"there")
-            bestview.publish(SITE.camera("c1", what), b"here")
+            c1.publish(SITE.camera("c0", topic), b"false")
+            auditor.publish(SITE.camera("c0", topic), b"false")
+            bestview.publish(SITE.camera("c0", topic), b"there")
+            bestview.publish(SITE.camera("c1", topic), b"here")
 
-        await heard.until(f"c0/{what} there", all_of_it)
-        await overheard.until(f"c1/{what} here", all_of_it)
+        await received.until(f"c0/{topic} there", all_of_it)
+        await received_by_other.until(f"c1/{topic} here", all_of_it)
         for number in range(5):  # time enough for it to arrive
-            await heard.until(f"c0/{what} {number}", partial(_tell, bestview, c1, what, number))
-        assert f"c0/{what} false" not in heard.texts
-        assert set(overheard.texts) - {f"c0/{what} false"} == {f"c1/{what} here"}, "except its own"
+            await received.until(f"c0/{topic} {number}", partial(_tell, bestview, c1, topic, number))
+        assert f"c0/{topic} false" not in received.texts
+        assert set(received_by_other.texts) - {f"c0/{topic} false"} == {f"c1/{topic} here"}, "except its own"
 
 
-def _tell(bestview: Bus, other: Bus, what: str, number: int) -> None:
-    other.publish(SITE.camera("c0", what), b"false")
-    bestview.publish(SITE.camera("c0", what), str(number).encode())
+def _tell(bestview: Bus, other: Bus, topic: str, number: int) -> None:
+    other.publish(SITE.camera("c0", topic), b"false")
+    bestview.publish(SITE.camera("c0", topic), str(number).encode())
 
 
 async def test_cameras_receive_peers_detections_but_not_their_video(settings: ZenohSettings) -> None:
-    heard = Heard()
+    received = ReceivedTexts()
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
@@ -210,36 +214,36 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
         lambda: Bus.listener(settings, "auditor"),
     ) as (_, c0, c1, auditor):
         for key in (SITE.camera("c0", "*"), SITE.camera("c0", "detections"), SITE.camera("c1", "detections")):
-            c1.subscribe(key, heard)
-        everything = Heard()
-        auditor.subscribe(SITE.camera("c0", "*"), everything)
+            c1.subscribe(key, received)
+        received_all = ReceivedTexts()
+        auditor.subscribe(SITE.camera("c0", "*"), received_all)
 
         def all_of_it() -> None:
             c0.publish(SITE.camera("c0", "video"), b"seen")
             auditor.publish(SITE.camera("c1", "detections"), b"false")
             c0.publish(SITE.camera("c0", "detections"), b"detections")
 
-        await heard.until("c0/detections detections", all_of_it)
-        await everything.until("c0/video seen", all_of_it)  # it may arrive within a round
-        await everything.until("c0/detections detections", all_of_it)
-        assert set(heard.texts) == {"c0/detections detections"}
-        assert set(everything.texts) == {"c0/video seen", "c0/detections detections"}, (
+        await received.until("c0/detections detections", all_of_it)
+        await received_all.until("c0/video seen", all_of_it)  # it may arrive within a round
+        await received_all.until("c0/detections detections", all_of_it)
+        assert set(received.texts) == {"c0/detections detections"}
+        assert set(received_all.texts) == {"c0/video seen", "c0/detections detections"}, (
             "a subscriber sends nothing"
         )
 
 
 async def test_a_further_service_may_subscribe_and_publish_everything(settings: ZenohSettings) -> None:
-    heard, told = Heard(), Heard()
+    received, told_commands = ReceivedTexts(), ReceivedTexts()
     with opened(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.further_service(settings, "bestview-1"),
     ) as (bestview, c0, second):
-        second.subscribe(SITE.camera("*", "tracks"), heard)
-        bestview.subscribe(SITE.bestview("choices", 1), told)
-        await heard.until("c0/tracks here", lambda: c0.publish(SITE.camera("c0", "tracks"), b"here"))
+        second.subscribe(SITE.camera("*", "tracks"), received)
+        bestview.subscribe(SITE.bestview("choices", 1), told_commands)
+        await received.until("c0/tracks here", lambda: c0.publish(SITE.camera("c0", "tracks"), b"here"))
         key = SITE.bestview("choices", 1)
-        await told.until(f"{key} chosen", lambda: second.publish(key, b"chosen"))
+        await told_commands.until(f"{key} chosen", lambda: second.publish(key, b"chosen"))
 
 
 def _users(folder: Path, text: str) -> Path:

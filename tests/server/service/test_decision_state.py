@@ -73,9 +73,9 @@ def test_reasons_expire_without_queries() -> None:
     state = DecisionState(25.0)
     decided(state, 0)
     state.explain(1)
-    asked = [decided(state, first).asked for first in range(10, 2000, 10)]
-    assert asked.index([]) == 75, "half a minute later"
-    assert not any(asked[75:])
+    counts = [decided(state, first).asked for first in range(10, 2000, 10)]
+    assert counts.index([]) == 75, "half a minute later"
+    assert not any(counts[75:])
     assert state.explain(1, 500) is None
 
 

@@ -22,7 +22,7 @@ OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
 
 
 @pytest.mark.parametrize(
-    ("host", "here"),
+    ("host", "expected"),
     [
         ("127.0.0.1", True),
         ("127.3.2.1", True),
@@ -35,8 +35,8 @@ OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
         ("server.example", False),
     ],
 )
-def test_loopback_hosts_are_recognized(host: str, here: bool) -> None:
-    assert is_loopback(host) == here
+def test_loopback_hosts_are_recognized(host: str, expected: bool) -> None:
+    assert is_loopback(host) == expected
 
 
 def test_the_defaults_are_reachable_from_this_machine_only() -> None:

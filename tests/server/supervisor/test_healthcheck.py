@@ -79,8 +79,10 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
 def secrets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Make all files as an operator does."""
     folder = tmp_path_factory.mktemp("made") / "secrets"
-    words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0"]
-    subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
+    arguments = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0"]
+    subprocess.run(
+        arguments, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True
+    )
     return folder
 
 
@@ -105,13 +107,13 @@ async def test_the_pulse_server_is_healthy_while_it_sends_its_greeting(
     assert await _apart("sync") == 1
 
 
-async def _apart(*words: str) -> int:
+async def _apart(*arguments: str) -> int:
     """Check as the container engine does, in a separate process."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
         "server.supervisor.healthcheck",
-        *words,
+        *arguments,
         cwd=ROOT,
         stdout=asyncio.subprocess.DEVNULL,
     )
@@ -144,8 +146,8 @@ def test_an_unknown_check_is_unhealthy(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{free_port()}")
-    for words in (["bestview"], ["camera", "c0"], ["camera"], []):
-        assert main(words) == 1
+    for arguments in (["bestview"], ["camera", "c0"], ["camera"], []):
+        assert main(arguments) == 1
         assert capsys.readouterr().out.count("\n") == 1
 
 
@@ -196,25 +198,25 @@ def made(folder: Path, name: str, camera: str = "c0", **environment: str) -> sub
 
 
 def test_without_openssl_no_secrets_are_generated(tmp_path: Path) -> None:
-    done = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
-    assert (done.returncode, done.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
+    result = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
+    assert (result.returncode, result.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
     assert not (tmp_path / "secrets").exists()
 
 
 @needs_openssl
 @pytest.mark.parametrize("camera", ["c 0", "../x", "bestview", "bestview-1", "a: b", ""])
 def test_an_invalid_camera_name_is_refused_before_anything_is_generated(tmp_path: Path, camera: str) -> None:
-    done = made(tmp_path / "secrets", "cameras.example", camera)
-    assert done.returncode == 2
-    assert "cannot be a camera's name" in done.stderr
+    result = made(tmp_path / "secrets", "cameras.example", camera)
+    assert result.returncode == 2
+    assert "cannot be a camera's name" in result.stderr
     assert not (tmp_path / "secrets").exists()
 
 
 @needs_openssl
 def test_a_host_name_too_long_for_a_certificate_is_refused(tmp_path: Path) -> None:
-    done = made(tmp_path, f"{'a' * 63}.example")
-    assert done.returncode == 1
-    assert "too long" in done.stderr
+    result = made(tmp_path, f"{'a' * 63}.example")
+    assert result.returncode == 1
+    assert "too long" in result.stderr
     assert made(tmp_path, "cameras.example").returncode == 0
     assert not [path.name for path in tmp_path.iterdir() if path.name in {"log", "names", "request"}]
 
@@ -230,7 +232,7 @@ def test_a_host_name_too_long_for_a_certificate_is_refused(tmp_path: Path) -> No
 )
 def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str, also: str) -> None:
     assert made(tmp_path, name).returncode == 0
-    words = [
+    arguments = [
         "openssl",
         "x509",
         "-in",
@@ -239,7 +241,7 @@ def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str,
         "-ext",
         "subjectAltName",
     ]
-    output = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    output = subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
     assert output.splitlines()[1:] == [f"    {also}"]
 
 
@@ -248,8 +250,10 @@ def test_a_camera_is_added_to_a_secure_site_that_stays_as_it_is(secrets: Path, t
     folder = tmp_path / "secrets"
     shutil.copytree(secrets, folder)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    words = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0", "yard"]
-    subprocess.run(words, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True)
+    arguments = ["sh", str(ROOT / "configs" / "secrets.sh"), "cameras.example", "c0", "yard"]
+    subprocess.run(
+        arguments, env={**os.environ, "MYVIEW_SECRETS": str(folder)}, check=True, capture_output=True
+    )
     assert all(path.read_bytes().startswith(content) for path, content in before.items())
     new = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     new -= {str(path.relative_to(folder)) for path in before}

@@ -72,9 +72,9 @@ def changed(keys: set[str]) -> Config:
         "track": {"window": WINDOW},
     }
     for key in keys:
-        first, *way, name = key.split(".")
-        inner = cameras[way.pop(0)] if first == "cameras" else content.setdefault(first, {})
-        for step in way:
+        first, *path, name = key.split(".")
+        inner = cameras[path.pop(0)] if first == "cameras" else content.setdefault(first, {})
+        for step in path:
             inner = inner.setdefault(step, dict(small.get(first, {}).get(step, {})))
         inner[name] = CHANGES[key][1]
     return small_config([*cameras.values()], **content)
@@ -97,8 +97,8 @@ def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
     else:
         assert reload.cameras == (("c1",) if CAMERA in takes.values() else ())
     assert set(changed_keys(reload.now, wanted)) == {*reload.best_view, *reload.site}
-    again = plan_reload(reload.now, wanted)
-    assert (again.now, again.live, again.cameras) == (reload.now, (), ())
+    repeated = plan_reload(reload.now, wanted)
+    assert (repeated.now, repeated.live, repeated.cameras) == (reload.now, (), ())
     assert all(
         name in reload.line for name in {*reload.live, *reload.cameras, *reload.best_view, *reload.site}
     )
@@ -215,9 +215,9 @@ async def test_the_operators_page_and_metrics_show_the_difference(found: ConfigF
 
 
 async def until_said(terminal: int, text: bytes) -> None:
-    heard = b""
-    while text not in heard:
-        heard += await asyncio.to_thread(os.read, terminal, 4096)
+    output = b""
+    while text not in output:
+        output += await asyncio.to_thread(os.read, terminal, 4096)
 
 
 @asynccontextmanager
@@ -225,14 +225,16 @@ async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subproce
     """Run a pulse server that logs to a terminal; return it and the terminal's other end once it sends."""
     port = free_port()
     write(path, sync={"port": port})
-    ours, theirs = pty.openpty()
+    controller, terminal_end = pty.openpty()
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "server.cli.main", "sync", str(path)), stderr=theirs, start_new_session=True
+        *(sys.executable, "-m", "server.cli.main", "sync", str(path)),
+        stderr=terminal_end,
+        start_new_session=True,
     )
-    os.close(theirs)
+    os.close(terminal_end)
     try:
-        await until_said(ours, b"pulses at")
-        yield process, ours
+        await until_said(controller, b"pulses at")
+        yield process, controller
     finally:
         if process.returncode is None:
             process.kill()  # nor does anybody read its terminal then

@@ -40,13 +40,13 @@ def test_an_invalid_ground_file_is_reported_until_it_is_repaired(
 def test_an_active_configuration_of_another_user_is_ignored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, theirs, link = (tmp_path / name for name in ("site.yaml", "theirs.yaml", "link.yaml"))
+    path, new_file, link = (tmp_path / name for name in ("site.yaml", "theirs.yaml", "link.yaml"))
     path.write_text("cameras: [{id: c0, source: x}]\n")
-    theirs.write_text("cameras: [{id: c9, source: x}]\n")
-    link.symlink_to(theirs)
+    new_file.write_text("cameras: [{id: c9, source: x}]\n")
+    link.symlink_to(new_file)
     monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(link))
     assert ActiveConfig(path).now.camera_ids == ("c0",)
-    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(theirs))
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(new_file))
     assert ActiveConfig(path).now.camera_ids == ("c9",), "of the supervisor"
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     assert ActiveConfig(path).now.camera_ids == ("c0",)

@@ -21,9 +21,9 @@ from server.system.child_process import defer_termination
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
 def handled(request: pytest.FixtureRequest) -> Iterator[tuple[signal.Signals, list[int]]]:
     """A signal, and those of its kind that were handled."""
-    seen: list[int] = []
-    before = signal.signal(request.param, lambda number, _: seen.append(number))
-    yield request.param, seen
+    received: list[int] = []
+    before = signal.signal(request.param, lambda number, _: received.append(number))
+    yield request.param, received
     signal.signal(request.param, before)
 
 
@@ -39,9 +39,9 @@ def other_thread() -> Iterator[int]:
     thread.join()
 
 
-def until(seen: list[int], length: int) -> None:
+def until(received: list[int], length: int) -> None:
     end = time.monotonic() + PATIENCE
-    while len(seen) < length:
+    while len(received) < length:
         assert time.monotonic() < end
         time.sleep(0.01)
 
@@ -49,19 +49,19 @@ def until(seen: list[int], length: int) -> None:
 def test_a_signal_is_deferred_even_if_another_thread_receives_it(
     handled: tuple[signal.Signals, list[int]], other_thread: int
 ) -> None:
-    number, seen = handled
+    number, received = handled
     with defer_termination():
         for _ in range(5):
             signal.pthread_kill(other_thread, number)
         while number in signal.sigpending():
             pass
-        assert seen == []
-    until(seen, 1)
+        assert received == []
+    until(received, 1)
     # The last signal may reach a thread that does not run now.
-    assert seen in ([number], [number] * 2), "once for repeated signals"
-    count = len(seen)
+    assert received in ([number], [number] * 2), "once for repeated signals"
+    count = len(received)
     signal.pthread_kill(other_thread, number)
-    until(seen, count + 1)  # and it is not put off afterwards
+    until(received, count + 1)  # and it is not put off afterwards
 
 
 def test_without_a_signal_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
@@ -77,10 +77,10 @@ def test_a_child_inherits_the_signal_mask_and_can_restore_it() -> None:
         "before = blocked(); again(); print(len(before), len(blocked()))"
     )
     with defer_termination():
-        done = subprocess.run(
+        result = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True
         )
-    assert done.stdout.split() == ["2", "0"]
+    assert result.stdout.split() == ["2", "0"]
 
 
 def test_a_process_with_a_blocked_thread_exits(tmp_path: Path) -> None:
@@ -135,15 +135,19 @@ _COMMANDS, _WHAT_IT_NEEDS = "server.cli.site_commands", "server.config.loader"
 def test_ctrl_c_while_a_command_loads_ends_it_silently(
     tmp_path: Path, command: list[str], loads: str, code: int
 ) -> None:
-    ended = pressed(tmp_path, command, loads)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", "")
+    result = pressed(tmp_path, command, loads)
+    assert (result.returncode, result.stdout, result.stderr) == (
+        code,
+        "",
+        "",
+    )
 
 
 def test_a_command_started_with_ignored_sigint_ignores_it_while_loading(tmp_path: Path) -> None:
     ignored = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
-    ended = pressed(tmp_path, ["token", "nobody"], _COMMANDS, ignored)
-    assert ended.returncode == 0, ended.stderr
-    assert "nobody" in ended.stdout
+    result = pressed(tmp_path, ["token", "nobody"], _COMMANDS, ignored)
+    assert result.returncode == 0, result.stderr
+    assert "nobody" in result.stdout
 
 
 def pressed(

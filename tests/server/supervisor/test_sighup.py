@@ -59,8 +59,8 @@ def test_a_sighup_between_reading_and_running_is_not_lost(
         reloaded.append("to read it again")
 
     monkeypatch.setattr(site_commands, "run_process", run)
-    ended = myview(command[0], path, *command[1:])
-    assert (ended.code, ended.err) == (0, "")
+    result = myview(command[0], path, *command[1:])
+    assert (result.code, result.err) == (0, "")
     assert reloaded == ["to read it again"]
 
 
@@ -71,9 +71,9 @@ async def test_early_sighups_count_as_one_and_later_ones_separately() -> None:
     waiting = sighups()
     async with asyncio.timeout(PATIENCE):
         await anext(waiting)
-        again = asyncio.ensure_future(anext(waiting))
+        second_wait = asyncio.ensure_future(anext(waiting))
         await asyncio.sleep(0)
-        assert not again.done(), "the early ones were one"
+        assert not second_wait.done(), "the early ones were one"
         hang_up()
-        await again
+        await second_wait
     await waiting.aclose()

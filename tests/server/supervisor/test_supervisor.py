@@ -61,9 +61,9 @@ class Machine:
         self.started: asyncio.Queue[Process] = asyncio.Queue()
         self.task: asyncio.Task[None] | None = None
 
-    async def start(self, *words: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
+    async def start(self, *command: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
         assert env[STARTED_FD_VARIABLE] == str(pass_fds[0])
-        process = Process(words[3:], os.dup(pass_fds[0]))
+        process = Process(command[3:], os.dup(pass_fds[0]))
         if self.loads_at_once:
             process.loaded()
         self.started.put_nowait(process)
@@ -183,13 +183,13 @@ async def test_only_the_process_that_died_or_was_terminated_is_restarted(
 
 
 async def test_the_callback_runs_before_every_start(machine: Machine) -> None:
-    seen: list[int] = []
-    machine.run(before_start=lambda: seen.append(len(seen)))
+    received: list[int] = []
+    machine.run(before_start=lambda: received.append(len(received)))
     processes = await machine.processes(4)
-    assert len(seen) == 4
+    assert len(received) == 4
     processes["c0"].end(-9)
     await machine.processes(1)
-    assert len(seen) == 5
+    assert len(received) == 5
 
 
 async def test_a_finished_camera_is_not_restarted_and_a_finished_best_view_ends_the_site(

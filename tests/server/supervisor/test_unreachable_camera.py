@@ -61,7 +61,7 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
     app = web.Application()
     app.router.add_static("/", tmp_path)
     runner = web.AppRunner(app)
-    begun: list[asyncio.Task[None]] = []
+    running_tasks: list[asyncio.Task[None]] = []
 
     def begin(width: int = 64, h264: str = "encode") -> Site:
         port, bus = free_port(), f"tcp/127.0.0.1:{free_port()}"
@@ -73,18 +73,18 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
             "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "h264": h264}],
         }
         path.write_text(yaml.safe_dump(content))
-        begun.append(asyncio.create_task(camera_process(ActiveConfig(path), "c0")))
+        running_tasks.append(asyncio.create_task(camera_process(ActiveConfig(path), "c0")))
 
         async def answer() -> None:
             await runner.setup()
             await web.TCPSite(runner, "127.0.0.1", port).start()
 
-        return Site(begun[-1], told, answer)
+        return Site(running_tasks[-1], told, answer)
 
     yield begin
-    for process in begun:
+    for process in running_tasks:
         process.cancel()
-    await asyncio.gather(*begun, return_exceptions=True)
+    await asyncio.gather(*running_tasks, return_exceptions=True)
     await runner.cleanup()
     log.removeHandler(told)
     log.setLevel(logging.NOTSET)

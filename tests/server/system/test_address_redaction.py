@@ -48,9 +48,9 @@ def test_only_protocol_and_host_of_addresses_are_shown_and_paths_are_unchanged(
 @example(ADDRESSES[0], "ps/w")
 @example(ADDRESSES[0], "pa@q/xz")
 def test_no_part_of_a_password_is_shown(place: str, password: str) -> None:
-    told = redact_address(place.format(password))
-    assert not leaks(told, password, without=place), told
-    assert redact_address(told) == told
+    redacted = redact_address(place.format(password))
+    assert not leaks(redacted, password, without=place), redacted
+    assert redact_address(redacted) == redacted
 
 
 @given(PASSWORDS.filter(lambda password: not set(password) & set("/?#")))
@@ -90,9 +90,9 @@ def test_options_of_bus_endpoints_are_hidden(endpoint: str, expected: str) -> No
 )
 def test_texts_are_cut_where_an_address_begins(place: str, password: str) -> None:
     text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
-    told = redact_addresses(text)
-    assert not leaks(told, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"), (
-        told
-    )
-    assert told.startswith("Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: ")
-    assert told.endswith("\nmore\n")
+    redacted = redact_addresses(text)
+    assert not leaks(
+        redacted, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"
+    ), redacted
+    assert redacted.startswith("Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: ")
+    assert redacted.endswith("\nmore\n")

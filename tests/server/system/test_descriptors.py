@@ -50,11 +50,11 @@ def test_every_command_raises_the_limit_for_itself_and_its_children(low: int, my
 @pytest.mark.parametrize("record", [{}, {"folder": "kept"}])
 def test_descriptors_are_reserved_for_other_uses(descriptors: int, record: dict[str, Any]) -> None:
     config = small_config(record=record, http={"viewers_max": 300, "connections_max": 2000})
-    taken = connection_limit(config, descriptors)
-    files = min(config.http.viewers_max, taken) if record else 0  # time shift: one for each viewer
-    assert 0 < taken <= 2000
-    assert taken == 2000 or taken + files + FOR_OPERATORS + 128 <= descriptors
-    assert (taken == 2000) == (descriptors >= 4096)
+    limit = connection_limit(config, descriptors)
+    files = min(config.http.viewers_max, limit) if record else 0  # time shift: one for each viewer
+    assert 0 < limit <= 2000
+    assert limit == 2000 or limit + files + FOR_OPERATORS + 128 <= descriptors
+    assert (limit == 2000) == (descriptors >= 4096)
 
 
 def test_the_default_limit_has_connections_for_all_viewers() -> None:
@@ -79,8 +79,8 @@ def test_the_doctor_reports_the_connections_that_fit() -> None:
 
 def test_the_doctor_includes_the_check_of_open_files(myview: RunCommand, tmp_path: Path) -> None:
     path = write_site(tmp_path, free_port())
-    said = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
-    (found,) = [finding for finding in said["findings"] if finding["check"] == "open files"]
+    report = json.loads(myview("doctor", path, "--json", "--seconds", 1).out)
+    (found,) = [finding for finding in report["findings"] if finding["check"] == "open files"]
     assert str(descriptor_limit()) in found["text"]
 
 
@@ -94,6 +94,6 @@ def test_failures_to_accept_are_logged_once_and_connections_are_accepted_later(t
         with connect(port) as late:
             late.settimeout(PATIENCE)
             assert late.recv(12) == b"MYVIEW-SYNC ", "it accepts again"
-    told = log.read_bytes()
-    assert told.count(b"cannot be accepted: Too many open files") == 1
-    assert b"Traceback" not in told
+    log_text = log.read_bytes()
+    assert log_text.count(b"cannot be accepted: Too many open files") == 1
+    assert b"Traceback" not in log_text

@@ -39,9 +39,9 @@ def line(message: str, *values: object, **more: Any) -> dict[str, Any]:
 
 def test_a_line_has_time_level_process_and_event() -> None:
     before = time.time()
-    said = line("camera %s disconnected", "c1", level=logging.WARNING)
-    assert datetime.fromisoformat(said.pop("time")).timestamp() == pytest.approx(before, abs=5.0)
-    assert said == {
+    logged = line("camera %s disconnected", "c1", level=logging.WARNING)
+    assert datetime.fromisoformat(logged.pop("time")).timestamp() == pytest.approx(before, abs=5.0)
+    assert logged == {
         "level": "WARNING",
         "process": "bestview",
         "logger": "server.service.ingest.ingest",
@@ -68,22 +68,22 @@ def test_a_line_has_time_level_process_and_event() -> None:
 def test_the_camera_or_object_of_a_line_is_a_field(
     message: str, values: tuple[object, ...], about: dict[str, object]
 ) -> None:
-    said = line(message, *values)
-    assert said["event"] == message % values
-    assert {key: said[key] for key in said if key not in FIELDS} == about
+    logged = line(message, *values)
+    assert logged["event"] == message % values
+    assert {key: logged[key] for key in logged if key not in FIELDS} == about
 
 
 @given(st.text(), st.text())
-def test_every_record_is_one_line(camera: str, why: str) -> None:
-    said = line("camera %s: %s", camera, why)
-    assert said["event"] == f"camera {camera}: {why}"
-    assert said["camera"] == camera
+def test_every_record_is_one_line(camera: str, reason: str) -> None:
+    logged = line("camera %s: %s", camera, reason)
+    assert logged["event"] == f"camera {camera}: {reason}"
+    assert logged["camera"] == camera
 
 
 def test_a_file_name_that_is_not_utf_8_is_escaped() -> None:
-    said = line("camera %s: cannot read %s", "c\udc80", Path("a\udc81b"))
-    assert said["event"] == r"camera c\udc80: cannot read a\udc81b"
-    assert said["camera"] == r"c\udc80"
+    logged = line("camera %s: cannot read %s", "c\udc80", Path("a\udc81b"))
+    assert logged["event"] == r"camera c\udc80: cannot read a\udc81b"
+    assert logged["camera"] == r"c\udc80"
 
 
 def test_error_lines_have_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,8 +95,8 @@ def test_a_traceback_is_a_field_of_the_line() -> None:
     try:
         int("what went wrong")
     except ValueError:
-        said = line("it failed", error=sys.exc_info())
-    assert "ValueError: invalid literal" in said["traceback"]
+        logged = line("it failed", error=sys.exc_info())
+    assert "ValueError: invalid literal" in logged["traceback"]
 
 
 def test_an_unknown_format_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,6 +147,6 @@ def test_the_reason_why_a_process_does_not_start_is_logged(tmp_path: Path) -> No
     with started("camera", site(tmp_path), "c9") as refused:
         _, written = refused.communicate(timeout=PATIENCE)
         assert refused.returncode == 2
-    said = json.loads(written)
-    assert said["level"] == "ERROR"
-    assert "there is no camera 'c9'" in said["event"]
+    logged = json.loads(written)
+    assert logged["level"] == "ERROR"
+    assert "there is no camera 'c9'" in logged["event"]

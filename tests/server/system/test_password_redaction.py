@@ -66,17 +66,17 @@ def door(source: str, **changes: Any) -> dict[str, Any]:
 @settings(max_examples=30)  # each writes out all settings
 @given(st.sampled_from(ADDRESSES), PASSWORDS)
 def test_the_operators_page_shows_no_password_of_a_source(place: str, password: str) -> None:
-    def told(secret: str) -> str:
+    def errors_of(secret: str) -> str:
         source = place.format(secret)
         return written(built(cameras=[door(source)], sound={"source": source}))
 
-    assert not leaks(told(password), password, without=told(HARMLESS))
+    assert not leaks(errors_of(password), password, without=errors_of(HARMLESS))
 
 
 @settings(max_examples=20)
 @given(PASSWORDS.filter(lambda password: not set(password) & set(" /#?")))
 def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
-    def told(secret: str) -> str:
+    def errors_of(secret: str) -> str:
         options = {"headers": f"Authorization: Basic {secret}", "rtsp_transport": secret}
         file = f"{secret}.password"  # the password itself instead of a file
         cameras = [door("rtsp://viewer:{password}@192.0.2.11/", options=options, password=file)]
@@ -87,7 +87,7 @@ def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
             built(cameras=cameras, zenoh=zenoh, record=record, view={"share": {"servers": servers}})
         )
 
-    assert not leaks(told(password), password, without=told(HARMLESS))
+    assert not leaks(errors_of(password), password, without=errors_of(HARMLESS))
 
 
 def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
@@ -119,13 +119,13 @@ def test_no_configuration_error_repeats_a_password(place: str, password: str) ->
     address = place.format(password)
     secrets = zip(misplaced(address, password), misplaced(place.format(HARMLESS), HARMLESS), strict=True)
     for content, harmless in secrets:
-        told = []
+        errors_of = []
         for mapping in (content, harmless):
             with pytest.raises(UserError) as refused:
                 build_config(mapping, where="site.yaml", folder=Path())
-            told.append("".join(traceback.format_exception(refused.value.__cause__ or refused.value)))
-            told[-1] += str(refused.value)
-        assert not leaks(told[0], password, without=told[1]), told[0]
+            errors_of.append("".join(traceback.format_exception(refused.value.__cause__ or refused.value)))
+            errors_of[-1] += str(refused.value)
+        assert not leaks(errors_of[0], password, without=errors_of[1]), errors_of[0]
 
 
 @pytest.mark.parametrize(
@@ -158,8 +158,8 @@ def test_yaml_errors_do_not_repeat_the_content(
     path.write_text(text)
     with pytest.raises(UserError, match=r"site\.yaml: ") as refused:
         read_yaml(path, "the configuration")
-    said = "".join(traceback.format_exception(refused.value))
-    assert not leaks(said, "QXZJKV7", without="")
+    shown_text = "".join(traceback.format_exception(refused.value))
+    assert not leaks(shown_text, "QXZJKV7", without="")
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -174,8 +174,8 @@ def test_errors_of_opening_a_camera_do_not_have_its_password(source: str, passwo
     ):
         with pytest.raises(UserError) as refused:
             attempt()
-        said = "".join(traceback.format_exception(refused.value))
-        assert not leaks(said, password, without=""), said
+        shown_text = "".join(traceback.format_exception(refused.value))
+        assert not leaks(shown_text, password, without=""), shown_text
 
 
 def test_the_doctor_shows_no_password(myview: RunCommand, tmp_path: Path) -> None:
@@ -193,13 +193,13 @@ def test_the_doctor_shows_no_password(myview: RunCommand, tmp_path: Path) -> Non
     path = tmp_path / "site.yaml"
     path.write_text(yaml.safe_dump(content))
     for how in ([], ["--json"]):
-        ended = myview("doctor", path, "--seconds", 1, *how)
-        assert ended.code == 1
+        result = myview("doctor", path, "--seconds", 1, *how)
+        assert result.code == 1
         for password in NAIVE:
-            assert not leaks(ended.out + ended.err, password, without="")
-    said = {load["check"]: load["text"] for load in json.loads(ended.out)["findings"]}
-    assert said["camera c1"].startswith("rtsp://127.0.0.1:1/...: cannot open this video: ")
-    assert said["camera c9"] == "(not shown): no such file or folder"
+            assert not leaks(result.out + result.err, password, without="")
+    shown_text = {load["check"]: load["text"] for load in json.loads(result.out)["findings"]}
+    assert shown_text["camera c1"].startswith("rtsp://127.0.0.1:1/...: cannot open this video: ")
+    assert shown_text["camera c9"] == "(not shown): no such file or folder"
 
 
 @pytest.mark.parametrize("command", ["render", "track", "calibrate"])
@@ -207,9 +207,9 @@ def test_an_address_given_as_a_recording_is_not_repeated(
     command: str, myview: RunCommand, tmp_path: Path
 ) -> None:
     for password in NAIVE:
-        ended = myview(command, f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", "--out", tmp_path / "out")
-        assert ended.code == 2
-        assert not leaks(ended.out + ended.err, password, without="")
+        result = myview(command, f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", "--out", tmp_path / "out")
+        assert result.code == 2
+        assert not leaks(result.out + result.err, password, without="")
 
 
 @pytest.mark.parametrize("lines", [TextLines(), JsonLines("door")])
@@ -219,7 +219,7 @@ def test_logged_tracebacks_are_cut_where_an_address_begins(lines: logging.Format
         av.open(f"rtsp://127.0.0.1:{password}@127.0.0.1:1/x", timeout=(5.0, 5.0))
     except (av.error.FFmpegError, OSError):
         record = logging.LogRecord("server", logging.ERROR, __file__, 1, "it failed", (), sys.exc_info())
-        said = lines.format(record)
-    assert "it failed" in said
-    assert "Traceback" in said
-    assert not leaks(said, password, without="")
+        shown_text = lines.format(record)
+    assert "it failed" in shown_text
+    assert "Traceback" in shown_text
+    assert not leaks(shown_text, password, without="")

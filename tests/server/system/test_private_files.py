@@ -43,9 +43,9 @@ def umask(mask: int) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def folder_of(who: str, tmp_path: Path) -> Iterator[Path]:
+def folder_of(user: str, tmp_path: Path) -> Iterator[Path]:
     """Yield a folder that is open to all, of the user that the tests run as or of another than root."""
-    with contextlib.nullcontext(tmp_path) if who == "whoever" else unprivileged_folder() as folder:
+    with contextlib.nullcontext(tmp_path) if user == "current user" else unprivileged_folder() as folder:
         folder.chmod(0o755)
         yield folder
 
@@ -58,10 +58,10 @@ def modes(folder: Path) -> dict[bool, set[int]]:
     return found
 
 
-@pytest.mark.parametrize("who", ["whoever", "nobody"])
+@pytest.mark.parametrize("user", ["current user", "unprivileged"])
 @pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
-def test_recordings_are_private(tmp_path: Path, who: str, mask: int) -> None:
-    with folder_of(who, tmp_path) as around, umask(mask):
+def test_recordings_are_private(tmp_path: Path, user: str, mask: int) -> None:
+    with folder_of(user, tmp_path) as around, umask(mask):
         store = written_folder(
             RecordingFolder(around / "site" / "kept", UNLIMITED),
             [gop_record(gop, {1: A}) for gop in range(7)],
@@ -73,10 +73,10 @@ def test_recordings_are_private(tmp_path: Path, who: str, mask: int) -> None:
         assert modes(around) == {True: {0o700}, False: {0o600}}
 
 
-@pytest.mark.parametrize("who", ["whoever", "nobody"])
+@pytest.mark.parametrize("user", ["current user", "unprivileged"])
 @pytest.mark.parametrize("mask", [0o000, 0o022])
-def test_decision_files_of_a_live_service_are_private(tmp_path: Path, who: str, mask: int) -> None:
-    with folder_of(who, tmp_path) as around, umask(mask):
+def test_decision_files_of_a_live_service_are_private(tmp_path: Path, user: str, mask: int) -> None:
+    with folder_of(user, tmp_path) as around, umask(mask):
         recorder = LiveDecisionWriter(around / "out" / "today", CAMERAS, FITS)
         recorder.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
         recorder.close()
@@ -100,12 +100,12 @@ def test_an_existing_folder_is_unchanged_and_reported(
     service.recorder.open()
     service.close()
     assert stat.S_IMODE(folder.stat().st_mode) == 0o755
-    (told,) = [message for message in caplog.messages if message.startswith("record.folder")]
-    assert "has mode 755" in told
-    assert "chmod 700" in told
+    (warning,) = [message for message in caplog.messages if message.startswith("record.folder")]
+    assert "has mode 755" in warning
+    assert "chmod 700" in warning
     (found, *_) = disk_findings(config, {})
-    said = f"{folder} can be written, but has mode 755: others on this machine may see"
-    assert (found.level, found.text) == (Level.WARNING, f"{said} when it was recorded, not what")
+    expected = f"{folder} can be written, but has mode 755: others on this machine may see"
+    assert (found.level, found.text) == (Level.WARNING, f"{expected} when it was recorded, not what")
     folder.chmod(0o700)
     (found, *_) = disk_findings(config, {})
     assert (found.level, found.text) == (Level.OK, f"{folder} can be written")
@@ -118,10 +118,10 @@ def test_own_runs_of_earlier_versions_become_private(tmp_path: Path) -> None:
     other = tmp_path / "holiday"
     other.mkdir()
     other.chmod(0o755)
-    again = RecordingFolder(tmp_path, UNLIMITED)
-    again.open()
-    again.write(gop_record(1, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
-    again.close()
+    reopened = RecordingFolder(tmp_path, UNLIMITED)
+    reopened.open()
+    reopened.write(gop_record(1, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
+    reopened.close()
     assert stat.S_IMODE(run.stat().st_mode) == 0o700
     assert stat.S_IMODE(other.stat().st_mode) == 0o755
 

@@ -162,7 +162,7 @@ def test_audio_continues_after_a_time_step_and_after_a_reconnect(
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
     sound, wrap, step = LiveAudioSource(SoundSettings(source="c0"), FPS), 95_443, FRAMES / FPS / 2
     frames: list[EncodedAudioFrame] = []
-    for again in (0, 1):
+    for run in (0, 1):
         with av.open(str(path)) as container:
             sound.opened(container.streams.audio[0])
             for packet in container.demux():
@@ -170,23 +170,23 @@ def test_audio_continues_after_a_time_step_and_after_a_reconnect(
                     continue
                 time = float(packet.pts * packet.time_base)
                 is_sound = packet.stream.type == "audio"
-                old = not again and time < step + (lag if is_sound else 0.0)
+                old = not run and time < step + (lag if is_sound else 0.0)
                 if is_sound:
                     sound.packet(shifted(packet, wrap if old else 0))
                 else:
                     sound.picture(Fraction(shifted(packet, wrap if old else 0).pts * packet.time_base))
-                    frames += sound.at(round(time * FPS) + again * 2 * FRAMES)
+                    frames += sound.at(round(time * FPS) + run * 2 * FRAMES)
     numbers = [frame.number for frame in frames]
     assert numbers == sorted(set(numbers)), "each once, in order"
     halves = [0.0, step, FRAMES / FPS, 2 * FRAMES / FPS, 3 * FRAMES / FPS]
-    first, second, _, anew = (
+    first, second, _, restarted = (
         sum(begin <= number * FRAME / FORM.rate < end for number in numbers)
         for begin, end in pairwise(halves)
     )
     each = step * FORM.rate / FRAME
     assert first > 0.9 * each - 3
     assert second > 0.9 * each - (abs(lag) + 0.1) * FORM.rate / FRAME
-    assert anew > 0.9 * 2 * each - 3
+    assert restarted > 0.9 * 2 * each - 3
     assert numbers[-1] < 3 * FRAMES / FPS * FORM.rate / FRAME
 
 

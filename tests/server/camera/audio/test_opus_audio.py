@@ -90,8 +90,8 @@ def test_all_else_is_encoded_to_opus(
     path = write_flashes(tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, options=options)
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES + 10)]
-    way = getattr(sound._framer, "_framer", sound._framer)
-    assert isinstance(way, AudioEncoder)
+    encoder = getattr(sound._framer, "_framer", sound._framer)
+    assert isinstance(encoder, AudioEncoder)
     assert {packet_samples(frame.data) for frame in frames} == {960}
     assert beeps(as_mp4(frames)) == pytest.approx(BEEP_TIMES, abs=0.005), "also for what it looks ahead"
 
@@ -174,9 +174,9 @@ def decide(served: ServedSite, gops: range) -> None:
         served.service.splicer.publish_decision(decision)
 
 
-async def watched(served: ServedSite, *ways: str) -> list[bytes]:
+async def watched(served: ServedSite, *urls: str) -> list[bytes]:
     decide(served, range(1))
-    answers = [await served.session.get(way) for way in ways]
+    answers = [await served.session.get(url) for url in urls]
     for gop in range(1, GOPS):
         decide(served, range(gop, gop + 1))
         await asyncio.sleep(0.005)
@@ -243,6 +243,6 @@ async def test_chromium_plays_it(served: ServedSite, recording: Path) -> None:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{served.port}/healthz")
         url = f"/objects/1/best.mp4?from=p0&to=p{FRAMES}"
-        seen = await page.evaluate(PLAY_JS, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])
-    assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
-    assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
+        played = await page.evaluate(PLAY_JS, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])
+    assert (played["error"], played["ranges"], played["tracks"]) == ("", 1, [True, True])
+    assert played["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]

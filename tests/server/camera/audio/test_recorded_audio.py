@@ -144,8 +144,8 @@ def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
     covered.write_bytes(tag + head + content + path.read_bytes())
     with av.open(str(covered)) as container:
         assert container.streams.video
-    ways = [RecordedAudioSource(str(recording), STEREO, FPS, 0, "loop") for recording in (path, covered)]
-    plain, other = (beeps(as_adts(all_until(way, 2 * FRAMES), FORM), "aac") for way in ways)
+    sources = [RecordedAudioSource(str(recording), STEREO, FPS, 0, "loop") for recording in (path, covered)]
+    plain, other = (beeps(as_adts(all_until(source, 2 * FRAMES), FORM), "aac") for source in sources)
     assert len(plain) > 2
     assert other == pytest.approx(plain, abs=0.03)
 

@@ -52,11 +52,11 @@ def turned(picture: Picture, turn: int, *, flip: bool) -> Picture:
     return rotated[:, ::-1] if flip else rotated
 
 
-def same(shown: Picture | None, meant: Picture) -> bool:
+def same(shown: Picture | None, expected: Picture) -> bool:
     return (
         shown is not None
-        and shown.shape == meant.shape
-        and bool(np.abs(shown - meant.astype(int)).mean() < 8)
+        and shown.shape == expected.shape
+        and bool(np.abs(shown - expected.astype(int)).mean() < 8)
     )
 
 
@@ -76,11 +76,11 @@ def test_the_display_matrix_is_applied_to_a_recording(
     tmp_path: Path, suffix: str, turn: int, flip: bool
 ) -> None:
     path = film(tmp_path / f"phone.{suffix}", turn, flip=flip, frames=3)
-    meant = turned(corners(), turn, flip=flip)
+    expected = turned(corners(), turn, flip=flip)
     recording = Recording(str(path))
-    assert recording.size == (meant.shape[1], meant.shape[0]) == read_video_info(path).size
-    assert same(recording.take(0), meant)
-    assert all(same(image, meant) for image in recording.ahead(range(3)))
+    assert recording.size == (expected.shape[1], expected.shape[0]) == read_video_info(path).size
+    assert same(recording.take(0), expected)
+    assert all(same(image, expected) for image in recording.ahead(range(3)))
     recording.close()
 
 
@@ -93,8 +93,8 @@ def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myv
     """The detections are as a program has found them that turns pictures, too."""
     video = film(tmp_path / "phone.mp4", 90, frames=30)
     write_rows(tmp_path / "det.txt", [MotRow(n + 1, -1, 20.0, 30.0 + n, 20.0, 30.0, 1.0) for n in range(30)])
-    done = myview("track", video, "--det", tmp_path / "det.txt", "--out", tmp_path / "tracks.txt")
-    assert done.code == 0, done.err
+    result = myview("track", video, "--det", tmp_path / "det.txt", "--out", tmp_path / "tracks.txt")
+    assert result.code == 0, result.err
     rows = read_rows(tmp_path / "tracks.txt")
     assert len(rows) == 30
     assert max(row.top + row.height for row in rows) > HIGH, "lower than the picture is stored"
@@ -111,7 +111,7 @@ def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> 
 
 
 @pytest.mark.parametrize(
-    ("turn", "aspect", "why"),
+    ("turn", "aspect", "reason"),
     [
         (90, "1:1", "it is shown rotated or mirrored"),
         (180, "1:1", "it is shown rotated or mirrored"),
@@ -119,12 +119,12 @@ def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> 
     ],
 )
 def test_rotated_or_stretched_video_is_not_passed_through(
-    tmp_path: Path, served: str, turn: int, aspect: str, why: str
+    tmp_path: Path, served: str, turn: int, aspect: str, reason: str
 ) -> None:
     path = film(tmp_path / "own.mkv", turn, aspect=aspect, frames=40)
-    with pytest.raises(IncompatibleStreamError, match=why):
+    with pytest.raises(IncompatibleStreamError, match=reason):
         PassthroughRecording(str(path), 0, "stop", SITE)
-    with pytest.raises(IncompatibleStreamError, match=why):
+    with pytest.raises(IncompatibleStreamError, match=reason):
         PassthroughStream(f"{served}/own.mkv", {}, None, SITE)
 
 
@@ -152,11 +152,11 @@ def served(tmp_path: Path) -> Iterator[str]:
 @pytest.mark.parametrize("turn", [90, 180])
 def test_a_stream_is_shown_upright_from_its_first_picture_on(tmp_path: Path, served: str, turn: int) -> None:
     film(tmp_path / "camera.mkv", turn)
-    meant = turned(corners(), turn, flip=False)
+    expected = turned(corners(), turn, flip=False)
     source = LiveStream(f"{served}/camera.mkv", {})
     try:
-        assert source.size == (meant.shape[1], meant.shape[0])
-        assert same(source.take(0), meant)
+        assert source.size == (expected.shape[1], expected.shape[0])
+        assert same(source.take(0), expected)
     finally:
         source.close()
 
@@ -233,10 +233,10 @@ def test_the_exif_orientation_of_an_image_is_applied(tmp_path: Path, suffix: str
     exif = Pillow.Exif()
     exif[274] = orientation
     Pillow.fromarray(corners()).save(tmp_path / f"0.{suffix}", exif=exif)
-    meant = turned(corners(), {1: 0, 3: 180, 6: 270, 8: 90}[orientation], flip=False)
+    expected = turned(corners(), {1: 0, 3: 180, 6: 270, 8: 90}[orientation], flip=False)
     folder = ImageFolder(str(tmp_path), 0, "stop")
-    assert folder.size == (meant.shape[1], meant.shape[0])
-    assert same(folder.take(0), meant)
+    assert folder.size == (expected.shape[1], expected.shape[0])
+    assert same(folder.take(0), expected)
     assert read_video_info(tmp_path).size == folder.size
 
 

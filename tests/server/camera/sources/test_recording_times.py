@@ -173,9 +173,9 @@ def test_video_without_one_frame_per_pulse_is_not_passed_through(tmp_path: Path)
 def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: RunCommand) -> None:
     write_video(tmp_path / "a.mp4", 25, fps=25)
     write_timed(tmp_path / "b.mp4", [n / 30 for n in range(30)], fps=30)
-    done = myview("render", tmp_path / "a.mp4", tmp_path / "b.mp4", "--out", tmp_path / "out")
-    assert done.code == 0
-    assert "the views are of different length" not in done.err
+    result = myview("render", tmp_path / "a.mp4", tmp_path / "b.mp4", "--out", tmp_path / "out")
+    assert result.code == 0
+    assert "the views are of different length" not in result.err
 
 
 def test_detections_go_with_the_pictures_that_they_were_made_of(tmp_path: Path, myview: RunCommand) -> None:
@@ -185,10 +185,10 @@ def test_detections_go_with_the_pictures_that_they_were_made_of(tmp_path: Path, 
     made_of = [MotRow(n + 1, -1, 10.0 + n, 5.0, 12.0, 30.0, 1.0) for n in range(len(times))]
     write_rows(tmp_path / "det.txt", made_of)
     (tmp_path / "site.yaml").write_text("site: {fps: 25, width: 64, height: 48}")
-    done = myview(
+    result = myview(
         *("track", video, "--det", tmp_path / "det.txt", "--config", tmp_path / "site.yaml"),
         *("--out", tmp_path / "tracks.txt"),
     )
-    assert done.code == 0, done.err
+    assert result.code == 0, result.err
     found = {row.frame - 1: row.left for row in read_rows(tmp_path / "tracks.txt")}
     assert [found[round(time * 25)] for time in times] == [10.0 + n for n in range(len(times))]

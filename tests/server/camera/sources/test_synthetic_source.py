@@ -36,7 +36,7 @@ def test_defaults_are_the_demos() -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "why"),
+    ("source", "reason"),
     [
         ("scene:cellar", "there is no scene 'cellar'"),
         ("scene:", "there is no scene ''"),
@@ -51,10 +51,10 @@ def test_defaults_are_the_demos() -> None:
         ("scene:room?cameras=0", "cameras must be"),
     ],
 )
-def test_a_wrong_address_is_refused_with_the_reason(source: str, why: str) -> None:
+def test_a_wrong_address_is_refused_with_the_reason(source: str, reason: str) -> None:
     with pytest.raises(UserError) as caught:
         SyntheticSource(source, SITE)
-    assert why in str(caught.value)
+    assert reason in str(caught.value)
     assert str(caught.value).startswith(source)
 
 

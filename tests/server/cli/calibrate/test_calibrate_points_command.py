@@ -60,7 +60,7 @@ def test_csv_and_json_points_give_the_same_result(run: RunCommand, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "words"),
+    ("name", "text", "error"),
     [
         ("p.json", "[1]", 'p.json: has no {"cameras"'),
         ("p.json", "{", "p.json:1: is not JSON"),
@@ -74,12 +74,12 @@ def test_csv_and_json_points_give_the_same_result(run: RunCommand, tmp_path: Pat
     ],
 )
 def test_an_invalid_points_file_is_refused_with_one_line(
-    run: RunCommand, tmp_path: Path, name: str, text: str, words: str
+    run: RunCommand, tmp_path: Path, name: str, text: str, error: str
 ) -> None:
     (tmp_path / name).write_text(text)
     code, out, err = run(name, "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert words in err
+    assert error in err
     assert sorted(path.name for path in tmp_path.iterdir()) == [name]
 
 

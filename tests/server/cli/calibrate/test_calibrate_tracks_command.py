@@ -36,10 +36,10 @@ def camera(east: float, north: float) -> np.ndarray:
     return np.asarray(lens @ np.column_stack([axes, -axes @ centre]))
 
 
-def write_walk(folder: Path, frames: int, way: Callable[[np.ndarray], np.ndarray]) -> Path:
+def write_walk(folder: Path, frames: int, path_of: Callable[[np.ndarray], np.ndarray]) -> Path:
     """Write two cameras' tracks of a person; the second recording begins `OFFSET` frames later."""
     folder.mkdir()
-    place = way(np.arange(frames))
+    place = path_of(np.arange(frames))
     for name, where, offset in (("c0", (-4.0, -1.0), 0), ("c1", (1.0, -4.5), OFFSET)):
         rows = []
         for frame, (east, north) in enumerate(place):
@@ -85,19 +85,19 @@ def test_a_walk_only_in_the_middle_is_written_only_with_force(run: RunCommand, t
         return np.column_stack([0.7 * np.sin(frames / 23.0), 0.7 * np.sin(frames / 15.0 + 1)])
 
     write_walk(tmp_path / "tracks", 300, near_the_middle)
-    given = ("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
-    code, _, err = run(*given)
+    arguments_of_command = ("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
+    code, _, err = run(*arguments_of_command)
     assert code == 2
     assert "the walk covered too little: walk also" in err
     assert not (tmp_path / "ground.json").exists()
-    code, out, _ = run(*given, "--force")
+    code, out, _ = run(*arguments_of_command, "--force")
     assert code == 0
     assert "walk also" in out
     assert (tmp_path / "ground.json").exists()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "error"),
     [
         (("away",), "away: does not exist"),
         (("a.txt", "a.txt"), "two cameras are called 'a'"),
@@ -111,7 +111,7 @@ def test_a_walk_only_in_the_middle_is_written_only_with_force(run: RunCommand, t
     ],
 )
 def test_invalid_walks_are_refused_with_one_line(
-    run: RunCommand, tmp_path: Path, arguments: tuple[str, ...], words: str
+    run: RunCommand, tmp_path: Path, arguments: tuple[str, ...], error: str
 ) -> None:
     for name, text in (
         ("a.txt", "1,1,10,10,20,50,1,-1,-1,-1\n"),
@@ -124,7 +124,7 @@ def test_invalid_walks_are_refused_with_one_line(
         (tmp_path / name).write_text(text)
     code, out, err = run(*arguments, "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert words in err
+    assert error in err
     assert not (tmp_path / "ground.json").exists()
 
 
@@ -137,6 +137,6 @@ def test_videos_are_tracked_first_and_must_have_equal_rates(run: RunCommand, tmp
         "ground: ground.json\n"  # which is to be made
         "detect: {prescan_frames: 0}\n"  # so that twenty frames are too few to know the scene
     )
-    ended = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
-    assert (ended.code, ended.err) == (2, "tracking c0\nmyview: c0.mp4: has no people\n")
+    result = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
+    assert (result.code, result.err) == (2, "tracking c0\nmyview: c0.mp4: has no people\n")
     assert {path.name for path in tmp_path.iterdir()} == {"c0.mp4", "c1.mp4", "site.yaml"}

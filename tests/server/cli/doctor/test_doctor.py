@@ -47,29 +47,29 @@ def of(findings: list[Finding], check: str) -> list[Said]:
 
 
 def only(findings: list[Finding], check: str) -> Said:
-    (said,) = of(findings, check)
-    return said
+    (reported,) = of(findings, check)
+    return reported
 
 
 def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: RunCommand, tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 12)
     path = write_site(tmp_path, record={"folder": "kept"})
     before = sorted(tmp_path.iterdir())
-    ended = myview("doctor", path, "--json", "--seconds", 20)
-    said = json.loads(ended.out)
-    assert (ended.code, ended.err, said["ok"]) == (0, "", True)
-    (camera,) = [finding for finding in said["findings"] if finding["check"] == "camera c0"]
+    result = myview("doctor", path, "--json", "--seconds", 20)
+    reported = json.loads(result.out)
+    assert (result.code, result.err, reported["ok"]) == (0, "", True)
+    (camera,) = [finding for finding in reported["findings"] if finding["check"] == "camera c0"]
     assert camera["level"] == "ok"
     assert camera["text"].startswith("64x48 pixels, 25.0 pictures a second, ")
-    assert {finding["check"] for finding in said["findings"]} >= {
+    assert {finding["check"] for finding in reported["findings"]} >= {
         "configuration", "http.port", "sync.port", "zenoh.listen", "clock", "disk", "processor", "memory"
     }  # fmt: skip
     assert sorted(tmp_path.iterdir()) == before
 
 
 async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -> None:
-    there = load_site(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
-    found = [finding async for finding in run_checks(there, 1.0)]
+    site_config = load_site(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
+    found = [finding async for finding in run_checks(site_config, 1.0)]
     assert only(found, "camera c0").level is Level.BAD
     assert "there is no scene 'nowhere'" in only(found, "camera c0").text
     assert {finding.check for finding in found if finding.level is Level.BAD} == {"camera c0"}
@@ -78,35 +78,35 @@ async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -
 def test_a_missing_camera_is_one_line_with_a_remedy_and_an_exit_code(
     myview: RunCommand, tmp_path: Path
 ) -> None:
-    ended = myview("doctor", write_site(tmp_path))
-    assert (ended.code, ended.err) == (1, "")
-    (line,) = [line for line in ended.out.splitlines() if "camera c0" in line]
+    result = myview("doctor", write_site(tmp_path))
+    assert (result.code, result.err) == (1, "")
+    (line,) = [line for line in result.out.splitlines() if "camera c0" in line]
     assert line.startswith("bad ")
     assert "c0.mp4: no such file or folder" in line
     assert "→ fix its source in the configuration, or make the file readable" in line
-    assert ended.out.splitlines()[-1].endswith("1 bad")
+    assert result.out.splitlines()[-1].endswith("1 bad")
 
 
 def test_an_invalid_configuration_is_the_only_finding(myview: RunCommand, tmp_path: Path) -> None:
-    ended = myview("doctor", write_site(tmp_path, htp={"port": 1}), "--json")
-    said = json.loads(ended.out)
-    assert (ended.code, said["ok"]) == (1, False)
-    (finding,) = said["findings"]
+    result = myview("doctor", write_site(tmp_path, htp={"port": 1}), "--json")
+    reported = json.loads(result.out)
+    assert (result.code, reported["ok"]) == (1, False)
+    (finding,) = reported["findings"]
     assert (finding["check"], finding["level"]) == ("configuration", "bad")
     assert "did you mean 'http'?" in finding["text"]
 
 
 @pytest.fixture
-def taken() -> Iterator[int]:
+def used_port() -> Iterator[int]:
     """Yield a port with a listener that never answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield int(server.getsockname()[1])
 
 
-async def test_a_port_used_by_another_program_is_bad(tmp_path: Path, taken: int) -> None:
-    found, runs = await port_findings(load_site(tmp_path, sync={"port": taken}))
+async def test_a_port_used_by_another_program_is_bad(tmp_path: Path, used_port: int) -> None:
+    found, runs = await port_findings(load_site(tmp_path, sync={"port": used_port}))
     assert not runs
-    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{taken} is used by another program")
+    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{used_port} is used by another program")
     assert {only(found, check).level for check in ("http.port", "zenoh.listen")} == {Level.OK}
 
 
@@ -116,12 +116,12 @@ async def test_an_address_of_another_machine_is_bad(tmp_path: Path) -> None:
     assert "192.0.2.7:7" in only(found, "sync.port").text
 
 
-async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path, taken: int) -> None:
+async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path, used_port: int) -> None:
     cameras = [{"id": name, "source": "scene:room"} for name in served.service.config.camera_ids]
     changes: Any = {
         "http": {"port": served.port},
         "cameras": cameras,
-        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{taken}"),
+        "zenoh": dict.fromkeys(("connect", "listen"), f"tcp/127.0.0.1:{used_port}"),
     }
     found, runs = await port_findings(load_site(tmp_path, **changes))
     assert runs
@@ -133,10 +133,10 @@ async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path
 
 
 async def test_the_clock_of_a_running_pulse_server_is_compared(tmp_path: Path) -> None:
-    there = load_site(tmp_path)
-    assert "is not running" in only(await clock_findings(there), "pulse server").text
-    async with PulseServer(FPS, port=there.sync.port):
-        found = only(await clock_findings(there), "pulse server")
+    site_config = load_site(tmp_path)
+    assert "is not running" in only(await clock_findings(site_config), "pulse server").text
+    async with PulseServer(FPS, port=site_config.sync.port):
+        found = only(await clock_findings(site_config), "pulse server")
     assert found.level is Level.OK
     assert "ms off this machine's" in found.text
 
@@ -146,18 +146,18 @@ async def test_a_pulse_server_that_accepts_a_password_of_this_site_is_its_own(
 ) -> None:
     users = {"c0": "0" * 32, "bestview": "1" * 32}
     (tmp_path / "users").write_text(f"c0:{users['c0']}\n")  # a camera's machine has only its own line
-    there = load_site(tmp_path, sync={"port": free_port(), "users": "users"})
+    site_config = load_site(tmp_path, sync={"port": free_port(), "users": "users"})
     credentials = Credentials("bestview", users["bestview"])
     async with (
-        PulseServer(FPS, port=there.sync.port, users=users) as server,
+        PulseServer(FPS, port=site_config.sync.port, users=users) as server,
         PulseClient("127.0.0.1", server.port, "bestview", credentials=credentials) as service,
     ):
         await anext(aiter(service))
-        assert "ms off this machine's" in only(await clock_findings(there), "pulse server").text
-        found, _ = await port_findings(there)
+        assert "ms off this machine's" in only(await clock_findings(site_config), "pulse server").text
+        found, _ = await port_findings(site_config)
         assert only(found, "sync.port").level is Level.OK
         (tmp_path / "users").write_text(f"c0:{'2' * 32}\n")
-        found, _ = await port_findings(there)
+        found, _ = await port_findings(site_config)
         assert only(found, "sync.port").level is Level.BAD
         assert server.clients()[0].name == "bestview", "the query takes no camera's place"
 
@@ -166,7 +166,7 @@ async def test_a_server_of_another_protocol_is_not_a_pulse_server(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(machine, "_ANSWER_S", PATIENCE)
-    there, left = load_site(tmp_path), asyncio.Event()
+    site_config, left = load_site(tmp_path), asyncio.Event()
 
     async def endless(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         writer.write(b"a" * 100_000)  # more than any connection
@@ -175,8 +175,8 @@ async def test_a_server_of_another_protocol_is_not_a_pulse_server(
         writer.close()
         left.set()
 
-    async with await asyncio.start_server(endless, "127.0.0.1", there.sync.port):
-        assert "is not running" in only(await clock_findings(there), "pulse server").text
+    async with await asyncio.start_server(endless, "127.0.0.1", site_config.sync.port):
+        assert "is not running" in only(await clock_findings(site_config), "pulse server").text
         async with asyncio.timeout(PATIENCE):
             await left.wait()
 
@@ -198,9 +198,9 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
     assert all(finding.level is Level.WARNING for finding in doubts)
 
 
-def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Path, taken: int) -> None:
+def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Path, used_port: int) -> None:
     write_video(tmp_path / "c0.mp4", 12)
-    silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{taken}/live"}
+    silent = {"id": "gate", "source": f"rtsp://127.0.0.1:{used_port}/live"}
     both = load_site(tmp_path, cameras=[silent, {"id": "c0", "source": "c0.mp4"}])
     probes = probe_cameras(both, 1.5)
     assert probes["gate"].problem
@@ -235,18 +235,22 @@ def test_a_camera_that_does_not_fit_the_site_is_a_warning(
     assert words in doubt.text
 
 
-def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, taken: int) -> None:
+def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, used_port: int) -> None:
     cameras = [
-        {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{taken}/live", "password": "secret"}
+        {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{used_port}/live", "password": "secret"}
     ]
-    there = load_site(tmp_path, cameras=cameras)
-    missing = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
+    site_config = load_site(tmp_path, cameras=cameras)
+    missing = only(
+        camera_findings(site_config, probe_cameras(site_config, 1.0), runs=False), "camera gate"
+    ).text
     assert "the file cannot be read: No such file or directory" in missing
     (tmp_path / "secret").write_text("open sesame\n")
     (tmp_path / "secret").chmod(0o644)
-    assert "others may read" in only(file_findings(there), "camera gate").text
-    shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
-    assert f"rtsp://127.0.0.1:{taken}/..." in shown
+    assert "others may read" in only(file_findings(site_config), "camera gate").text
+    shown = only(
+        camera_findings(site_config, probe_cameras(site_config, 1.0), runs=False), "camera gate"
+    ).text
+    assert f"rtsp://127.0.0.1:{used_port}/..." in shown
 
 
 def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
@@ -259,16 +263,18 @@ def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
 
 
 def test_the_password_of_a_sound_source_is_not_shown(tmp_path: Path) -> None:
-    there = load_site(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
-    said = only(sound_findings(there), "sound").text
-    assert "127.0.0.1" in said
-    assert "hunter2" not in said
+    site_config = load_site(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
+    reported = only(sound_findings(site_config), "sound").text
+    assert "127.0.0.1" in reported
+    assert "hunter2" not in reported
 
 
-def test_a_cameras_password_is_not_shown(tmp_path: Path, taken: int) -> None:
-    source = f"rtsp://me:pa@ss:w@127.0.0.1:{taken}/live?x=a:b@c"
-    there = load_site(tmp_path, cameras=[{"id": "gate", "source": source}])
-    shown = only(camera_findings(there, probe_cameras(there, 1.0), runs=False), "camera gate").text
+def test_a_cameras_password_is_not_shown(tmp_path: Path, used_port: int) -> None:
+    source = f"rtsp://me:pa@ss:w@127.0.0.1:{used_port}/live?x=a:b@c"
+    site_config = load_site(tmp_path, cameras=[{"id": "gate", "source": source}])
+    shown = only(
+        camera_findings(site_config, probe_cameras(site_config, 1.0), runs=False), "camera gate"
+    ).text
     assert "rtsp://...: cannot open" in shown
 
 
@@ -349,14 +355,14 @@ def test_a_site_exposed_by_accident_is_bad(tmp_path: Path) -> None:
 def test_a_camera_without_a_homography_among_calibrated_ones_is_a_warning(tmp_path: Path) -> None:
     ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
-    said = only(file_findings(load_site(tmp_path, cameras=cameras)), "ground")
-    assert said == (Level.WARNING, "c1: no homography: people are matched by appearance alone there")
+    reported = only(file_findings(load_site(tmp_path, cameras=cameras)), "ground")
+    assert reported == (Level.WARNING, "c1: no homography: people are matched by appearance alone there")
 
 
 def test_the_available_processors_are_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "available_processors", lambda: 0.5)
-    said = only(machine_findings(load_site(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
-    assert (said.level, said.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
+    reported = only(machine_findings(load_site(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
+    assert (reported.level, reported.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 
 
 def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
@@ -370,7 +376,7 @@ def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
 
 def expired(folder: Path) -> tuple[Path, Path]:
     """Create an expired certificate, signed by an authority, since only that can set its start."""
-    certificate, key, asked, settings = (
+    certificate, key, request, settings = (
         folder / name for name in ("over.pem", "over.key", "asked", "settings")
     )
     (folder / "known").touch()
@@ -381,9 +387,9 @@ def expired(folder: Path) -> tuple[Path, Path]:
         "[any]\ncommonName = supplied\n"
     )
     made = ["openssl", "req", "-new", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
-    made += ["-subj", "/CN=hall", "-out", str(asked), "-keyout", str(key)]
+    made += ["-subj", "/CN=hall", "-out", str(request), "-keyout", str(key)]
     signed = ["openssl", "ca", "-batch", "-notext", "-config", str(settings), "-selfsign"]
-    signed += ["-keyfile", str(key), "-in", str(asked), "-out", str(certificate)]
+    signed += ["-keyfile", str(key), "-in", str(request), "-out", str(certificate)]
     signed += ["-startdate", "20200101000000Z", "-enddate", "20200201000000Z"]
     for command in (made, signed):
         subprocess.run(command, check=True, capture_output=True)

@@ -59,9 +59,9 @@ def test_the_size_is_that_of_probed_cameras_and_names_the_others(tmp_path: Path)
     both = site(tmp_path, ("c0", "c1"))
     found = of(disk_findings(both, {"c0": AWAY, "c1": GOOD}), "disk")
     one = (1000 + INDEX_KBPS) * HOUR_S / 8000
-    known = f"without c0, whose rate is not known, 1.0 hours of the cameras take about {one:.0f} MB; "
+    estimate = f"without c0, whose rate is not known, 1.0 hours of the cameras take about {one:.0f} MB; "
     assert found.level is Level.WARNING
-    assert found.text.startswith(known)
+    assert found.text.startswith(estimate)
     found = of(disk_findings(both, {"c0": GOOD, "c1": GOOD}), "disk")
     assert (found.level, found.text.split(" take")[0]) == (Level.OK, "1.0 hours of these cameras")
 

@@ -49,11 +49,11 @@ BROKEN = [(Level.BAD, "/closed/door: Permission denied")]
 async def test_a_failed_check_does_not_lose_others_findings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str, lost: set[str]
 ) -> None:
-    there = load_site(tmp_path)
-    before = {finding.check async for finding in command.run_checks(there, 1.0)}
+    site_config = load_site(tmp_path)
+    before = {finding.check async for finding in command.run_checks(site_config, 1.0)}
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
     monkeypatch.setattr(command, check, broken)
-    found = [finding async for finding in command.run_checks(there, 1.0)]
+    found = [finding async for finding in command.run_checks(site_config, 1.0)]
     (failed,) = [finding for finding in found if (finding.level, finding.text) == BROKEN[0]]
     assert {finding.check for finding in found if finding is not failed} == before - lost
 
@@ -61,15 +61,15 @@ async def test_a_failed_check_does_not_lose_others_findings(
 async def test_a_failed_check_of_one_port_or_file_does_not_lose_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    there = load_site(tmp_path)
+    site_config = load_site(tmp_path)
     monkeypatch.setattr(ports, "_is_this_site", broken)
-    with socket.create_server(("127.0.0.1", there.http.port)):
-        found, _ = await port_findings(there)
+    with socket.create_server(("127.0.0.1", site_config.http.port)):
+        found, _ = await port_findings(site_config)
     assert of(found, "http.port") == BROKEN
     assert of(found, "zenoh.listen")[0][0] is Level.OK
     monkeypatch.setattr(files, "_exposed", broken)
-    assert of(file_findings(there), "access") == BROKEN
-    assert of(file_findings(there), "ground")[0][0] is Level.OK
+    assert of(file_findings(site_config), "access") == BROKEN
+    assert of(file_findings(site_config), "ground")[0][0] is Level.OK
 
 
 async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,13 +105,13 @@ async def test_findings_are_printed_as_they_are_found(
 
 async def test_an_unresolvable_server_is_bad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = {"connect": "tcp/bus:7447", "listen": "tcp/127.0.0.1:7447"}
-    there = load_site(tmp_path, sync={"host": "pulses", "port": 7400}, zenoh=ends)
+    site_config = load_site(tmp_path, sync={"host": "pulses", "port": 7400}, zenoh=ends)
 
     def unknown(*_: object, **__: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
-    found = await reachability_findings(there)
+    found = await reachability_findings(site_config)
     assert of(found, "sync.host") == [
         (Level.BAD, "pulses:7400 cannot be resolved: Name or service not known")
     ]
@@ -143,10 +143,10 @@ async def test_two_services_on_one_port_are_bad(tmp_path: Path) -> None:
 
 def test_a_device_shared_by_two_cameras_is_bad(tmp_path: Path) -> None:
     sources = {"c0": "/dev/video9", "c1": "/dev/video9", "c2": "c.mp4", "c3": "c.mp4"}
-    there = load_site(
+    site_config = load_site(
         tmp_path, cameras=[{"id": camera, "source": source} for camera, source in sources.items()]
     )
-    found = camera_findings(there, {}, runs=False)
+    found = camera_findings(site_config, {}, runs=False)
     text = "/dev/video9 is also used by camera c0, and only one can open it"
     assert [(finding.check, finding.level, finding.text) for finding in found] == [
         ("camera c1", Level.BAD, text)
@@ -155,11 +155,11 @@ def test_a_device_shared_by_two_cameras_is_bad(tmp_path: Path) -> None:
 
 def test_an_invalid_configuration_is_reported_with_a_remedy(myview: RunCommand, tmp_path: Path) -> None:
     path = write_site(tmp_path, ground="none.json")
-    ended = myview("doctor", path)
-    assert (ended.code, ended.err) == (1, "")
-    line = ended.out.splitlines()[0]
-    why = f"{path}: ground: cannot read {tmp_path / 'none.json'}: No such file or directory"
-    assert f"{why} → fix the configuration" in line
+    result = myview("doctor", path)
+    assert (result.code, result.err) == (1, "")
+    line = result.out.splitlines()[0]
+    reason = f"{path}: ground: cannot read {tmp_path / 'none.json'}: No such file or directory"
+    assert f"{reason} → fix the configuration" in line
 
 
 def test_a_missing_token_file_is_reported_once(tmp_path: Path) -> None:

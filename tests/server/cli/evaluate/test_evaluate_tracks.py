@@ -21,9 +21,9 @@ def run(myview: RunCommand) -> Printed:
     """Return a function that runs `myview evaluate` and returns its output."""
 
     def command(*arguments: object) -> str:
-        ended = myview("evaluate", *arguments)
-        assert ended.code == 0, ended.err
-        return ended.out
+        result = myview("evaluate", *arguments)
+        assert result.code == 0, result.err
+        return result.out
 
     return command
 
@@ -104,31 +104,33 @@ def test_a_missing_file_is_named(refused: Printed, tmp_path: Path) -> None:
 
 def test_files_are_paired_by_name_in_any_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / "seen" / f"c{number}.txt", people((number + 1,))) for number in range(3)]
-    there = [write(tmp_path / "gt" / f"c{number}.txt.gz", people((number + 1,))) for number in (2, 0, 1)]
-    once = rows(run(*each("--gt", there), *each("--tracks", found)))
+    truth_files = [
+        write(tmp_path / "gt" / f"c{number}.txt.gz", people((number + 1,))) for number in (2, 0, 1)
+    ]
+    once = rows(run(*each("--gt", truth_files), *each("--tracks", found)))
     assert list(once) == ["camera", "c0", "c1", "c2", "mean,", "joint"]
     assert once["joint"][5] == "100.0"
-    assert rows(run(*each("--gt", there), "--tracks", tmp_path / "seen")) == once
+    assert rows(run(*each("--gt", truth_files), "--tracks", tmp_path / "seen")) == once
 
 
 def test_a_second_value_without_a_repeated_option_is_refused(myview: RunCommand, tmp_path: Path) -> None:
     a, b = (write(tmp_path / f"{name}.txt", people((1,))) for name in "ab")
-    ended = myview("evaluate", "--gt", a, b, "--tracks", a, b)
-    assert ended.code == 2
-    assert "unexpected extra argument" in ended.err
+    result = myview("evaluate", "--gt", a, b, "--tracks", a, b)
+    assert result.code == 2
+    assert "unexpected extra argument" in result.err
 
 
 def test_files_without_common_names_are_paired_by_order(run: Printed, tmp_path: Path) -> None:
     found = [write(tmp_path / f"{name}.txt", people((1,))) for name in ("left", "right")]
-    there = [write(tmp_path / name / "gt.txt", people((1,))) for name in ("a", "b")]
-    assert list(rows(run(*each("--gt", there), *each("--tracks", found)))) == [
+    truth_files = [write(tmp_path / name / "gt.txt", people((1,))) for name in ("a", "b")]
+    assert list(rows(run(*each("--gt", truth_files), *each("--tracks", found)))) == [
         "camera",
         "left",
         "right",
         "mean,",
         "joint",
     ]
-    table = rows(run(*each("--gt", found), *each("--tracks", there)))
+    table = rows(run(*each("--gt", found), *each("--tracks", truth_files)))
     assert list(table) == ["camera", "left", "right", "mean,", "joint"]
 
 

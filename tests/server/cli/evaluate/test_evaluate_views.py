@@ -151,7 +151,7 @@ def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: RunComma
 
 
 @pytest.mark.parametrize(
-    ("lines", "why"),
+    ("lines", "reason"),
     [
         (["frame,camera", "1,c0"], "its first line is not frame,object,camera"),
         (["frame,object,camera", "1,1"], "choices.csv:2: expected 3 fields, found 2"),
@@ -164,17 +164,17 @@ def test_plots_show_the_choice_and_the_frames_around_its_cuts(evaluate: RunComma
     ],
 )
 def test_an_invalid_choices_file_is_refused(
-    evaluate: RunCommand, served: Path, lines: list[str], why: str
+    evaluate: RunCommand, served: Path, lines: list[str], reason: str
 ) -> None:
     code, out, err = evaluate("--gt", served, "--views", write(served / "choices.csv", lines), *SIZE)
     assert (code, out) == (BAD_INPUT, "")
-    assert why in err
+    assert reason in err
     assert len(err.splitlines()) == 1
 
 
 def test_invalid_options_are_refused(evaluate: RunCommand, served: Path) -> None:
     path = write(served / "choices.csv", choices({1: "c0"}))
-    for arguments, why in (
+    for arguments, reason in (
         ([], "give --tracks, --views, or both"),
         (["--tracks", served, "--plots", served / "p"], "--plots and --videos need --views"),
         (["--views", served / "none.csv", *SIZE], "none.csv: cannot be read"),
@@ -186,12 +186,12 @@ def test_invalid_options_are_refused(evaluate: RunCommand, served: Path) -> None
         ),
     ):
         code, out, err = evaluate("--gt", served, *arguments)
-        assert (code, out) == (BAD_INPUT, ""), why
-        assert why in err
+        assert (code, out) == (BAD_INPUT, ""), reason
+        assert reason in err
 
 
 @pytest.mark.parametrize(
-    ("text", "why"),
+    ("text", "reason"),
     [
         ('{"fps": 3}', "was not written by `myview render`"),
         ('{"fps": 3, "switch_cost_s": 1, "sizes": {"c0": [1e999, 9]}}', "was not written by `myview render`"),
@@ -201,10 +201,10 @@ def test_invalid_options_are_refused(evaluate: RunCommand, served: Path) -> None
         ('{"fps": 0, "switch_cost_s": 1, "sizes": {"c0": [9, 9]}}', "invalid rate, size or cost"),
     ],
 )
-def test_an_invalid_site_file_is_refused(evaluate: RunCommand, served: Path, text: str, why: str) -> None:
+def test_an_invalid_site_file_is_refused(evaluate: RunCommand, served: Path, text: str, reason: str) -> None:
     path = write(served / "choices.csv", choices({1: "c0"}))
     (served / "site.json").write_text(text)
-    assert why in input_error(evaluate("--gt", served, "--views", path))
+    assert reason in input_error(evaluate("--gt", served, "--views", path))
 
 
 def test_a_person_twice_in_a_frame_is_refused(evaluate: RunCommand, served: Path) -> None:
@@ -216,8 +216,8 @@ def test_a_person_twice_in_a_frame_is_refused(evaluate: RunCommand, served: Path
 
 def test_all_requested_files_are_written_or_none(evaluate: RunCommand, served: Path) -> None:
     path = write(served / "choices.csv", choices({1: "c0"}))
-    given = ("--gt", served, "--views", path, *SIZE, "--plots", served / "plots")
-    assert "cannot write there" in input_error(evaluate(*given, "--json", path / "numbers.json"))
+    options = ("--gt", served, "--views", path, *SIZE, "--plots", served / "plots")
+    assert "cannot write there" in input_error(evaluate(*options, "--json", path / "numbers.json"))
     assert not (served / "plots").exists()
 
 

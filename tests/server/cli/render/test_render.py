@@ -45,12 +45,12 @@ def test_two_views_become_films_tracks_choices_and_plots_with_one_warning_of_len
     views: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    done = render(views / "long" / "c0.mp4", views / "short" / "c1.mp4", "--out", out)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.splitlines() == [
+    completed = render(views / "long" / "c0.mp4", views / "short" / "c1.mp4", "--out", out)
+    assert completed.returncode == 0, completed.stderr
+    assert completed.stderr.splitlines() == [
         "the views are of different length: c0 with frame 80, c1 with frame 65; the shorter ones end first"
     ]
-    assert done.stdout.startswith(f"{out}: best views of ")
+    assert completed.stdout.startswith(f"{out}: best views of ")
     files = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
     films = {name for name in files if name.startswith("best/object-")}
     assert films
@@ -83,8 +83,8 @@ def test_every_film_has_the_configured_sound(views: Path, tmp_path: Path) -> Non
     write_flashes(tmp_path / "beeps.wav", 80, codec="pcm_s16le", pictures=False)
     (tmp_path / "site.yaml").write_text("sound: {source: beeps.wav}", encoding="utf-8")
     out = tmp_path / "out"
-    done = render(views / "long" / "c0.mp4", "--config", tmp_path / "site.yaml", "--out", out)
-    assert done.returncode == 0, done.stderr
+    completed = render(views / "long" / "c0.mp4", "--config", tmp_path / "site.yaml", "--out", out)
+    assert completed.returncode == 0, completed.stderr
     with (out / "choices.csv").open(encoding="ascii", newline="") as file:
         rows = [(int(row["object"]), int(row["frame"]) - 1) for row in csv.DictReader(file)]
     for number in {number for number, _ in rows}:
@@ -102,15 +102,15 @@ def test_an_error_while_rendering_leaves_nothing(tmp_path: Path) -> None:
     write_video(tmp_path / "c0.mp4", 25)
     damage(write_video(tmp_path / "c1.mp4", 5), [0, 1, 2, 3, 4])
     before = sorted(tmp_path.iterdir())
-    done = render(tmp_path / "c0.mp4", tmp_path / "c1.mp4", "--out", tmp_path / "out")
-    assert done.returncode == 2
-    [line] = done.stderr.splitlines()
+    completed = render(tmp_path / "c0.mp4", tmp_path / "c1.mp4", "--out", tmp_path / "out")
+    assert completed.returncode == 2
+    [line] = completed.stderr.splitlines()
     assert line.startswith(f"myview: camera c1: {tmp_path / 'c1.mp4'}: this video has no frames")
     assert sorted(tmp_path.iterdir()) == before
 
 
 @contextmanager
-def begun(folder: Path) -> Iterator[subprocess.Popen[str]]:
+def started_rendering(folder: Path) -> Iterator[subprocess.Popen[str]]:
     """Start a long rendering; return once it has begun to write."""
     (folder / "many").mkdir()
     cv2.imwrite(str(folder / "one.jpg"), np.zeros((90, 160, 3), np.uint8))
@@ -132,7 +132,7 @@ def begun(folder: Path) -> Iterator[subprocess.Popen[str]]:
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_an_interrupted_rendering_leaves_nothing(tmp_path: Path, number: signal.Signals, code: int) -> None:
-    with begun(tmp_path) as process:
+    with started_rendering(tmp_path) as process:
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == code

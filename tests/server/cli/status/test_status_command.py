@@ -37,9 +37,9 @@ def url(served: ServedSite) -> str:
 
 def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> str:  # noqa: B008 — frozen
     console = Console(width=200, record=True, file=None)
-    with console.capture() as said:
+    with console.capture() as output:
         console.print(render_status(now, rates, notice))
-    return said.get()
+    return output.get()
 
 
 async def test_a_sites_status_is_shown(site_with_people: ServedSite) -> None:
@@ -74,10 +74,10 @@ async def test_a_site_that_is_not_ready_exits_with_1_and_the_reason(
     served: ServedSite, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert not await status_once(url(served), None, as_json=False)
-    said = capsys.readouterr().out
-    assert "not ready: " in said
-    assert "no camera delivers frames" in said
-    assert "no people yet" in said
+    output = capsys.readouterr().out
+    assert "not ready: " in output
+    assert "no camera delivers frames" in output
+    assert "no people yet" in output
     show_people(served)
     assert await status_once(url(served), None, as_json=True)
     content = json.loads(capsys.readouterr().out)
@@ -104,16 +104,16 @@ async def test_no_text_of_the_server_controls_the_terminal(site_with_people: Ser
     evil = "\x1b[2J\x1b]0;owned\x07\nnew [red]line"
     camera = msgspec.structs.replace(now.cameras[0], message=evil, state=evil, camera=evil)
     person = msgspec.structs.replace(now.people[0], name=evil, camera=evil, cameras=(evil,))
-    said = printed(
+    output = printed(
         msgspec.structs.replace(now, name=evil, ready=False, why=evil, cameras=(camera,), people=(person,)),
         notice=evil,
     )
-    assert said.count("·[2J·]0;owned· new [red]line") == 10
+    assert output.count("·[2J·]0;owned· new [red]line") == 10
     assert now.service is not None
     counted = msgspec.structs.replace(now.service, viewers={evil: 1}, waiting={evil: 2})
-    said += printed(msgspec.structs.replace(now, service=counted))
-    assert said.count("·[2J·]0;owned· new [red]line") == 12
-    assert all(char.isprintable() or char == "\n" for char in said)
+    output += printed(msgspec.structs.replace(now, service=counted))
+    assert output.count("·[2J·]0;owned· new [red]line") == 12
+    assert all(char.isprintable() or char == "\n" for char in output)
 
 
 async def test_rates_are_between_two_snapshots_of_one_run(site_with_people: ServedSite) -> None:
@@ -135,12 +135,12 @@ async def test_an_unreachable_server_is_retried(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(command, "_EVERY_S", 0.01)
-    said: list[Any] = []
+    output: list[Any] = []
 
     async def until(met: Any) -> None:
-        while not any(met(line) for line in said):
+        while not any(met(line) for line in output):
             await asyncio.sleep(0.01)
-            said.extend(map(json.loads, capsys.readouterr().out.splitlines()))
+            output.extend(map(json.loads, capsys.readouterr().out.splitlines()))
 
     async with asyncio.timeout(PATIENCE):
         async with serving(
@@ -149,7 +149,7 @@ async def test_an_unreachable_server_is_retried(
             live = asyncio.create_task(status_live(f"http://127.0.0.1:{port}", None, as_json=True))
             await until(lambda status: status.get("name") == "hall")
         await until(lambda status: "away" in status)
-        said.clear()
+        output.clear()
         async with serving(
             make_app(BestViewService(BestViewPipeline(small_config()))), HttpSettings(port=port)
         ):
@@ -168,21 +168,21 @@ async def test_the_display_shows_an_unreachable_and_a_restarted_server(
     answers = iter([now, client.AwayError("hall: no answer"), other])
 
     async def answer(*_: Any) -> client.SiteNow:
-        given = next(answers, None)
-        if given is None:
+        outcome = next(answers, None)
+        if outcome is None:
             raise client.RefusedError("a token is needed")
-        if isinstance(given, Exception):
-            raise given
-        return given
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
 
     monkeypatch.setattr(command, "_EVERY_S", 0.0)
     monkeypatch.setattr(command, "status", answer)
     monkeypatch.setattr(command, "Console", lambda: Console(force_terminal=True, width=200))
     with pytest.raises(UserError, match="a token is needed; --token, or MYVIEW_TOKEN"):
         await status_live("hall", None, as_json=False)
-    said = capsys.readouterr().out
-    assert "hall: no answer; trying again" in said
-    assert said.index("trying again") < said.index("the service was restarted")
+    output = capsys.readouterr().out
+    assert "hall: no answer; trying again" in output
+    assert output.index("trying again") < output.index("the service was restarted")
 
 
 async def test_another_or_a_missing_server_is_reported_in_one_line(served: ServedSite) -> None:
@@ -203,8 +203,8 @@ def test_values_that_are_not_finite_are_ignored() -> None:
 @pytest.mark.parametrize("wrong", [{"fps": 0.0}, {"now": 1e300}])
 async def test_an_invalid_site_is_reported_in_one_line(served: ServedSite, wrong: dict[str, float]) -> None:
     async def site(_: web.Request) -> web.Response:
-        here = await client.site(url(served))
-        return web.json_response({**msgspec.to_builtins(here), **wrong})
+        found_site = await client.site(url(served))
+        return web.json_response({**msgspec.to_builtins(found_site), **wrong})
 
     app = web.Application()
     app.router.add_get("/api/site", site)
@@ -214,7 +214,7 @@ async def test_an_invalid_site_is_reported_in_one_line(served: ServedSite, wrong
 
 
 def test_the_command_refuses_in_one_line(myview: RunCommand) -> None:
-    ended = myview("status", "http://127.0.0.1:9", "--once")
-    assert (ended.code, ended.out) == (3, "")
-    assert ended.err.startswith("myview: status: http://127.0.0.1:9")
-    assert len(ended.err.splitlines()) == 1
+    result = myview("status", "http://127.0.0.1:9", "--once")
+    assert (result.code, result.out) == (3, "")
+    assert result.err.startswith("myview: status: http://127.0.0.1:9")
+    assert len(result.err.splitlines()) == 1

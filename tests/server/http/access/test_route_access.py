@@ -116,9 +116,9 @@ def filled(path: str, number: int = 1, camera: str = A) -> str:
     return path
 
 
-async def status(served: ServedSite, method: str, path: str, who: str) -> int:
+async def status(served: ServedSite, method: str, path: str, name: str) -> int:
     """Send a request without waiting for the body, which may be endless."""
-    heads = {CSRF_HEADER: "1", **({} if who == NOBODY else bearer(who))}
+    heads = {CSRF_HEADER: "1", **({} if name == NOBODY else bearer(name))}
     async with served.session.request(
         method,
         path,
@@ -135,13 +135,13 @@ async def test_every_route_admits_exactly_the_permitted_tokens(site: ServedSite)
     assert len(routes) > 60
     wrong = []
     for method, path in routes:
-        for who in sorted(ANYBODY):
-            if who in who_may(method, path) and method == "GET" and path.endswith((".mjpeg", ".jpg")):
+        for name in sorted(ANYBODY):
+            if name in who_may(method, path) and method == "GET" and path.endswith((".mjpeg", ".jpg")):
                 continue  # HEAD avoids starting a render worker
-            code = await status(site, method, filled(path), who)
-            may = who in who_may(method, path)
-            if (code in REFUSED) == may or (who == NOBODY and not may and code != 401):
-                wrong.append(f"{who}: {method} {path}: {code}")
+            code = await status(site, method, filled(path), name)
+            may = name in who_may(method, path)
+            if (code in REFUSED) == may or (name == NOBODY and not may and code != 401):
+                wrong.append(f"{name}: {method} {path}: {code}")
     assert wrong == []
 
 

@@ -24,8 +24,8 @@ async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
         yield served
 
 
-async def get(served: ServedSite, path: str, who: str) -> Any:
-    async with served.session.get(path, headers=bearer(who)) as answer:
+async def get(served: ServedSite, path: str, token_name: str) -> Any:
+    async with served.session.get(path, headers=bearer(token_name)) as answer:
         assert answer.status == 200
         text = await answer.text()
         return (
@@ -65,9 +65,9 @@ async def test_only_the_scoped_person_is_listed(site: ServedSite) -> None:
 
 async def test_only_the_scoped_camera_is_listed_without_others_errors(site: ServedSite) -> None:
     site.service.ingest.states[B].refused = "its parameters are not those of camera c0"
-    everything = (await get(site, "/api/cameras", "desk"))["cameras"]
-    assert [camera["camera"] for camera in everything] == [A, B]
-    assert "its parameters" in repr(everything)
+    unscoped = (await get(site, "/api/cameras", "desk"))["cameras"]
+    assert [camera["camera"] for camera in unscoped] == [A, B]
+    assert "its parameters" in repr(unscoped)
     assert [camera["camera"] for camera in (await get(site, "/api/cameras", "door"))["cameras"]] == [A]
     response = (await get(site, "/api/cameras", "family"))["cameras"]
     assert [camera["camera"] for camera in response] == [A, B]
@@ -109,17 +109,17 @@ async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pyt
         RiskEvent(reason="crossing", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
         RiskEvent(reason="track_loss", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
-    said = camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
+    track_message = camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
     async with site.session.get("/api/events", headers=bearer("family")) as response:
-        site.service.ingest.tracks(tracks(said))
+        site.service.ingest.tracks(tracks(track_message))
         site.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
         site.service.decide()
-        everything = (await get(site, "/api/flags", "desk"))["flags"]
-        assert [(flag["objects"], flag["cameras"], flag["state"]) for flag in everything] == [
+        unscoped = (await get(site, "/api/flags", "desk"))["flags"]
+        assert [(flag["objects"], flag["cameras"], flag["state"]) for flag in unscoped] == [
             ([1, 2], [A], "raised"),
             ([2], [A], "raised"),
         ]
-        flag = {**everything[0], "objects": [1]}
+        flag = {**unscoped[0], "objects": [1]}
         assert (await get(site, "/api/flags", "family"))["flags"] == [flag]
         site.service.feed(4, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
         received = await events(response, site.service.decision_state.end - 5)
@@ -131,19 +131,19 @@ async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pyt
 
 
 async def test_recorded_decisions_are_limited_to_the_scoped_person(site: ServedSite) -> None:
-    everything = await get(site, "/api/past?from=p0", "desk")
+    unscoped = await get(site, "/api/past?from=p0", "desk")
     response = await get(site, "/api/past?from=p0", "family")
-    assert {number for gop in everything for number in people_in({"merged": [], "split": [], **gop})} == {
+    assert {number for gop in unscoped for number in people_in({"merged": [], "split": [], **gop})} == {
         1,
         2,
     }
     assert {number for gop in response for number in people_in({"merged": [], "split": [], **gop})} == {1}
-    assert [gop["first"] for gop in response] == [gop["first"] for gop in everything]
+    assert [gop["first"] for gop in response] == [gop["first"] for gop in unscoped]
 
 
 async def test_the_last_subscriber_of_a_scope_leaves_no_state(site: ServedSite) -> None:
-    for who in ("family", "door", "desk"):
-        async with site.session.get("/api/events", headers=bearer(who)) as answer:
+    for token_name in ("family", "door", "desk"):
+        async with site.session.get("/api/events", headers=bearer(token_name)) as answer:
             await events(answer, 0)
 
 

@@ -41,11 +41,12 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
     codec = "vp8" if form == "webm" else "h264"
     async with departure_site(tmp_path, encode={"codec": codec}) as served:
         decisions = feed_epochs(served, range(3))
-        theirs, all_of_it = [
-            await open_stream(served, f"/objects/1/best.{form}", who) for who in ("family", "desk")
+        scoped, all_of_it = [
+            await open_stream(served, f"/objects/1/best.{form}", token_name)
+            for token_name in ("family", "desk")
         ]
         decisions += feed_epochs(served, range(3, EPOCHS))
-        narrow, full = map(decoded, await finish_streams(served, theirs, all_of_it))
+        narrow, full = map(decoded, await finish_streams(served, scoped, all_of_it))
     right = expected_pictures(decisions, codec)
     if form == "ts":  # which begins at another time
         narrow, full = (
@@ -64,9 +65,9 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
 async def test_a_stream_opened_while_the_person_is_away_begins_with_gray(tmp_path: Path) -> None:
     async with departure_site(tmp_path) as served:
         decisions = feed_epochs(served, range(14))
-        theirs = await open_stream(served, "/objects/1/best.mp4", "family")
+        scoped = await open_stream(served, "/objects/1/best.mp4", "family")
         decisions += feed_epochs(served, range(14, EPOCHS))
-        shown = decoded((await finish_streams(served, theirs))[0])
+        shown = decoded((await finish_streams(served, scoped))[0])
     assert is_gray(shown[min(shown)])
     assert_equal_pictures(shown, expected_pictures(decisions))
 
@@ -74,9 +75,9 @@ async def test_a_stream_opened_while_the_person_is_away_begins_with_gray(tmp_pat
 async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> None:
     async with departure_site(tmp_path) as served:
         decisions = feed_epochs(served, range(3))
-        theirs = await open_stream(served, "/objects/1/best.mp4?prefer=c0", "family")
+        scoped = await open_stream(served, "/objects/1/best.mp4?prefer=c0", "family")
         decisions += feed_epochs(served, range(3, EPOCHS))
-        shown = decoded((await finish_streams(served, theirs))[0])
+        shown = decoded((await finish_streams(served, scoped))[0])
     is_as_expected = {
         pulse: is_gray(picture) for pulse, picture in expected_pictures(decisions).items() if pulse in shown
     }
@@ -84,18 +85,20 @@ async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> 
     np.testing.assert_array_equal(shown[max(shown)], camera_pictures("c0")[max(shown)])
 
 
-async def listed(served: ServedSite, pattern: str, who: str) -> bytes:
+async def listed(served: ServedSite, pattern: str, token_name: str) -> bytes:
     """Fetch the segments of a playlist, after its init segment."""
-    text = (await fetch(served, "/objects/1/hls/index.m3u8", who)).decode()
+    text = (await fetch(served, "/objects/1/hls/index.m3u8", token_name)).decode()
     names = ["init.mp4", *re.findall(pattern, text, re.MULTILINE)]
-    return b"".join([await fetch(served, f"/objects/1/hls/{name}", who) for name in names])
+    return b"".join([await fetch(served, f"/objects/1/hls/{name}", token_name) for name in names])
 
 
 @pytest.mark.parametrize("pattern", [r"^[0-9]+\.m4s$", r'PART:.*URI="([0-9.]+\.m4s)"'])
 async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: Path, pattern: str) -> None:
     async with departure_site(tmp_path, http=HLS) as served:
         decisions = feed_epochs(served, range(EPOCHS - 5))
-        narrow, full = [decoded(await listed(served, pattern, who)) for who in ("family", "desk")]
+        narrow, full = [
+            decoded(await listed(served, pattern, token_name)) for token_name in ("family", "desk")
+        ]
     until = max(full) + 1
     right = expected_pictures(decisions)
     for pulse in range(min(narrow), until):  # a picture held for a whole segment has its duration
@@ -112,7 +115,9 @@ async def test_sound_is_silent_without_the_person(tmp_path: Path) -> None:
     async with departure_site(tmp_path, sound={"source": str(recording)}) as served:
         send_audio(served.service, recording)
         feed_epochs(served, range(3))
-        answers = [await open_stream(served, "/objects/1/best.mp4", who) for who in ("family", "desk")]
+        answers = [
+            await open_stream(served, "/objects/1/best.mp4", token_name) for token_name in ("family", "desk")
+        ]
         feed_epochs(served, range(3, EPOCHS))
         narrow, full = await finish_streams(served, *answers)
     assert [round(beep * FPS) for beep in beeps(full)] == [20, 40, 60, 80, 100]

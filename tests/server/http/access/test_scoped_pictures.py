@@ -32,16 +32,16 @@ def picture_of(jpeg: bytes) -> Image:
 async def test_scoped_pictures_are_gray_without_the_person(tmp_path: Path, query: str) -> None:
     async with departure_site(tmp_path) as served:
         feed_epochs(served, range(12))
-        theirs = picture_of(await fetch(served, f"/objects/1/best.jpg{query}", "family"))
-        everything = picture_of(await fetch(served, f"/objects/1/best.jpg{query}", "desk"))
+        scoped = picture_of(await fetch(served, f"/objects/1/best.jpg{query}", "family"))
+        unscoped = picture_of(await fetch(served, f"/objects/1/best.jpg{query}", "desk"))
         async with (
             await open_stream(served, f"/objects/1/best.mjpeg{query}", "family") as series,
             aclosing(jpeg_parts(series)) as shown,
         ):
             feed_epochs(served, range(12, 14))
             several = [picture_of((await anext(shown)).jpeg) for _ in range(2)]
-    assert is_nearly_grey(theirs)
-    assert not is_nearly_grey(everything)
+    assert is_nearly_grey(scoped)
+    assert not is_nearly_grey(unscoped)
     assert all(map(is_nearly_grey, several))
 
 
@@ -64,15 +64,17 @@ async def test_only_the_box_of_the_scoped_person_is_drawn(tmp_path: Path) -> Non
         decision = room.decisions[max(room.decisions)]
         boxes = decision.boxes[decision.choices[1]][-1]
         plain = await still(room, "", "desk")
-        theirs, all_of_it = [await still(room, "?overlay=1", who) for who in ("family", "desk")]
+        scoped, unscoped_image = [
+            await still(room, "?overlay=1", token_name) for token_name in ("family", "desk")
+        ]
     assert len(boxes) > 1, "another person is in the picture"
     for number, *box in boxes:
-        assert has_box(all_of_it, plain, box)
-        assert has_box(theirs, plain, box) == (number == 1)
+        assert has_box(unscoped_image, plain, box)
+        assert has_box(scoped, plain, box) == (number == 1)
 
 
-async def still(room: DrawnSite, query: str, who: str) -> Image:
-    async with room.session.get(f"/objects/1/best.jpg{query}", headers=bearer(who)) as answer:
+async def still(room: DrawnSite, query: str, token_name: str) -> Image:
+    async with room.session.get(f"/objects/1/best.jpg{query}", headers=bearer(token_name)) as answer:
         assert answer.status == 200
         return picture_of(await answer.read())
 

@@ -62,7 +62,7 @@ async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[
 async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form: str) -> None:
     served, decisions = kept
     path = f"/objects/1/best.{form}?from=p0&to=p{len(decisions) * GOP}"
-    narrow, full = [decoded(await fetch(served, path, who)) for who in ("family", "desk")]
+    narrow, full = [decoded(await fetch(served, path, token_name)) for token_name in ("family", "desk")]
     if form == "ts":
         narrow, full = (
             {pulse - min(pictures): shown for pulse, shown in pictures.items()} for pictures in (narrow, full)
@@ -75,11 +75,11 @@ async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form
 async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
     async with departure_site(tmp_path) as served:
         decisions = feed_epochs(served, range(12))
-        theirs = await open_stream(served, "/objects/1/best.mp4?from=p25", "family")
+        scoped = await open_stream(served, "/objects/1/best.mp4?from=p25", "family")
         while not served.service.splicer.scoped_persons[1].viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         decisions += feed_epochs(served, range(12, EPOCHS))
-        shown = decoded((await finish_streams(served, theirs))[0])
+        shown = decoded((await finish_streams(served, scoped))[0])
     right = expected_pictures(decisions, freezes=False)
     assert min(shown) == 25
     assert [is_gray(shown[pulse]) for pulse in (29, 30, 79, 80)] == [False, True, True, False]
@@ -91,19 +91,21 @@ async def test_recorded_segments_are_gray_without_the_person(
 ) -> None:
     served, decisions = kept
     shown: dict[str, dict[int, Picture]] = {}
-    for who in ("family", "desk"):
-        listed = (await fetch(served, "/objects/1/hls/index.m3u8?from=p0&to=p90", who)).decode()
+    for token_name in ("family", "desk"):
+        listed = (await fetch(served, "/objects/1/hls/index.m3u8?from=p0&to=p90", token_name)).decode()
         names = ["init.mp4", *re.findall(r"^[0-9]+\.m4s$", listed, re.MULTILINE)]
         for scoped in (True, False):
             reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
             assert reel is not None
             reel._segments.clear()
-        shown[who] = decoded(b"".join([await fetch(served, f"/objects/1/hls/{name}", who) for name in names]))
+        shown[token_name] = decoded(
+            b"".join([await fetch(served, f"/objects/1/hls/{name}", token_name) for name in names])
+        )
     assert max(shown["desk"]) == 89
     right = {"family": expected_pictures(decisions, freezes=False), "desk": chosen_pictures(decisions)}
-    for who, pictures in shown.items():
+    for token_name, pictures in shown.items():
         for pulse, picture in pictures.items():
-            np.testing.assert_array_equal(picture, right[who][pulse], f"{who} {pulse}")
+            np.testing.assert_array_equal(picture, right[token_name][pulse], f"{token_name} {pulse}")
     assert sum(map(is_gray, shown["family"].values())) > 8 * GOP
 
 
@@ -116,8 +118,8 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
         send_audio(served.service, recording)
         decisions = feed_epochs(served, range(EPOCHS))
         await written(served, len(decisions) - 2)
-        heard: dict[str, list[int]] = {}
-        for who in ("family", "desk"):
+        beep_times: dict[str, list[int]] = {}
+        for token_name in ("family", "desk"):
             names = [f"best.mp4?from=p0&to=p{len(decisions) * GOP}"]
             if hls:
                 names = [f"hls/{file}" for file in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
@@ -125,6 +127,6 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
                     reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
                     assert reel is not None
                     reel._segments.clear()
-            data = b"".join([await fetch(served, f"/objects/1/{name}", who) for name in names])
-            heard[who] = [round(beep * FPS) for beep in beeps(data)]
-    assert heard == {"family": [20, 80, 100], "desk": [20, 40, 60, 80, 100]}
+            data = b"".join([await fetch(served, f"/objects/1/{name}", token_name) for name in names])
+            beep_times[token_name] = [round(beep * FPS) for beep in beeps(data)]
+    assert beep_times == {"family": [20, 80, 100], "desk": [20, 40, 60, 80, 100]}

@@ -49,7 +49,7 @@ async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
         yield served
 
 
-async def asked(
+async def request_status(
     served: ServedSite, path: str = SESSION, method: str = "GET", json: object = None, **headers: str
 ) -> tuple[int, str]:
     """Return the status and the error; headers are named with _ for -."""
@@ -64,7 +64,7 @@ async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_opera
 ) -> None:
     session = await served.get_json(SESSION)
     assert session == {"by_token": False, "name": None, "role": "operate", "object": None, "camera": None}
-    assert await asked(served, CAMERAS, Host=f"localhost:{served.port}") == (200, "")
+    assert await request_status(served, CAMERAS, Host=f"localhost:{served.port}") == (200, "")
     async with served.session.get(SESSION, headers={"X-Forwarded-For": "10.0.0.7"}) as answer:
         assert (await answer.json())["role"] == "watch"
 
@@ -85,7 +85,7 @@ async def test_without_tokens_everyone_may_watch_and_only_this_machine_may_opera
 async def test_without_tokens_other_machines_cannot_operate_and_get_instructions(
     served: ServedSite, head: str, value: str
 ) -> None:
-    status, error = await asked(served, CAMERAS, **{head.replace("-", "_"): value})
+    status, error = await request_status(served, CAMERAS, **{head.replace("-", "_"): value})
     assert status == 403
     assert "access.tokens" in error
     assert "\n" not in error
@@ -118,7 +118,7 @@ def test_usual_headers_of_browsers_and_programs_are_not_proxy_headers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("address", "here"),
+    ("address", "is_local"),
     [
         ("127.0.0.1", True),
         ("127.8.0.1", True),
@@ -131,9 +131,9 @@ def test_usual_headers_of_browsers_and_programs_are_not_proxy_headers() -> None:
         ("localhost", False),
     ],
 )
-def test_loopback_addresses_are_this_machine(address: str, here: bool) -> None:
+def test_loopback_addresses_are_this_machine(address: str, is_local: bool) -> None:
     request = make_mocked_request("GET", CAMERAS, headers={"Host": "localhost"})
-    assert is_local_request(request.clone(remote=address)) == here
+    assert is_local_request(request.clone(remote=address)) == is_local
 
 
 @pytest.mark.parametrize("path", [SESSION, "/api/operator/view_selection"])
@@ -141,14 +141,14 @@ def test_loopback_addresses_are_this_machine(address: str, here: bool) -> None:
 async def test_pages_of_other_sites_can_neither_read_nor_change_anything(
     served: ServedSite, site: str, path: str
 ) -> None:
-    assert (await asked(served, path, Sec_Fetch_Site=site))[0] == 403
-    assert (await asked(served, path, method="DELETE", Sec_Fetch_Site=site))[0] == 403
+    assert (await request_status(served, path, Sec_Fetch_Site=site))[0] == 403
+    assert (await request_status(served, path, method="DELETE", Sec_Fetch_Site=site))[0] == 403
     for method in ("PUT", "POST", "DELETE"):
-        status, error = await asked(served, path, method=method, json={})
+        status, error = await request_status(served, path, method=method, json={})
         assert status == 403
         assert CSRF_HEADER in error
-    asks = {"Origin": "https://evil.example", "Access_Control_Request_Method": "DELETE"}
-    assert (await asked(served, path, method="OPTIONS", **asks))[0] == 403
+    preflight = {"Origin": "https://evil.example", "Access_Control_Request_Method": "DELETE"}
+    assert (await request_status(served, path, method="OPTIONS", **preflight))[0] == 403
 
 
 async def test_with_tokens_requests_need_one_and_answers_reveal_none(site: ServedSite) -> None:
@@ -159,12 +159,12 @@ async def test_with_tokens_requests_need_one_and_answers_reveal_none(site: Serve
     async with site.session.get(CAMERAS, headers={"Authorization": "Bearer wrong"}) as answer:
         assert answer.status == 401
         assert answer.headers["WWW-Authenticate"] == "Bearer"
-    assert (await asked(site, Authorization="Basic d3Jvbmc="))[0] == 401
+    assert (await request_status(site, Authorization="Basic d3Jvbmc="))[0] == 401
     for more in ({}, {"X_Forwarded_For": "10.0.0.7"}):
-        assert await asked(site, CAMERAS, **bearer("lead"), **more) == (200, "")
+        assert await request_status(site, CAMERAS, **bearer("lead"), **more) == (200, "")
     async with site.session.get("/api/operator/config", headers=bearer("lead")) as answer:
-        told = await answer.text()
-    assert not any(token_entry(name)["sha256"] in told for name in ("lead", "desk"))
+        error = await answer.text()
+    assert not any(token_entry(name)["sha256"] in error for name in ("lead", "desk"))
 
 
 async def test_a_session_describes_the_permissions_of_its_token(site: ServedSite) -> None:
@@ -176,7 +176,7 @@ async def test_a_session_describes_the_permissions_of_its_token(site: ServedSite
             "object": 1,
             "camera": None,
         }
-    status, error = await asked(site, CAMERAS, **bearer("desk"))
+    status, error = await request_status(site, CAMERAS, **bearer("desk"))
     assert (status, error) == (403, "the token 'desk' is only for watching")
 
 
@@ -205,10 +205,10 @@ async def test_signing_in_sets_an_http_only_cookie_until_signing_out(site: Serve
     assert not cookie["secure"]
     assert token_of("lead") not in cookie.value
     kept = f"{cookie.key}={cookie.value}"
-    assert await asked(site, CAMERAS, Cookie=kept) == (200, "")
+    assert await request_status(site, CAMERAS, Cookie=kept) == (200, "")
     async with site.session.delete(SESSION, headers={**MINE, "Cookie": kept}) as answer:
         assert answer.status == 204
-    assert (await asked(site, CAMERAS, Cookie=kept))[0] == 401  # not only forgotten by the browser
+    assert (await request_status(site, CAMERAS, Cookie=kept))[0] == 401  # not only forgotten by the browser
 
 
 async def test_behind_an_https_proxy_the_cookie_is_secure(site: ServedSite) -> None:
@@ -220,8 +220,8 @@ async def test_behind_an_https_proxy_the_cookie_is_secure(site: ServedSite) -> N
 
 async def test_a_token_takes_precedence_over_a_session(site: ServedSite) -> None:
     kept = await sign_in(site, "desk")
-    assert (await asked(site, CAMERAS, Cookie=kept))[0] == 403
-    assert (await asked(site, CAMERAS, Cookie=kept, **bearer("lead")))[0] == 200
+    assert (await request_status(site, CAMERAS, Cookie=kept))[0] == 403
+    assert (await request_status(site, CAMERAS, Cookie=kept, **bearer("lead")))[0] == 200
 
 
 async def test_signing_in_to_another_service_of_the_machine_keeps_this_session(
@@ -236,11 +236,11 @@ async def test_signing_in_to_another_service_of_the_machine_keeps_this_session(
     ):
         for address in (url, f"http://127.0.0.1:{(await anext(halls)).port}{SESSION}", url):
             async with browser.get(address) as answer:
-                known = answer.status == 200
-            if not known:
+                is_valid = answer.status == 200
+            if not is_valid:
                 async with browser.post(address, headers=MINE, json={"token": token_of("lead")}) as answer:
                     assert answer.status == 200
-    assert known
+    assert is_valid
 
 
 def test_a_session_expires_and_a_token_has_a_limited_number_of_sessions() -> None:
@@ -272,15 +272,15 @@ async def test_invalid_bytes_are_neither_a_token_nor_a_session(site: ServedSite,
 async def test_wrong_tokens_are_rate_limited_but_known_valid_ones_are_not(
     site: ServedSite,
 ) -> None:
-    assert (await asked(site, **bearer("desk")))[0] == 200
-    codes = [(await asked(site, Authorization=f"Bearer {number}"))[0] for number in range(7)]
+    assert (await request_status(site, **bearer("desk")))[0] == 200
+    codes = [(await request_status(site, Authorization=f"Bearer {number}"))[0] for number in range(7)]
     assert codes == 5 * [401] + 2 * [429]
     async with site.session.post(SESSION, headers=MINE, json={"token": token_of("lead")}) as answer:
         assert answer.status == 429
         seconds = int(answer.headers["Retry-After"])
         assert 1 <= seconds <= 12
         assert (await answer.json())["error"] == f"too many wrong tokens; try again in {seconds} s"
-    assert (await asked(site, **bearer("desk")))[0] == 200, "others may share the address"
+    assert (await request_status(site, **bearer("desk")))[0] == 200, "others may share the address"
     async with site.session.get("/metrics", headers=bearer("desk")) as answer:
         assert "myview_wrong_tokens_total 5.0" in (await answer.text()).splitlines()
 
@@ -301,7 +301,9 @@ def test_retry_after_is_never_zero(tmp_path: Path) -> None:
 
 
 async def test_an_expired_cookie_does_not_count_as_a_wrong_token(site: ServedSite) -> None:
-    codes = [(await asked(site, Cookie=f"{COOKIE_PREFIX}_hall_0={number}"))[0] for number in range(9)]
+    codes = [
+        (await request_status(site, Cookie=f"{COOKIE_PREFIX}_hall_0={number}"))[0] for number in range(9)
+    ]
     assert codes == 9 * [401]
 
 
@@ -339,7 +341,7 @@ async def test_request_bodies_are_not_decompressed(site: ServedSite, packing: st
 
 
 async def test_signing_in_without_tokens_is_refused(served: ServedSite) -> None:
-    assert (await asked(served, method="POST", json={"token": "x"}, **{CSRF_HEADER: "1"}))[0] == 400
+    assert (await request_status(served, method="POST", json={"token": "x"}, **{CSRF_HEADER: "1"}))[0] == 400
 
 
 async def test_the_page_is_public_and_reveals_nothing(site: ServedSite) -> None:

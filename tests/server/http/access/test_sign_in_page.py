@@ -76,9 +76,9 @@ async def test_a_link_with_a_token_opens_a_person_and_drops_the_token_from_the_u
         await expect(page.locator("#people li")).to_have_count(1)
         await expect(page.get_by_label("Watching needs a token")).to_be_hidden()
         assert "token" not in await page.evaluate("location.href")
-        asked = [address for address in addresses if "#" not in address]
-        assert any("best.mp4" in address for address in asked)
-        assert not any(token in address for address in asked)
+        requested = [address for address in addresses if "#" not in address]
+        assert any("best.mp4" in address for address in requested)
+        assert not any(token in address for address in requested)
 
 
 async def test_a_viewer_whose_token_is_revoked_is_shown_the_sign_in_form(

@@ -47,7 +47,7 @@ async def stream(served: ServedSite, path: str, **heads: str) -> aiohttp.ClientR
     return answer
 
 
-async def ended(answer: aiohttp.ClientResponse) -> None:
+async def wait_for_end(answer: aiohttp.ClientResponse) -> None:
     """Read until the server ends the stream."""
     with contextlib.suppress(aiohttp.ClientError):  # aborted, or ended regularly
         while await answer.content.readany():
@@ -61,8 +61,8 @@ async def test_revoking_a_token_ends_only_its_streams(site: ServedSite, tmp_path
     by_address = await stream(site, f"{path}?token={token_of('desk')}")
     other = await stream(site, path, **bearer("lead"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
-    await ended(by_head)
-    await ended(by_address)
+    await wait_for_end(by_head)
+    await wait_for_end(by_address)
     async with site.session.get("/api/objects", headers=bearer("desk")) as answer:
         assert answer.status == 401
     site.service.feed(3, {A: {1: SMALL}, B: {}})
@@ -83,9 +83,9 @@ async def test_streams_of_its_sessions_end_too_and_those_of_a_signed_out_session
         kept.append(f"{cookie.key}={cookie.value}")
     signed_out, revoked, other = [await stream(site, "/api/events", Cookie=cookie) for cookie in kept]
     async with site.session.delete("/api/session", headers={CSRF_HEADER: "1", "Cookie": kept[0]}):
-        await ended(signed_out)
+        await wait_for_end(signed_out)
     write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
-    await ended(revoked)
+    await wait_for_end(revoked)
     assert await other.content.readany()
     other.close()
 
@@ -97,7 +97,7 @@ async def test_streams_outside_a_narrowed_scope_end(
 ) -> None:
     answer = await stream(site, path, **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", **less))
-    await ended(answer)
+    await wait_for_end(answer)
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/objects/1/best.mjpeg"])
@@ -107,14 +107,14 @@ async def test_a_persons_stream_ends_when_its_token_becomes_limited_to_that_pers
     """Otherwise it would show the room after the person has left."""
     answer = await stream(site, path, **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", object=1, made=IN_FUTURE))
-    await ended(answer)
+    await wait_for_end(answer)
 
 
 async def test_streams_within_a_changed_scope_continue(site: ServedSite, tmp_path: Path) -> None:
     camera = await stream(site, "/cameras/c0/live.mp4", **bearer("desk"))
     events = await stream(site, "/api/events", **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", camera="c0"))
-    await ended(events)
+    await wait_for_end(events)
     site.service.feed(3, {A: {1: SMALL}, B: {}})
     assert await camera.content.readany()
     camera.close()
@@ -128,7 +128,7 @@ async def test_a_blocked_disk_does_not_delay_revocation(site: ServedSite, tmp_pa
     await asyncio.sleep(0)
     write_tokens(tmp_path / "tokens.yaml", token_entry("lead"))
     try:
-        await asyncio.wait_for(ended(answer), 10.0)
+        await asyncio.wait_for(wait_for_end(answer), 10.0)
     finally:
         hangs.set()
         await asyncio.gather(*waiting)
@@ -144,8 +144,10 @@ async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
         hangs.wait(30.0)
 
     sessions = {CSRF_HEADER: "1"}
-    async with site.session.post("/api/session", headers=sessions, json={"token": token_of("desk")}) as done:
-        [cookie] = done.cookies.values()
+    async with site.session.post(
+        "/api/session", headers=sessions, json={"token": token_of("desk")}
+    ) as response:
+        [cookie] = response.cookies.values()
     answer = await stream(site, "/api/events", Cookie=f"{cookie.key}={cookie.value}")
     monkeypatch.setattr(TokenStore, "reload_if_changed", look)
     try:
@@ -153,7 +155,7 @@ async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
         monkeypatch.setattr(
             "server.http.access.sessions.Sessions.token", lambda *_: None
         )  # 12 hours are over
-        await asyncio.wait_for(ended(answer), 10.0)
+        await asyncio.wait_for(wait_for_end(answer), 10.0)
     finally:
         hangs.set()
 
@@ -161,7 +163,7 @@ async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
 async def test_a_new_token_is_valid_without_a_restart(site: ServedSite, tmp_path: Path) -> None:
     old = await stream(site, "/api/events", **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("guest", role="watch"))
-    await ended(old)
+    await wait_for_end(old)
     async with site.session.get("/api/site", headers=bearer("guest")) as answer:
         assert answer.status == 200
 
@@ -179,9 +181,11 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
         )
         served.service.connect_cameras(*CAMERAS)
         if remembered is not None:
-            said = IdentitySnapshot(pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[])
+            snapshot = IdentitySnapshot(pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[])
             key = ZenohKeys("hall").camera("c0", "retained_identities")
-            served.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(said), b""))
+            served.service.state_replication.snapshot_received(
+                Message(key, msgspec.json.encode(snapshot), b"")
+            )
         while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)
             async with served.session.get("/api/site", headers=bearer("guest")) as answer:

@@ -112,7 +112,7 @@ async def test_past_choices_are_explained_from_the_first_request_on(site_with_pe
     assert (await site_with_people.get_json("/api/objects/1/choice"))["first"] == newest["first"] + GOP
     for at in (f"p{newest['first']}", f"p{newest['first'] + GOP - 1}", f"-{GOP / FPS}"):
         assert await site_with_people.get_json(f"/api/objects/1/choice?at={at}") == newest
-    for path, expected, words in (
+    for path, expected, error in (
         ("1/choice?at=p0", 404, "no reasons are stored"),
         ("1/choice?at=p999999", 404, "no reasons are stored"),
         ("9/choice?at=-1", 404, "object 9"),
@@ -120,7 +120,7 @@ async def test_past_choices_are_explained_from_the_first_request_on(site_with_pe
     ):
         code, content = await site_with_people.get(f"/api/objects/{path}")
         assert code == expected
-        assert words in content["error"]
+        assert error in content["error"]
 
 
 async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:

@@ -70,8 +70,8 @@ async def stream(
 async def status(served: ServedSite, path: str, **heads: str) -> int:
     """Send a request on a new connection."""
     lines = "".join(f"{name}: {value}\r\n" for name, value in {**heads, "Connection": "close"}.items())
-    said = await over(await silent(served, GET.format(path, lines)))
-    return int(said.split(maxsplit=2)[1]) if said else 0
+    received = await over(await silent(served, GET.format(path, lines)))
+    return int(received.split(maxsplit=2)[1]) if received else 0
 
 
 @pytest.mark.parametrize("begin", ["", "GET /api/site HTTP/1.1\r\nHost: ha", "\r\n\r\n", "\x16\x03\x01"])
@@ -95,8 +95,8 @@ async def test_a_body_above_the_limit_is_refused(tmp_path: Path) -> None:
 
 async def test_an_idle_connection_is_closed() -> None:
     async with small(keepalive_timeout_s=SOON) as served:
-        said = await over(await silent(served, GET.format("/healthz", "")))
-        assert said.endswith(b"ok\n")
+        received = await over(await silent(served, GET.format("/healthz", "")))
+        assert received.endswith(b"ok\n")
 
 
 @needs_openssl
@@ -173,14 +173,14 @@ def test_a_flood_of_connections_leaves_descriptors_for_the_service(tmp_path: Pat
         connect(port).close()
         for _ in range(500):
             flood.enter_context(connect(port))
-        for what, said in ((b"healthz", b"ok\n"), (b"metrics", b"process_open_fds")):
+        for route, expected in ((b"healthz", b"ok\n"), (b"metrics", b"process_open_fds")):
             with connect(port) as asking:
                 asking.settimeout(60)
-                asking.sendall(ask % what)
+                asking.sendall(ask % route)
                 answer = b""
                 while some := asking.recv(1 << 16):
                     answer += some
-            assert said in answer
+            assert expected in answer
         (open_now,) = [line for line in answer.splitlines() if line.startswith(b"process_open_fds ")]
         assert float(open_now.split()[1]) < 300 - 32
         wait_for_log(log, b"http.connections_max")
@@ -233,18 +233,18 @@ ACTS = st.lists(
 
 @given(ACTS)
 def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str, int]]) -> None:
-    clock, there, busy = Clock(), list[Connection](), set[int]()
+    clock, open_connections, busy = Clock(), list[Connection](), set[int]()
     places = ConnectionLimiter(BOUNDS, clock)
-    for act, address, which in acts:
-        connection = there[which % len(there)] if there else None
+    for act, address, choice in acts:
+        connection = open_connections[choice % len(open_connections)] if open_connections else None
         if act == "comes":
             new = places.admit(address, Fake())
             if new is None:
-                beyond = [connection for connection in there if connection.is_reserved]
+                beyond = [connection for connection in open_connections if connection.is_reserved]
                 assert len(beyond) == BOUNDS.for_operators
                 assert all(id(connection) in busy for connection in beyond)
             else:
-                there.append(new)
+                open_connections.append(new)
         elif act == "time":
             clock.now += 5.0
             places.close_overdue()
@@ -256,14 +256,23 @@ def test_the_limit_holds_and_busy_connections_are_kept(acts: list[tuple[str, str
         elif connection is not None:
             busy.discard(id(connection))
             {"rests": places.idle, "waits": places.receiving, "leaves": places.closed}[act](connection)
-        assert not any(connection.transport.ended for connection in there if id(connection) in busy)  # type: ignore[attr-defined]
-        there = [connection for connection in there if not connection.closed]
-        assert places.open == len(there)
-        assert len([connection for connection in there if not connection.is_reserved]) <= BOUNDS.most
-        assert len([connection for connection in there if connection.is_reserved]) <= BOUNDS.for_operators
-        placed = Counter(connection.network for connection in there if not connection.is_reserved)
+        assert not any(
+            connection.transport.ended  # type: ignore[attr-defined]
+            for connection in open_connections
+            if id(connection) in busy
+        )
+        open_connections = [connection for connection in open_connections if not connection.closed]
+        assert places.open == len(open_connections)
+        assert (
+            len([connection for connection in open_connections if not connection.is_reserved]) <= BOUNDS.most
+        )
+        assert (
+            len([connection for connection in open_connections if connection.is_reserved])
+            <= BOUNDS.for_operators
+        )
+        placed = Counter(connection.network for connection in open_connections if not connection.is_reserved)
         assert all(count <= BOUNDS.per_address for network, count in placed.items() if network != "127.0.0.1")
-    for connection in there:
+    for connection in open_connections:
         places.closed(connection)
     assert places.open == 0
     assert not places._per_network

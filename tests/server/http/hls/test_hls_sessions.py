@@ -57,32 +57,37 @@ def test_players_that_fetched_recently_or_wait_are_counted(
     open_ones: list[tuple[HlsClient, str | None, ExitStack]] = []
 
     def least(client: HlsClient) -> int:
-        waiting = [kind for who, kind, _ in open_ones if who == client]
+        waiting = [kind for client_reader, kind, _ in open_ones if client_reader == client]
         most = max((waiting.count(kind) for kind in ("playlist", "part")), default=0)
         lately = clock.now - last_request.get(client, -KEPT_S) < KEPT_S
         return max(most, 1 if lately else 0)
 
     for act, stream, player, kind, seconds in acts:
-        who = reader(stream, player)
+        client_reader = reader(stream, player)
         if act == "asks":
-            before, one_more = readers.of(who.stream), readers.is_new_viewer(who, kind)
+            before, one_more = readers.of(client_reader.stream), readers.is_new_viewer(client_reader, kind)
             stack = ExitStack()
-            stack.enter_context(readers.request(who, kind))
-            open_ones.append((who, kind, stack))
-            last_request[who] = clock.now
-            assert readers.of(who.stream) - before == one_more
+            stack.enter_context(readers.request(client_reader, kind))
+            open_ones.append((client_reader, kind, stack))
+            last_request[client_reader] = clock.now
+            assert readers.of(client_reader.stream) - before == one_more
         elif act == "is answered" and open_ones:
-            who, _, stack = open_ones.pop(0)
+            client_reader, _, stack = open_ones.pop(0)
             stack.close()
-            last_request[who] = clock.now
+            last_request[client_reader] = clock.now
         else:
             clock.now += seconds
         # requests without a part number are answered at once; here all block
-        everybody = [reader(one, other) for one in (0, 1) for other in (0, 1)]
+        readers_expected = [reader(one, other) for one in (0, 1) for other in (0, 1)]
         assert [readers.of(f"object {number}") for number in (0, 1)] == [
-            sum(least(who) for who in everybody if who.stream == f"object {number}") for number in (0, 1)
+            sum(
+                least(client_reader)
+                for client_reader in readers_expected
+                if client_reader.stream == f"object {number}"
+            )
+            for number in (0, 1)
         ]
-        assert readers.all == shares.all == sum(map(least, everybody))
+        assert readers.all == shares.all == sum(map(least, readers_expected))
     for _, _, stack in open_ones:
         stack.close()
     clock.now += KEPT_S

@@ -39,13 +39,13 @@ async def served() -> AsyncIterator[ServedSite]:
         yield served
 
 
-def shows(served: ServedSite, gops: range, nobody: frozenset[int] = frozenset()) -> None:
+def shows(served: ServedSite, gops: range, without_pictures: frozenset[int] = frozenset()) -> None:
     """Decide GOPs of person 1 in alternating cameras, some without pictures."""
     for gop in gops:
-        for seed, camera in enumerate(CAMERAS if gop not in nobody else ()):
+        for seed, camera in enumerate(CAMERAS if gop not in without_pictures else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
                 served.service.ingest.video(video(camera, unit))
-        choice = ObjectChoice(1, None if gop in nobody else CAMERAS[gop % 2], None, departed=False)
+        choice = ObjectChoice(1, None if gop in without_pictures else CAMERAS[gop % 2], None, departed=False)
         served.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
 
@@ -231,7 +231,7 @@ async def test_parts_equal_their_segments_and_independent_ones_are_decodable(
     served: ServedSite,
 ) -> None:
     gops = 8 * PARTS
-    shows(served, range(gops), nobody=frozenset({5, 6, 7, 10, 13, 14, 15, 16}))
+    shows(served, range(gops), without_pictures=frozenset({5, 6, 7, 10, 13, 14, 15, 16}))
     init = await data_of(served, "init.mp4")
     numbers = range(1, gops // PARTS)
     segments = decoded(init + b"".join([await data_of(served, f"{number}.m4s") for number in numbers]))
@@ -265,9 +265,9 @@ async def test_ffmpeg_ignores_parts_and_plays_without_a_warning(served: ServedSi
         shows(served, range(gop, gop + 1))
         await asyncio.sleep(0.02)
     served.service.splicer.close()
-    done = await playing
-    assert (done.returncode, done.stderr) == (0, "")
-    assert sum(not line.startswith("#") for line in done.stdout.splitlines()) == 8 * PARTS * GOP
+    completed = await playing
+    assert (completed.returncode, completed.stderr) == (0, "")
+    assert sum(not line.startswith("#") for line in completed.stdout.splitlines()) == 8 * PARTS * GOP
 
 
 async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> None:

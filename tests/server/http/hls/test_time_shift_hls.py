@@ -208,10 +208,10 @@ async def test_ffmpeg_plays_a_time_range_with_sound_to_the_end(tmp_path: Path) -
         out = tmp_path / "past.mp4"
         url = f"http://127.0.0.1:{served.port}/objects/1/hls/index.m3u8?from=p0&to=p{SOUNDING}"
         command = ["ffmpeg", "-v", "warning", "-i", url, "-c", "copy", str(out)]
-        done = await asyncio.to_thread(
+        completed = await asyncio.to_thread(
             subprocess.run, command, capture_output=True, text=True, timeout=PATIENCE
         )
-        assert (done.returncode, done.stderr) == (0, "")
+        assert (completed.returncode, completed.stderr) == (0, "")
         times, _ = decode_audio(out.read_bytes())
         assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
         assert times[-1] == pytest.approx(SOUNDING / FPS, abs=0.03)
@@ -225,7 +225,7 @@ async def test_chromium_plays_a_time_range_to_the_end(served: ServedSite) -> Non
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{served.port}/healthz")
-        seen = await page.evaluate(NATIVE_HLS_JS, "/objects/1/hls/index.m3u8?from=-2.4&to=-0.4")
-    if seen is None:
+        playback = await page.evaluate(NATIVE_HLS_JS, "/objects/1/hls/index.m3u8?from=-2.4&to=-0.4")
+    if playback is None:
         pytest.skip("this Chromium plays no HLS by itself")
-    assert seen == {"end": "ended", "seconds": pytest.approx(2.0, abs=0.05)}
+    assert playback == {"end": "ended", "seconds": pytest.approx(2.0, abs=0.05)}

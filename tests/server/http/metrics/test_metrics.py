@@ -148,10 +148,10 @@ async def test_gops_lost_by_slow_viewers_stay_counted_after_they_leave() -> None
     assert (sent.lost, sent.longest_queue) == (2, 0)
 
 
-def measured(lag: LoopLag, what: str) -> float:
+def measured(lag: LoopLag, name_end: str) -> float:
     """Return a sample of the histogram of a loop's lag."""
     [family] = lag.histogram.collect()
-    return next(sample.value for sample in family.samples if sample.name.endswith(what))
+    return next(sample.value for sample in family.samples if sample.name.endswith(name_end))
 
 
 async def test_a_blocked_event_loop_is_measured_as_late() -> None:
@@ -168,18 +168,18 @@ async def test_a_blocked_event_loop_is_measured_as_late() -> None:
 
 async def ready(served: ServedSite) -> tuple[int, str]:
     async with served.session.get("/readyz") as answer:
-        words = await answer.text()
-    assert words.endswith("\n")
-    assert words.count("\n") == 1
-    return answer.status, words.strip()
+        text = await answer.text()
+    assert text.endswith("\n")
+    assert text.count("\n") == 1
+    return answer.status, text.strip()
 
 
 async def test_a_site_is_ready_when_pulses_and_frames_arrive_and_decisions_keep_up(
     served: ServedSite,
 ) -> None:
-    code, words = await ready(served)
+    code, text = await ready(served)
     assert code == 503
-    assert words.split("; ") == [
+    assert text.split("; ") == [
         "no pulse received from the pulse server",
         "no camera delivers frames",
         "nothing has been decided yet",
@@ -194,8 +194,8 @@ async def test_a_site_whose_decisions_fall_behind_is_not_ready(site_with_people:
     site_with_people.service.pulse = site_with_people.service.decision_state.end - 1 + allowed
     assert (await ready(site_with_people))[0] == 200
     site_with_people.service.pulse += 1
-    code, words = await ready(site_with_people)
-    assert (code, words) == (503, f"decisions are {(allowed + 1) / FPS:.1f} s behind the pulses")
+    code, text = await ready(site_with_people)
+    assert (code, text) == (503, f"decisions are {(allowed + 1) / FPS:.1f} s behind the pulses")
     assert (await samples(site_with_people))["myview_ready",] == 0
 
 

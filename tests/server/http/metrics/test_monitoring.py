@@ -33,12 +33,12 @@ async def printed(served: ServedSite) -> ExportedMetrics:
 async def test_every_expression_yields_series_with_the_labels_in_its_legend(
     site_with_people: ServedSite,
 ) -> None:
-    there = await printed(site_with_people)
+    metrics = await printed(site_with_people)
     assert len(EXPRESSIONS) > 50
     for query in EXPRESSIONS:
         if {selector.name for selector in selectors(query.expression)} <= BUILT_IN_METRICS:
             continue
-        series = select_series(query.expression, there)
+        series = select_series(query.expression, metrics)
         assert series, query.place
         assert all(query.shown <= dict(labels).keys() for labels in series), query.place
 
@@ -90,7 +90,7 @@ def test_the_evaluator_yields_known_results(expression: str, series: list[dict[s
 
 
 @pytest.mark.parametrize(
-    ("expression", "words"),
+    ("expression", "error"),
     [
         ("rate(b[5m])", "rate of b, which is a gauge"),
         ("delta(a_total[5m])", "delta of a_total, which is a counter"),
@@ -99,8 +99,8 @@ def test_the_evaluator_yields_known_results(expression: str, series: list[dict[s
         ("rate(a_total[5m)", "."),
     ],
 )
-def test_the_evaluator_reports_invalid_expressions(expression: str, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+def test_the_evaluator_reports_invalid_expressions(expression: str, error: str) -> None:
+    with pytest.raises(ValueError, match=error):
         select_series(expression, ExportedMetrics.of(SAID))
 
 

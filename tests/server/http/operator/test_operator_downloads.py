@@ -10,8 +10,8 @@ import pytest
 from fakes.service.fed_site import A, B, ServedSite
 
 
-async def rows(served: ServedSite, what: str, span: str) -> list[dict[str, str]]:
-    async with served.session.get(f"/api/operator/{what}.csv?{span}") as answer:
+async def rows(served: ServedSite, table: str, span: str) -> list[dict[str, str]]:
+    async with served.session.get(f"/api/operator/{table}.csv?{span}") as answer:
         assert answer.status == 200
         assert answer.content_type == "text/csv"
         assert "attachment" in answer.headers["Content-Disposition"]

@@ -284,8 +284,8 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
 
 
 async def test_ignored_areas_become_configuration_lines(browser: Browser) -> None:
-    known = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
-    cameras = [{"id": A, "source": "scene:room", "ignore": known}, B]
+    existing_areas = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
+    cameras = [{"id": A, "source": "scene:room", "ignore": existing_areas}, B]
     async with operating(browser, "#zones", cameras=cameras) as (served, page):
         show_people(served)
         await page.reload()
@@ -302,11 +302,11 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
         await page.keyboard.press("Backspace")
         written = yaml.safe_load(await lines.input_value())["cameras"][0]
         site = served.service.config.site
-        mine = np.array(written["ignore"][1])
+        drawn_area = np.array(written["ignore"][1])
         right, top = 0.75 * site.width, 0.25 * site.height
         expected = [[0.25 * site.width, top], [right, top], [right - 1, top + 10]]
-        np.testing.assert_allclose(mine, expected, atol=0.2)
-        assert written["ignore"][0] == known[0]
+        np.testing.assert_allclose(drawn_area, expected, atol=0.2)
+        assert written["ignore"][0] == existing_areas[0]
         small_config(cameras=[{**written, "source": "scene:room"}])
         await page.get_by_role("button", name="Clear").click()
         assert "ignore: []" in await lines.input_value()

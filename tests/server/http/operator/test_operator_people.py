@@ -85,17 +85,17 @@ async def test_merged_people_have_one_number_from_the_next_gop_on(real: ServedSi
 
 
 async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: ServedSite) -> None:
-    who = real.service.decider.people.number(A, 1, 10)
-    assert who is not None
+    number = real.service.decider.people.number(A, 1, 10)
+    assert number is not None
     decisions: list[Any] = []
     real.service.on_decision.append(decisions.append)
-    status, answer = await post_edit(real, object=who, split=[A])
+    status, answer = await post_edit(real, object=number, split=[A])
     assert status == 200
     new = answer["new_object"]
     for epoch in range(3, 8):
         feed(real, epoch)
     splits = [(split.kept, split.new_object, split.camera) for gop in decisions for split in gop.split]
-    assert splits == [(who, new, A)]
+    assert splits == [(number, new, A)]
     assert A in (await objects(real))[new]["cameras"]
     assert (await real.get_json(f"/api/objects/{new}/choice"))["camera"] is not None
 

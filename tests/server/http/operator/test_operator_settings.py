@@ -46,8 +46,11 @@ def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -
         if tuned is not None and number == after:
             decider.apply_view_settings(tuned)
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
-        words = [camera_tracks(A, number, {1: one, 2: SMALL}), camera_tracks(B, number, {1: other, 2: one})]
-        decisions += decider.step(epoch_of(number, *words))
+        messages = [
+            camera_tracks(A, number, {1: one, 2: SMALL}),
+            camera_tracks(B, number, {1: other, 2: one}),
+        ]
+        decisions += decider.step(epoch_of(number, *messages))
     return decisions
 
 
@@ -64,17 +67,21 @@ def test_settings_tuned_before_the_start_equal_configured_ones() -> None:
 def test_settings_tuned_while_running_apply_from_the_next_gop_on_to_buffered_views_too() -> None:
     config = small_config()
     tuned, before = decided(config, TRIED, after=6), decided(config)
-    done = sum(decision.first < 5 * 5 for decision in tuned)
-    assert tuned[: done - 1] == before[: done - 1]
+    settled = sum(decision.first < 5 * 5 for decision in tuned)
+    assert tuned[: settled - 1] == before[: settled - 1]
     so = config.model_copy(update={"view": TRIED.model_copy(update={"identity": config.view.identity})})
-    for mine, theirs in zip(tuned[done:], decided(so)[done:], strict=True):
+    for actual, expected in zip(tuned[settled:], decided(so)[settled:], strict=True):
         for person in (1, 2):
-            seen, meant = mine.reasons.of(person), theirs.reasons.of(person)
-            assert seen.weights == meant.weights
-            assert seen.switch_cost == meant.switch_cost
+            actual_reasons, expected_reasons = actual.reasons.of(person), expected.reasons.of(person)
+            assert actual_reasons.weights == expected_reasons.weights
+            assert actual_reasons.switch_cost == expected_reasons.switch_cost
             for camera in CAMERAS:
-                assert seen.views[camera].quality == pytest.approx(meant.views[camera].quality)
-                assert seen.views[camera].terms == pytest.approx(meant.views[camera].terms)
+                assert actual_reasons.views[camera].quality == pytest.approx(
+                    expected_reasons.views[camera].quality
+                )
+                assert actual_reasons.views[camera].terms == pytest.approx(
+                    expected_reasons.views[camera].terms
+                )
 
 
 def test_settings_can_be_tuned_back() -> None:

@@ -39,7 +39,7 @@ async (address) => {
 
 
 @pytest.fixture
-async def going() -> AsyncIterator[DrawnSite]:
+async def moving_site() -> AsyncIterator[DrawnSite]:
     """A site that runs in real time."""
     async for drawn in drawn_room():
         task = asyncio.create_task(drawn.advance_forever(GOP / FPS))
@@ -53,7 +53,7 @@ async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -
         async for drawn in drawn_room():
             page = await browser.new_page()
             await page.goto(f"http://127.0.0.1:{drawn.port}/healthz")
-            going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
+            sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
             await page.evaluate(
                 "(path) => new Promise((done) => { const image = new Image(); image.onload = done;"
                 " image.src = path; document.body.append(image); })",
@@ -61,14 +61,14 @@ async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -
             )
             assert await page.evaluate(LOOKS) == {"size": [320, 180], "pictures": 6}
             assert await page.evaluate(PLAYS, "/objects/1/best.mp4?overlay=1") == [320, 180]
-            going.cancel()
+            sending.cancel()
 
 
 @needs_ffmpeg
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mjpeg", "/objects/1/best.mp4?overlay=1"])
-async def test_ffmpeg_reads_mjpeg_without_a_warning(going: DrawnSite, path: str) -> None:
+async def test_ffmpeg_reads_mjpeg_without_a_warning(moving_site: DrawnSite, path: str) -> None:
     reading = await asyncio.create_subprocess_exec(
-        *("ffmpeg", "-v", "warning", "-nostdin", "-i", f"http://127.0.0.1:{going.port}{path}"),
+        *("ffmpeg", "-v", "warning", "-nostdin", "-i", f"http://127.0.0.1:{moving_site.port}{path}"),
         *("-frames:v", "15", "-f", "framecrc", "-"),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,

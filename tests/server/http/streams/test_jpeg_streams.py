@@ -142,18 +142,21 @@ async def test_multipart_jpeg_continues_with_the_newest_picture(drawn: DrawnSite
 
 async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn: DrawnSite) -> None:
     loop = asyncio.get_running_loop()
-    came: dict[int, float] = {}
-    going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
+    arrival: dict[int, float] = {}
+    sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg?overlay=1") as answer:
         async for part in jpeg_parts(answer):
-            came[part.pulse] = loop.time()
-            if len(came) > 4 * GOP:
+            arrival[part.pulse] = loop.time()
+            if len(arrival) > 4 * GOP:
                 break
-    going.cancel()
-    steps = np.diff(sorted(came))[GOP:]
+    sending.cancel()
+    steps = np.diff(sorted(arrival))[GOP:]
     assert (steps == 1).mean() > 0.8, "most pictures are shown, not only one of each GOP"
     # A busy machine may hand over some GOPs in bursts; test_pictures_parts.py has a clock of its own.
-    gops = [[came[n] for n in range(first, first + GOP) if n in came] for first in range(0, max(came), GOP)]
+    gops = [
+        [arrival[n] for n in range(first, first + GOP) if n in arrival]
+        for first in range(0, max(arrival), GOP)
+    ]
     assert max(max(gop) - min(gop) for gop in gops[1:] if gop) > 0.4 * GOP / FPS, "no bursts"
 
 
@@ -191,7 +194,7 @@ async def test_a_killed_worker_is_replaced_and_its_streams_continue(
 ) -> None:
     monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # no viewer waits for it
     pictures: RenderPool = drawn.app[SERVICE].rendering
-    going = asyncio.create_task(drawn.advance_forever(GOP / FPS))
+    sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with (
         drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
         drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as series,
@@ -207,7 +210,7 @@ async def test_a_killed_worker_is_replaced_and_its_streams_continue(
         data += await read_film(film, 2 * GOP)
         await anext(reading)
         await reading.aclose()
-    going.cancel()
+    sending.cancel()
     with av.open(io.BytesIO(data), "r") as stream:
         times = [round(float(frame.time or 0) * FPS) for frame in stream.decode(video=0)]
     assert times == sorted(set(times))

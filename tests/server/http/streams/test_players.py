@@ -143,8 +143,10 @@ async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: Serv
     command = "ffmpeg -nostdin -v warning {} -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     starts = ["-live_start_index 0" if "m3u8" in path else "" for path in PATHS]
-    seen = await played(live, *(command.format(*start).split() for start in zip(starts, urls, strict=True)))
-    for path, player in zip(PATHS, seen, strict=True):
+    outputs = await played(
+        live, *(command.format(*start).split() for start in zip(starts, urls, strict=True))
+    )
+    for path, player in zip(PATHS, outputs, strict=True):
         own_doing = OF_EVERY_PLAYLIST if "m3u8" in path else NEVER
         assert (player.code, own_doing.sub("", player.complaints)) == (0, ""), path
         check_pictures(live, path, player.output)
@@ -154,8 +156,8 @@ async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: Serv
 async def test_mpv_plays_to_the_end_without_a_warning(live: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal"
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
-    seen = await played(live, *([*command.split(), url] for url in urls))
-    for path, player in zip(PATHS, seen, strict=True):
+    outputs = await played(live, *([*command.split(), url] for url in urls))
+    for path, player in zip(PATHS, outputs, strict=True):
         assert (player.code, player.output + player.complaints.encode()) == (0, b""), path
 
 
@@ -175,11 +177,11 @@ VLC = (
 
 def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
     """Find each picture in a camera; a player may repeat or skip pictures, but not go back."""
-    known = {
+    frame_of_picture = {
         picture.tobytes(): (pulse, camera) for camera in range(2) for pulse, picture in enumerate(own(camera))
     }
-    assert len(known) == 2 * EPOCHS * STRIDE, "no picture is like another"
-    shown = [known[picture] for picture in pictures]
+    assert len(frame_of_picture) == 2 * EPOCHS * STRIDE, "no picture is like another"
+    shown = [frame_of_picture[picture] for picture in pictures]
     pulses = [pulse for pulse, _ in shown]
     assert all(before <= after for before, after in pairwise(pulses)), path
     assert pulses[0] <= 20 * STRIDE, path
@@ -206,8 +208,8 @@ async def test_vlc_plays_across_cuts_without_a_warning(live: ServedSite, shared:
     urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
     user = "nobody" if os.geteuid() == 0 else None
     commands = [VLC.format(shown, url).split() for shown, url in zip(files, urls, strict=True)]
-    seen = await played(live, *commands, user=user)
-    for path, player, shown in zip(PATHS, seen, files, strict=True):
+    outputs = await played(live, *commands, user=user)
+    for path, player, shown in zip(PATHS, outputs, files, strict=True):
         complaints = [
             line for line in OF_A_STREAM.findall(player.complaints) if not OF_EVERY_FRAGMENT.search(line)
         ]
@@ -226,8 +228,8 @@ async def test_chromium_plays_hls_natively_to_the_end(live: ServedSite) -> None:
                 await asyncio.sleep(STRIDE / FPS / 5)
                 feed(live, epoch)
             live.service.splicer.close()
-            seen = await playing
-    if seen is None:
+            outputs = await playing
+    if outputs is None:
         pytest.skip("this Chromium plays no HLS by itself")
-    assert seen["end"] == "ended"
-    assert seen["seconds"] > 2, "players begin some segments before the end"
+    assert outputs["end"] == "ended"
+    assert outputs["seconds"] > 2, "players begin some segments before the end"

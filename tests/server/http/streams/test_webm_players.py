@@ -70,12 +70,14 @@ async def test_ffmpeg_plays_across_cuts_without_a_warning(vp8_site: ServedSite) 
     np.testing.assert_array_equal(camera, alone[1, -len(camera) :])
     shown = np.frombuffer(best[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
     end = vp8_site.service.decider._next_gop or 0
-    whose = [int(np.array_equal(picture, alone[1, end - len(shown) + n])) for n, picture in enumerate(shown)]
+    is_from_second = [
+        int(np.array_equal(picture, alone[1, end - len(shown) + n])) for n, picture in enumerate(shown)
+    ]
     for n, picture in enumerate(shown):
         np.testing.assert_array_equal(
-            picture, alone[whose[n], end - len(shown) + n], f"frame {n} of {len(shown)}"
+            picture, alone[is_from_second[n], end - len(shown) + n], f"frame {n} of {len(shown)}"
         )
-    assert np.abs(np.diff(whose)).sum() >= 2, "there are cuts"
+    assert np.abs(np.diff(is_from_second)).sum() >= 2, "there are cuts"
 
 
 @needs_mpv
@@ -111,13 +113,13 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(vp8_site: ServedSi
         splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     show(0)
-    seen = await play_in_chromium(
+    played_in_browser = await play_in_chromium(
         *(vp8_site.port, splicer, GOPS, show),
         *(PLAY_JS, "/objects/7/best.webm", 'video/webm; codecs="vp8"', 1),
     )
-    assert (seen["error"], seen["ranges"]) == ("", 1)
-    assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
-    pulses = [time * FPS for time in seen["shown"]]
+    assert (played_in_browser["error"], played_in_browser["ranges"]) == ("", 1)
+    assert played_in_browser["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
+    pulses = [time * FPS for time in played_in_browser["shown"]]
     assert pulses == pytest.approx([round(pulse) for pulse in pulses], abs=0.03), "frames are at their pulses"
     assert pulses[-1] > GOPS * GOP - 3
 
@@ -145,7 +147,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_sit
         page = await browser.new_page(bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.set_default_timeout(PATIENCE_MS)
-        going_on = asyncio.create_task(go_on(vp8_site))
+        feeding = asyncio.create_task(go_on(vp8_site))
         await page.goto(f"http://127.0.0.1:{vp8_site.port}/?object=1")
         await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")
         await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
@@ -159,7 +161,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_sit
         await page.keyboard.press(",")
         results = await page.locator("#notice").text_content()
         assert results == "Nothing is recorded of that time: this is live."
-        going_on.cancel()
+        feeding.cancel()
     assert errors == []
 
 
@@ -191,8 +193,8 @@ async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(vp8_site: Served
     ]
     for path in ("/objects/1/best.jpg", "/cameras/c1/live.jpg"):
         picture, pulse = pictures[path]
-        off = [np.abs(picture.astype(float) - own_picture).mean() for own_picture in alone]
-        assert int(np.argmin(off)) == pulse, "the picture of its pulse, of the chosen camera"
+        differences = [np.abs(picture.astype(float) - own_picture).mean() for own_picture in alone]
+        assert int(np.argmin(differences)) == pulse, "the picture of its pulse, of the chosen camera"
     plain, boxed = (pictures[f"/objects/1/best.jpg{query}"][0] for query in ("", "?overlay=1"))
     assert np.abs(plain.astype(float) - boxed).max() > 50, "there are boxes in it"
 

@@ -37,8 +37,8 @@ def encoded(width: int, height: int, missed: frozenset[int] = frozenset()) -> tu
     """Encode pictures that move, so that frames build on the ones before them, but for those missed."""
     encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(codec="vp8", gop=GOP))
     noise = np.random.default_rng(0).integers(0, 255, (height, width, 3), dtype=np.uint8)
-    taken = (pulse for pulse in range(FRAMES) if pulse not in missed)
-    return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in taken)
+    captured = (pulse for pulse in range(FRAMES) if pulse not in missed)
+    return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in captured)
 
 
 def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
@@ -54,11 +54,13 @@ def decoded(frames: list[bytes], decoder: str) -> list[Pixels]:
 def test_a_repetition_shows_the_picture_before_and_changes_none_after(
     width: int, height: int, repeats: list[int]
 ) -> None:
-    units, again = encoded(width, height), repeat_frame(width, height)
+    units, repetition = encoded(width, height), repeat_frame(width, height)
     plain = decoded([unit.data for unit in units], "vp8")
     expected = [n for n, count in enumerate(repeats) for _ in range(1 + count)]
     frames = [
-        data for unit, count in zip(units, repeats, strict=True) for data in [unit.data, *[again] * count]
+        data
+        for unit, count in zip(units, repeats, strict=True)
+        for data in [unit.data, *[repetition] * count]
     ]
     for decoder in ("vp8", "libvpx"):  # FFmpeg's decoder, and that of browsers
         np.testing.assert_array_equal(decoded(frames, decoder), [plain[n] for n in expected], decoder)
@@ -118,28 +120,28 @@ def test_a_stream_has_a_picture_for_every_pulse_despite_losses(
     stream_format = Vp8StreamFormat(64, 48)
     time, on = GaplessTimeline(stream_format, FPS, GOP), FrameBuffer(FPS, FRAMES, stream_format)
     shown: list[EncodedPicture] = []
-    seen: list[int] = []
+    shown_at: list[int] = []
     """The pulse of the picture that is to be seen at each pulse."""
     for pulse in range(FRAMES):
         unit = None if pulse in lost else units.get(pulse)
         if unit is not None:
             after = None if unit.after is None else first + unit.after
             shown += time.push(on.put(first + pulse, 1, unit.data, key=unit.key, after=after))
-        if unit is not None and (unit.key or unit.after in seen):
-            seen.append(pulse)
-        elif seen:
-            seen.append(seen[-1])
+        if unit is not None and (unit.key or unit.after in shown_at):
+            shown_at.append(pulse)
+        elif shown_at:
+            shown_at.append(shown_at[-1])
     shown += time.fill(first + FRAMES)
-    if not seen:
+    if not shown_at:
         assert not shown
         return
     pictures = read(header(64, 48, FPS) + b"".join(picture.fragment for picture in shown))
     pulses = [pulse for picture in shown for pulse in range(picture.pulse, picture.until)]
-    assert pulses == list(range(first + FRAMES - len(seen), first + FRAMES))
+    assert pulses == list(range(first + FRAMES - len(shown_at), first + FRAMES))
     assert [round(pulse, 3) for pulse, _ in pictures] == [picture.pulse for picture in shown]
-    begun = dict(zip(pulses, seen, strict=True))
+    place_of = dict(zip(pulses, shown_at, strict=True))
     np.testing.assert_array_equal(
-        [picture for _, picture in pictures], [plain[begun[picture.pulse]] for picture in shown]
+        [picture for _, picture in pictures], [plain[place_of[picture.pulse]] for picture in shown]
     )
 
 

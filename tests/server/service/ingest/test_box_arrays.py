@@ -16,10 +16,10 @@ TOLD = st.lists(st.lists(st.tuples(SIDE, SIDE, SIDE, SIDE) | st.none(), max_size
 
 @settings(deadline=None, max_examples=100)
 @given(TOLD)
-def test_boxes_are_converted_exactly_and_hidden_ones_are_nan(told: list[list[Box | None]]) -> None:
-    heard = msgspec.json.decode(msgspec.json.encode(told), type=list[list[Box | None]])
-    expected = [box or (np.nan,) * 4 for boxes in told for box in boxes]
-    assert np.array_equal(boxes_array(heard), np.array(expected).reshape(-1, 4), equal_nan=True)
+def test_boxes_are_converted_exactly_and_hidden_ones_are_nan(sent: list[list[Box | None]]) -> None:
+    decoded = msgspec.json.decode(msgspec.json.encode(sent), type=list[list[Box | None]])
+    expected = [box or (np.nan,) * 4 for boxes in sent for box in boxes]
+    assert np.array_equal(boxes_array(decoded), np.array(expected).reshape(-1, 4), equal_nan=True)
 
 
 def test_any_number_of_boxes_is_converted() -> None:

@@ -27,8 +27,8 @@ async def test_other_tasks_run_between_two_epochs() -> None:
 
 
 async def test_waiting_messages_are_handled_before_the_next_epoch() -> None:
-    service, taken, waited = service_with_backlog(), list[int](), list[int]()
-    inbox = Inbox(taken.append, turn_s=0.0)
+    service, handled, waited = service_with_backlog(), list[int](), list[int]()
+    inbox = Inbox(handled.append, turn_s=0.0)
     service.bus.inboxes.append(inbox)
     step = service._step
 
@@ -41,7 +41,7 @@ async def test_waiting_messages_are_handled_before_the_next_epoch() -> None:
     service._step = noting  # type: ignore[method-assign]
     await service.decide_cooperatively()
     assert waited == [0] * EPOCHS
-    assert len(taken) == 5 * EPOCHS
+    assert len(handled) == 5 * EPOCHS
     service.close()
 
 

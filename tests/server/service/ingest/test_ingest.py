@@ -38,7 +38,7 @@ from server.service.streaming.frame_buffer import FrameBuffer
 KEYS = ZenohKeys("hall")
 
 
-class Hall:
+class IngestWithBuffers:
     """An ingest with its buffers."""
 
     def __init__(self) -> None:
@@ -50,14 +50,14 @@ class Hall:
         for camera in CAMERAS:
             self.ingest.alive(KEYS.camera(camera, "alive"), is_present=True)
 
-    def handle(self, what: str, message: Message) -> None:
+    def handle(self, kind: str, message: Message) -> None:
         handlers = {
             "video": self.ingest.video,
             "tracks": self.ingest.tracks,
             "status": self.ingest.status,
             "thumbs": self.ingest.thumbnail,
         }
-        handlers[what](message)
+        handlers[kind](message)
 
     def bad(self, camera: str = "c0") -> int:
         return self.ingest.states[camera].bad_messages
@@ -66,39 +66,39 @@ class Hall:
 KINDS = ["video", "tracks", "status", "thumbs"]
 
 
-@pytest.mark.parametrize("what", KINDS)
-def test_invalid_utf8_is_counted_and_dropped(what: str) -> None:
-    served = Hall()
+@pytest.mark.parametrize("kind", KINDS)
+def test_invalid_utf8_is_counted_and_dropped(kind: str) -> None:
+    served = IngestWithBuffers()
     broken = b'{"camera": "\xff", "histogram": "\xc3\x28", "state": "\xed\xa0\x80", "\xff": "\xff"}'
-    served.handle(what, Message(KEYS.camera("c0", what), broken, broken))
+    served.handle(kind, Message(KEYS.camera("c0", kind), broken, broken))
     assert served.bad() == 1
 
 
 @pytest.mark.parametrize("field", ["missed", "shed", "boot"])
 def test_a_count_too_large_for_a_metric_is_refused(field: str) -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.handle("status", status("c0", **{field: 10**400}))
     assert served.bad() == 1
     assert served.ingest.states["c0"].status is None
 
 
-@pytest.mark.parametrize("words", ["\x1b[2J", "searching\n", "x" * 201, "suchend: zu groß"])
-def test_a_load_text_with_unprintable_characters_is_refused(words: str) -> None:
-    served = Hall()
-    served.handle("status", status("c0", load=words))
+@pytest.mark.parametrize("text", ["\x1b[2J", "searching\n", "x" * 201, "suchend: zu groß"])
+def test_a_load_text_with_unprintable_characters_is_refused(text: str) -> None:
+    served = IngestWithBuffers()
+    served.handle("status", status("c0", load=text))
     assert served.bad() == 1
     assert served.ingest.states["c0"].status is None
 
 
 def test_a_connected_cameras_load_text_is_its_message() -> None:
-    served = Hall()
-    words = "detecting in every 3rd frame: the machine is too busy"
+    served = IngestWithBuffers()
+    text = "detecting in every 3rd frame: the machine is too busy"
     state = served.ingest.states["c0"]
-    served.handle("status", status("c0", load_level=2, load=words))
-    assert state.message == words
+    served.handle("status", status("c0", load_level=2, load=text))
+    assert state.message == text
     served.handle("status", status("c0"))
     assert state.message == ""
-    served.handle("status", status("c0", load_level=2, load=words))
+    served.handle("status", status("c0", load_level=2, load=text))
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
     assert state.message == ""
 
@@ -111,20 +111,20 @@ anything = st.recursive(
 
 
 @settings(deadline=None, max_examples=200)
-@given(what=st.sampled_from(KINDS), payload=st.binary(max_size=100), attachment=st.binary(max_size=100))
-def test_arbitrary_bytes_are_counted_and_dropped(what: str, payload: bytes, attachment: bytes) -> None:
-    served = Hall()
-    served.handle(what, Message(KEYS.camera("c0", what), payload, attachment))
+@given(kind=st.sampled_from(KINDS), payload=st.binary(max_size=100), attachment=st.binary(max_size=100))
+def test_arbitrary_bytes_are_counted_and_dropped(kind: str, payload: bytes, attachment: bytes) -> None:
+    served = IngestWithBuffers()
+    served.handle(kind, Message(KEYS.camera("c0", kind), payload, attachment))
     assert served.bad() == 1
     assert not served.frames
     assert served.aligner.ready(now=100) == []
 
 
 @settings(deadline=None, max_examples=100)
-@given(what=st.sampled_from(KINDS), key=st.text(max_size=40))
-def test_arbitrary_keys_are_ignored(what: str, key: str) -> None:
-    served = Hall()
-    served.handle(what, Message(key, b"", b""))
+@given(kind=st.sampled_from(KINDS), key=st.text(max_size=40))
+def test_arbitrary_keys_are_ignored(kind: str, key: str) -> None:
+    served = IngestWithBuffers()
+    served.handle(kind, Message(key, b"", b""))
     served.ingest.alive(key, is_present=True)
     assert served.bad() == 0
 
@@ -138,16 +138,16 @@ GOOD: dict[str, Message] = {
 
 
 @settings(deadline=None, max_examples=80)
-@given(data=st.data(), what=st.sampled_from(KINDS))
-def test_a_message_with_one_wrong_field_raises_no_error(data: st.DataObject, what: str) -> None:
-    served, good = Hall(), GOOD[what]
+@given(data=st.data(), kind=st.sampled_from(KINDS))
+def test_a_message_with_one_wrong_field_raises_no_error(data: st.DataObject, kind: str) -> None:
+    served, good = IngestWithBuffers(), GOOD[kind]
     in_head = bool(good.attachment)
     fields: dict[str, Any] = msgspec.json.decode(good.attachment if in_head else good.payload)
     name = data.draw(st.sampled_from(sorted(fields)))
     fields[name] = data.draw(anything | st.integers(-(2**70), 2**70))
     changed = json.dumps(fields).encode()
     served.handle(
-        what, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
+        kind, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
     )
     people = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
     for epoch in served.aligner.ready(now=1000):
@@ -170,7 +170,7 @@ def test_a_message_with_one_wrong_field_raises_no_error(data: st.DataObject, wha
     ],
 )
 def test_inconsistent_tracks_are_refused(changes: dict[str, Any]) -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     fields = {**msgspec.json.decode(GOOD["tracks"].payload), **msgspec.to_builtins(changes)}
     payload = json.dumps(fields).encode()
     served.ingest.tracks(Message(GOOD["tracks"].key, payload, b""))
@@ -178,18 +178,18 @@ def test_inconsistent_tracks_are_refused(changes: dict[str, Any]) -> None:
 
 
 def test_unconfigured_cameras_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.video(video("cellar", encoded(0)[0]))
     served.ingest.tracks(tracks(camera_tracks("cellar", 0, {})))
-    for there in (True, False) * 5:
-        served.ingest.alive(KEYS.camera("cellar", "alive"), is_present=there)
+    for is_present in (True, False) * 5:
+        served.ingest.alive(KEYS.camera("cellar", "alive"), is_present=is_present)
     assert len(caplog.messages) == 1
     assert list(served.ingest.states) == list(CAMERAS)
     assert not served.frames
 
 
 def test_a_camera_with_other_parameter_sets_is_refused() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.video(video("c0", encoded(0)[0]))
     for unit in encoded(1, crf=40)[:10]:
         served.ingest.video(video("c1", unit))
@@ -203,7 +203,7 @@ def test_a_camera_with_other_parameter_sets_is_refused() -> None:
 
 
 def test_a_refused_camera_is_accepted_after_a_restart_with_the_right_settings() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.video(video("c0", encoded(0)[0]))
     served.ingest.video(video("c1", encoded(1, crf=40)[0]))
     served.ingest.alive(KEYS.camera("c1", "alive"), is_present=False)
@@ -214,25 +214,25 @@ def test_a_refused_camera_is_accepted_after_a_restart_with_the_right_settings() 
 
 
 def test_a_cameras_state_follows_its_messages() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     state = served.ingest.states["c0"]
-    words = [state.label]
+    labels = [state.label]
     served.ingest.video(video("c0", encoded(0)[0]))
-    words.append(state.label)
+    labels.append(state.label)
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
-    words.append(state.label)
+    labels.append(state.label)
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
     served.ingest.tracks(tracks(camera_tracks("c0", 0, {}, ended=True)))
-    words.append(state.label)
+    labels.append(state.label)
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
-    words.append(state.label)
+    labels.append(state.label)
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
-    words.append(state.label)
-    assert words == ["starting", "live", "gone", "ended", "ended", "live"]
+    labels.append(state.label)
+    assert labels == ["starting", "live", "gone", "ended", "ended", "live"]
 
 
 def test_thumbnails_are_kept_by_boot_and_track_until_they_expire_or_the_camera_disconnects() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
     served.ingest.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
     served.ingest.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
@@ -243,7 +243,7 @@ def test_thumbnails_are_kept_by_boot_and_track_until_they_expire_or_the_camera_d
 
 
 def test_messages_of_pulses_far_in_the_future_are_counted_and_dropped() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest = Ingest(
         served.frame_buffers, served.aligner, lambda *_: None, current_pulse=lambda: 20, max_ahead=50
     )
@@ -261,7 +261,7 @@ def test_messages_of_pulses_far_in_the_future_are_counted_and_dropped() -> None:
 
 
 def test_thumbnails_are_limited_for_each_camera() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.thumbnail(thumbnail("c1", 7, b"jpeg"))
     for track in range(1200):
         served.ingest.thumbnail(thumbnail("c0", track, b"jpeg"))
@@ -271,7 +271,7 @@ def test_thumbnails_are_limited_for_each_camera() -> None:
 
 
 def test_an_invalid_thumbnail_is_counted_and_dropped() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
     assert served.bad() == 1
     assert not served.ingest.thumbnails
@@ -281,25 +281,25 @@ def test_a_flapping_camera_writes_few_log_lines(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")
-    served = Hall()
+    served = IngestWithBuffers()
     caplog.clear()
-    for there in (False, True) * 50:
-        served.ingest.alive(KEYS.camera("c0", "alive"), is_present=there)
+    for is_present in (False, True) * 50:
+        served.ingest.alive(KEYS.camera("c0", "alive"), is_present=is_present)
     assert caplog.messages == ["camera c0 disconnected", "camera c0 connected"] * 4 + [
         "camera c0 disconnected"
     ]
 
 
 def test_a_status_is_kept() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     served.ingest.status(status("c0", fps=24.5))
-    told = served.ingest.states["c0"].status
-    assert told is not None
-    assert told.fps == 24.5
+    current_status = served.ingest.states["c0"].status
+    assert current_status is not None
+    assert current_status.fps == 24.5
 
 
 def test_frames_and_tracks_become_epochs() -> None:
-    served = Hall()
+    served = IngestWithBuffers()
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[:STRIDE]:
             served.ingest.video(video(camera, unit))

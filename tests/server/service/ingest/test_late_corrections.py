@@ -21,18 +21,18 @@ MENDED = STRIDE
 def late_revision(epoch: int) -> CameraTracks:
     """Return a camera's word that the two were in each other's place since then."""
     last = end_of_epoch(epoch, STRIDE)
-    said = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
+    revision = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
     frames = last - MENDED + 1
-    tracks = [msgspec.structs.replace(track, boxes=track.boxes[:1] * frames) for track in said.tracks]
-    return msgspec.structs.replace(said, tracks=tracks)
+    tracks = [msgspec.structs.replace(track, boxes=track.boxes[:1] * frames) for track in revision.tracks]
+    return msgspec.structs.replace(revision, tracks=tracks)
 
 
 @pytest.mark.parametrize("late", [1, 2, 3])
 def test_tracks_exchange_their_keys_once_however_many_late_revisions_report_it(late: int) -> None:
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
     for epoch in range(4):
-        [said] = people.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: LEFT, 2: RIGHT})))
-    left, right = said.keys
+        [revision] = people.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: LEFT, 2: RIGHT})))
+    left, right = revision.keys
     now = 4 + late
     revisions = tuple(late_revision(epoch) for epoch in range(4, now))
     newest = {"c0": camera_tracks("c0", now, {1: RIGHT, 2: LEFT})}

@@ -42,9 +42,9 @@ def test_a_spell_of_late_tracks_is_logged_when_it_begins_and_when_it_ends(
         lossy.epochs(range(ten, ten + 4), late=B)
         lossy.epochs(range(ten + 4, ten + 10))
     lossy.epochs(range(100, 100 + minute))
-    [begun, over] = caplog.records
-    assert (begun.levelname, over.levelname) == ("WARNING", "INFO")
-    assert begun.getMessage() == f"camera {B}: its tracks for pulses up to {STRIDE - 1} arrived too late"
+    [start, over] = caplog.records
+    assert (start.levelname, over.levelname) == ("WARNING", "INFO")
+    assert start.getMessage() == f"camera {B}: its tracks for pulses up to {STRIDE - 1} arrived too late"
     seconds = 93 * STRIDE / FPS
     assert over.getMessage() == (
         f"camera {B}: its tracks arrive in time again; 40 windows in {seconds:.0f} s were late"

@@ -31,13 +31,13 @@ def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> N
 
 def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
     measured = CameraMetrics()
-    said = camera_tracks("c0", 0, {1: SMALL}, solved_at=100.5)
-    measured.window(said)  # of a missed frame
+    message = camera_tracks("c0", 0, {1: SMALL}, solved_at=100.5)
+    measured.window(message)  # of a missed frame
     assert measured.tracking_delay is None
-    measured.frame(head(said.last, 0.1))
-    measured.window(said)
+    measured.frame(head(message.last, 0.1))
+    measured.window(message)
     assert measured.tracking_delay == RecentSeconds(0.5, 0.5)
-    assert measured.size == said.size
+    assert measured.size == message.size
 
 
 @pytest.mark.parametrize(("gaps", "share"), [([], None), ([0.0], 1.0), ([0.0, 0.1, 1e-12, 0.0], 0.75)])

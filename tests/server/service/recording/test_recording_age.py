@@ -266,11 +266,11 @@ def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
     early = next(path.name for path in tmp_path.iterdir() if path.is_dir() and path.name != late)
     assert early < late, "names are by the clock"
     size = sum(session.size for session in (*store.earlier, store.session) if session is not None)
-    again = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
+    restarted = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
     deleted = sorted(set(range(20)) - set(segments_on_disk(tmp_path)))
     assert deleted
     assert deleted == list(range(len(deleted)))
-    again.close()
+    restarted.close()
 
 
 def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks: ManualClocks) -> None:

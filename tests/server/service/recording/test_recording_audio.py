@@ -173,17 +173,17 @@ async def test_audio_that_was_deleted_or_not_recorded_is_silent(served: ServedSi
     forget(served.service)
     session = served.service.recorder.session
     assert session is not None
-    gone = session.segments[6].first
-    session.paths.audio_file(gone).unlink()
+    deleted = session.segments[6].first
+    session.paths.audio_file(deleted).unlink()
     data = await download(served, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
     unbroken(data)
     _, samples = decode_audio(data)
     assert not samples[31 * FRAME : 59 * FRAME].any()
-    assert not samples[(gone + 1) * 1920 + FRAME : (gone + 2 * GOP) * 1920 - 2 * FRAME].any()
-    silent = {*range(round(30 * FRAME / 1920), round(60 * FRAME / 1920)), *range(gone, gone + 2 * GOP)}
+    assert not samples[(deleted + 1) * 1920 + FRAME : (deleted + 2 * GOP) * 1920 - 2 * FRAME].any()
+    silent = {*range(round(30 * FRAME / 1920), round(60 * FRAME / 1920)), *range(deleted, deleted + 2 * GOP)}
     kept = [at for at in BEEP_TIMES if round(at * FPS) not in silent]
     # The frame before the deleted part has the start of a beep: AAC frames overlap.
-    assert [beep for beep in beeps(data) if abs(beep - gone / FPS) > MAX_AV_OFFSET_S] == pytest.approx(
+    assert [beep for beep in beeps(data) if abs(beep - deleted / FPS) > MAX_AV_OFFSET_S] == pytest.approx(
         kept, abs=MAX_AV_OFFSET_S
     )
 
@@ -217,9 +217,9 @@ async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
         clocks.now = PULSE0 + gop * GOP / FPS
         record = gop_record(gop, {1: A})
         begin, end = (FORM.frame_at(pulse, FPS) for pulse in (gop * GOP, (gop + 1) * GOP))
-        heard = AudioChunk(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
+        chunk = AudioChunk(begin, tuple(bytes([number % 251]) * 9 for number in range(begin, end)), FORM)
         store.write(
-            GopRecord(record.choices, record.cameras, heard),
+            GopRecord(record.choices, record.cameras, chunk),
             session_info(),
             InitSegments(b"pictures", b"sound"),
         )
@@ -233,9 +233,9 @@ async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
         sum(path.stat().st_size for path in session.folder.rglob("*") if path.is_file()), abs=3000
     )
     store.close()
-    again = RecordingFolder(tmp_path, UNLIMITED)
-    again.open()
-    assert again.earlier[0].audio.index.all == session.audio.index.all
+    reopened = RecordingFolder(tmp_path, UNLIMITED)
+    reopened.open()
+    assert reopened.earlier[0].audio.index.all == session.audio.index.all
 
 
 @needs_ffprobe

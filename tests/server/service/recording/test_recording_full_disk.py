@@ -101,24 +101,24 @@ def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, 
     leave(store)
     clock.now += 2.6
     with files_of_at_most(0):
-        again = opened(tmp_path, clock)
+        restarted = opened(tmp_path, clock)
     assert on_disk(tmp_path) == [75]
-    (earlier,) = again.earlier
+    (earlier,) = restarted.earlier
     assert [segment.first for segment in earlier.segments] == [75]
     assert files_in(earlier) == {75}
-    again.close()
+    restarted.close()
 
 
 def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     leave(store)
-    again = opened(tmp_path, clock)
+    restarted = opened(tmp_path, clock)
     assert on_disk(tmp_path) == [0, 25, 50, 75]
-    refused(again, clock, 27)
+    refused(restarted, clock, 27)
     assert on_disk(tmp_path) == [50, 75]
-    assert again.session is None, "it could not begin"
-    again.close()
+    assert restarted.session is None, "it could not begin"
+    restarted.close()
 
 
 def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path, clock: ManualClocks) -> None:
@@ -129,10 +129,10 @@ def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path,
     with files_of_at_most(0):
         leave(store)
     assert files_in_playlists(store.session) == {0, 25, 50, 75}
-    again = opened(tmp_path, clock, UNLIMITED)
-    (earlier,) = again.earlier
+    restarted = opened(tmp_path, clock, UNLIMITED)
+    (earlier,) = restarted.earlier
     assert files_in(earlier) == {50, 75} == files_in_playlists(earlier)
-    again.close()
+    restarted.close()
 
 
 def test_files_that_cannot_be_deleted_are_not_forgotten(

@@ -213,12 +213,12 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
         on_disk = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
         assert on_disk <= max_mb * 1e6 + slack
     store.close()
-    again = RecordingFolder(folder, UNLIMITED)
-    again.open()
+    reopened = RecordingFolder(folder, UNLIMITED)
+    reopened.open()
     assert store.session is not None
     found = {
         number: playlist.index.all
-        for session in again.earlier
+        for session in reopened.earlier
         for number, playlist in session.objects.items()
     }
     assert found == {number: playlist.index.all for number, playlist in store.session.objects.items()}
@@ -227,11 +227,11 @@ def test_the_size_stays_bounded_and_a_restart_reads_the_same_indexes(
         kept = [pulse // GOP for entry in entries for pulse in range(entry.first, entry.end, GOP)]
         assert kept == expected[len(expected) - len(kept) :], "the newest, without a new gap"
         for entry in entries:
-            path = again.earlier[0].paths.camera_file(entry.camera, entry.file)
+            path = reopened.earlier[0].paths.camera_file(entry.camera, entry.file)
             assert [gop.first for gop in read_gops(path, entry.offset, entry.length, FPS)] == list(
                 range(entry.first, entry.end, GOP)
             )
-    again.close()
+    reopened.close()
 
 
 def test_on_a_full_disk_earlier_gops_play_and_recording_continues_later(tmp_path: Path) -> None:

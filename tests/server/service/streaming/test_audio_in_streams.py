@@ -66,7 +66,7 @@ def decide(service: FedService, gop: int, camera: str | None) -> None:
 
 
 async def watched(
-    served: ServedSite, recording: Path, ways: list[str], lost: frozenset[int] = frozenset()
+    served: ServedSite, recording: Path, paths: list[str], lost: frozenset[int] = frozenset()
 ) -> list[bytes]:
     """Show the recording's pictures as alternating cameras; return the streams of these paths."""
     service = served.service
@@ -76,7 +76,7 @@ async def watched(
             if unit.pulse not in lost:
                 service.ingest.video(video(camera, unit))
     decide(service, 0, A)
-    answers = [await served.session.get(way) for way in ways]
+    answers = [await served.session.get(path) for path in paths]
     for gop in range(1, GOPS):
         decide(service, gop, CAMERAS[gop % 2])
         await asyncio.sleep(0.005)
@@ -84,12 +84,12 @@ async def watched(
     return [await answer.read() for answer in answers]
 
 
-@pytest.mark.parametrize(("way", "kind"), [("best.mp4", "mp4"), ("best.ts", "mpegts")])
+@pytest.mark.parametrize(("path", "kind"), [("best.mp4", "mp4"), ("best.ts", "mpegts")])
 async def test_after_every_cut_a_beep_is_with_its_flash(
-    loud: ServedSite, recording: Path, way: str, kind: str
+    loud: ServedSite, recording: Path, path: str, kind: str
 ) -> None:
     own = send_audio(loud.service, recording)
-    (data,) = await watched(loud, recording, [f"/objects/1/{way}"])
+    (data,) = await watched(loud, recording, [f"/objects/1/{path}"])
     assert flashes(data, kind) == pytest.approx(BEEP_TIMES, abs=0.001)
     assert beeps(data, kind) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     if kind == "mp4":
@@ -238,12 +238,12 @@ async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: ServedSite, r
 @needs_ffprobe
 async def test_ffprobe_reports_no_errors(loud: ServedSite, recording: Path, tmp_path: Path) -> None:
     send_audio(loud.service, recording)
-    ways = ["best.mp4", "best.ts"]
-    for way, data in zip(
-        ways, await watched(loud, recording, [f"/objects/1/{way}" for way in ways]), strict=True
+    paths = ["best.mp4", "best.ts"]
+    for path, data in zip(
+        paths, await watched(loud, recording, [f"/objects/1/{path}" for path in paths]), strict=True
     ):
-        (tmp_path / way).write_bytes(data)
-        found = {stream[0]: int(stream[1]) for stream in probed(tmp_path / way, "codec_name,nb_read_frames")}
+        (tmp_path / path).write_bytes(data)
+        found = {stream[0]: int(stream[1]) for stream in probed(tmp_path / path, "codec_name,nb_read_frames")}
         assert found["h264"] == FRAMES
         assert found["aac"] >= FRAMES * 48_000 // FPS // FRAME
 
@@ -266,12 +266,12 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(
     decide(service, 0, A)
     parameters = service.stream_format.parameters
     assert parameters is not None
-    seen = await play_in_chromium(
+    played = await play_in_chromium(
         *(loud.port, service.splicer, GOPS, show),
         *(PLAY_JS, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec},mp4a.40.2"', 4),
     )
-    assert (seen["error"], seen["ranges"], seen["tracks"]) == ("", 1, [True, True])
-    assert seen["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
+    assert (played["error"], played["ranges"], played["tracks"]) == ("", 1, [True, True])
+    assert played["range"] == [0, pytest.approx(FRAMES / FPS, abs=0.03)]
 
 
 async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
@@ -291,8 +291,8 @@ async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
     for gop in range(2, GOPS):
         decide(service, gop, CAMERAS[gop % 2])
         await asyncio.sleep(0.005)
-    done = await recorded
-    assert done.complete
+    result = await recorded
+    assert result.complete
     data, begin = out.read_bytes(), GOP / FPS
     expected = [moment - begin for moment in BEEP_TIMES if begin < moment < begin + 3.3]
     assert flashes(data) == pytest.approx(expected, abs=0.001)

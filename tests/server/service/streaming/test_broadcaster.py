@@ -43,12 +43,12 @@ async def test_a_viewer_of_single_frames_starts_where_the_gop_begins() -> None:
 async def test_a_viewer_that_falls_behind_loses_whole_gops_and_others_lose_none() -> None:
     broadcaster = Broadcaster(queue_gops=3)
     slow, quick = broadcaster.subscribe(), broadcaster.subscribe()
-    seen = []
+    received = []
     for number in range(10):
         broadcaster.publish(BytesChunk(b"I%d" % number, random_access=True))
         broadcaster.publish(BytesChunk(b"P%d" % number, random_access=False))
-        seen += await take(quick, 2)
-    assert len(seen) == 20
+        received += await take(quick, 2)
+    assert len(received) == 20
     assert slow.lost_gops > 0
     left = await take(slow, 2)
     assert left[0][:1] == b"I", "never a broken GOP"

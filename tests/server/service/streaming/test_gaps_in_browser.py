@@ -41,9 +41,9 @@ async def test_media_source_extensions_play_over_missing_pictures_to_the_end(ser
     show(0)
     parameters = served.service.stream_format.parameters
     assert parameters is not None
-    seen = await play_in_chromium(
+    played = await play_in_chromium(
         *(served.port, splicer, GOPS, show),
         *(PLAY_JS, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec}"', 4),
     )
-    assert (seen["error"], seen["ranges"]) == ("", 1)
-    assert seen["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
+    assert (played["error"], played["ranges"]) == ("", 1)
+    assert played["range"] == [0, pytest.approx(GOPS * GOP / FPS)]

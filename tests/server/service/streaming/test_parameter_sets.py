@@ -71,9 +71,11 @@ def test_the_cameras_have_different_parameter_sets() -> None:
 async def test_every_frame_is_the_chosen_cameras_and_gaps_repeat_the_last_picture(form: str) -> None:
     mp4, ts = await spliced(config())
     with av.open(io.BytesIO(mp4 if form == "mp4" else ts), format=form) as container:
-        seen = [(frame.time, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)]
-    assert [round(time * FPS) for time, _ in seen] == list(range(GOPS * GOP))
-    for pulse, ((_, picture), right) in enumerate(zip(seen, expected_pictures(), strict=True)):
+        shown_frames = [
+            (frame.time, frame.to_ndarray(format="yuv420p")) for frame in container.decode(video=0)
+        ]
+    assert [round(time * FPS) for time, _ in shown_frames] == list(range(GOPS * GOP))
+    for pulse, ((_, picture), right) in enumerate(zip(shown_frames, expected_pictures(), strict=True)):
         np.testing.assert_array_equal(picture, right, f"pulse {pulse}")
 
 
@@ -125,14 +127,14 @@ LOOK = (
 @needs_chromium
 async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
     async for served in serve_site(patience=60, **OWN_PARAMETERS, http={"viewer_queue_gops": 100}):
-        seen = await _played(served)
-    assert (seen["error"], seen["ranges"]) == ("", 1)
+        shown_frames = await _played(served)
+    assert (shown_frames["error"], shown_frames["ranges"]) == ("", 1)
     rgb = [
         av.VideoFrame.from_ndarray(picture, format="yuv420p").to_ndarray(format="rgb24")
         for picture in expected_pictures()
     ]
     right = np.array([picture[4::8, 4::8, 1].ravel() for picture in rgb], dtype=float)[::3]
-    found = np.array(seen["greens"], dtype=float)
+    found = np.array(shown_frames["greens"], dtype=float)
     assert len(found) == GOPS * GOP / 3
     # Colours are converted in two ways; pictures of other pulses or cameras differ by several times as much.
     assert np.abs(found - right).mean(axis=1).max() < 20

@@ -33,12 +33,12 @@ class Site:
 
     def decide(self, frames_seen: int, number: int = 1, merged: dict[int, int] | None = None) -> None:
         """Decide a GOP: B is best, and A sees the person in its first frames."""
-        seen: list[list[NumberedBox]] = [
+        visible_gops: list[list[NumberedBox]] = [
             [(number, 1.0, 1.0, 9.0, 9.0)] if frame < frames_seen else [] for frame in range(GOP)
         ]
         choices = () if merged and 1 in merged else (ObjectChoice(1, B, B, departed=False),)
         choices += (ObjectChoice(2, B, B, departed=False),)
-        boxes = {A: seen, B: [[] for _ in seen]}
+        boxes = {A: visible_gops, B: [[] for _ in visible_gops]}
         decision = GopDecision(self.gops * GOP, GOP, choices, boxes, merged or {}, (), NO_REASON)
         self.splicer.publish_decision(decision)
         self.gops += 1
@@ -60,7 +60,7 @@ class Site:
 
 
 @pytest.mark.parametrize(
-    ("seen", "shown"),
+    ("visible_gops", "shown"),
     [
         ([5, 5, 5, 5], "0000"),
         ([5, 5, 0, 5, 5], "00110"),
@@ -69,11 +69,13 @@ class Site:
         ([5, 0, 5, 0, 5], "01111"),
     ],
 )
-async def test_a_preferred_camera_is_shown_while_it_sees_the_person(seen: Sequence[int], shown: str) -> None:
+async def test_a_preferred_camera_is_shown_while_it_sees_the_person(
+    visible_gops: Sequence[int], shown: str
+) -> None:
     site = Site()
-    site.decide(seen[0])
+    site.decide(visible_gops[0])
     viewer = site.splicer.preferred.broadcaster(1, A).subscribe()
-    for frames in seen[1:]:
+    for frames in visible_gops[1:]:
         site.decide(frames)
     assert await site.cameras(viewer) == shown
 

@@ -37,7 +37,7 @@ class Shown:
 
 
 @cache
-def taken(seed: int, missed: frozenset[int], preset: str) -> tuple[AccessUnit, ...]:
+def captured_units(seed: int, missed: frozenset[int], preset: str) -> tuple[AccessUnit, ...]:
     """Encode a camera's pictures, but for those pulses that it misses."""
     encoder = Encoder(
         SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
@@ -91,12 +91,12 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     stream_format = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, FRAMES, stream_format) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, stream_format, small_config())
-    sent = {camera: taken(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
+    sent = {camera: captured_units(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
     own = {camera: alone(units) for camera, units in sent.items()}
     live = {camera: splicer.cameras[camera].subscribe() for camera in CAMERAS}
-    for camera, gone in zip(CAMERAS, lost, strict=True):
+    for camera, lost_frames in zip(CAMERAS, lost, strict=True):
         for unit in sent[camera]:
-            if unit.pulse not in gone:
+            if unit.pulse not in lost_frames:
                 splicer.publish_frame(
                     camera, frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
                 )
@@ -134,7 +134,7 @@ def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
     stream_format = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, 40, stream_format) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, stream_format, small_config())
-    for unit in taken(0, frozenset(), "ultrafast"):
+    for unit in captured_units(0, frozenset(), "ultrafast"):
         frame_buffers["c0"].put(unit.pulse, 1, unit.data, key=unit.key)
     assert stream_format.parameters is not None
     return splicer, frame_buffers, init_segment(stream_format.parameters, WIDTH, HEIGHT)
@@ -147,7 +147,7 @@ def decide(splicer: Splicer, gop: int, camera: str | None) -> None:
 
 async def test_a_skipped_frame_affects_no_other_picture() -> None:
     splicer, frame_buffers, head = splicing()
-    units = taken(1, frozenset({7, 8}), "ultrafast")
+    units = captured_units(1, frozenset({7, 8}), "ultrafast")
     for unit in units:
         frame_buffers["c1"].put(unit.pulse, 1, unit.data, key=unit.key)
     decide(splicer, 0, "c1")
@@ -168,7 +168,7 @@ async def test_a_skipped_frame_affects_no_other_picture() -> None:
 async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> None:
     splicer, _, head = splicing()
     viewer = splicer.cameras["c0"].subscribe()
-    units = taken(0, frozenset(), "ultrafast")
+    units = captured_units(0, frozenset(), "ultrafast")
     frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
     for unit in units[: GOP + 2]:
         splicer.publish_frame("c0", frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key))
@@ -201,7 +201,7 @@ async def test_a_stream_continues_after_hours_without_a_picture() -> None:
     decide(splicer, 0, "c0")
     viewer = splicer.persons[1].subscribe()
     day = 86_400 * FPS
-    for unit in taken(0, frozenset(), "ultrafast")[:GOP]:
+    for unit in captured_units(0, frozenset(), "ultrafast")[:GOP]:
         frame_buffers["c0"].put(day + unit.pulse, 1, unit.data, key=unit.key)
     decide(splicer, day // GOP, "c0")
     assert len(await received(viewer)) == 2
@@ -209,7 +209,7 @@ async def test_a_stream_continues_after_hours_without_a_picture() -> None:
 
 async def test_restarted_pulses_restart_the_stream() -> None:
     splicer, frame_buffers, _ = splicing()
-    units = taken(0, frozenset(), "ultrafast")
+    units = captured_units(0, frozenset(), "ultrafast")
     for unit in units[:GOP]:
         splicer.publish_frame("c0", frame_buffers["c0"].put(100_000 + unit.pulse, 1, unit.data, key=unit.key))
     viewer = splicer.cameras["c0"].subscribe()

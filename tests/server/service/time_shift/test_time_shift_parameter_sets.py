@@ -68,12 +68,12 @@ async def test_time_shift_plays_what_was_live(served: ServedSite, form: str) -> 
     with av.open(io.BytesIO(data), "r") as container:
         frames = list(container.decode(video=0))
     start = float(frames[0].time or 0) if form == "ts" else 0.0
-    seen = {
+    shown = {
         round((float(frame.time or 0) - start) * FPS): frame.to_ndarray(format="yuv420p") for frame in frames
     }
     assert LOST_GOPS, "there are gaps, which are filled"
-    assert form == "hls" or list(seen) == list(range(FRAMES))
+    assert form == "hls" or list(shown) == list(range(FRAMES))
     for pulse, right in enumerate(expected_pictures()):
         np.testing.assert_array_equal(
-            seen[max(earlier for earlier in seen if earlier <= pulse)], right, str(pulse)
+            shown[max(earlier for earlier in shown if earlier <= pulse)], right, str(pulse)
         )

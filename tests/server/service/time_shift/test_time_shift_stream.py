@@ -244,8 +244,8 @@ async def test_spans_and_views_are_limited_to_the_requested_range(
     assert cameras(part["views"]) == {number: whole[number] for number in range(begin, begin + frames)}
     span = (await recorded.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
     assert (span["first"], span["frames"]) == (begin, 15 if query == "from=p20" else frames)
-    nothing = await recorded.get_json("/api/objects/1/past?from=p900")
-    assert nothing == {"spans": [], "views": []}
+    beyond_end = await recorded.get_json("/api/objects/1/past?from=p900")
+    assert beyond_end == {"spans": [], "views": []}
 
 
 async def test_recorded_decisions_have_choices_and_boxes(recorded: ServedSite) -> None:
@@ -327,11 +327,11 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(start, start + frames))])
     store.close()
-    there = available_ranges(source)
+    available = available_ranges(source)
     assert first_available(source, start) == next(
-        (max(span.first, start) for span in there if span.end > start), None
+        (max(span.first, start) for span in available if span.end > start), None
     )
-    assert end_of_available(source) == (there[-1].end if there else 0)
+    assert end_of_available(source) == (available[-1].end if available else 0)
     kept = [gop for gop, camera in enumerate(shown) if camera is not None]
     wanted = [gop for gop in kept if (gop + 1) * GOP > start and gop * GOP < start + frames]
     if not wanted:
@@ -389,8 +389,10 @@ async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(t
     source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
     stream_format, header = site_of(store)
     broadcaster, back = Broadcaster(), gop_record(8, {1: A}).cameras[A]
-    came = [Shown(back.first + at, not at, fragment, boot=1) for at, fragment in enumerate(back.fragments)]
-    broadcaster.publish(MediaChunk(came, FPS, ContinuityCounters()))
+    live_pictures = [
+        Shown(back.first + at, not at, fragment, boot=1) for at, fragment in enumerate(back.fragments)
+    ]
+    broadcaster.publish(MediaChunk(live_pictures, FPS, ContinuityCounters()))
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: broadcaster)
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, 5 * GOP))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(2 * GOP))

@@ -235,10 +235,10 @@ def test_the_reason_announces_a_planned_cut() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3 + [{A: {1: SMALL}, B: {1: LARGE}}] * 7
     decisions = decide(decider(view={"lookahead": 4 * GOP, "switch_cost_s": 0.04}), story)
     last = shown(decisions).index(B) - 1
-    why = decisions[last].reasons.of(1)
-    assert why.stay is not None
-    assert why.cut is not None
-    assert why.stay > why.cut, "for the whole look-ahead the other one would be better"
+    reasons = decisions[last].reasons.of(1)
+    assert reasons.stay is not None
+    assert reasons.cut is not None
+    assert reasons.stay > reasons.cut, "for the whole look-ahead the other one would be better"
     assert (
         reason_of(decisions[last])
         == "Another camera will see this person better than c0: it is too soon to cut."
@@ -247,9 +247,21 @@ def test_the_reason_announces_a_planned_cut() -> None:
 
 @pytest.mark.parametrize(("min_shot_s", "cuts"), [(0.0, 4), (0.5, 2)])
 def test_shots_have_the_minimum_length(min_shot_s: float, cuts: int) -> None:
-    here: Seen = {A: {1: LARGE}, B: {1: SMALL}}
-    there: Seen = {A: {1: SMALL}, B: {1: LARGE}}
-    story = [here, here, there, there, here, here, there, there, here, here, here]
+    larger_in_a: Seen = {A: {1: LARGE}, B: {1: SMALL}}
+    larger_in_b: Seen = {A: {1: SMALL}, B: {1: LARGE}}
+    story = [
+        larger_in_a,
+        larger_in_a,
+        larger_in_b,
+        larger_in_b,
+        larger_in_a,
+        larger_in_a,
+        larger_in_b,
+        larger_in_b,
+        larger_in_a,
+        larger_in_a,
+        larger_in_a,
+    ]
     view_decider = decider(view={"min_shot_s": min_shot_s})
     views = shown(decide(view_decider, story, end=11 * STRIDE - 1))
     changes = [n for n in range(1, len(views)) if views[n] != views[n - 1]]
@@ -258,9 +270,9 @@ def test_shots_have_the_minimum_length(min_shot_s: float, cuts: int) -> None:
 
 
 def test_a_shot_without_the_person_may_be_short() -> None:
-    here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    larger_in_a, hidden_in_a = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
     view_decider = decider(view={"min_shot_s": 2.0})
-    assert shown(decide(view_decider, [here, here, *[gone] * 4])) == [A, A, B, B, B]
+    assert shown(decide(view_decider, [larger_in_a, larger_in_a, *[hidden_in_a] * 4])) == [A, A, B, B, B]
 
 
 def test_a_track_that_changes_person_within_the_window_counts_for_each_in_their_frames() -> None:
@@ -285,13 +297,15 @@ def test_with_relative_quality_distance_makes_no_difference() -> None:
 
 @pytest.mark.parametrize(("presence_decay_s", "expected"), [(0.0, [A, B, A, A]), (1.0, [A, A, A, A])])
 def test_a_short_missed_detection_causes_no_cuts(presence_decay_s: float, expected: list[str]) -> None:
-    here, missed = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    larger_in_a, missed = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
     view_decider = decider(view={"presence_decay_s": presence_decay_s})
-    assert shown(decide(view_decider, [here, missed, here, here, here])) == expected
+    assert (
+        shown(decide(view_decider, [larger_in_a, missed, larger_in_a, larger_in_a, larger_in_a])) == expected
+    )
 
 
 def test_a_camera_that_keeps_missing_the_person_is_left_eventually() -> None:
-    here, gone = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
-    views = shown(decide(decider(view={"presence_decay_s": 1.0}), [here, *[gone] * 8]))
+    larger_in_a, hidden_in_a = {A: {1: LARGE}, B: {1: SMALL}}, {A: {}, B: {1: SMALL}}
+    views = shown(decide(decider(view={"presence_decay_s": 1.0}), [larger_in_a, *[hidden_in_a] * 8]))
     assert (views[0], views[-1]) == (A, B)
     assert [a != b for a, b in itertools.pairwise(views)].count(True) == 1

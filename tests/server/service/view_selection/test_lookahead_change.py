@@ -107,15 +107,15 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
         service.feed(epoch, {A: {1: one}, B: {1: other}})
         if viewer is None and 1 in service.splicer.persons:
             viewer = service.splicer.persons[1].subscribe()
-            begun = len(shown) - 1
+            change = len(shown) - 1
             got += [chunk.data for chunk in viewer._queue]
             viewer._queue.clear()
             viewer.direct_send = take
     if viewer is not None:
         assert viewer.lost_gops == 0
-        names = [camera or "" for camera in shown[begun:]]
+        names = [camera or "" for camera in shown[change:]]
         assert got == [
-            service.frame_buffers[name].gop((begun + n) * GOP, GOP) for n, name in enumerate(names)
+            service.frame_buffers[name].gop((change + n) * GOP, GOP) for n, name in enumerate(names)
         ]
     service.close()
 

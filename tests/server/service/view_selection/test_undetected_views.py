@@ -116,19 +116,19 @@ def test_a_person_outside_the_picture_is_not_expected_in_it() -> None:
 
 def test_the_explanation_includes_undetected_views_and_their_quality() -> None:
     decisions = decide(decider(), [FOUND] * 20 + [COVERED] * 6)
-    why = decisions[-1].reasons.of(1)
-    assert (why.views[A].seen, why.views[A].undetected) == (1.0, 0.0)
-    assert (why.views[B].seen, why.views[B].undetected) == (0.0, 1.0)
-    assert why.views[B].quality is None
-    seen_quality = why.views[A].quality
-    undetected_quality = why.views[B].undetected_quality
+    reasons = decisions[-1].reasons.of(1)
+    assert (reasons.views[A].seen, reasons.views[A].undetected) == (1.0, 0.0)
+    assert (reasons.views[B].seen, reasons.views[B].undetected) == (0.0, 1.0)
+    assert reasons.views[B].quality is None
+    seen_quality = reasons.views[A].quality
+    undetected_quality = reasons.views[B].undetected_quality
     assert seen_quality is not None
     assert undetected_quality is not None
     assert undetected_quality == pytest.approx(2.0 * seen_quality), (
         "twice as large, and B detects people reliably"
     )
-    assert why.views[B].cost == pytest.approx(0.0)
-    assert reason(decisions[-1].choices[0], why).startswith("c1 does not detect this person, but")
+    assert reasons.views[B].cost == pytest.approx(0.0)
+    assert reason(decisions[-1].choices[0], reasons).startswith("c1 does not detect this person, but")
 
 
 @pytest.mark.parametrize("frames", [1, 4, 10, 13, 25])
