@@ -27,14 +27,14 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 @asynccontextmanager
-async def answering(handler: Handler, path: str = "/{rest:.*}") -> AsyncIterator[str]:
+async def serve_handler(handler: Handler, path: str = "/{rest:.*}") -> AsyncIterator[str]:
     app = web.Application()
     app.router.add_get(path, handler)
     async with asyncio.timeout(PATIENCE), TestServer(app) as server:
         yield str(server.make_url("/"))
 
 
-def endless(piece: bytes, status: int = 200, pause: float = 0.0) -> Handler:
+def endless_response(piece: bytes, status: int = 200, pause: float = 0.0) -> Handler:
     async def answer(request: web.Request) -> web.StreamResponse:
         response = web.StreamResponse(status=status)
         await response.prepare(request)
@@ -70,26 +70,26 @@ async def ask_events(url: str) -> object:
     ],
 )
 async def test_an_endless_answer_is_refused(asking: Callable[[str], Awaitable[object]], error: str) -> None:
-    async with answering(endless(PIECE)) as url:
+    async with serve_handler(endless_response(PIECE)) as url:
         with pytest.raises(client.ContractError, match=error):
             await asking(url)
 
 
 async def test_an_endless_error_response_is_reported_by_its_status() -> None:
-    async with answering(endless(PIECE, status=404)) as url:
+    async with serve_handler(endless_response(PIECE, status=404)) as url:
         with pytest.raises(client.NotFoundError, match=r"^404 Not Found$"):
             await ask(url)
 
 
 @pytest.mark.parametrize("status", [200, 503])
 async def test_a_trickling_answer_times_out(status: int) -> None:
-    async with answering(endless(b" ", status, pause=0.01)) as url:
+    async with serve_handler(endless_response(b" ", status, pause=0.01)) as url:
         with pytest.raises(client.AwayError, match=r"no answer$"):
             await ask(url, HASTY)
 
 
 @asynccontextmanager
-async def saying(say: Callable[[asyncio.StreamWriter], Awaitable[None]]) -> AsyncIterator[str]:
+async def serve_bytes(say: Callable[[asyncio.StreamWriter], Awaitable[None]]) -> AsyncIterator[str]:
     """Answer one request with bytes that need be no HTTP."""
     over = asyncio.Event()
 
@@ -114,7 +114,7 @@ async def test_endless_headers_are_refused() -> None:
             writer.write(b"X: y\r\n")
             await asyncio.sleep(0.01)
 
-    async with saying(trickle) as url:
+    async with serve_bytes(trickle) as url:
         with pytest.raises(client.AwayError, match=r"no answer$"):
             await ask(url, HASTY)
 
@@ -130,7 +130,7 @@ async def test_invalid_json_is_reported_in_one_line(body: bytes, error: str) -> 
     async def answer(_: web.Request) -> web.Response:
         return web.Response(body=body)
 
-    async with answering(answer) as url:
+    async with serve_handler(answer) as url:
         with pytest.raises(client.ContractError, match=error) as caught:
             await ask(url)
     assert len(str(caught.value).splitlines()) == 1
@@ -140,7 +140,7 @@ async def test_an_error_response_without_text_is_reported_by_its_status() -> Non
     async def answer(_: web.Request) -> web.Response:
         return web.Response(status=401, body=b'{"error": "\xff"}')
 
-    async with answering(answer) as url:
+    async with serve_handler(answer) as url:
         with pytest.raises(client.RefusedError, match=r"^401 Unauthorized$"):
             await ask(url)
 
@@ -153,7 +153,7 @@ async def test_another_protocol_is_reported_in_one_line(response_bytes: bytes) -
         writer.write(response_bytes)
         await writer.drain()
 
-    async with saying(say) as url:
+    async with serve_bytes(say) as url:
         with pytest.raises(client.AwayError) as caught:
             await ask(url)
     assert len(str(caught.value).splitlines()) == 1
@@ -164,7 +164,7 @@ async def test_too_many_redirects_are_an_error() -> None:
     async def lead(_: web.Request) -> web.Response:
         raise web.HTTPFound("/api/objects")
 
-    async with answering(lead) as url:
+    async with serve_handler(lead) as url:
         with pytest.raises(client.AwayError, match=r"too many redirects$"):
             await ask(url)
 
@@ -176,19 +176,19 @@ async def test_a_token_is_not_sent_to_another_server_after_a_redirect() -> None:
         received.append(request.headers.get("Authorization"))
         return web.json_response({"objects": []})
 
-    async with answering(list_nobody) as other:
+    async with serve_handler(list_nobody) as other:
 
         async def lead(request: web.Request) -> web.Response:
             received.append(request.headers.get("Authorization"))
             raise web.HTTPFound(other + "api/objects")
 
-        async with answering(lead) as url:
+        async with serve_handler(lead) as url:
             assert await client.objects(url, client.HttpSettings(token="secret")) == ()  # noqa: S106
     assert received == ["Bearer secret", None]
 
 
 async def test_an_invalid_status_is_reported_in_one_line() -> None:
-    async with answering(endless(PIECE), "/api/site") as url:
+    async with serve_handler(endless_response(PIECE), "/api/site") as url:
         with pytest.raises(client.ContractError, match="larger than"):
             await ask_status(url)
 
@@ -218,7 +218,7 @@ async def test_no_error_has_secrets_of_an_address(typed: str) -> None:
 
 @pytest.mark.parametrize("asking", [ask, ask_status, ask_past, ask_events])
 async def test_another_server_is_named_only_by_its_host(asking: Callable[[str], Awaitable[object]]) -> None:
-    async with answering(endless(PIECE), "/QXZJKV7/{rest:.*}") as url:
+    async with serve_handler(endless_response(PIECE), "/QXZJKV7/{rest:.*}") as url:
         typed = url.replace("http://", "http://me:QXZJKV7@") + "QXZJKV7/?token=QXZJKV7"
         with pytest.raises(client.ContractError, match=r"^http://127\.0\.0\.1:\d+: ") as refused:
             await asking(typed)

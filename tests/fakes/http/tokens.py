@@ -46,5 +46,5 @@ async def serve_with_tokens(folder: Path, *names: str, **changes: Any) -> AsyncI
     """Serve a site that requires tokens; they are in `tokens.yaml` in the folder."""
     path = write_tokens(folder / "tokens.yaml", *map(token_entry, names or TOKEN_ENTRIES))
     access = {"tokens": str(path), **changes.pop("access", {})}
-    async with aclosing(serve_site(access=access, **changes)) as halls:
-        yield await anext(halls)
+    async with aclosing(serve_site(access=access, **changes)) as sites:
+        yield await anext(sites)

@@ -33,7 +33,7 @@ def run(myview: RunCommand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     return myview
 
 
-def written(folder: Path) -> set[str]:
+def file_names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
@@ -131,9 +131,9 @@ def test_inputs_and_special_files_are_not_replaced_and_invalid_options_are_refus
     (tmp_path / "det.txt").write_text(DETECTIONS)
     (tmp_path / "points.json").write_text('{"cameras": {}}')
     os.mkfifo(tmp_path / "pipe")
-    before = written(tmp_path)
+    before = file_names(tmp_path)
     assert reason in input_error(run(*command_words))
-    assert written(tmp_path) == before
+    assert file_names(tmp_path) == before
     assert (tmp_path / "det.txt").read_text() == DETECTIONS
 
 
@@ -148,7 +148,7 @@ def test_a_full_disk_is_reported_in_one_line_and_leaves_nothing(run: RunCommand,
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, ignored)
     assert "t.txt: cannot write there: File too large" in line
-    assert written(tmp_path) == {"det.txt"}
+    assert file_names(tmp_path) == {"det.txt"}
 
 
 def test_an_invalid_log_level_is_refused(
@@ -186,7 +186,7 @@ def test_a_port_in_use_is_refused_and_nothing_is_written(
         assert f"{section}." in input_error(run("bestview", path, "--out", "out"))
     else:
         assert "the port is in use" in input_error(run("sync", path))
-    assert written(tmp_path) == {"c0.mp4", "site.yaml"}
+    assert file_names(tmp_path) == {"c0.mp4", "site.yaml"}
 
 
 def test_the_port_on_the_command_line_overrides_the_configuration(
@@ -211,14 +211,14 @@ def test_scene_lists_the_scenes_and_their_default_cameras(run: RunCommand, tmp_p
     result = run("scene", "fish", "--out", "fish", "--seconds", 0.2, "--size", "128x72")
     assert (result.code, result.err) == (0, "")
     assert result.out.splitlines()[-1] == "fish: 1 view, gt/"
-    assert written(tmp_path / "fish") == {"c0.mp4", "gt"}
+    assert file_names(tmp_path / "fish") == {"c0.mp4", "gt"}
 
 
 def test_scene_writes_a_recording_or_refuses(run: RunCommand, tmp_path: Path) -> None:
     small = ["--cameras", 1, "--objects", 1, "--size", "128x72"]
     result = run("scene", "room", "--out", "room", "--seconds", 0.2, *small)
     assert (result.code, result.err) == (0, "")
-    assert written(tmp_path / "room") == {"c0.mp4", "gt", "ground.json"}
+    assert file_names(tmp_path / "room") == {"c0.mp4", "gt", "ground.json"}
     assert "not an empty folder" in input_error(run("scene", "room", "--out", "room", *small))
     assert "there is no scene 'cellar'" in input_error(run("scene", "cellar", "--out", "new", *small))
     assert "WIDTHxHEIGHT" in input_error(run("scene", "room", "--out", "new", "--size", "big"))
@@ -229,7 +229,7 @@ def test_scene_writes_a_recording_or_refuses(run: RunCommand, tmp_path: Path) ->
     assert "at least one frame" in input_error(
         run("scene", "room", "--out", "new", "--fps", 1, *small, "--seconds", 0.4)
     )
-    assert written(tmp_path) == {"room"}
+    assert file_names(tmp_path) == {"room"}
 
 
 def test_an_interrupted_scene_leaves_no_incomplete_files(
@@ -248,7 +248,7 @@ def test_an_interrupted_scene_leaves_no_incomplete_files(
     result = run("scene", "room", "--out", "room", "--cameras", 1, "--objects", 1, "--size", "128x72")
     assert result.code == 130
     assert drawn == [0, 1, 2, 3]
-    assert written(tmp_path) == set()
+    assert file_names(tmp_path) == set()
 
 
 def test_track_writes_a_file_or_refuses(run: RunCommand, tmp_path: Path) -> None:
@@ -256,7 +256,7 @@ def test_track_writes_a_file_or_refuses(run: RunCommand, tmp_path: Path) -> None
     (tmp_path / "det.txt").write_text("".join(rows))
     (tmp_path / "bad.txt").write_text("1,2,three\n")
     write_video(tmp_path / "my view (1).mp4", 12)
-    before = written(tmp_path)
+    before = file_names(tmp_path)
     assert "name a video, or its detections" in input_error(run("track", "--out", "t.txt"))
     assert "there is no solver 'oracle'" in input_error(
         run("track", "--det", "det.txt", "--out", "t.txt", "--solver", "oracle")
@@ -266,7 +266,7 @@ def test_track_writes_a_file_or_refuses(run: RunCommand, tmp_path: Path) -> None
     assert "bad.txt" in input_error(run("track", "--det", "bad.txt", "--out", "t.txt"))
     assert "is a folder" in input_error(run("track", "--det", "det.txt", "--out", tmp_path))
     assert "cannot write there" in input_error(run("track", "--det", "det.txt", "--out", "det.txt/t.txt"))
-    assert written(tmp_path) == before
+    assert file_names(tmp_path) == before
     result = run("track", "--det", "det.txt", "--out", "t.txt")
     assert (result.code, result.out, result.err) == (0, "t.txt: 1 people\n", "")
     assert len((tmp_path / "t.txt").read_text().splitlines()) == 30
@@ -323,9 +323,9 @@ def test_render_refuses_and_leaves_nothing(
     write_video(tmp_path / "sub" / "c0.mp4", 5)
     (tmp_path / "empty.mp4").write_bytes(b"")
     (tmp_path / "wrong.yaml").write_text("sight: {}\n")
-    before = written(tmp_path)
+    before = file_names(tmp_path)
     assert reason in input_error(run("render", "--out", "out", *arguments))
-    assert written(tmp_path) == before
+    assert file_names(tmp_path) == before
 
 
 def test_help_lists_every_command(run: RunCommand) -> None:

@@ -30,7 +30,7 @@ def test_the_environment_overrides_the_rate(tmp_path: Path, monkeypatch: pytest.
     assert demo_config(tmp_path, 0, 12.5)[1].site.fps == 5
 
 
-def put(folder: Path, **files: str) -> None:
+def write_files(folder: Path, **files: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         (folder / name.replace("_", ".", 1)).write_text(text)
@@ -50,15 +50,15 @@ def put(folder: Path, **files: str) -> None:
 def test_the_lowest_limit_of_a_containers_groups_counts(
     tmp_path: Path, own: str, above: str, limit: float
 ) -> None:
-    put(tmp_path / "groups" / "a" / "b", cpu_max=own)
-    put(tmp_path / "groups" / "a", cpu_max=above)
+    write_files(tmp_path / "groups" / "a" / "b", cpu_max=own)
+    write_files(tmp_path / "groups" / "a", cpu_max=above)
     (tmp_path / "cgroup").write_text("0::/a/b\n")
     assert available_processors(tmp_path / "groups", tmp_path / "cgroup") == limit
 
 
 @pytest.mark.parametrize(("quota", "limit"), [("20000", 0.2), ("-1", THERE)])
 def test_version_1_groups_count(tmp_path: Path, quota: str, limit: float) -> None:
-    put(tmp_path / "groups" / "cpu" / "a", cpu_cfs_quota_us=quota, cpu_cfs_period_us="100000")
+    write_files(tmp_path / "groups" / "cpu" / "a", cpu_cfs_quota_us=quota, cpu_cfs_period_us="100000")
     (tmp_path / "cgroup").write_text("4:memory:/z\n2:cpu,cpuacct:/a\n")
     assert available_processors(tmp_path / "groups", tmp_path / "cgroup") == limit
 

@@ -35,7 +35,7 @@ async def recorded(served: ServedSite, out: Path) -> None:
     await run_watch(f"http://127.0.0.1:{served.port}", 1, out, None, "p0", f"p{FRAMES}")
 
 
-async def size_of_it(served: ServedSite, folder: Path) -> int:
+async def stream_size(served: ServedSite, folder: Path) -> int:
     """Record it on a disk with room enough; give the bytes of its stream."""
     whole = await client.watch(
         f"http://127.0.0.1:{served.port}", 1, folder / "w.mp4", start="p0", end=f"p{FRAMES}"
@@ -72,7 +72,7 @@ async def test_a_disk_that_fills_up_keeps_only_complete_pictures(
     served: ServedSite, tmp_path: Path, part: float
 ) -> None:
     (tmp_path / "ample").mkdir()
-    size, out = await size_of_it(served, tmp_path / "ample"), tmp_path / "small" / "one.mp4"
+    size, out = await stream_size(served, tmp_path / "ample"), tmp_path / "small" / "one.mp4"
     out.parent.mkdir()
     with (
         files_of_at_most(round(part * size)),

@@ -40,7 +40,7 @@ Dialogue: 1,00:00:00.08,00:00:00.12,Name,,0,0,0,,{\\pos(1,0)}2
 """
 
 
-def written(film: Path, frames: list[Frame]) -> tuple[str, str]:
+def written_texts(film: Path, frames: list[Frame]) -> tuple[str, str]:
     write_sidecars(film, iter(frames), 5, 1, SITE)
     vtt, ass = (path.read_bytes().decode() for path in sidecars(film))
     return vtt, ass.partition("Effect, Text\n")[2]
@@ -48,12 +48,12 @@ def written(film: Path, frames: list[Frame]) -> tuple[str, str]:
 
 def test_the_sidecar_files_have_these_bytes(tmp_path: Path) -> None:
     frames = [Frame(7, "c0", (BOX, Box(2, 1.26, 2.0, 3.0, 4.0))), Frame(8, "c1", ())]
-    assert written(tmp_path / "one.mp4", frames) == (VTT, DRAWN)
+    assert written_texts(tmp_path / "one.mp4", frames) == (VTT, DRAWN)
     head = "\n".join(VTT.split("\n")[:3]) + "\n"
-    assert written(tmp_path / "none.mp4", []) == (head, "\n")
+    assert written_texts(tmp_path / "none.mp4", []) == (head, "\n")
 
 
-def peak(film: Path, frames: int) -> int:
+def peak_memory(film: Path, frames: int) -> int:
     """Return the bytes that writing takes at most."""
     all_frames: Iterator[Frame] = (Frame(pulse, "c0", (BOX,) * 5) for pulse in range(frames))
     tracemalloc.start()
@@ -66,8 +66,8 @@ def peak(film: Path, frames: int) -> int:
 
 def test_memory_does_not_grow_with_the_number_of_frames(tmp_path: Path) -> None:
     film = tmp_path / "one.mp4"
-    peak(film, 10)  # allocated only once
-    few, many = peak(film, 100), peak(film, 1000)
+    peak_memory(film, 10)  # allocated only once
+    few, many = peak_memory(film, 100), peak_memory(film, 1000)
     assert film.with_suffix(".ass").stat().st_size > 500_000
     assert many < few + 50_000
 
@@ -77,7 +77,7 @@ def gop_event(gop: int) -> Gop:
     return Gop(first=gop * GOP, frames=GOP, choices={1: "c0"}, boxes={"c0": boxes}, cuts=())
 
 
-def held(folder: Path, gops: int) -> int:
+def memory_in_use(folder: Path, gops: int) -> int:
     """Return the bytes of memory in use after some events."""
     spool = Spool(folder)
     history = ViewHistory(1, spool=spool)
@@ -96,7 +96,7 @@ def held(folder: Path, gops: int) -> int:
 
 def test_boxes_are_spooled_to_disk(tmp_path: Path) -> None:
     packed = GOP * 5 * 30  # bytes of a GOP's boxes, at least
-    assert held(tmp_path, 500) < 500 * packed / 2
+    assert memory_in_use(tmp_path, 500) < 500 * packed / 2
     assert not list(tmp_path.iterdir()), "the file is unnamed, so it ends with the process"
 
 

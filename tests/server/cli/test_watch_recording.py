@@ -32,12 +32,12 @@ FIRST = 2 * GOP  # of the watched stream
 @pytest.fixture
 async def served() -> AsyncIterator[ServedSite]:
     """Person 1, three GOPs in c0, then in c1; person 2 in c0."""
-    async for site_served in serve_site():
-        site_served.service.connect_cameras(*CAMERAS)
+    async for recorded_site in serve_site():
+        recorded_site.service.connect_cameras(*CAMERAS)
         for epoch in range(7):
             in_a, in_b = (LARGE, SMALL) if epoch < 3 else (SMALL, LARGE)
-            site_served.service.feed(epoch, {A: {1: in_a, 2: SMALL}, B: {1: in_b}})
-        yield site_served
+            recorded_site.service.feed(epoch, {A: {1: in_a, 2: SMALL}, B: {1: in_b}})
+        yield recorded_site
 
 
 async def watched(served: ServedSite, out: Path) -> client.WatchResult:
@@ -45,7 +45,7 @@ async def watched(served: ServedSite, out: Path) -> client.WatchResult:
     return await client.watch(url, 1, out, start=f"p{FIRST}", end="p28")
 
 
-def chosen(served: ServedSite) -> dict[int, str]:
+def chosen_cameras(served: ServedSite) -> dict[int, str]:
     return {
         pulse: choices.choices[1]
         for choices in served.service.recorder.recent.choices(0)
@@ -61,7 +61,7 @@ async def test_the_recording_begins_at_0_with_unchanged_pictures(served: ServedS
     shown = list(pictures(out))
     assert [place for place, _ in shown] == list(range(28 - FIRST))
     for place, picture in shown:
-        camera = chosen(served)[FIRST + place]
+        camera = chosen_cameras(served)[FIRST + place]
         np.testing.assert_array_equal(picture, own_pictures(camera)[FIRST + place])
     with av.open(str(out), "r") as film:
         assert film.streams.video[0].frames == 28 - FIRST, "counted in its table"
@@ -130,7 +130,7 @@ async def test_every_frame_has_its_boxes_in_the_sidecar(served: ServedSite, tmp_
         begin, end = (float(part.rpartition(":")[2]) for part in times.split(" --> "))
         assert (begin, end) == pytest.approx((place / FPS, (place + 1) / FPS))
         content = json.loads(text)
-        assert content["camera"] == chosen(served)[FIRST + place]
+        assert content["camera"] == chosen_cameras(served)[FIRST + place]
         boxes_by_number = {number: tuple(box) for number, *box in content["boxes"]}
         assert boxes_by_number == {1: LARGE, 2: SMALL} if content["camera"] == A else {1: LARGE}
 

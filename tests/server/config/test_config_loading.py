@@ -19,7 +19,7 @@ def site(**changes: Any) -> dict[str, Any]:
     return {"cameras": [{"id": "c0", "source": "c0.mp4"}, {"id": "c1", "source": "c1.mp4"}], **changes}
 
 
-def complaint(content: dict[str, Any], folder: Path = Path()) -> str:
+def error_of(content: dict[str, Any], folder: Path = Path()) -> str:
     with pytest.raises(UserError) as caught:
         build_config(content, where="site.yaml", folder=folder)
     text = str(caught.value)
@@ -29,20 +29,20 @@ def complaint(content: dict[str, Any], folder: Path = Path()) -> str:
 
 
 def test_an_unknown_key_is_refused_with_a_suggestion() -> None:
-    assert "cameras.0.sourc: unknown key; did you mean 'source'?" in complaint(
+    assert "cameras.0.sourc: unknown key; did you mean 'source'?" in error_of(
         {"cameras": [{"id": "c0", "source": "x", "sourc": "y"}]}
     )
-    assert "http.prt: unknown key; did you mean 'port'?" in complaint(site(http={"prt": 1}))
+    assert "http.prt: unknown key; did you mean 'port'?" in error_of(site(http={"prt": 1}))
 
 
 def test_an_unknown_key_in_nested_settings_is_refused() -> None:
-    assert "did you mean 'stride'?" in complaint(site(track={"window": {"strid": 5}}))
-    assert "unknown key" in complaint(site(detect={"median": {"no_such": 5}}))
+    assert "did you mean 'stride'?" in error_of(site(track={"window": {"strid": 5}}))
+    assert "unknown key" in error_of(site(detect={"median": {"no_such": 5}}))
 
 
 @pytest.mark.parametrize("detect", [{"prescan_every": 0}, {"prescan_frames": -1}])
 def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, Any]) -> None:
-    assert "detect: prescan_frames must be at least 0, and prescan_every at least 1" in complaint(
+    assert "detect: prescan_frames must be at least 0, and prescan_every at least 1" in error_of(
         site(detect=detect)
     )
 
@@ -59,27 +59,27 @@ def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, An
     ],
 )
 def test_counts_of_zero_are_refused(detect: dict[str, Any], reason: str) -> None:
-    assert reason in complaint(site(detect=detect))
+    assert reason in error_of(site(detect=detect))
 
 
 def test_duplicate_camera_ids_are_refused() -> None:
     cameras = [{"id": "c0", "source": "a"}, {"id": "c0", "source": "b"}]
-    assert "two cameras are called 'c0'" in complaint({"cameras": cameras})
+    assert "two cameras are called 'c0'" in error_of({"cameras": cameras})
 
 
 def test_homography_that_is_not_invertible_is_refused_with_its_camera() -> None:
     flat = [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [0.0, 0.0, 1.0]]
-    text = complaint({"cameras": [{"id": "door", "source": "a", "ground": flat}]})
+    text = error_of({"cameras": [{"id": "door", "source": "a", "ground": flat}]})
     assert "camera door" in text
     assert "not invertible" in text
 
 
 def test_homographies_of_a_ground_file_are_validated(tmp_path: Path) -> None:
     (tmp_path / "ground.json").write_text('{"homography": {"c0": [[1, 0], [0, 1]]}}')
-    assert "camera c0" in complaint(site(ground="ground.json"), tmp_path)
+    assert "camera c0" in error_of(site(ground="ground.json"), tmp_path)
     (tmp_path / "ground.json").write_text("not json")
-    assert "cannot read" in complaint(site(ground="ground.json"), tmp_path)
-    assert "No such file" in complaint(site(ground="absent.json"), tmp_path)
+    assert "cannot read" in error_of(site(ground="ground.json"), tmp_path)
+    assert "No such file" in error_of(site(ground="absent.json"), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -91,15 +91,15 @@ def test_a_misspelled_metric_unit_is_refused_with_a_suggestion(
 ) -> None:
     reason = f"{unit!r} is not understood; did you mean {suggestion!r}?"
     cameras = [{"id": "c0", "source": "a", "ground_unit": unit}]
-    assert f"cameras.0.ground_unit: {reason}" in complaint({"cameras": cameras})
+    assert f"cameras.0.ground_unit: {reason}" in error_of({"cameras": cameras})
     (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
-    assert f"unit: {reason}" in complaint(site(ground="ground.json"), tmp_path)
+    assert f"unit: {reason}" in error_of(site(ground="ground.json"), tmp_path)
 
 
 @pytest.mark.parametrize("unit", [1, "", ["m"]])
 def test_an_invalid_unit_is_refused(unit: Any, tmp_path: Path) -> None:
     (tmp_path / "ground.json").write_text(json.dumps({"unit": unit, "homography": {}}))
-    assert f"unit: {unit!r} is not a unit" in complaint(site(ground="ground.json"), tmp_path)
+    assert f"unit: {unit!r} is not a unit" in error_of(site(ground="ground.json"), tmp_path)
 
 
 @pytest.mark.parametrize("unit", ["m", "cm", "mm", "ft", "grid (of 358 x 360)", "person"])
@@ -118,14 +118,14 @@ def test_a_mirrored_homography_is_refused_with_its_camera() -> None:
         return {"cameras": [{"id": camera, "source": "a", "ground": of} for camera, of in grounds.items()]}
 
     build_config(cameras(grounds_by_camera), where="", folder=Path())
-    assert "ground: camera c9 has the floor mirrored against camera c0: " in complaint(
+    assert "ground: camera c9 has the floor mirrored against camera c0: " in error_of(
         cameras(grounds_by_camera | {"c9": past})
     )
 
 
 def test_the_lookahead_must_cover_the_stages_of_temporal_consistency() -> None:
     track = {"tracker": "temporal", "temporal": {"window_stages": 2, "stage_s": 0.4}}
-    wrong = complaint(site(view={"lookahead": 28}, track=track))
+    wrong = error_of(site(view={"lookahead": 28}, track=track))
     assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
     enough = build_config(site(view={"lookahead": 29}, track=track), where="", folder=Path())
     assert enough.track.lag(25.0) == 19
@@ -133,16 +133,16 @@ def test_the_lookahead_must_cover_the_stages_of_temporal_consistency() -> None:
 
 def test_too_many_stages_are_refused_before_their_frames_are_counted() -> None:
     track = {"tracker": "temporal", "temporal": {"stage_s": float("inf")}}
-    assert "track.temporal: window_stages must be 1 to 1000, and stage_s" in complaint(site(track=track))
+    assert "track.temporal: window_stages must be 1 to 1000, and stage_s" in error_of(site(track=track))
 
 
 def test_a_lookahead_below_the_trackers_lag_is_refused_with_the_minimum() -> None:
-    assert "must be at least 20" in complaint(site(view={"lookahead": 19}))
+    assert "must be at least 20" in error_of(site(view={"lookahead": 19}))
 
 
 def test_a_person_must_be_published_before_they_are_settled() -> None:
     identity = {"publish_after": 7, "clustering_interval": 4, "settle_after": 14}
-    assert "view.identity.settle_after: is 14 frames but must be at least 15" in complaint(
+    assert "view.identity.settle_after: is 14 frames but must be at least 15" in error_of(
         site(view={"identity": identity})
     )
     config = build_config(
@@ -163,11 +163,11 @@ def test_a_person_must_be_published_before_they_are_settled() -> None:
     ],
 )
 def test_values_out_of_range_are_refused(section: str, value: dict[str, Any]) -> None:
-    assert f"{section}.{next(iter(value))}" in complaint(site(**{section: value}))
+    assert f"{section}.{next(iter(value))}" in error_of(site(**{section: value}))
 
 
 def test_unknown_solver_is_refused_with_the_known_ones() -> None:
-    assert "columns" in complaint(site(track={"solver": "oracle"}))
+    assert "columns" in error_of(site(track={"solver": "oracle"}))
 
 
 def test_the_environment_overrides_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,7 +179,7 @@ def test_the_environment_overrides_the_file(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYVIEW_HTP__PORT", "9999")
-    assert "MYVIEW_HTP__PORT" in complaint(site())
+    assert "MYVIEW_HTP__PORT" in error_of(site())
 
 
 def test_a_list_from_the_environment_must_be_json(
@@ -188,7 +188,7 @@ def test_a_list_from_the_environment_must_be_json(
     monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", '["optimality_gap"]')
     assert build_config(site(), where="", folder=Path()).view.flags.reasons == ["optimality_gap"]
     monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", "optimality_gap")
-    assert "a list, or a whole section, must be JSON" in complaint(site())
+    assert "a list, or a whole section, must be JSON" in error_of(site())
 
 
 def test_paths_are_relative_to_the_configuration(tmp_path: Path) -> None:

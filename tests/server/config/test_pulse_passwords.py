@@ -90,7 +90,7 @@ async def test_the_pulse_server_admits_clients_with_a_password(tmp_path: Path) -
     serving = asyncio.create_task(sync_process(running))
     try:
         async with asyncio.timeout(PATIENCE):
-            await _pulses_come(running.now)
+            await _receive_pulses(running.now)
             sync = running.now.sync
             auditor = pulse_credentials(running.now, "auditor")
             assert await query_clients(sync.host, sync.port, PATIENCE, credentials=auditor) == ()
@@ -99,7 +99,7 @@ async def test_the_pulse_server_admits_clients_with_a_password(tmp_path: Path) -
         await asyncio.gather(serving, return_exceptions=True)
 
 
-async def _pulses_come(config: Config) -> None:
+async def _receive_pulses(config: Config) -> None:
     """Connect as all clients that the server waits for."""
     sync = config.sync
 

@@ -46,7 +46,7 @@ async def test_a_failing_step_is_logged_once_and_retried(caplog: pytest.LogCaptu
     assert caplog.messages[0].startswith("counting failed")
 
 
-async def runs_on(task: asyncio.Task[None], failing: Failing) -> bool:
+async def is_retried(task: asyncio.Task[None], failing: Failing) -> bool:
     """Return whether a failed step is retried."""
     await asyncio.wait([task, asyncio.create_task(failing.done.wait())], return_when="FIRST_COMPLETED")
     is_done = task.done()
@@ -61,7 +61,7 @@ async def test_lists_are_published_after_a_failed_step(monkeypatch: pytest.Monke
     events = Events(BestViewService(service))
     events._by_scope = {None: None}  # type: ignore[dict-item]
     monkeypatch.setattr(events, "_publish_changed", failing)
-    assert await runs_on(asyncio.create_task(events.run()), failing)
+    assert await is_retried(asyncio.create_task(events.run()), failing)
     service.close()
 
 
@@ -74,7 +74,7 @@ async def test_tokens_are_checked_after_a_failed_reload_and_expired_requests_end
     access = AccessControl(Authenticator(tokens, "hall"), lambda number: number)
     monkeypatch.setattr(access.authenticator.file, "reload_if_changed", failing)
     monkeypatch.setattr(access, "end_expired", over)
-    assert await runs_on(asyncio.create_task(access.run()), failing)
+    assert await is_retried(asyncio.create_task(access.run()), failing)
     assert over.times >= failing.times > 1
 
 
@@ -82,7 +82,7 @@ async def test_the_certificate_is_checked_after_a_failed_step(monkeypatch: pytes
     monkeypatch.setattr("server.http.tls._CHECK_EVERY_S", 0.001)
     certificate, failing = Certificate.__new__(Certificate), Failing(RuntimeError("not thought of"))
     monkeypatch.setattr(certificate, "reload_if_changed", failing)
-    assert await runs_on(asyncio.create_task(certificate.run()), failing)
+    assert await is_retried(asyncio.create_task(certificate.run()), failing)
 
 
 def test_a_half_done_renewal_is_loaded_when_it_is_complete(

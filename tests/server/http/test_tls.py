@@ -30,18 +30,20 @@ pytestmark = needs_openssl
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[TlsSettings, TlsSettings]:
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> tuple[TlsSettings, TlsSettings]:
     folder = tmp_path_factory.mktemp("certificates")
     return make_certificate(folder / "first", "first"), make_certificate(folder / "second", "second")
 
 
 @pytest.fixture
-def tls(made: tuple[TlsSettings, TlsSettings], tmp_path: Path) -> TlsSettings:
+def tls(certificates: tuple[TlsSettings, TlsSettings], tmp_path: Path) -> TlsSettings:
     """Return a certificate in files that the test may change."""
-    return copied(made[0], TlsSettings(certificate=tmp_path / "c.pem", key=tmp_path / "k.pem"))
+    return copy_certificate(
+        certificates[0], TlsSettings(certificate=tmp_path / "c.pem", key=tmp_path / "k.pem")
+    )
 
 
-def copied(source: TlsSettings, to: TlsSettings) -> TlsSettings:
+def copy_certificate(source: TlsSettings, to: TlsSettings) -> TlsSettings:
     for one, other in ((source.certificate, to.certificate), (source.key, to.key)):
         assert one is not None
         assert other is not None
@@ -49,21 +51,21 @@ def copied(source: TlsSettings, to: TlsSettings) -> TlsSettings:
     return to
 
 
-def trusting(tls: TlsSettings) -> ssl.SSLContext:
+def client_context(tls: TlsSettings) -> ssl.SSLContext:
     return ssl.create_default_context(cafile=str(tls.certificate))
 
 
 async def test_https_is_answered_and_plain_http_is_not(tls: TlsSettings, tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("desk"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
-    async with aclosing(serve_site(**settings)) as halls, aiohttp.ClientSession() as session:
-        port = (await anext(halls)).port
+    async with aclosing(serve_site(**settings)) as sites, aiohttp.ClientSession() as session:
+        port = (await anext(sites)).port
         url = f"https://127.0.0.1:{port}"
-        async with session.get(f"{url}/healthz", ssl=trusting(tls)) as answer:
+        async with session.get(f"{url}/healthz", ssl=client_context(tls)) as answer:
             assert answer.status == 200
         body = {"token": token_of("desk")}
         async with session.post(
-            f"{url}/api/session", json=body, headers={CSRF_HEADER: "1"}, ssl=trusting(tls)
+            f"{url}/api/session", json=body, headers={CSRF_HEADER: "1"}, ssl=client_context(tls)
         ) as answer:
             [cookie] = answer.cookies.values()
         assert cookie["secure"]
@@ -78,8 +80,8 @@ async def test_watch_trusts_the_authority_of_the_environment_and_sends_its_token
 ) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("family"))
     settings = {"http": {"tls": tls.model_dump()}, "access": {"tokens": str(tokens)}}
-    async with aclosing(serve_site(**settings)) as halls:
-        served = await anext(halls)
+    async with aclosing(serve_site(**settings)) as sites:
+        served = await anext(sites)
         served.service.connect_cameras(*CAMERAS)
         for epoch in range(3):
             served.service.feed(epoch, {A: {1: SMALL, 2: SMALL}, B: {}})
@@ -102,7 +104,7 @@ async def test_watch_trusts_the_authority_of_the_environment_and_sends_its_token
 async def is_proven(port: int, trusted: TlsSettings) -> bool:
     """Return whether a new connection is proven by a certificate."""
     try:
-        _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=trusting(trusted))
+        _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=client_context(trusted))
     except ssl.SSLCertVerificationError:
         return False
     writer.close()
@@ -110,7 +112,7 @@ async def is_proven(port: int, trusted: TlsSettings) -> bool:
 
 
 async def test_a_renewed_certificate_is_used_for_new_connections(
-    made: tuple[TlsSettings, TlsSettings], tls: TlsSettings, caplog: pytest.LogCaptureFixture
+    certificates: tuple[TlsSettings, TlsSettings], tls: TlsSettings, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "server.http.tls")
     certificate = Certificate.of(tls)
@@ -119,18 +121,18 @@ async def test_a_renewed_certificate_is_used_for_new_connections(
         lambda _, writer: writer.close(), "127.0.0.1", 0, ssl=certificate.context
     )
     port = server.sockets[0].getsockname()[1]
-    assert await is_proven(port, made[0])
+    assert await is_proven(port, certificates[0])
     assert tls.key is not None
-    assert made[1].key is not None
-    tls.key.write_bytes(made[1].key.read_bytes())
+    assert certificates[1].key is not None
+    tls.key.write_bytes(certificates[1].key.read_bytes())
     certificate.reload_if_changed()
     assert "stays in force" in caplog.messages[-1]
     assert "\n" not in caplog.messages[-1]
-    assert await is_proven(port, made[0]), "half of a pair is ignored"
-    copied(made[1], tls)
+    assert await is_proven(port, certificates[0]), "half of a pair is ignored"
+    copy_certificate(certificates[1], tls)
     certificate.reload_if_changed()
-    assert await is_proven(port, made[1])
-    assert not await is_proven(port, made[0])
+    assert await is_proven(port, certificates[1])
+    assert not await is_proven(port, certificates[0])
     count = len(caplog.messages)
     certificate.reload_if_changed()
     assert len(caplog.messages) == count
@@ -139,17 +141,17 @@ async def test_a_renewed_certificate_is_used_for_new_connections(
 
 
 def test_an_invalid_certificate_is_reported_in_one_line(
-    made: tuple[TlsSettings, TlsSettings], tmp_path: Path
+    certificates: tuple[TlsSettings, TlsSettings], tmp_path: Path
 ) -> None:
-    none = TlsSettings(certificate=tmp_path / "none.pem", key=made[0].key)
+    none = TlsSettings(certificate=tmp_path / "none.pem", key=certificates[0].key)
     bad = tmp_path / "bad.pem"
     bad.write_text("no certificate", encoding="utf-8")
     for settings in (
         none,
-        TlsSettings(certificate=bad, key=made[0].key),
-        TlsSettings(certificate=made[0].certificate, key=bad),
-        TlsSettings(certificate=made[0].certificate, key=made[1].key),
-        TlsSettings(certificate=tmp_path, key=made[0].key),
+        TlsSettings(certificate=bad, key=certificates[0].key),
+        TlsSettings(certificate=certificates[0].certificate, key=bad),
+        TlsSettings(certificate=certificates[0].certificate, key=certificates[1].key),
+        TlsSettings(certificate=tmp_path, key=certificates[0].key),
     ):
         with pytest.raises(UserError) as raised:
             Certificate.of(settings)
@@ -158,14 +160,14 @@ def test_an_invalid_certificate_is_reported_in_one_line(
 
 
 def test_a_key_with_a_password_is_refused_without_a_prompt(
-    made: tuple[TlsSettings, TlsSettings], tmp_path: Path
+    certificates: tuple[TlsSettings, TlsSettings], tmp_path: Path
 ) -> None:
     locked = tmp_path / "locked.pem"
     command = [
         "openssl",
         "ec",
         "-in",
-        str(made[0].key),
+        str(certificates[0].key),
         "-aes128",
         "-passout",
         "pass:hush",
@@ -174,7 +176,7 @@ def test_a_key_with_a_password_is_refused_without_a_prompt(
     ]
     subprocess.run(command, check=True, capture_output=True)
     with pytest.raises(UserError, match=r"http\.tls: .*: the key has a password; save it without one"):
-        Certificate.of(TlsSettings(certificate=made[0].certificate, key=locked))
+        Certificate.of(TlsSettings(certificate=certificates[0].certificate, key=locked))
 
 
 def test_one_file_without_the_other_is_refused() -> None:

@@ -76,7 +76,7 @@ class ReceivedTexts:
 
 
 @contextmanager
-def opened(*openings: Callable[[], Bus]) -> Iterator[list[Bus]]:
+def open_sessions(*openings: Callable[[], Bus]) -> Iterator[list[Bus]]:
     """Open sessions, and close them all."""
     with ExitStack() as stack:
         buses = []
@@ -96,7 +96,7 @@ def router(settings: ZenohSettings) -> Bus:
 
 async def test_a_camera_publishes_under_its_own_key_only(settings: ZenohSettings) -> None:
     received = ReceivedTexts()
-    with opened(
+    with open_sessions(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
     ) as (bestview, c0, c1):
         bestview.subscribe(SITE.camera("*", "video"), received)
@@ -114,7 +114,7 @@ async def test_a_camera_publishes_under_its_own_key_only(settings: ZenohSettings
 
 async def test_audio_is_published_by_the_audio_camera_only(settings: ZenohSettings) -> None:
     received = ReceivedTexts()
-    with opened(
+    with open_sessions(
         lambda: router(settings), lambda: Bus.client(settings, "c0"), lambda: Bus.client(settings, "c1")
     ) as (bestview, c0, c1):
         bestview.subscribe(SITE.sound, received)
@@ -140,7 +140,7 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         settings.model_copy(update={"tls": ProcessTlsSettings()}),
     ]
     received, received_by_other = ReceivedTexts(), ReceivedTexts()
-    with opened(
+    with open_sessions(
         lambda: router(settings),
         lambda: Bus.client(settings, "c1"),
         *(partial(Bus.client, stranger, "c0") for stranger in strangers),
@@ -153,7 +153,7 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
             client.declare_alive(SITE.camera("c0", "alive"))
         c1.declare_alive(SITE.camera("c1", "alive"))
         for number in range(10):  # time enough to be admitted
-            await received.until(f"c1/video {number}", partial(_all, [*them, c1], number))
+            await received.until(f"c1/video {number}", partial(_publish_from_all, [*them, c1], number))
         assert not [text for text in received.texts if text.startswith("c0")]
         assert alive == [SITE.camera("c1", "alive")]
         assert not [
@@ -164,7 +164,7 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
                 await asyncio.to_thread(Bus.listener, stranger, "c0")
 
 
-def _all(buses: Sequence[Bus], number: int) -> None:
+def _publish_from_all(buses: Sequence[Bus], number: int) -> None:
     *them, c1 = buses
     for client in them:
         client.publish(SITE.camera("c0", "video"), b"false")
@@ -176,7 +176,7 @@ async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
     settings: ZenohSettings, topic: str
 ) -> None:
     received, received_by_other = ReceivedTexts(), ReceivedTexts()
-    with opened(
+    with open_sessions(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.client(settings, "c1"),
@@ -195,19 +195,19 @@ async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
         await received.until(f"c0/{topic} there", all_of_it)
         await received_by_other.until(f"c1/{topic} here", all_of_it)
         for number in range(5):  # time enough for it to arrive
-            await received.until(f"c0/{topic} {number}", partial(_tell, bestview, c1, topic, number))
+            await received.until(f"c0/{topic} {number}", partial(_send_commands, bestview, c1, topic, number))
         assert f"c0/{topic} false" not in received.texts
         assert set(received_by_other.texts) - {f"c0/{topic} false"} == {f"c1/{topic} here"}, "except its own"
 
 
-def _tell(bestview: Bus, other: Bus, topic: str, number: int) -> None:
+def _send_commands(bestview: Bus, other: Bus, topic: str, number: int) -> None:
     other.publish(SITE.camera("c0", topic), b"false")
     bestview.publish(SITE.camera("c0", topic), str(number).encode())
 
 
 async def test_cameras_receive_peers_detections_but_not_their_video(settings: ZenohSettings) -> None:
     received = ReceivedTexts()
-    with opened(
+    with open_sessions(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.listener(settings, "c1"),
@@ -234,7 +234,7 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
 
 async def test_a_further_service_may_subscribe_and_publish_everything(settings: ZenohSettings) -> None:
     received, told_commands = ReceivedTexts(), ReceivedTexts()
-    with opened(
+    with open_sessions(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.further_service(settings, "bestview-1"),

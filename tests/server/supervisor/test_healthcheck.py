@@ -69,7 +69,7 @@ def serving(service: Service) -> Iterator[Service]:
 
 
 @pytest.fixture
-def plain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+def http_service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     service = Service()
     monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://127.0.0.1:{service.server_port}")
     yield from serving(service)
@@ -87,7 +87,7 @@ def secrets(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def secure(secrets: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+def https_service(secrets: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     service = Service(secrets)
     monkeypatch.setenv("MYVIEW_HEALTH_URL", f"https://127.0.0.1:{service.server_port}/")
     monkeypatch.setenv("MYVIEW_HEALTH_CERTIFICATE", str(secrets / "public" / "https.pem"))
@@ -101,13 +101,13 @@ async def test_the_pulse_server_is_healthy_while_it_sends_its_greeting(
 ) -> None:
     async with PulseServer(25.0, users=users) as server:
         monkeypatch.setenv("MYVIEW_SYNC__PORT", str(server.port))
-        assert await _apart("sync") == 0
+        assert await _run_check("sync") == 0
         assert server.refused == 0, "repeated health checks are not logged as strangers"
     monkeypatch.setenv("MYVIEW_SYNC__PORT", str(free_port()))
-    assert await _apart("sync") == 1
+    assert await _run_check("sync") == 1
 
 
-async def _apart(*arguments: str) -> int:
+async def _run_check(*arguments: str) -> int:
     """Check as the container engine does, in a separate process."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
@@ -121,7 +121,7 @@ async def _apart(*arguments: str) -> int:
 
 
 def test_a_camera_is_healthy_when_its_frames_arrive(
-    plain: Service, capsys: pytest.CaptureFixture[str]
+    http_service: Service, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["camera", "c0"]) == 0
     assert main(["bestview"]) == 0
@@ -130,12 +130,12 @@ def test_a_camera_is_healthy_when_its_frames_arrive(
         {"state": "gone", "message": "its source gives no pictures"},
         {"camera": "c1"},
     ):
-        plain.cameras = [{**LIVE, **state}]
+        http_service.cameras = [{**LIVE, **state}]
         assert main(["camera", "c0"]) == 1
         assert capsys.readouterr().out.count("\n") == 1
 
 
-@pytest.mark.usefixtures("plain")
+@pytest.mark.usefixtures("http_service")
 def test_no_proxy_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("http_proxy", f"http://127.0.0.1:{free_port()}")
     monkeypatch.delenv("no_proxy", raising=False)
@@ -151,13 +151,13 @@ def test_an_unknown_check_is_unhealthy(
         assert capsys.readouterr().out.count("\n") == 1
 
 
-def test_an_invalid_answer_is_unhealthy(plain: Service) -> None:
-    plain.cameras = [{"camera": "c0"}]
+def test_an_invalid_answer_is_unhealthy(http_service: Service) -> None:
+    http_service.cameras = [{"camera": "c0"}]
     assert main(["camera", "c0"]) == 1
 
 
 @needs_openssl
-@pytest.mark.usefixtures("secure")
+@pytest.mark.usefixtures("https_service")
 def test_https_checks_use_the_certificate_and_the_token(
     secrets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,14 +191,16 @@ def users(path: Path) -> dict[str, str]:
     return read_users(path, "users")
 
 
-def made(folder: Path, name: str, camera: str = "c0", **environment: str) -> subprocess.CompletedProcess[str]:
+def run_secrets_script(
+    folder: Path, name: str, camera: str = "c0", **environment: str
+) -> subprocess.CompletedProcess[str]:
     script = ["/bin/sh", str(ROOT / "configs" / "secrets.sh"), name, camera]
     surroundings = {**os.environ, "MYVIEW_SECRETS": str(folder), **environment}
     return subprocess.run(script, env=surroundings, capture_output=True, text=True, check=False)
 
 
 def test_without_openssl_no_secrets_are_generated(tmp_path: Path) -> None:
-    result = made(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
+    result = run_secrets_script(tmp_path / "secrets", "cameras.example", PATH=str(tmp_path))
     assert (result.returncode, result.stderr) == (1, "secrets.sh: needs openssl, which is not there\n")
     assert not (tmp_path / "secrets").exists()
 
@@ -206,7 +208,7 @@ def test_without_openssl_no_secrets_are_generated(tmp_path: Path) -> None:
 @needs_openssl
 @pytest.mark.parametrize("camera", ["c 0", "../x", "bestview", "bestview-1", "a: b", ""])
 def test_an_invalid_camera_name_is_refused_before_anything_is_generated(tmp_path: Path, camera: str) -> None:
-    result = made(tmp_path / "secrets", "cameras.example", camera)
+    result = run_secrets_script(tmp_path / "secrets", "cameras.example", camera)
     assert result.returncode == 2
     assert "cannot be a camera's name" in result.stderr
     assert not (tmp_path / "secrets").exists()
@@ -214,10 +216,10 @@ def test_an_invalid_camera_name_is_refused_before_anything_is_generated(tmp_path
 
 @needs_openssl
 def test_a_host_name_too_long_for_a_certificate_is_refused(tmp_path: Path) -> None:
-    result = made(tmp_path, f"{'a' * 63}.example")
+    result = run_secrets_script(tmp_path, f"{'a' * 63}.example")
     assert result.returncode == 1
     assert "too long" in result.stderr
-    assert made(tmp_path, "cameras.example").returncode == 0
+    assert run_secrets_script(tmp_path, "cameras.example").returncode == 0
     assert not [path.name for path in tmp_path.iterdir() if path.name in {"log", "names", "request"}]
 
 
@@ -231,7 +233,7 @@ def test_a_host_name_too_long_for_a_certificate_is_refused(tmp_path: Path) -> No
     ],
 )
 def test_a_certificate_is_for_the_name_or_the_address(tmp_path: Path, name: str, also: str) -> None:
-    assert made(tmp_path, name).returncode == 0
+    assert run_secrets_script(tmp_path, name).returncode == 0
     arguments = [
         "openssl",
         "x509",
@@ -267,6 +269,6 @@ def test_a_site_without_pulse_passwords_gets_them(secrets: Path, tmp_path: Path)
     for name in ("pulses", "web/pulses", "cameras/c0/pulses"):
         (folder / name).unlink()
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert made(folder, "cameras.example").returncode == 0
+    assert run_secrets_script(folder, "cameras.example").returncode == 0
     assert all(path.read_bytes() == content for path, content in before.items())
     assert set(users(folder / "pulses")) == {"bestview", "c0"}

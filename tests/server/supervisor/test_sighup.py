@@ -20,17 +20,17 @@ from server.supervisor.sighup import record_early_sighups, sighups
 
 
 @pytest.fixture(autouse=True)
-def _nothing_ends_by_it() -> Iterator[None]:
+def _ignore_sighup() -> Iterator[None]:
     before = signal.signal(signal.SIGHUP, lambda *_: None)
     yield
     signal.signal(signal.SIGHUP, before)
 
 
-def hang_up() -> None:
+def send_sighup() -> None:
     os.kill(os.getpid(), signal.SIGHUP)
 
 
-async def turn() -> None:
+async def wait_for_sighup() -> None:
     """Wait for SIGHUP."""
     waiting = sighups()
     async with asyncio.timeout(PATIENCE):
@@ -54,8 +54,8 @@ def test_a_sighup_between_reading_and_running_is_not_lost(
     reloaded: list[str] = []
 
     def run(_: Callable[[], Coroutine[Any, Any, None]], **__: float) -> None:
-        hang_up()
-        asyncio.run(turn())
+        send_sighup()
+        asyncio.run(wait_for_sighup())
         reloaded.append("to read it again")
 
     monkeypatch.setattr(site_commands, "run_process", run)
@@ -66,14 +66,14 @@ def test_a_sighup_between_reading_and_running_is_not_lost(
 
 async def test_early_sighups_count_as_one_and_later_ones_separately() -> None:
     record_early_sighups()
-    hang_up()
-    hang_up()
+    send_sighup()
+    send_sighup()
     waiting = sighups()
     async with asyncio.timeout(PATIENCE):
         await anext(waiting)
         second_wait = asyncio.ensure_future(anext(waiting))
         await asyncio.sleep(0)
         assert not second_wait.done(), "the early ones were one"
-        hang_up()
+        send_sighup()
         await second_wait
     await waiting.aclose()

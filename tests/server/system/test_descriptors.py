@@ -25,7 +25,7 @@ from server.system.descriptors import descriptor_limit, raise_descriptor_limit
 
 
 @pytest.fixture
-def low() -> Iterator[int]:
+def low_limit() -> Iterator[int]:
     """Lower this process's soft limit; give the hard one."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (512, hard))
@@ -33,17 +33,19 @@ def low() -> Iterator[int]:
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-def test_the_soft_limit_is_raised_to_the_hard_one(low: int) -> None:
+def test_the_soft_limit_is_raised_to_the_hard_one(low_limit: int) -> None:
     assert descriptor_limit() == 512
     raise_descriptor_limit()
-    assert descriptor_limit() == min(low, 1 << 20) > 512
+    assert descriptor_limit() == min(low_limit, 1 << 20) > 512
 
 
-def test_every_command_raises_the_limit_for_itself_and_its_children(low: int, myview: RunCommand) -> None:
+def test_every_command_raises_the_limit_for_itself_and_its_children(
+    low_limit: int, myview: RunCommand
+) -> None:
     assert myview("--version").code == 0
     child = [sys.executable, "-c", "import resource; print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])"]
     shown = subprocess.run(child, check=True, capture_output=True, text=True)
-    assert int(shown.stdout) == descriptor_limit() == min(low, 1 << 20)
+    assert int(shown.stdout) == descriptor_limit() == min(low_limit, 1 << 20)
 
 
 @pytest.mark.parametrize("descriptors", [256, 512, 1024, 4096, 1 << 20])

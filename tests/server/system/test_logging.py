@@ -122,7 +122,7 @@ def site(folder: Path, **changes: Any) -> Path:
     return path
 
 
-def started(*arguments: object) -> subprocess.Popen[str]:
+def run_with_json_log(*arguments: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "server.cli.main", *map(str, arguments)]
     environment = {**os.environ, "MYVIEW_LOG_FORMAT": "json", "MYVIEW_LOG": "DEBUG"}
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
@@ -130,7 +130,7 @@ def started(*arguments: object) -> subprocess.Popen[str]:
 
 @pytest.mark.slow
 def test_every_line_of_a_whole_site_can_be_parsed(tmp_path: Path) -> None:
-    with started("up", site(tmp_path)) as up:
+    with run_with_json_log("up", site(tmp_path)) as up:
         assert up.stderr is not None
         lines = []
         for written in up.stderr:
@@ -144,7 +144,7 @@ def test_every_line_of_a_whole_site_can_be_parsed(tmp_path: Path) -> None:
 
 
 def test_the_reason_why_a_process_does_not_start_is_logged(tmp_path: Path) -> None:
-    with started("camera", site(tmp_path), "c9") as refused:
+    with run_with_json_log("camera", site(tmp_path), "c9") as refused:
         _, written = refused.communicate(timeout=PATIENCE)
         assert refused.returncode == 2
     logged = json.loads(written)

@@ -26,7 +26,7 @@ def niceness(pid: int) -> int:
     return os.getpriority(os.PRIO_PROCESS, pid)
 
 
-def nicer_by(*steps: int) -> int:
+def niceness_after(*steps: int) -> int:
     """Return the niceness of a process after some calls."""
     calls = "; ".join(f"lower_own_priority({by})" for by in steps)
     script = f"import os; from server.system.niceness import lower_own_priority; {calls}; print(os.nice(0))"
@@ -35,11 +35,11 @@ def nicer_by(*steps: int) -> int:
 
 @pytest.mark.parametrize(("steps", "by"), [((4,), 4), ((4, 4), 4), ((4, 2), 4), ((0,), 0)])
 def test_a_process_is_nicer_than_its_parent_after_repeated_calls(steps: tuple[int, ...], by: int) -> None:
-    assert nicer_by(*steps) == BEFORE + by
+    assert niceness_after(*steps) == BEFORE + by
 
 
 def test_the_niceness_is_at_most_the_systems_maximum() -> None:
-    assert nicer_by(19) == 19
+    assert niceness_after(19) == 19
 
 
 def test_a_process_that_has_exited_is_ignored() -> None:

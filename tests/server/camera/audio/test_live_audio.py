@@ -79,18 +79,18 @@ def test_the_audio_of_a_camera_is_received_with_its_video(camera: str) -> None:
         frames += sound.at(100 + int((time.monotonic() - begin) * FPS))
     assert source.take(0) is not None
     source.close()
-    assert len(moments(frames)) >= 1
+    assert len(beep_times(frames)) >= 1
     assert [frame.number for frame in frames] == sorted({frame.number for frame in frames})
 
 
-def moments(frames: list[EncodedAudioFrame], form: AudioFormat = FORM) -> list[float]:
+def beep_times(frames: list[EncodedAudioFrame], form: AudioFormat = FORM) -> list[float]:
     """Return when beeps begin, seconds after pulse 0."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, form.silence) for number in range(max(found) + 1)]
     return beeps(audio_init_segment(form) + audio_fragment(form, data, 0))
 
 
-def handed_over(path: Path, sound: LiveAudioSource, first: int) -> list[EncodedAudioFrame]:
+def pass_to_source(path: Path, sound: LiveAudioSource, first: int) -> list[EncodedAudioFrame]:
     """Hand over a recording as a camera would whose pulse numbers are ``first`` ahead of its clock's."""
     frames: list[EncodedAudioFrame] = []
     with av.open(str(path)) as container:
@@ -117,7 +117,7 @@ def test_audio_is_in_sync_with_video_also_after_a_restart_of_the_camera(
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
     settings = SoundSettings(source="c0", codec=codec)
     sound = LiveAudioSource(settings, FPS)
-    one, two = handed_over(path, sound, 50), handed_over(path, sound, 50 + 2 * FRAMES)
+    one, two = pass_to_source(path, sound, 50), pass_to_source(path, sound, 50 + 2 * FRAMES)
     numbers = [frame.number for frame in one + two]
     assert numbers == sorted(set(numbers)), "each once, in order"
     assert len(two) > 0.9 * len(one)
@@ -126,7 +126,7 @@ def test_audio_is_in_sync_with_video_also_after_a_restart_of_the_camera(
         (start + number) / FPS for start in starts for number in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)
     ]
     assert settings.format is not None
-    assert moments(one + two, settings.format) == pytest.approx(expected, abs=0.04)
+    assert beep_times(one + two, settings.format) == pytest.approx(expected, abs=0.04)
 
 
 @pytest.mark.parametrize(("rate", "channels"), [(48_000, 1), (44_100, 2), (32_000, 1)])
@@ -143,10 +143,10 @@ def test_audio_continues_when_its_format_changes(tmp_path: Path, rate: int, chan
                 sound.picture(Fraction(packet.pts * packet.time_base))
                 frames += sound.at(round(packet.pts * packet.time_base * FPS))
                 sound.packet(packet)
-    assert len(moments(frames)) == 2 * len(range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL))
+    assert len(beep_times(frames)) == 2 * len(range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL))
 
 
-def shifted(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:
+def shift_packet(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:
     assert packet.pts is not None
     packet.pts += round(seconds / packet.time_base)
     packet.dts = packet.pts
@@ -172,9 +172,9 @@ def test_audio_continues_after_a_time_step_and_after_a_reconnect(
                 is_sound = packet.stream.type == "audio"
                 old = not run and time < step + (lag if is_sound else 0.0)
                 if is_sound:
-                    sound.packet(shifted(packet, wrap if old else 0))
+                    sound.packet(shift_packet(packet, wrap if old else 0))
                 else:
-                    sound.picture(Fraction(shifted(packet, wrap if old else 0).pts * packet.time_base))
+                    sound.picture(Fraction(shift_packet(packet, wrap if old else 0).pts * packet.time_base))
                     frames += sound.at(round(time * FPS) + run * 2 * FRAMES)
     numbers = [frame.number for frame in frames]
     assert numbers == sorted(set(numbers)), "each once, in order"

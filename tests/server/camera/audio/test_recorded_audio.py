@@ -38,7 +38,7 @@ STEREO = SoundSettings(source="here")
 FORM = AudioFormat(48_000, 2)
 
 
-def all_until(sound: RecordedAudioSource, pulse: int, first: int = 0) -> list[EncodedAudioFrame]:
+def frames_until(sound: RecordedAudioSource, pulse: int, first: int = 0) -> list[EncodedAudioFrame]:
     return [frame for number in range(first, pulse + 1) for frame in sound.until(number)]
 
 
@@ -49,7 +49,7 @@ def as_adts(frames: list[EncodedAudioFrame], form: AudioFormat) -> bytes:
     return b"".join(form.adts(len(frame)) + frame for frame in data)
 
 
-def numbers_grow(frames: list[EncodedAudioFrame]) -> bool:
+def are_numbers_rising(frames: list[EncodedAudioFrame]) -> bool:
     return all(a.number < b.number for a, b in pairwise(frames))
 
 
@@ -62,7 +62,7 @@ def test_compatible_audio_is_passed_through_byte_for_byte(tmp_path: Path) -> Non
             for packet in container.demux(audio=0)
             if packet.size and packet.pts is not None and packet.pts >= 0
         ]
-    frames = all_until(sound, FRAMES + 10)
+    frames = frames_until(sound, FRAMES + 10)
     assert isinstance(sound._framer, AudioPassthrough)
     assert [frame.data for frame in frames] == own
     assert [frame.number for frame in frames] == list(range(len(own)))
@@ -86,9 +86,9 @@ def test_beeps_are_where_the_pictures_are(
         tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, pictures=name != "plain.wav"
     )
     sound = RecordedAudioSource(str(path), STEREO, FPS, offset, "stop")
-    frames = all_until(sound, FRAMES + 10)
+    frames = frames_until(sound, FRAMES + 10)
     assert isinstance(sound._framer, AudioPassthrough if name == "same.mp4" else AudioEncoder)
-    assert numbers_grow(frames)
+    assert are_numbers_rising(frames)
     form = STEREO.format
     assert form is not None
     expected = [(number + offset) / FPS for number in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)]
@@ -98,8 +98,8 @@ def test_beeps_are_where_the_pictures_are(
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
 def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "loop.mkv", FRAMES, codec=codec)
-    frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), 4 * FRAMES)
-    assert numbers_grow(frames)
+    frames = frames_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), 4 * FRAMES)
+    assert are_numbers_rising(frames)
     assert sum(1 for _ in consecutive_runs(frames)) <= 5, "whole but for the places where it begins again"
     form = STEREO.format
     assert form is not None
@@ -117,14 +117,14 @@ def test_a_recording_with_no_sound_beside_its_pictures_is_silent_and_is_not_read
     path = write_flashes(tmp_path / "loop.mkv", FRAMES)
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "loop")
     sound._start -= 60  # as where the sound begins a minute after the pictures
-    assert all_until(sound, 2 * FRAMES) == []
+    assert frames_until(sound, 2 * FRAMES) == []
 
 
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
 def test_a_late_start_gives_the_same_audio_frames(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "late.mkv", FRAMES, codec=codec)
     late = 10 * FRAMES
-    frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
+    frames = frames_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
     form = STEREO.format
     assert form is not None
     assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not all that was"
@@ -145,7 +145,7 @@ def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
     with av.open(str(covered)) as container:
         assert container.streams.video
     sources = [RecordedAudioSource(str(recording), STEREO, FPS, 0, "loop") for recording in (path, covered)]
-    plain, other = (beeps(as_adts(all_until(source, 2 * FRAMES), FORM), "aac") for source in sources)
+    plain, other = (beeps(as_adts(frames_until(source, 2 * FRAMES), FORM), "aac") for source in sources)
     assert len(plain) > 2
     assert other == pytest.approx(plain, abs=0.03)
 
@@ -173,7 +173,7 @@ def test_audio_that_cannot_be_converted_is_silent_and_logged_once(
         file.setsampwidth(2)
         file.setframerate(48_000)
         file.writeframes(bytes(2 * 9 * 48_000))
-    frames = all_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "stop"), FPS)
+    frames = frames_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "stop"), FPS)
     assert beeps(as_adts(frames, FORM), "aac") == []
     (line,) = caplog.messages
     assert line.startswith("audio of 9 channels at 48000 Hz cannot be converted: ")
@@ -187,7 +187,7 @@ def test_sound_is_in_step_with_pictures_of_another_rate_than_the_site_s(
     path = write_flashes(tmp_path / "own.mkv", FRAMES)
     passes = 2 if at_end == "loop" else 1
     sound = RecordedAudioSource(str(path), STEREO, fps, 0, at_end)
-    frames = all_until(sound, round(passes * FRAMES / FPS * fps))
+    frames = frames_until(sound, round(passes * FRAMES / FPS * fps))
     expected = [
         (m * FRAMES + n) / FPS for m in range(passes) for n in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)
     ]

@@ -47,12 +47,12 @@ def corners() -> Picture:
     return picture
 
 
-def turned(picture: Picture, turn: int, *, flip: bool) -> Picture:
+def turn_picture(picture: Picture, turn: int, *, flip: bool) -> Picture:
     rotated = np.rot90(picture, turn // 90)
     return rotated[:, ::-1] if flip else rotated
 
 
-def same(shown: Picture | None, expected: Picture) -> bool:
+def is_same(shown: Picture | None, expected: Picture) -> bool:
     return (
         shown is not None
         and shown.shape == expected.shape
@@ -60,7 +60,9 @@ def same(shown: Picture | None, expected: Picture) -> bool:
     )
 
 
-def film(path: Path, turn: int = 0, *, flip: bool = False, frames: int = 20, aspect: str = "1:1") -> Path:
+def write_film(
+    path: Path, turn: int = 0, *, flip: bool = False, frames: int = 20, aspect: str = "1:1"
+) -> Path:
     def prepare(stream: VideoStream) -> None:
         if turn or flip:
             stream.set_display_rotation(turn, hflip=flip)
@@ -75,23 +77,23 @@ def film(path: Path, turn: int = 0, *, flip: bool = False, frames: int = 20, asp
 def test_the_display_matrix_is_applied_to_a_recording(
     tmp_path: Path, suffix: str, turn: int, flip: bool
 ) -> None:
-    path = film(tmp_path / f"phone.{suffix}", turn, flip=flip, frames=3)
-    expected = turned(corners(), turn, flip=flip)
+    path = write_film(tmp_path / f"phone.{suffix}", turn, flip=flip, frames=3)
+    expected = turn_picture(corners(), turn, flip=flip)
     recording = Recording(str(path))
     assert recording.size == (expected.shape[1], expected.shape[0]) == read_video_info(path).size
-    assert same(recording.take(0), expected)
-    assert all(same(image, expected) for image in recording.ahead(range(3)))
+    assert is_same(recording.take(0), expected)
+    assert all(is_same(image, expected) for image in recording.ahead(range(3)))
     recording.close()
 
 
 def test_a_site_is_as_high_as_its_upright_first_view(tmp_path: Path) -> None:
-    site = config_for_videos([film(tmp_path / "phone.mp4", 90, frames=2)]).site
+    site = config_for_videos([write_film(tmp_path / "phone.mp4", 90, frames=2)]).site
     assert (site.width, site.height) == (HIGH, WIDE)
 
 
 def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myview: RunCommand) -> None:
     """The detections are as a program has found them that turns pictures, too."""
-    video = film(tmp_path / "phone.mp4", 90, frames=30)
+    video = write_film(tmp_path / "phone.mp4", 90, frames=30)
     write_rows(tmp_path / "det.txt", [MotRow(n + 1, -1, 20.0, 30.0 + n, 20.0, 30.0, 1.0) for n in range(30)])
     result = myview("track", video, "--det", tmp_path / "det.txt", "--out", tmp_path / "tracks.txt")
     assert result.code == 0, result.err
@@ -102,11 +104,11 @@ def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myv
 
 @pytest.mark.parametrize("aspect", ["2:1", "3:4"])
 def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> None:
-    path = film(tmp_path / "dv.mp4", frames=2, aspect=aspect)
+    path = write_film(tmp_path / "dv.mp4", frames=2, aspect=aspect)
     width = round(WIDE * Fraction(aspect.replace(":", "/")))
     recording = Recording(str(path))
     assert recording.size == (width, HIGH) == read_video_info(path).size
-    assert same(recording.take(0), cv2.resize(corners(), (width, HIGH)))
+    assert is_same(recording.take(0), cv2.resize(corners(), (width, HIGH)))
     recording.close()
 
 
@@ -119,21 +121,21 @@ def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> 
     ],
 )
 def test_rotated_or_stretched_video_is_not_passed_through(
-    tmp_path: Path, served: str, turn: int, aspect: str, reason: str
+    tmp_path: Path, folder_url: str, turn: int, aspect: str, reason: str
 ) -> None:
-    path = film(tmp_path / "own.mkv", turn, aspect=aspect, frames=40)
+    path = write_film(tmp_path / "own.mkv", turn, aspect=aspect, frames=40)
     with pytest.raises(IncompatibleStreamError, match=reason):
         PassthroughRecording(str(path), 0, "stop", SITE)
     with pytest.raises(IncompatibleStreamError, match=reason):
-        PassthroughStream(f"{served}/own.mkv", {}, None, SITE)
+        PassthroughStream(f"{folder_url}/own.mkv", {}, None, SITE)
 
 
 def test_upright_video_is_passed_through(tmp_path: Path) -> None:
-    PassthroughRecording(str(film(tmp_path / "own.mp4")), 0, "stop", SITE).close()
+    PassthroughRecording(str(write_film(tmp_path / "own.mp4")), 0, "stop", SITE).close()
 
 
 @pytest.fixture
-def served(tmp_path: Path) -> Iterator[str]:
+def folder_url(tmp_path: Path) -> Iterator[str]:
     """Serve the test's folder over HTTP; gives the address."""
 
     class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -150,13 +152,15 @@ def served(tmp_path: Path) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("turn", [90, 180])
-def test_a_stream_is_shown_upright_from_its_first_picture_on(tmp_path: Path, served: str, turn: int) -> None:
-    film(tmp_path / "camera.mkv", turn)
-    expected = turned(corners(), turn, flip=False)
-    source = LiveStream(f"{served}/camera.mkv", {})
+def test_a_stream_is_shown_upright_from_its_first_picture_on(
+    tmp_path: Path, folder_url: str, turn: int
+) -> None:
+    write_film(tmp_path / "camera.mkv", turn)
+    expected = turn_picture(corners(), turn, flip=False)
+    source = LiveStream(f"{folder_url}/camera.mkv", {})
     try:
         assert source.size == (expected.shape[1], expected.shape[0])
-        assert same(source.take(0), expected)
+        assert is_same(source.take(0), expected)
     finally:
         source.close()
 
@@ -233,10 +237,10 @@ def test_the_exif_orientation_of_an_image_is_applied(tmp_path: Path, suffix: str
     exif = Pillow.Exif()
     exif[274] = orientation
     Pillow.fromarray(corners()).save(tmp_path / f"0.{suffix}", exif=exif)
-    expected = turned(corners(), {1: 0, 3: 180, 6: 270, 8: 90}[orientation], flip=False)
+    expected = turn_picture(corners(), {1: 0, 3: 180, 6: 270, 8: 90}[orientation], flip=False)
     folder = ImageFolder(str(tmp_path), 0, "stop")
     assert folder.size == (expected.shape[1], expected.shape[0])
-    assert same(folder.take(0), expected)
+    assert is_same(folder.take(0), expected)
     assert read_video_info(tmp_path).size == folder.size
 
 
@@ -252,7 +256,7 @@ def test_images_of_any_depth_and_kind_are_pictures(tmp_path: Path) -> None:
     Pillow.fromarray(grey).convert("P").save(tmp_path / "palette.png")
     folder = ImageFolder(str(tmp_path), 0, "stop")
     for number in range(4):
-        assert same(folder.take(number), np.dstack([grey, grey, grey]))
+        assert is_same(folder.take(number), np.dstack([grey, grey, grey]))
 
 
 def test_images_of_several_sizes_are_letterboxed_and_logged(

@@ -103,7 +103,7 @@ def test_pictures_without_times_are_counted_also_where_some_cannot_be_decoded(
         assert [frames[n] for n in (2, 5, 22, 23)] == [2, 5, 22, 23]
 
 
-def lost(path: Path, frames: range, into: Path) -> Path:
+def write_without_frames(path: Path, frames: range, into: Path) -> Path:
     """Write an MPEG transport stream without the packets of some frames, as a bad network loses them."""
     with av.open(str(path)) as container:
         places = [packet.pos or 0 for packet in container.demux(video=0) if packet.size]
@@ -116,7 +116,7 @@ def test_missing_frames_do_not_shift_later_ones_and_are_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     whole = write_video(tmp_path / "whole.ts", 25)
-    frames = shown(lost(whole, range(10, 12), tmp_path / "lossy.ts"))
+    frames = shown(write_without_frames(whole, range(10, 12), tmp_path / "lossy.ts"))
     assert len(frames) == 25
     assert frames[:10] == list(range(10))
     assert frames[20:] == list(range(20, 25)), "the next key picture is where it was"

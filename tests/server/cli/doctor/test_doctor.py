@@ -37,17 +37,17 @@ from server.cli.doctor.ports import port_findings
 from server.cli.doctor.stream_probe import StreamStats
 
 
-class Said(NamedTuple):
+class Reported(NamedTuple):
     level: Level
     text: str
 
 
-def of(findings: list[Finding], check: str) -> list[Said]:
-    return [Said(finding.level, finding.text) for finding in findings if finding.check == check]
+def findings_of(findings: list[Finding], check: str) -> list[Reported]:
+    return [Reported(finding.level, finding.text) for finding in findings if finding.check == check]
 
 
-def only(findings: list[Finding], check: str) -> Said:
-    (reported,) = of(findings, check)
+def finding_of(findings: list[Finding], check: str) -> Reported:
+    (reported,) = findings_of(findings, check)
     return reported
 
 
@@ -70,8 +70,8 @@ def test_a_working_site_is_ok_and_nothing_is_left_behind(myview: RunCommand, tmp
 async def test_an_unknown_scene_is_reported_by_its_camera_only(tmp_path: Path) -> None:
     site_config = load_site(tmp_path, cameras=[{"id": "c0", "source": "scene:nowhere"}])
     found = [finding async for finding in run_checks(site_config, 1.0)]
-    assert only(found, "camera c0").level is Level.BAD
-    assert "there is no scene 'nowhere'" in only(found, "camera c0").text
+    assert finding_of(found, "camera c0").level is Level.BAD
+    assert "there is no scene 'nowhere'" in finding_of(found, "camera c0").text
     assert {finding.check for finding in found if finding.level is Level.BAD} == {"camera c0"}
 
 
@@ -106,14 +106,14 @@ def used_port() -> Iterator[int]:
 async def test_a_port_used_by_another_program_is_bad(tmp_path: Path, used_port: int) -> None:
     found, runs = await port_findings(load_site(tmp_path, sync={"port": used_port}))
     assert not runs
-    assert only(found, "sync.port") == (Level.BAD, f"127.0.0.1:{used_port} is used by another program")
-    assert {only(found, check).level for check in ("http.port", "zenoh.listen")} == {Level.OK}
+    assert finding_of(found, "sync.port") == (Level.BAD, f"127.0.0.1:{used_port} is used by another program")
+    assert {finding_of(found, check).level for check in ("http.port", "zenoh.listen")} == {Level.OK}
 
 
 async def test_an_address_of_another_machine_is_bad(tmp_path: Path) -> None:
     found, _ = await port_findings(load_site(tmp_path, sync={"bind": "192.0.2.7", "port": 7}))
-    assert only(found, "sync.port").level is Level.BAD
-    assert "192.0.2.7:7" in only(found, "sync.port").text
+    assert finding_of(found, "sync.port").level is Level.BAD
+    assert "192.0.2.7:7" in finding_of(found, "sync.port").text
 
 
 async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path, used_port: int) -> None:
@@ -125,18 +125,18 @@ async def test_ports_used_by_this_site_are_ok(served: ServedSite, tmp_path: Path
     }
     found, runs = await port_findings(load_site(tmp_path, **changes))
     assert runs
-    assert only(found, "http.port").text.endswith("by this site, which is running")
-    assert only(found, "zenoh.listen").level is Level.OK
+    assert finding_of(found, "http.port").text.endswith("by this site, which is running")
+    assert finding_of(found, "zenoh.listen").level is Level.OK
     found, runs = await port_findings(load_site(tmp_path, **changes, site={"name": "another", **SIZE}))
-    assert (runs, only(found, "http.port").level) == (False, Level.BAD)
-    assert only(found, "zenoh.listen").level is Level.BAD
+    assert (runs, finding_of(found, "http.port").level) == (False, Level.BAD)
+    assert finding_of(found, "zenoh.listen").level is Level.BAD
 
 
 async def test_the_clock_of_a_running_pulse_server_is_compared(tmp_path: Path) -> None:
     site_config = load_site(tmp_path)
-    assert "is not running" in only(await clock_findings(site_config), "pulse server").text
+    assert "is not running" in finding_of(await clock_findings(site_config), "pulse server").text
     async with PulseServer(FPS, port=site_config.sync.port):
-        found = only(await clock_findings(site_config), "pulse server")
+        found = finding_of(await clock_findings(site_config), "pulse server")
     assert found.level is Level.OK
     assert "ms off this machine's" in found.text
 
@@ -153,12 +153,12 @@ async def test_a_pulse_server_that_accepts_a_password_of_this_site_is_its_own(
         PulseClient("127.0.0.1", server.port, "bestview", credentials=credentials) as service,
     ):
         await anext(aiter(service))
-        assert "ms off this machine's" in only(await clock_findings(site_config), "pulse server").text
+        assert "ms off this machine's" in finding_of(await clock_findings(site_config), "pulse server").text
         found, _ = await port_findings(site_config)
-        assert only(found, "sync.port").level is Level.OK
+        assert finding_of(found, "sync.port").level is Level.OK
         (tmp_path / "users").write_text(f"c0:{'2' * 32}\n")
         found, _ = await port_findings(site_config)
-        assert only(found, "sync.port").level is Level.BAD
+        assert finding_of(found, "sync.port").level is Level.BAD
         assert server.clients()[0].name == "bestview", "the query takes no camera's place"
 
 
@@ -176,7 +176,7 @@ async def test_a_server_of_another_protocol_is_not_a_pulse_server(
         left.set()
 
     async with await asyncio.start_server(endless, "127.0.0.1", site_config.sync.port):
-        assert "is not running" in only(await clock_findings(site_config), "pulse server").text
+        assert "is not running" in finding_of(await clock_findings(site_config), "pulse server").text
         async with asyncio.timeout(PATIENCE):
             await left.wait()
 
@@ -191,7 +191,7 @@ def test_a_network_camera_is_measured_against_the_site(tmp_path: Path) -> None:
         found = camera_findings(site_of, probe_cameras(site_of, 4.0), runs=False)
     finally:
         camera.close()
-    first, *doubts = of(found, "camera door")
+    first, *doubts = findings_of(found, "camera door")
     assert first.level is Level.OK, first
     assert first.text.startswith("64x48 pixels, ")
     assert any("are smaller than the site's (128x96)" in finding.text for finding in doubts)
@@ -205,8 +205,8 @@ def test_cameras_are_probed_in_parallel_and_a_dead_one_delays_none(tmp_path: Pat
     probes = probe_cameras(both, 1.5)
     assert probes["gate"].problem
     found = camera_findings(both, probes, runs=False)
-    assert only(found, "camera gate").level is Level.BAD
-    assert only(camera_findings(both, probes, runs=True), "camera gate").level is Level.WARNING
+    assert finding_of(found, "camera gate").level is Level.BAD
+    assert finding_of(camera_findings(both, probes, runs=True), "camera gate").level is Level.WARNING
 
 
 @pytest.mark.parametrize(
@@ -229,8 +229,13 @@ def test_a_camera_that_does_not_fit_the_site_is_a_warning(
     tmp_path: Path, found: CameraProbe, words: str
 ) -> None:
     small = load_site(tmp_path, site={"width": 640, "height": 360})
-    assert len(of(camera_findings(small, {"c0": CameraProbe(size=(640, 360))}, runs=False), "camera c0")) == 1
-    fine, doubt = of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
+    assert (
+        len(
+            findings_of(camera_findings(small, {"c0": CameraProbe(size=(640, 360))}, runs=False), "camera c0")
+        )
+        == 1
+    )
+    fine, doubt = findings_of(camera_findings(small, {"c0": found}, runs=False), "camera c0")
     assert (fine.level, doubt.level) == (Level.OK, Level.WARNING)
     assert words in doubt.text
 
@@ -240,14 +245,14 @@ def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, used_port
         {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{used_port}/live", "password": "secret"}
     ]
     site_config = load_site(tmp_path, cameras=cameras)
-    missing = only(
+    missing = finding_of(
         camera_findings(site_config, probe_cameras(site_config, 1.0), runs=False), "camera gate"
     ).text
     assert "the file cannot be read: No such file or directory" in missing
     (tmp_path / "secret").write_text("open sesame\n")
     (tmp_path / "secret").chmod(0o644)
-    assert "others may read" in only(file_findings(site_config), "camera gate").text
-    shown = only(
+    assert "others may read" in finding_of(file_findings(site_config), "camera gate").text
+    shown = finding_of(
         camera_findings(site_config, probe_cameras(site_config, 1.0), runs=False), "camera gate"
     ).text
     assert f"rtsp://127.0.0.1:{used_port}/..." in shown
@@ -257,14 +262,14 @@ def test_sound_that_cannot_be_opened_is_bad(tmp_path: Path) -> None:
     assert sound_findings(load_site(tmp_path)) == []
     write_video(tmp_path / "silent.mp4", 3)
     for source, words in (("none.wav", "none.wav: is neither"), ("silent.mp4", "sound")):
-        found = only(sound_findings(load_site(tmp_path, sound={"source": source})), "sound")
+        found = finding_of(sound_findings(load_site(tmp_path, sound={"source": source})), "sound")
         assert found.level is Level.BAD
         assert words in found.text
 
 
 def test_the_password_of_a_sound_source_is_not_shown(tmp_path: Path) -> None:
     site_config = load_site(tmp_path, sound={"source": "http://viewer:hunter2@127.0.0.1:9/sound.aac"})
-    reported = only(sound_findings(site_config), "sound").text
+    reported = finding_of(sound_findings(site_config), "sound").text
     assert "127.0.0.1" in reported
     assert "hunter2" not in reported
 
@@ -272,7 +277,7 @@ def test_the_password_of_a_sound_source_is_not_shown(tmp_path: Path) -> None:
 def test_a_cameras_password_is_not_shown(tmp_path: Path, used_port: int) -> None:
     source = f"rtsp://me:pa@ss:w@127.0.0.1:{used_port}/live?x=a:b@c"
     site_config = load_site(tmp_path, cameras=[{"id": "gate", "source": source}])
-    shown = only(
+    shown = finding_of(
         camera_findings(site_config, probe_cameras(site_config, 1.0), runs=False), "camera gate"
     ).text
     assert "rtsp://...: cannot open" in shown
@@ -283,17 +288,17 @@ def test_the_size_of_the_recording_is_compared_with_the_disk(tmp_path: Path) -> 
     probes = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1000.0)}
     small = load_site(tmp_path, record=record)
     assert needed_mb(small, probes) == pytest.approx((1000 + 8 * 100 * 25 / 1000) * 3600 / 8000)
-    assert only(disk_findings(small, probes), "disk").level is Level.OK
+    assert finding_of(disk_findings(small, probes), "disk").level is Level.OK
     assert not (tmp_path / "kept").exists()
     huge = {"c0": CameraProbe(size=(WIDTH, HEIGHT), kbps=1e12)}
     assert (
-        only(disk_findings(load_site(tmp_path, record={**record, "max_mb": 1e12}), huge), "disk").level
+        finding_of(disk_findings(load_site(tmp_path, record={**record, "max_mb": 1e12}), huge), "disk").level
         is Level.BAD
     )
     capped = load_site(tmp_path, record=record, encode={"max_kbps": 500})
     assert needed_mb(capped, huge) == pytest.approx((500 + 20) * 3600 / 8000)
     less = disk_findings(load_site(tmp_path, record={**record, "max_mb": 46.0}), probes)
-    assert "about 6 minutes are kept" in only(less, "record.max_mb").text
+    assert "about 6 minutes are kept" in finding_of(less, "record.max_mb").text
 
 
 def test_files_removed_by_a_running_site_are_not_counted(
@@ -311,13 +316,13 @@ def test_files_removed_by_a_running_site_are_not_counted(
 
     monkeypatch.setattr(os, "walk", walked)
     findings = disk_findings(load_site(tmp_path, record={"folder": "kept"}), {})
-    assert "and 3 MB are recorded already" in only(findings, "disk").text
+    assert "and 3 MB are recorded already" in finding_of(findings, "disk").text
 
 
 def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
     (tmp_path / "kept").write_text("a file")
     assert (
-        only(disk_findings(load_site(tmp_path, record={"folder": "kept"}), {}), "record.folder").level
+        finding_of(disk_findings(load_site(tmp_path, record={"folder": "kept"}), {}), "record.folder").level
         is Level.BAD
     )
 
@@ -337,17 +342,17 @@ def test_files_that_others_can_read_or_write_are_reported(tmp_path: Path) -> Non
     assert f"others may read {users}" in words
     assert "no line for c0" in words
     pulses = file_findings(load_site(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
-    assert [finding.level for finding in of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
-    assert "passwords of bestview" in of(pulses, "sync.users")[0].text
+    assert [finding.level for finding in findings_of(pulses, "sync.users")] == [Level.BAD, Level.WARNING]
+    assert "passwords of bestview" in findings_of(pulses, "sync.users")[0].text
     users.write_text("bestview:" + "b" * 32 + "\n")
     pulses = file_findings(load_site(tmp_path, **changes, sync={"port": 7400, "users": "users"}))
-    assert "no line for c0" in of(pulses, "sync.users")[0].text
+    assert "no line for c0" in findings_of(pulses, "sync.users")[0].text
     tokens.write_text("tokens: nonsense\n")
-    assert of(file_findings(load_site(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
+    assert findings_of(file_findings(load_site(tmp_path, **changes)), "access.tokens")[0].level is Level.BAD
 
 
 def test_a_site_exposed_by_accident_is_bad(tmp_path: Path) -> None:
-    found = only(file_findings(load_site(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
+    found = finding_of(file_findings(load_site(tmp_path, http={"host": "0.0.0.0"})), "access")  # noqa: S104
     assert found.level is Level.BAD
     assert "http.host" in found.text
 
@@ -355,26 +360,26 @@ def test_a_site_exposed_by_accident_is_bad(tmp_path: Path) -> None:
 def test_a_camera_without_a_homography_among_calibrated_ones_is_a_warning(tmp_path: Path) -> None:
     ground = [[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]
     cameras = [{"id": "c0", "source": "x", "ground": ground}, {"id": "c1", "source": "y"}]
-    reported = only(file_findings(load_site(tmp_path, cameras=cameras)), "ground")
+    reported = finding_of(file_findings(load_site(tmp_path, cameras=cameras)), "ground")
     assert reported == (Level.WARNING, "c1: no homography: people are matched by appearance alone there")
 
 
 def test_the_available_processors_are_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "available_processors", lambda: 0.5)
-    reported = only(machine_findings(load_site(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
+    reported = finding_of(machine_findings(load_site(tmp_path), {"c0": CameraProbe(cores=0.2)}), "processor")
     assert (reported.level, reported.text.endswith("of 0.5 cores")) == (Level.WARNING, True)
 
 
 def test_a_machine_that_is_too_small_is_a_warning(tmp_path: Path) -> None:
     small = load_site(tmp_path)
     fine, busy = ({"c0": CameraProbe(size=(WIDTH, HEIGHT), cores=cores)} for cores in (0.0, 1000.0))
-    assert only(machine_findings(small, fine), "processor").level is Level.OK
-    assert only(machine_findings(small, busy), "processor").level is Level.WARNING
+    assert finding_of(machine_findings(small, fine), "processor").level is Level.OK
+    assert finding_of(machine_findings(small, busy), "processor").level is Level.WARNING
     large = load_site(tmp_path, track={"backlog_s": 1e7})
-    assert only(machine_findings(large, fine), "memory").level is Level.WARNING
+    assert finding_of(machine_findings(large, fine), "memory").level is Level.WARNING
 
 
-def expired(folder: Path) -> tuple[Path, Path]:
+def expired_certificate(folder: Path) -> tuple[Path, Path]:
     """Create an expired certificate, signed by an authority, since only that can set its start."""
     certificate, key, request, settings = (
         folder / name for name in ("over.pem", "over.key", "asked", "settings")
@@ -428,7 +433,7 @@ def test_a_certificate_is_ok_until_shortly_before_it_expires(tmp_path: Path) -> 
     good = certificate_finding("http.tls", certificate, key)
     assert (good.level, good.text) == (Level.OK, f"{certificate} is valid for 100 days, for hall")
     assert certificate_finding("http.tls", *made("soon", "-days", "3")).level is Level.WARNING
-    over = certificate_finding("http.tls", *expired(tmp_path))
+    over = certificate_finding("http.tls", *expired_certificate(tmp_path))
     assert (over.level, over.text) == (Level.BAD, f"{tmp_path / 'over.pem'}: certificate has expired")
     wrong = certificate_finding("http.tls", other, key)
     assert wrong.level is Level.BAD

@@ -44,51 +44,51 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=FREE_MB * 1e6))
 
 
-def of(findings: list[Finding], check: str) -> Finding:
+def finding_of(findings: list[Finding], check: str) -> Finding:
     (found,) = [finding for finding in findings if finding.check == check]
     return found
 
 
 def test_without_any_probed_camera_the_size_is_unknown(tmp_path: Path) -> None:
-    found = of(disk_findings(site(tmp_path), {"c0": AWAY}), "disk")
+    found = finding_of(disk_findings(site(tmp_path), {"c0": AWAY}), "disk")
     assert found.level is Level.WARNING
     assert found.text.startswith("the size of 1.0 hours of c0 is not known; 1000 MB are free")
 
 
 def test_the_size_is_that_of_probed_cameras_and_names_the_others(tmp_path: Path) -> None:
     both = site(tmp_path, ("c0", "c1"))
-    found = of(disk_findings(both, {"c0": AWAY, "c1": GOOD}), "disk")
+    found = finding_of(disk_findings(both, {"c0": AWAY, "c1": GOOD}), "disk")
     one = (1000 + INDEX_KBPS) * HOUR_S / 8000
     estimate = f"without c0, whose rate is not known, 1.0 hours of the cameras take about {one:.0f} MB; "
     assert found.level is Level.WARNING
     assert found.text.startswith(estimate)
-    found = of(disk_findings(both, {"c0": GOOD, "c1": GOOD}), "disk")
+    found = finding_of(disk_findings(both, {"c0": GOOD, "c1": GOOD}), "disk")
     assert (found.level, found.text.split(" take")[0]) == (Level.OK, "1.0 hours of these cameras")
 
 
 def test_a_recording_that_surely_does_not_fit_is_bad(tmp_path: Path) -> None:
     large = CameraProbe(size=(64, 48), kbps=10_000.0)
     findings = disk_findings(site(tmp_path, ("c0", "c1")), {"c0": AWAY, "c1": large})
-    assert of(findings, "disk").level is Level.BAD
+    assert finding_of(findings, "disk").level is Level.BAD
     small = site(tmp_path, ("c0", "c1"), record={"folder": "kept", "keep_s": HOUR_S, "max_mb": 46.0})
     findings = disk_findings(small, {"c0": AWAY, "c1": GOOD})
-    assert "at most 6 minutes are kept" in of(findings, "record.max_mb").text
+    assert "at most 6 minutes are kept" in finding_of(findings, "record.max_mb").text
 
 
 def test_the_encoders_limit_is_assumed_for_cameras_that_were_not_probed(tmp_path: Path) -> None:
     capped = site(tmp_path, encode={"max_kbps": 500})
-    found = of(disk_findings(capped, {"c0": AWAY}), "disk")
+    found = finding_of(disk_findings(capped, {"c0": AWAY}), "disk")
     assert found.level is Level.OK
     assert "take about 234 MB, with c0 as encode.max_kbps allows; " in found.text
-    assert "max_kbps" not in of(disk_findings(capped, {"c0": GOOD}), "disk").text
+    assert "max_kbps" not in finding_of(disk_findings(capped, {"c0": GOOD}), "disk").text
 
 
 def test_the_encoders_limit_is_not_assumed_for_passthrough_cameras(tmp_path: Path) -> None:
-    own = site(tmp_path, h264="auto", encode={"max_kbps": 500})
+    tests_folder = site(tmp_path, h264="auto", encode={"max_kbps": 500})
     passing = CameraProbe(size=(64, 48), kbps=4000.0, passes=True)
-    assert needed_mb(own, {"c0": passing}) == pytest.approx((4000 + INDEX_KBPS) * HOUR_S / 8000)
-    assert needed_mb(own, {"c0": GOOD}) == pytest.approx((500 + INDEX_KBPS) * HOUR_S / 8000)
-    assert of(disk_findings(own, {"c0": AWAY}), "disk").level is Level.WARNING
+    assert needed_mb(tests_folder, {"c0": passing}) == pytest.approx((4000 + INDEX_KBPS) * HOUR_S / 8000)
+    assert needed_mb(tests_folder, {"c0": GOOD}) == pytest.approx((500 + INDEX_KBPS) * HOUR_S / 8000)
+    assert finding_of(disk_findings(tests_folder, {"c0": AWAY}), "disk").level is Level.WARNING
 
 
 def test_an_invalid_folder_name_is_reported_in_one_line(tmp_path: Path) -> None:

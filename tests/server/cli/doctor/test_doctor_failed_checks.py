@@ -22,11 +22,11 @@ from server.cli.doctor.ports import port_findings
 from server.cli.doctor.reachability import reachability_findings
 
 
-def of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
+def findings_of(findings: list[Finding], check: str) -> list[tuple[Level, str]]:
     return [(finding.level, finding.text) for finding in findings if finding.check == check]
 
 
-def broken(*_: object, **__: object) -> Any:
+def refuse_access(*_: object, **__: object) -> Any:
     raise PermissionError(13, "Permission denied", "/closed/door")
 
 
@@ -52,7 +52,7 @@ async def test_a_failed_check_does_not_lose_others_findings(
     site_config = load_site(tmp_path)
     before = {finding.check async for finding in command.run_checks(site_config, 1.0)}
     assert before >= {"http.port", "sync.host", "ground", "clock", "camera c0", "record", "memory"}
-    monkeypatch.setattr(command, check, broken)
+    monkeypatch.setattr(command, check, refuse_access)
     found = [finding async for finding in command.run_checks(site_config, 1.0)]
     (failed,) = [finding for finding in found if (finding.level, finding.text) == BROKEN[0]]
     assert {finding.check for finding in found if finding is not failed} == before - lost
@@ -62,14 +62,14 @@ async def test_a_failed_check_of_one_port_or_file_does_not_lose_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     site_config = load_site(tmp_path)
-    monkeypatch.setattr(ports, "_is_this_site", broken)
+    monkeypatch.setattr(ports, "_is_this_site", refuse_access)
     with socket.create_server(("127.0.0.1", site_config.http.port)):
         found, _ = await port_findings(site_config)
-    assert of(found, "http.port") == BROKEN
-    assert of(found, "zenoh.listen")[0][0] is Level.OK
-    monkeypatch.setattr(files, "_exposed", broken)
-    assert of(file_findings(site_config), "access") == BROKEN
-    assert of(file_findings(site_config), "ground")[0][0] is Level.OK
+    assert findings_of(found, "http.port") == BROKEN
+    assert findings_of(found, "zenoh.listen")[0][0] is Level.OK
+    monkeypatch.setattr(files, "_exposed", refuse_access)
+    assert findings_of(file_findings(site_config), "access") == BROKEN
+    assert findings_of(file_findings(site_config), "ground")[0][0] is Level.OK
 
 
 async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,8 +79,8 @@ async def test_a_bug_is_reported_without_a_password(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(command, "sound_findings", wrong)
     found = [finding async for finding in command.run_checks(load_site(tmp_path), 1.0)]
     text = "a bug in MyView: RuntimeError: cannot be: ..."
-    assert of(found, "sound") == [(Level.BAD, text)]
-    assert of(found, "memory")
+    assert findings_of(found, "sound") == [(Level.BAD, text)]
+    assert findings_of(found, "memory")
 
 
 async def test_findings_are_printed_as_they_are_found(
@@ -112,10 +112,10 @@ async def test_an_unresolvable_server_is_bad(tmp_path: Path, monkeypatch: pytest
 
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
     found = await reachability_findings(site_config)
-    assert of(found, "sync.host") == [
+    assert findings_of(found, "sync.host") == [
         (Level.BAD, "pulses:7400 cannot be resolved: Name or service not known")
     ]
-    assert of(found, "zenoh.connect")[0][0] is Level.BAD
+    assert findings_of(found, "zenoh.connect")[0][0] is Level.BAD
 
 
 async def test_an_address_of_this_machine_must_lead_to_a_listener(tmp_path: Path) -> None:
@@ -126,19 +126,21 @@ async def test_an_address_of_this_machine_must_lead_to_a_listener(tmp_path: Path
         tmp_path, zenoh={"connect": f"tcp/127.0.0.1:{other}", "listen": f"tcp/127.0.0.1:{port}"}
     )
     text = f"nothing listens at 127.0.0.1:{other}, where cameras connect; zenoh.listen is 127.0.0.1:{port}"
-    assert of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
+    assert findings_of(await reachability_findings(astray), "zenoh.connect") == [(Level.BAD, text)]
     with socket.create_server(("127.0.0.1", other)):
         answered = [(Level.OK, f"127.0.0.1:{other} answers")]  # a proxy may forward it
-        assert of(await reachability_findings(astray), "zenoh.connect") == answered
+        assert findings_of(await reachability_findings(astray), "zenoh.connect") == answered
     narrow = load_site(tmp_path, sync={"host": "127.0.0.2", "port": other})
-    assert of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD
+    assert findings_of(await reachability_findings(narrow), "sync.host")[0][0] is Level.BAD
 
 
 async def test_two_services_on_one_port_are_bad(tmp_path: Path) -> None:
     port = free_port()
     found, _ = await port_findings(load_site(tmp_path, http={"port": port}, sync={"port": port}))
-    assert of(found, "sync.port") == [(Level.BAD, f"127.0.0.1:{port} is also the address of http.port")]
-    assert of(found, "zenoh.listen")[0][0] is Level.OK
+    assert findings_of(found, "sync.port") == [
+        (Level.BAD, f"127.0.0.1:{port} is also the address of http.port")
+    ]
+    assert findings_of(found, "zenoh.listen")[0][0] is Level.OK
 
 
 def test_a_device_shared_by_two_cameras_is_bad(tmp_path: Path) -> None:

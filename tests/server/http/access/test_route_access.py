@@ -80,7 +80,7 @@ WHO = {
 REFUSED = {401, 403}
 
 
-def who_may(method: str, path: str) -> frozenset[str]:
+def permitted_tokens(method: str, path: str) -> frozenset[str]:
     if path.startswith("/api/operator/"):
         return frozenset({"lead"})
     if path == "/api/session" and method not in {"GET", "HEAD"}:
@@ -104,7 +104,7 @@ def all_routes(served: ServedSite) -> list[tuple[str, str]]:
     return sorted(found)
 
 
-def filled(path: str, number: int = 1, camera: str = A) -> str:
+def fill_path(path: str, number: int = 1, camera: str = A) -> str:
     for name, value in {
         "object": number,
         "camera": camera,
@@ -136,10 +136,14 @@ async def test_every_route_admits_exactly_the_permitted_tokens(site: ServedSite)
     wrong = []
     for method, path in routes:
         for name in sorted(ANYBODY):
-            if name in who_may(method, path) and method == "GET" and path.endswith((".mjpeg", ".jpg")):
+            if (
+                name in permitted_tokens(method, path)
+                and method == "GET"
+                and path.endswith((".mjpeg", ".jpg"))
+            ):
                 continue  # HEAD avoids starting a render worker
-            code = await status(site, method, filled(path), name)
-            may = name in who_may(method, path)
+            code = await status(site, method, fill_path(path), name)
+            may = name in permitted_tokens(method, path)
             if (code in REFUSED) == may or (name == NOBODY and not may and code != 401):
                 wrong.append(f"{name}: {method} {path}: {code}")
     assert wrong == []
@@ -148,9 +152,9 @@ async def test_every_route_admits_exactly_the_permitted_tokens(site: ServedSite)
 async def test_a_limited_token_sees_only_its_person_or_camera(site: ServedSite) -> None:
     for method, path in all_routes(site):
         if "{object}" in path:
-            assert await status(site, method, filled(path, number=2), "family") == 403, path
+            assert await status(site, method, fill_path(path, number=2), "family") == 403, path
         if "{camera}" in path:
-            assert await status(site, method, filled(path, camera=B), "door") == 403, path
+            assert await status(site, method, fill_path(path, camera=B), "door") == 403, path
 
 
 async def test_unknown_and_forbidden_people_get_the_same_answer(site: ServedSite) -> None:

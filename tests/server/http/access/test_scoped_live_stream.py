@@ -85,7 +85,7 @@ async def test_a_preferred_camera_is_gray_without_the_person(tmp_path: Path) -> 
     np.testing.assert_array_equal(shown[max(shown)], camera_pictures("c0")[max(shown)])
 
 
-async def listed(served: ServedSite, pattern: str, token_name: str) -> bytes:
+async def fetch_listed(served: ServedSite, pattern: str, token_name: str) -> bytes:
     """Fetch the segments of a playlist, after its init segment."""
     text = (await fetch(served, "/objects/1/hls/index.m3u8", token_name)).decode()
     names = ["init.mp4", *re.findall(pattern, text, re.MULTILINE)]
@@ -97,7 +97,7 @@ async def test_segments_and_parts_are_gray_only_for_the_scoped_token(tmp_path: P
     async with departure_site(tmp_path, http=HLS) as served:
         decisions = feed_epochs(served, range(EPOCHS - 5))
         narrow, full = [
-            decoded(await listed(served, pattern, token_name)) for token_name in ("family", "desk")
+            decoded(await fetch_listed(served, pattern, token_name)) for token_name in ("family", "desk")
         ]
     until = max(full) + 1
     right = expected_pictures(decisions)

@@ -35,7 +35,7 @@ Kept = tuple[ServedSite, list[GopChoices]]
 HLS = {**PATIENT_HTTP, "hls_segment_s": 0.4, "hls_window_s": 0.8}
 
 
-async def written(served: ServedSite, gops: int) -> None:
+async def wait_until_on_disk(served: ServedSite, gops: int) -> None:
     """Drop all but the newest GOP from memory."""
     recorder = served.service.recorder
     while recorder.writer is not None and recorder.writer.written < gops:  # noqa: ASYNC110
@@ -46,7 +46,7 @@ async def written(served: ServedSite, gops: int) -> None:
 
 
 @pytest.fixture(params=["memory", "disk"])
-async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[Kept]:
+async def recorded_site(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[Kept]:
     """A site that records in memory or on the disk, and its decisions."""
     on_disk = request.param == "disk"
     record = {"folder": str(tmp_path / "kept") if on_disk else None, "segment_s": 1.0}
@@ -54,13 +54,13 @@ async def kept(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[
         served.service.recorder.open()
         decisions = feed_epochs(served, range(EPOCHS))
         if on_disk:
-            await written(served, len(decisions) - 2)
+            await wait_until_on_disk(served, len(decisions) - 2)
         yield served, decisions
 
 
 @pytest.mark.parametrize("form", ["mp4", "ts"])
-async def test_a_time_shifted_stream_is_gray_without_the_person(kept: Kept, form: str) -> None:
-    served, decisions = kept
+async def test_a_time_shifted_stream_is_gray_without_the_person(recorded_site: Kept, form: str) -> None:
+    served, decisions = recorded_site
     path = f"/objects/1/best.{form}?from=p0&to=p{len(decisions) * GOP}"
     narrow, full = [decoded(await fetch(served, path, token_name)) for token_name in ("family", "desk")]
     if form == "ts":
@@ -87,17 +87,17 @@ async def test_a_time_shifted_stream_continues_live(tmp_path: Path) -> None:
 
 
 async def test_recorded_segments_are_gray_without_the_person(
-    kept: Kept,
+    recorded_site: Kept,
 ) -> None:
-    served, decisions = kept
+    served, decisions = recorded_site
     shown: dict[str, dict[int, Picture]] = {}
     for token_name in ("family", "desk"):
         listed = (await fetch(served, "/objects/1/hls/index.m3u8?from=p0&to=p90", token_name)).decode()
         names = ["init.mp4", *re.findall(r"^[0-9]+\.m4s$", listed, re.MULTILINE)]
         for scoped in (True, False):
-            reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
-            assert reel is not None
-            reel._segments.clear()
+            segmenter = served.service.splicer.segmenter_of_person(1, scoped=scoped)
+            assert segmenter is not None
+            segmenter._segments.clear()
         shown[token_name] = decoded(
             b"".join([await fetch(served, f"/objects/1/hls/{name}", token_name) for name in names])
         )
@@ -117,16 +117,16 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
         served.service.recorder.open()
         send_audio(served.service, recording)
         decisions = feed_epochs(served, range(EPOCHS))
-        await written(served, len(decisions) - 2)
+        await wait_until_on_disk(served, len(decisions) - 2)
         beep_times: dict[str, list[int]] = {}
         for token_name in ("family", "desk"):
             names = [f"best.mp4?from=p0&to=p{len(decisions) * GOP}"]
             if hls:
                 names = [f"hls/{file}" for file in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
                 for scoped in (True, False):
-                    reel = served.service.splicer.segmenter_of_person(1, scoped=scoped)
-                    assert reel is not None
-                    reel._segments.clear()
+                    segmenter = served.service.splicer.segmenter_of_person(1, scoped=scoped)
+                    assert segmenter is not None
+                    segmenter._segments.clear()
             data = b"".join([await fetch(served, f"/objects/1/{name}", token_name) for name in names])
             beep_times[token_name] = [round(beep * FPS) for beep in beeps(data)]
     assert beep_times == {"family": [20, 80, 100], "desk": [20, 40, 60, 80, 100]}

@@ -231,10 +231,10 @@ async def test_signing_in_to_another_service_of_the_machine_keeps_this_session(
     tokens = write_tokens(tmp_path / "yard.yaml", token_entry("lead"))
     other = {"site": {"name": "yard"}, "access": {"tokens": str(tokens)}}
     async with (
-        aclosing(serve_site(**other)) as halls,
+        aclosing(serve_site(**other)) as sites,
         ClientSession(cookie_jar=CookieJar(unsafe=True)) as browser,
     ):
-        for address in (url, f"http://127.0.0.1:{(await anext(halls)).port}{SESSION}", url):
+        for address in (url, f"http://127.0.0.1:{(await anext(sites)).port}{SESSION}", url):
             async with browser.get(address) as answer:
                 is_valid = answer.status == 200
             if not is_valid:

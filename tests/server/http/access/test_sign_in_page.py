@@ -31,7 +31,7 @@ async def browser() -> AsyncIterator[Browser]:
 
 
 @asynccontextmanager
-async def watching(
+async def open_page(
     browser: Browser, folder: Path, address: str = ""
 ) -> AsyncIterator[tuple[ServedSite, Page, list[str]]]:
     """Open the page of a site with tokens and two people; also yield the requests that it received."""
@@ -51,7 +51,7 @@ async def watching(
 
 
 async def test_a_viewer_watches_from_signing_in_to_signing_out(browser: Browser, tmp_path: Path) -> None:
-    async with watching(browser, tmp_path) as (_, page, _):
+    async with open_page(browser, tmp_path) as (_, page, _):
         field = page.get_by_label("Watching needs a token")
         await field.fill("wrong")
         await page.get_by_role("button", name="Sign in").click()
@@ -72,7 +72,7 @@ async def test_a_link_with_a_token_opens_a_person_and_drops_the_token_from_the_u
     browser: Browser, tmp_path: Path
 ) -> None:
     token = token_of("family")
-    async with watching(browser, tmp_path, f"?object=1#token={token}") as (_, page, addresses):
+    async with open_page(browser, tmp_path, f"?object=1#token={token}") as (_, page, addresses):
         await expect(page.locator("#people li")).to_have_count(1)
         await expect(page.get_by_label("Watching needs a token")).to_be_hidden()
         assert "token" not in await page.evaluate("location.href")
@@ -84,7 +84,7 @@ async def test_a_link_with_a_token_opens_a_person_and_drops_the_token_from_the_u
 async def test_a_viewer_whose_token_is_revoked_is_shown_the_sign_in_form(
     browser: Browser, tmp_path: Path
 ) -> None:
-    async with watching(browser, tmp_path) as (_, page, _):
+    async with open_page(browser, tmp_path) as (_, page, _):
         field = page.get_by_label("Watching needs a token")
         await field.fill(token_of("desk"))
         await page.keyboard.press("Enter")
@@ -96,7 +96,7 @@ async def test_a_viewer_whose_token_is_revoked_is_shown_the_sign_in_form(
 async def test_axe_finds_no_violation_in_the_sign_in_form(browser: Browser, tmp_path: Path) -> None:
     if not AXE.exists():
         pytest.skip("axe-core is not there: make node_modules/.installed")
-    async with watching(browser, tmp_path) as (_, page, _):
+    async with open_page(browser, tmp_path) as (_, page, _):
         await expect(page.get_by_label("Watching needs a token")).to_be_visible()
         found = await page.evaluate("axe.run()")
         assert [violation["id"] for violation in found["violations"]] == []

@@ -26,7 +26,7 @@ from server.messaging.messages import ZenohKeys
 
 
 @pytest.fixture(autouse=True)
-def _looks_often(monkeypatch: pytest.MonkeyPatch) -> None:
+def _check_tokens_often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.http.access.authorization._CHECK_EVERY_S", 0.02)
 
 
@@ -137,10 +137,10 @@ async def test_a_blocked_disk_does_not_delay_revocation(site: ServedSite, tmp_pa
 async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
     site: ServedSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looked, hangs = threading.Event(), threading.Event()
+    token_file, hangs = threading.Event(), threading.Event()
 
     def look(_: TokenStore) -> None:
-        looked.set()
+        token_file.set()
         hangs.wait(30.0)
 
     sessions = {CSRF_HEADER: "1"}
@@ -151,7 +151,7 @@ async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
     answer = await stream(site, "/api/events", Cookie=f"{cookie.key}={cookie.value}")
     monkeypatch.setattr(TokenStore, "reload_if_changed", look)
     try:
-        await asyncio.to_thread(looked.wait, 10.0)
+        await asyncio.to_thread(token_file.wait, 10.0)
         monkeypatch.setattr(
             "server.http.access.sessions.Sessions.token", lambda *_: None
         )  # 12 hours are over
@@ -201,7 +201,7 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
                 assert error.startswith("person numbers have restarted since the token 'family' was made")
 
 
-class Looked:
+class TokenFileCheck:
     """A token file that is checked by the test."""
 
     def __init__(self, path: Path) -> None:
@@ -213,49 +213,49 @@ class Looked:
 
 
 @pytest.fixture
-def looked(tmp_path: Path) -> Looked:
-    return Looked(tmp_path / "tokens.yaml")
+def token_file(tmp_path: Path) -> TokenFileCheck:
+    return TokenFileCheck(tmp_path / "tokens.yaml")
 
 
 @pytest.mark.parametrize("text", ["tokens: [", "tokens:\n- {name: desk}\n", "", None])
 def test_an_invalid_token_file_keeps_the_old_tokens_and_is_logged_once(
-    looked: Looked, text: str | None, caplog: pytest.LogCaptureFixture
+    token_file: TokenFileCheck, text: str | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
     if text is None:
-        looked.path.unlink()
+        token_file.path.unlink()
     else:
-        looked.path.write_text(text, encoding="utf-8")
+        token_file.path.write_text(text, encoding="utf-8")
     for _ in range(4):
-        looked.file.reload_if_changed()
-        assert looked.has("desk")
+        token_file.file.reload_if_changed()
+        assert token_file.has("desk")
     [line] = caplog.messages
     assert line.endswith("the previous 1 tokens stay in force")
     assert "\n" not in line
-    write_tokens(looked.path, token_entry("lead"))
+    write_tokens(token_file.path, token_entry("lead"))
     for _ in range(2):
-        looked.file.reload_if_changed()
-    assert (looked.has("desk"), looked.has("lead")) == (False, True)
+        token_file.file.reload_if_changed()
+    assert (token_file.has("desk"), token_file.has("lead")) == (False, True)
 
 
-def test_a_token_file_is_reloaded_only_when_it_stays_unchanged(looked: Looked) -> None:
-    looked.file.reload_if_changed()
-    write_tokens(looked.path)  # half written: an empty list
-    looked.file.reload_if_changed()
-    assert looked.has("desk")
-    write_tokens(looked.path, token_entry("desk"), token_entry("lead"))
-    looked.file.reload_if_changed()
-    assert not looked.has("lead")
-    looked.file.reload_if_changed()
-    assert looked.has("desk")
-    assert looked.has("lead")
+def test_a_token_file_is_reloaded_only_when_it_stays_unchanged(token_file: TokenFileCheck) -> None:
+    token_file.file.reload_if_changed()
+    write_tokens(token_file.path)  # half written: an empty list
+    token_file.file.reload_if_changed()
+    assert token_file.has("desk")
+    write_tokens(token_file.path, token_entry("desk"), token_entry("lead"))
+    token_file.file.reload_if_changed()
+    assert not token_file.has("lead")
+    token_file.file.reload_if_changed()
+    assert token_file.has("desk")
+    assert token_file.has("lead")
 
 
-def test_a_replaced_file_of_equal_size_and_time_is_reloaded(looked: Looked) -> None:
-    other = write_tokens(looked.path.with_name("new.yaml"), token_entry("lead"))
-    before = looked.path.stat()
+def test_a_replaced_file_of_equal_size_and_time_is_reloaded(token_file: TokenFileCheck) -> None:
+    other = write_tokens(token_file.path.with_name("new.yaml"), token_entry("lead"))
+    before = token_file.path.stat()
     os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))
-    other.replace(looked.path)
+    other.replace(token_file.path)
     for _ in range(2):
-        looked.file.reload_if_changed()
-    assert looked.has("lead")
+        token_file.file.reload_if_changed()
+    assert token_file.has("lead")

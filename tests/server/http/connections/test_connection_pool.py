@@ -32,22 +32,22 @@ GET = "GET {} HTTP/1.1\r\nHost: localhost\r\n{}\r\n"
 
 
 @asynccontextmanager
-async def small(**http: Any) -> AsyncIterator[ServedSite]:
+async def serve_small_site(**http: Any) -> AsyncIterator[ServedSite]:
     """Serve a site with people; timeouts are long unless a test sets them."""
-    async with aclosing(serve_site(http={"request_timeout_s": 60.0, **http})) as halls:
-        served = await anext(halls)
+    async with aclosing(serve_site(http={"request_timeout_s": 60.0, **http})) as sites:
+        served = await anext(sites)
         show_people(served)
         yield served
 
 
-async def silent(served: ServedSite, begin: str = "") -> Pair:
+async def open_silent(served: ServedSite, begin: str = "") -> Pair:
     """Connect, and send an incomplete request."""
     reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
     writer.write(begin.encode())
     return reader, writer
 
 
-async def over(pair: Pair) -> bytes:
+async def read_to_end(pair: Pair) -> bytes:
     """Wait until the server closes a connection; return what it sent."""
     reader, writer = pair
     try:
@@ -62,7 +62,7 @@ async def stream(
     served: ServedSite, path: str = "/objects/1/best.ts", heads: str = "X-Forwarded-For: x\r\n"
 ) -> Pair:
     """Open a stream; return the connection once it has begun."""
-    pair = await silent(served, GET.format(path, heads))
+    pair = await open_silent(served, GET.format(path, heads))
     assert (await pair[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
     return pair
 
@@ -70,20 +70,20 @@ async def stream(
 async def status(served: ServedSite, path: str, **heads: str) -> int:
     """Send a request on a new connection."""
     lines = "".join(f"{name}: {value}\r\n" for name, value in {**heads, "Connection": "close"}.items())
-    received = await over(await silent(served, GET.format(path, lines)))
+    received = await read_to_end(await open_silent(served, GET.format(path, lines)))
     return int(received.split(maxsplit=2)[1]) if received else 0
 
 
 @pytest.mark.parametrize("begin", ["", "GET /api/site HTTP/1.1\r\nHost: ha", "\r\n\r\n", "\x16\x03\x01"])
 async def test_an_incomplete_request_times_out(begin: str) -> None:
-    async with small(request_timeout_s=SOON) as served:
-        assert b" 200 " not in await over(await silent(served, begin))
+    async with serve_small_site(request_timeout_s=SOON) as served:
+        assert b" 200 " not in await read_to_end(await open_silent(served, begin))
 
 
 async def test_an_incomplete_body_times_out(tmp_path: Path) -> None:
     async with serve_with_tokens(tmp_path, http={"request_timeout_s": SOON}) as served:
         head = f"POST /api/session HTTP/1.1\r\nHost: hall\r\n{CSRF_HEADER}: 1\r\nContent-Length: 99\r\n\r\n{{"
-        assert await over(await silent(served, head)) == b""
+        assert await read_to_end(await open_silent(served, head)) == b""
 
 
 async def test_a_body_above_the_limit_is_refused(tmp_path: Path) -> None:
@@ -94,24 +94,24 @@ async def test_a_body_above_the_limit_is_refused(tmp_path: Path) -> None:
 
 
 async def test_an_idle_connection_is_closed() -> None:
-    async with small(keepalive_timeout_s=SOON) as served:
-        received = await over(await silent(served, GET.format("/healthz", "")))
+    async with serve_small_site(keepalive_timeout_s=SOON) as served:
+        received = await read_to_end(await open_silent(served, GET.format("/healthz", "")))
         assert received.endswith(b"ok\n")
 
 
 @needs_openssl
 async def test_a_missing_tls_handshake_times_out(tmp_path: Path) -> None:
     tls = make_certificate(tmp_path, "hall")
-    async with small(request_timeout_s=SOON, tls=tls.model_dump()) as served:
+    async with serve_small_site(request_timeout_s=SOON, tls=tls.model_dump()) as served:
         for begin in ("", "GET / HTTP/1.1\r\n\r\n"):
-            await over(await silent(served, begin))
+            await read_to_end(await open_silent(served, begin))
 
 
 @pytest.mark.parametrize("path", ["/objects/1/best.ts", "/api/events"])
 async def test_a_connection_with_an_endless_answer_is_not_idle(path: str) -> None:
-    async with small(request_timeout_s=1.0, keepalive_timeout_s=SOON) as served:
+    async with serve_small_site(request_timeout_s=1.0, keepalive_timeout_s=SOON) as served:
         reader, writer = await stream(served, path)
-        await over(await silent(served))  # equally idle, and newer
+        await read_to_end(await open_silent(served))  # equally idle, and newer
         while len(await reader.read(1 << 20)) == 1 << 20:
             pass  # the currently open ones
         served.service.feed(3, {A: {1: SMALL, 2: SMALL}, B: {}})
@@ -120,11 +120,11 @@ async def test_a_connection_with_an_endless_answer_is_not_idle(path: str) -> Non
 
 
 async def test_at_the_limit_the_longest_waiting_connection_is_closed() -> None:
-    async with small(connections_max=3) as served:
-        first, second, third = [await silent(served) for _ in range(3)]
+    async with serve_small_site(connections_max=3) as served:
+        first, second, third = [await open_silent(served) for _ in range(3)]
         for _ in range(3):
             assert await status(served, "/api/site", **ELSEWHERE) == 200
-        await over(first)
+        await read_to_end(first)
         second[1].write(GET.format("/healthz", "").encode())
         assert (await second[0].readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 200")
         for _, writer in (second, third):
@@ -132,7 +132,7 @@ async def test_at_the_limit_the_longest_waiting_connection_is_closed() -> None:
 
 
 async def test_when_all_are_busy_operators_are_admitted_and_others_get_503() -> None:
-    async with small(connections_max=2) as served, AsyncExitStack() as stack:
+    async with serve_small_site(connections_max=2) as served, AsyncExitStack() as stack:
         for _ in range(2):
             _, writer = await stream(served)
             stack.callback(writer.close)
@@ -140,7 +140,7 @@ async def test_when_all_are_busy_operators_are_admitted_and_others_get_503() -> 
         assert await status(served, "/objects/1/best.jpg", **ELSEWHERE) == 503
         for open_to_all in ("/healthz", "/", "/operator"):
             assert await status(served, open_to_all, **ELSEWHERE) == 200
-        flood = [await silent(served) for _ in range(100)]
+        flood = [await open_silent(served) for _ in range(100)]
         assert await status(served, "/api/operator/cameras") == 200
         assert await status(served, "/api/site", **ELSEWHERE) == 503
         _, writer = await stream(served, heads="")

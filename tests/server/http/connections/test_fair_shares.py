@@ -52,12 +52,12 @@ async def site(folder: Path, **http: Any) -> AsyncIterator[ServedSite]:
         yield served
 
 
-async def fetched(served: ServedSite, path: str, name: str, player: str) -> int:
+async def fetch_status(served: ServedSite, path: str, name: str, player: str) -> int:
     async with served.session.get(path, headers={**bearer(name), "User-Agent": player}) as answer:
         return answer.status
 
 
-async def joined(stack: AsyncExitStack, served: ServedSite, path: str, **heads: str) -> Viewer | int:
+async def open_viewer(stack: AsyncExitStack, served: ServedSite, path: str, **heads: str) -> Viewer | int:
     """Open a stream or events until the stack closes; return the status if refused."""
     session = await stack.enter_async_context(aiohttp.ClientSession(f"http://127.0.0.1:{served.port}"))
     answer = await session.get(path, headers=heads)
@@ -67,17 +67,17 @@ async def joined(stack: AsyncExitStack, served: ServedSite, path: str, **heads: 
 
 async def test_a_token_with_many_players_does_not_take_others_streams(tmp_path: Path) -> None:
     async with site(tmp_path, viewers_max=20) as served:
-        flood = [await fetched(served, DOOR, "door", f"player {number}") for number in range(40)]
+        flood = [await fetch_status(served, DOOR, "door", f"player {number}") for number in range(40)]
         assert flood == [200] * 20 + [503] * 20
         for name in ("desk", "family", "lead"):
             path = "/objects/1/hls/index.m3u8"
-            assert [await fetched(served, path, name, f"{name} {number}") for number in range(3)] == [
+            assert [await fetch_status(served, path, name, f"{name} {number}") for number in range(3)] == [
                 200
             ] * 3, name
-        assert await fetched(served, DOOR, "door", "player 0") == 200, "the oldest connection stays"
-        assert await fetched(served, DOOR, "door", "player 19") == 503, "the newest was evicted"
+        assert await fetch_status(served, DOOR, "door", "player 0") == 200, "the oldest connection stays"
+        assert await fetch_status(served, DOOR, "door", "player 19") == 503, "the newest was evicted"
         for name in ("desk", "family", "lead"):
-            assert await fetched(served, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, (
+            assert await fetch_status(served, "/objects/1/hls/index.m3u8", name, f"{name} 0") == 200, (
                 "and continues"
             )
 
@@ -96,20 +96,22 @@ async def test_a_token_with_many_connections_does_not_take_others_streams(
 ) -> None:
     async with site(tmp_path, **{bound: 3}) as served, AsyncExitStack() as stack:
         door, desk, lead = bearer("door"), bearer("desk"), bearer("lead")
-        flood = [await joined(stack, served, path, **door) for _ in range(4)]
+        flood = [await open_viewer(stack, served, path, **door) for _ in range(4)]
         *held, newest, refused = flood
         assert refused == 503
         assert isinstance(newest, Viewer)
         async with served.session.head(path, headers=desk) as answer:
             assert answer.status == 503, "a refused request evicts none"
-        mine = await joined(stack, served, path, **desk)
+        mine = await open_viewer(stack, served, path, **desk)
         assert isinstance(mine, Viewer)
         await newest.ends()
-        assert await joined(stack, served, path, **desk) == 503, "more than the others' share"
-        assert await joined(stack, served, path, **door) == 503
+        assert await open_viewer(stack, served, path, **desk) == 503, "more than the others' share"
+        assert await open_viewer(stack, served, path, **door) == 503
         for _ in range(3):
-            assert isinstance(await joined(stack, served, path, **lead), Viewer), "operators always get in"
-        assert await joined(stack, served, path, **lead) == 503, "but not for each other's places"
+            assert isinstance(await open_viewer(stack, served, path, **lead), Viewer), (
+                "operators always get in"
+            )
+        assert await open_viewer(stack, served, path, **lead) == 503, "but not for each other's places"
         for share in (*held, mine):
             assert isinstance(share, Viewer)
             await share.ends()
@@ -118,12 +120,13 @@ async def test_a_token_with_many_connections_does_not_take_others_streams(
 async def test_a_stream_that_has_caught_up_can_be_evicted_like_live_ones(tmp_path: Path) -> None:
     async with site(tmp_path, viewers_per_object=2) as served, AsyncExitStack() as stack:
         flood = [
-            await joined(stack, served, "/cameras/c0/live.mp4?from=-1", **bearer("door")) for _ in range(2)
+            await open_viewer(stack, served, "/cameras/c0/live.mp4?from=-1", **bearer("door"))
+            for _ in range(2)
         ]
         channel = served.service.splicer.cameras["c0"]
         while channel.viewers < 2:
             await served.get("/healthz", "HEAD")
-        assert isinstance(await joined(stack, served, "/cameras/c0/live.ts", **bearer("desk")), Viewer)
+        assert isinstance(await open_viewer(stack, served, "/cameras/c0/live.ts", **bearer("desk")), Viewer)
         assert isinstance(flood[1], Viewer)
         await flood[1].ends()
 
@@ -133,9 +136,9 @@ async def test_without_tokens_shares_are_by_address_and_this_machine_operates() 
         show_people(served)
         async with AsyncExitStack() as stack:
             elsewhere = {"X-Forwarded-For": "10.0.0.7"}
-            flood = [await joined(stack, served, "/objects/1/best.ts", **elsewhere) for _ in range(3)]
+            flood = [await open_viewer(stack, served, "/objects/1/best.ts", **elsewhere) for _ in range(3)]
             assert flood[2] == 503
-            assert isinstance(await joined(stack, served, "/objects/1/best.ts"), Viewer)
+            assert isinstance(await open_viewer(stack, served, "/objects/1/best.ts"), Viewer)
             assert isinstance(flood[1], Viewer)
             await flood[1].ends()
             assert isinstance(flood[0], Viewer)

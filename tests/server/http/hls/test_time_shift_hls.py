@@ -87,12 +87,12 @@ async def test_a_recorded_segment_has_the_bytes_of_the_live_one(served: ServedSi
                 new[number] = await fetch(served, f"{stream}/hls/{number}.m4s")
     await wait_until_written(served, GOPS)
     drop_from_memory(served)
-    for reel in (
+    for segmenter in (
         served.service.splicer.segmenter_of_person(1),
         served.service.splicer.segmenter_of_camera("c0"),
     ):
-        assert reel is not None
-        reel._segments.clear()
+        assert segmenter is not None
+        segmenter._segments.clear()
     assert len(new) > 15
     for number, data in new.items():
         assert await fetch(served, f"{stream}/hls/{number}.m4s") == data, number

@@ -46,8 +46,8 @@ async def test_the_last_error_is_shown_until_the_next_one(site_with_people: Serv
 async def test_the_floor_shows_calibrated_cameras_whose_size_is_known() -> None:
     plan = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
     cameras = [{"id": A, "source": "scene:room", "ground": plan}, B]
-    async with aclosing(serve_site(cameras=cameras)) as halls:
-        served = await anext(halls)
+    async with aclosing(serve_site(cameras=cameras)) as sites:
+        served = await anext(sites)
         assert await served.get_json("/api/operator/floor") == {"cameras": [], "uncalibrated": [B]}
         served.service.connect_cameras(*CAMERAS)
         served.service.feed(0, {A: {}, B: {}})
@@ -63,11 +63,11 @@ async def test_the_pulse_servers_clients_and_missing_ones_are_listed() -> None:
         PulseServer(25.0) as server,
         PulseClient("127.0.0.1", server.port, A) as camera,
         PulseClient("127.0.0.1", server.port, "stranger") as stranger,
-        aclosing(serve_site(sync={"port": server.port})) as halls,
+        aclosing(serve_site(sync={"port": server.port})) as sites,
     ):
         for client in (camera, stranger):
             await anext(aiter(client))  # it is connected
-        answer = await (await anext(halls)).get_json("/api/operator/pulses")
+        answer = await (await anext(sites)).get_json("/api/operator/pulses")
         assert (answer["server"], answer["error"]) == (f"127.0.0.1:{server.port}", "")
     assert {(client["name"], client["expected"], client["behind"]) for client in answer["clients"]} == {
         (A, True, 0),
@@ -81,10 +81,10 @@ async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() 
     async with (
         PulseServer(25.0, users=users) as server,
         PulseClient("127.0.0.1", server.port, A, credentials=Credentials(A, users[A])) as camera,
-        aclosing(serve_site(sync={"port": server.port})) as halls,
+        aclosing(serve_site(sync={"port": server.port})) as sites,
     ):
         await anext(aiter(camera))
-        served = await anext(halls)
+        served = await anext(sites)
         assert "needs a login" in (await served.get_json("/api/operator/pulses"))["error"]
         served.service.pulse_credentials = Credentials("bestview", users["bestview"])
         answer = await served.get_json("/api/operator/pulses")
@@ -94,7 +94,7 @@ async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() 
 
 @pytest.mark.parametrize("port", [1])
 async def test_an_unreachable_pulse_server_is_reported_in_one_line(port: int) -> None:
-    async with aclosing(serve_site(sync={"port": port})) as halls:
-        answer = await (await anext(halls)).get_json("/api/operator/pulses")
+    async with aclosing(serve_site(sync={"port": port})) as sites:
+        answer = await (await anext(sites)).get_json("/api/operator/pulses")
     assert answer["error"].startswith(f"there is no pulse server at 127.0.0.1:{port}")
     assert "\n" not in answer["error"]

@@ -60,13 +60,13 @@ async def browser() -> AsyncIterator[Browser]:
 
 
 @asynccontextmanager
-async def operating(
+async def open_operator_page(
     browser: Browser, place: str = "", axe: str = "", *, patience: float = 60, **changes: Any
 ) -> AsyncIterator[tuple[ServedSite, Page]]:
     """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
     complaints: list[str] = []
-    async with aclosing(serve_site(patience=patience, **changes)) as halls:
-        served = await anext(halls)
+    async with aclosing(serve_site(patience=patience, **changes)) as sites:
+        served = await anext(sites)
         page = await browser.new_page(viewport={"width": 1000, "height": 800})
         await page.add_init_script(axe)  # without the site's content policy
         page.set_default_timeout(PATIENCE_MS)
@@ -83,7 +83,7 @@ async def operating(
 
 async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_path: Path) -> None:
     tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("lead"), token_entry("desk"))
-    async with operating(browser, access={"tokens": str(tokens)}) as (_, page):
+    async with open_operator_page(browser, access={"tokens": str(tokens)}) as (_, page):
         field = page.get_by_label("An operator's token")
         await field.fill("wrong")
         await page.get_by_role("button", name="Sign in").click()
@@ -109,14 +109,14 @@ async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_p
 
 
 async def test_a_site_without_tokens_shows_no_sign_in_form(browser: Browser) -> None:
-    async with operating(browser) as (served, page):
+    async with open_operator_page(browser) as (served, page):
         await expect(page.locator("#site")).to_have_text(served.service.config.site.name)
         await expect(page.get_by_label("An operator's token")).to_be_hidden()
         await expect(page.get_by_role("button", name="Sign out")).to_be_hidden()
 
 
 async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
-    async with operating(browser, "#cameras") as (served, page):
+    async with open_operator_page(browser, "#cameras") as (served, page):
         await expect(page.locator(".camera-tile .state")).to_have_text(["Starting", "Starting"])
         show_people(served)
         await expect(page.locator(".camera-tile .state")).to_have_text(["Live", "Live"])
@@ -137,7 +137,7 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:
     cameras = [{"id": camera, "source": "scene:room", "ground": PLAN} for camera in CAMERAS]
-    async with operating(browser, "#floor", cameras=cameras) as (served, page):
+    async with open_operator_page(browser, "#floor", cameras=cameras) as (served, page):
         await expect(page.locator("#floor-message")).to_have_text("No camera has reported yet.")
         show_people(served)
         await page.reload()
@@ -152,14 +152,14 @@ async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browse
 
 
 async def test_an_uncalibrated_site_shows_how_to_calibrate(browser: Browser) -> None:
-    async with operating(browser, "#floor") as (served, page):
+    async with open_operator_page(browser, "#floor") as (served, page):
         show_people(served)
         await expect(page.locator("#floor-message")).to_contain_text("No camera is calibrated")
         await expect(page.locator("#plan")).to_be_hidden()
 
 
 async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browser) -> None:
-    async with operating(browser, "#people") as (served, page):
+    async with open_operator_page(browser, "#people") as (served, page):
         people = served.service.decider.people
         people._registry = IdentityRegistry(served.service.config.view.identity, dict.fromkeys(CAMERAS))
         await expect(page.locator("#people-message")).to_have_text("No people yet.")
@@ -187,7 +187,7 @@ async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browse
 
 
 async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
-    async with operating(browser, "#flags") as (served, page):
+    async with open_operator_page(browser, "#flags") as (served, page):
         await expect(page.locator("#no-flags")).to_have_text("None so far.")
         show_people(served)
         served.service.decider.people.registry.set_name(1, "Ann")
@@ -213,7 +213,7 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
 
 
 async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browser) -> None:
-    async with operating(browser, "#downloads") as (served, page):
+    async with open_operator_page(browser, "#downloads") as (served, page):
         end = int(time.time())
         served.service.pulse0 = end - 0.2  # five frames before
         show_people(served)
@@ -238,7 +238,10 @@ async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browse
 async def test_a_late_picture_of_another_camera_does_not_replace_the_selected_one(
     browser: Browser,
 ) -> None:
-    async with operating(browser, "#configuration") as (served, page):  # without requesting a picture
+    async with open_operator_page(browser, "#configuration") as (
+        served,
+        page,
+    ):  # without requesting a picture
         show_people(served)
         late = asyncio.Event()
 
@@ -265,7 +268,7 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
     browser: Browser,
 ) -> None:
     cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
-    async with operating(browser, "#zones", cameras=cameras) as (served, page):
+    async with open_operator_page(browser, "#zones", cameras=cameras) as (served, page):
         show_people(served)
         pressed = asyncio.Event()
 
@@ -286,7 +289,7 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
 async def test_ignored_areas_become_configuration_lines(browser: Browser) -> None:
     existing_areas = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
     cameras = [{"id": A, "source": "scene:room", "ignore": existing_areas}, B]
-    async with operating(browser, "#zones", cameras=cameras) as (served, page):
+    async with open_operator_page(browser, "#zones", cameras=cameras) as (served, page):
         show_people(served)
         await page.reload()
         stage, lines = page.locator("#mark-stage"), page.get_by_label("Zones as YAML")
@@ -313,7 +316,7 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
 
 
 async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, tmp_path: Path) -> None:
-    async with operating(browser, "#zones") as (served, page):
+    async with open_operator_page(browser, "#zones") as (served, page):
         show_people(served)
         await page.reload()
         await page.get_by_label("Camera", exact=True).select_option(B)
@@ -339,7 +342,7 @@ async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, 
 
 
 async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browser, tmp_path: Path) -> None:
-    async with operating(browser, "#calibration", patience=280, **SITE) as (served, page):
+    async with open_operator_page(browser, "#calibration", patience=280, **SITE) as (served, page):
         walking, state = served.service.walk_session, page.locator("#walk-state")
         await expect(state).to_have_text("No walk yet.")
         await expect(page.get_by_role("button", name="Finish")).to_be_disabled()
@@ -371,7 +374,7 @@ async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browse
 
 
 async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browser) -> None:
-    async with operating(browser, "#view-selection") as (served, page):
+    async with open_operator_page(browser, "#view-selection") as (served, page):
         decider, lines = served.service.decider, page.get_by_label("Lines for the configuration")
         cost = page.get_by_label("Cut cost λ, s")
         await expect(cost).to_have_value("0.04")
@@ -401,7 +404,7 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
 
 
 async def test_the_configuration_shows_differences_and_can_be_searched(browser: Browser) -> None:
-    async with operating(browser, "#configuration") as (_, page):
+    async with open_operator_page(browser, "#configuration") as (_, page):
         rows = page.locator("#settings tr")
         await expect(rows.filter(has_text="encode.gop")).to_have_text("encode.gop510")
         await expect(rows.filter(has_text="http.jpeg_quality")).to_have_count(0)
@@ -414,7 +417,7 @@ async def test_the_configuration_shows_differences_and_can_be_searched(browser: 
 
 async def test_no_width_overflows_and_axe_finds_no_serious_violation(browser: Browser) -> None:
     axe = AXE.read_text(encoding="utf-8") if AXE.exists() else ""
-    async with operating(browser, axe=axe) as (served, page):
+    async with open_operator_page(browser, axe=axe) as (served, page):
         show_people(served)
         for width in (360, 800, 1600):
             await page.set_viewport_size({"width": width, "height": 800})
@@ -423,14 +426,14 @@ async def test_no_width_overflows_and_axe_finds_no_serious_violation(browser: Br
                 await expect(page.locator(f"#{section}")).to_be_visible()
                 assert await page.evaluate("document.documentElement.scrollWidth") <= width, section
                 if width == 360:
-                    await large_enough_for_a_thumb(page)
+                    await check_button_sizes(page)
                 if width == 800 and axe:
                     assert await serious_faults(page) == []
     if not axe:
         pytest.skip("axe-core is not there: make node_modules/.installed")
 
 
-async def large_enough_for_a_thumb(page: Page) -> None:
+async def check_button_sizes(page: Page) -> None:
     for button in await page.locator("button:visible, select:visible, nav a").all():
         box = await button.bounding_box()
         assert box is not None
@@ -447,7 +450,7 @@ async def serious_faults(page: Page) -> list[Any]:
 
 
 async def test_sections_are_reached_by_keyboard_and_stored_in_the_url(browser: Browser) -> None:
-    async with operating(browser) as (_, page):
+    async with open_operator_page(browser) as (_, page):
         await expect(page.locator("#cameras")).to_be_visible()
         for section in SECTIONS[1:]:
             await page.locator(f'nav a[href="#{section}"]').focus()

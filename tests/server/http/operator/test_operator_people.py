@@ -19,10 +19,10 @@ PEOPLE = "/api/operator/people"
 
 
 @pytest.fixture
-async def real() -> AsyncIterator[ServedSite]:
+async def identifying_site() -> AsyncIterator[ServedSite]:
     """Serve a site with two people: one in both cameras, the other only in c0."""
-    async with aclosing(serve_site()) as halls:
-        served = await anext(halls)
+    async with aclosing(serve_site()) as sites:
+        served = await anext(sites)
         config = served.service.config
         served.service.decider.people._registry = IdentityRegistry(
             config.view.identity, camera_homographies(config)
@@ -65,39 +65,41 @@ async def test_a_name_is_listed_unchanged(
     assert any(line.split()[:2] == ["2", "yes"] for line in lines)
 
 
-async def test_merged_people_have_one_number_from_the_next_gop_on(real: ServedSite) -> None:
-    people = await objects(real)
+async def test_merged_people_have_one_number_from_the_next_gop_on(identifying_site: ServedSite) -> None:
+    people = await objects(identifying_site)
     kept, lost = sorted(people)[:2]
     decisions: list[Any] = []
-    real.service.on_decision.append(decisions.append)
-    status, answer = await post_edit(real, object=kept, merge=lost)
-    assert (await post_edit(real, object=lost, name="Bob"))[0] == 200, "the merged number is valid at once"
+    identifying_site.service.on_decision.append(decisions.append)
+    status, answer = await post_edit(identifying_site, object=kept, merge=lost)
+    assert (await post_edit(identifying_site, object=lost, name="Bob"))[0] == 200, (
+        "the merged number is valid at once"
+    )
     assert (status, answer["merged"]) == (200, {str(lost): kept})
     for epoch in range(3, 8):
-        feed(real, epoch)
+        feed(identifying_site, epoch)
     assert [(merge.kept, merge.lost) for gop in decisions for merge in gop.merged] == [(kept, lost)]
-    people = await objects(real)
+    people = await objects(identifying_site)
     assert lost not in people
     assert people[kept]["aliases"] == [lost]
     assert people[kept]["name"] == "Bob"
-    assert (await real.get_json(f"/api/objects/{lost}/choice"))["object"] == kept
-    assert (await post_edit(real, object=kept, merge=lost))[0] == 400
+    assert (await identifying_site.get_json(f"/api/objects/{lost}/choice"))["object"] == kept
+    assert (await post_edit(identifying_site, object=kept, merge=lost))[0] == 400
 
 
-async def test_a_person_split_off_has_a_new_number_for_all_viewers(real: ServedSite) -> None:
-    number = real.service.decider.people.number(A, 1, 10)
+async def test_a_person_split_off_has_a_new_number_for_all_viewers(identifying_site: ServedSite) -> None:
+    number = identifying_site.service.decider.people.number(A, 1, 10)
     assert number is not None
     decisions: list[Any] = []
-    real.service.on_decision.append(decisions.append)
-    status, answer = await post_edit(real, object=number, split=[A])
+    identifying_site.service.on_decision.append(decisions.append)
+    status, answer = await post_edit(identifying_site, object=number, split=[A])
     assert status == 200
     new = answer["new_object"]
     for epoch in range(3, 8):
-        feed(real, epoch)
+        feed(identifying_site, epoch)
     splits = [(split.kept, split.new_object, split.camera) for gop in decisions for split in gop.split]
     assert splits == [(number, new, A)]
-    assert A in (await objects(real))[new]["cameras"]
-    assert (await real.get_json(f"/api/objects/{new}/choice"))["camera"] is not None
+    assert A in (await objects(identifying_site))[new]["cameras"]
+    assert (await identifying_site.get_json(f"/api/objects/{new}/choice"))["camera"] is not None
 
 
 @pytest.mark.parametrize(
@@ -123,8 +125,8 @@ async def test_an_invalid_edit_is_refused_with_one_line(
 
 
 async def test_people_cannot_be_edited_on_a_sharded_site() -> None:
-    async with aclosing(serve_site(view={"share": {"of": 2}})) as halls:
-        served = await anext(halls)
+    async with aclosing(serve_site(view={"share": {"of": 2}})) as sites:
+        served = await anext(sites)
         status, response = await post_edit(served, object=1, name="Ann")
         assert status == 409
         assert (await served.get_json(PEOPLE))["unavailable"] == response["error"]

@@ -154,8 +154,8 @@ async def open_hall() -> AsyncIterator[ServedSite]:
         },
         B,
     ]
-    async with aclosing(serve_site(cameras=cameras)) as halls:
-        yield await anext(halls)
+    async with aclosing(serve_site(cameras=cameras)) as sites:
+        yield await anext(sites)
 
 
 async def test_the_configuration_shows_differences_and_no_secrets(open_hall: ServedSite) -> None:

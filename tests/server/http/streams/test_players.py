@@ -65,7 +65,7 @@ def feed(served: ServedSite, epoch: int) -> None:
 
 
 @pytest.fixture
-async def live() -> AsyncIterator[ServedSite]:
+async def ending_site() -> AsyncIterator[ServedSite]:
     """A site that runs at five times its rate, too fast for a window of HLS, and ends."""
     async for served in serve_site(
         http={"hls_segment_s": 0.4, "hls_window_s": 60.0, "viewer_queue_gops": 100}
@@ -77,7 +77,7 @@ async def live() -> AsyncIterator[ServedSite]:
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayerOutput:
     """The output of a player."""
 
     code: int | None
@@ -85,7 +85,9 @@ class Played:
     complaints: str
 
 
-async def played(served: ServedSite, *commands: Sequence[str], user: str | None = None) -> list[Played]:
+async def run_players(
+    served: ServedSite, *commands: Sequence[str], user: str | None = None
+) -> list[PlayerOutput]:
     """Run a player for each path while the site runs and ends."""
     pipe = asyncio.subprocess.PIPE
     players = [
@@ -108,12 +110,12 @@ async def played(served: ServedSite, *commands: Sequence[str], user: str | None 
                 player.kill()
         await asyncio.gather(*ends, return_exceptions=True)
     return [
-        Played(player.returncode, output, complaints.decode())
+        PlayerOutput(player.returncode, output, complaints.decode())
         for player, (output, complaints) in zip(players, results, strict=True)
     ]
 
 
-def own(camera: int) -> list[NDArray[np.uint8]]:
+def decoded_alone(camera: int) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("h264", "r")
     packets = [*(av.Packet(unit.data) for unit in encoded(camera, EPOCHS * STRIDE)), None]
     return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
@@ -121,7 +123,7 @@ def own(camera: int) -> list[NDArray[np.uint8]]:
 
 def check_pictures(served: ServedSite, path: str, output: bytes) -> None:
     """Find each picture that was shown, none left out, up to the last, in one of the cameras."""
-    alone = np.array([own(camera) for camera in range(2)])
+    alone = np.array([decoded_alone(camera) for camera in range(2)])
     pictures = np.frombuffer(output, np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
     last = end_of(served, path)
     first = last - len(pictures)
@@ -139,30 +141,30 @@ def end_of(served: ServedSite, path: str) -> int:
 
 
 @needs_ffmpeg
-async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(live: ServedSite) -> None:
+async def test_ffmpeg_plays_across_cuts_and_reloads_without_a_warning(ending_site: ServedSite) -> None:
     command = "ffmpeg -nostdin -v warning {} -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
-    urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
+    urls = [f"http://127.0.0.1:{ending_site.port}{path}" for path in PATHS]
     starts = ["-live_start_index 0" if "m3u8" in path else "" for path in PATHS]
-    outputs = await played(
-        live, *(command.format(*start).split() for start in zip(starts, urls, strict=True))
+    outputs = await run_players(
+        ending_site, *(command.format(*start).split() for start in zip(starts, urls, strict=True))
     )
     for path, player in zip(PATHS, outputs, strict=True):
         own_doing = OF_EVERY_PLAYLIST if "m3u8" in path else NEVER
         assert (player.code, own_doing.sub("", player.complaints)) == (0, ""), path
-        check_pictures(live, path, player.output)
+        check_pictures(ending_site, path, player.output)
 
 
 @needs_mpv
-async def test_mpv_plays_to_the_end_without_a_warning(live: ServedSite) -> None:
+async def test_mpv_plays_to_the_end_without_a_warning(ending_site: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal"
-    urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
-    outputs = await played(live, *([*command.split(), url] for url in urls))
+    urls = [f"http://127.0.0.1:{ending_site.port}{path}" for path in PATHS]
+    outputs = await run_players(ending_site, *([*command.split(), url] for url in urls))
     for path, player in zip(PATHS, outputs, strict=True):
         assert (player.code, player.output + player.complaints.encode()) == (0, b""), path
 
 
 @pytest.fixture
-def shared() -> Iterator[Path]:
+def shared_folder() -> Iterator[Path]:
     """A world-writable folder: VLC does not run as root."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder).chmod(0o777)
@@ -178,7 +180,9 @@ VLC = (
 def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
     """Find each picture in a camera; a player may repeat or skip pictures, but not go back."""
     frame_of_picture = {
-        picture.tobytes(): (pulse, camera) for camera in range(2) for pulse, picture in enumerate(own(camera))
+        picture.tobytes(): (pulse, camera)
+        for camera in range(2)
+        for pulse, picture in enumerate(decoded_alone(camera))
     }
     assert len(frame_of_picture) == 2 * EPOCHS * STRIDE, "no picture is like another"
     shown = [frame_of_picture[picture] for picture in pictures]
@@ -203,31 +207,31 @@ def pictures_of(film: bytes) -> list[bytes]:
 
 @needs_vlc
 @pytest.mark.slow  # plays in real time: faster, it drops pictures on a busy machine
-async def test_vlc_plays_across_cuts_without_a_warning(live: ServedSite, shared: Path) -> None:
-    files = [shared / f"{number}.yuv" for number in range(len(PATHS))]
-    urls = [f"http://127.0.0.1:{live.port}{path}" for path in PATHS]
+async def test_vlc_plays_across_cuts_without_a_warning(ending_site: ServedSite, shared_folder: Path) -> None:
+    files = [shared_folder / f"{number}.yuv" for number in range(len(PATHS))]
+    urls = [f"http://127.0.0.1:{ending_site.port}{path}" for path in PATHS]
     user = "nobody" if os.geteuid() == 0 else None
     commands = [VLC.format(shown, url).split() for shown, url in zip(files, urls, strict=True)]
-    outputs = await played(live, *commands, user=user)
+    outputs = await run_players(ending_site, *commands, user=user)
     for path, player, shown in zip(PATHS, outputs, files, strict=True):
         complaints = [
             line for line in OF_A_STREAM.findall(player.complaints) if not OF_EVERY_FRAGMENT.search(line)
         ]
         assert (player.code, complaints) == (0, []), path
-        check_order(live, path, pictures_of(shown.read_bytes()))
+        check_order(ending_site, path, pictures_of(shown.read_bytes()))
 
 
 @needs_chromium
-async def test_chromium_plays_hls_natively_to_the_end(live: ServedSite) -> None:
+async def test_chromium_plays_hls_natively_to_the_end(ending_site: ServedSite) -> None:
     async with chromium() as browser:
         page = await browser.new_page(bypass_csp=True)
-        await page.goto(f"http://127.0.0.1:{live.port}/healthz")
+        await page.goto(f"http://127.0.0.1:{ending_site.port}/healthz")
         playing = asyncio.create_task(page.evaluate(NATIVE_HLS_JS, "/objects/1/hls/index.m3u8"))
         async with asyncio.timeout(PATIENCE):
             for epoch in range(20, EPOCHS):
                 await asyncio.sleep(STRIDE / FPS / 5)
-                feed(live, epoch)
-            live.service.splicer.close()
+                feed(ending_site, epoch)
+            ending_site.service.splicer.close()
             outputs = await playing
     if outputs is None:
         pytest.skip("this Chromium plays no HLS by itself")

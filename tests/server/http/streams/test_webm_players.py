@@ -36,7 +36,7 @@ from server.service.view_selection.decider import GopDecision, ObjectChoice
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
 
 
-async def played(served: ServedSite, command: str) -> list[tuple[int | None, bytes, str]]:
+async def run_players(served: ServedSite, command: str) -> list[tuple[int | None, bytes, str]]:
     """Run a player for each path while the site runs and ends; return exit code, output and warnings."""
     pipe = asyncio.subprocess.PIPE
     urls = [f"http://127.0.0.1:{served.port}{path}" for path in PATHS]
@@ -63,7 +63,7 @@ async def played(served: ServedSite, command: str) -> list[tuple[int | None, byt
 async def test_ffmpeg_plays_across_cuts_without_a_warning(vp8_site: ServedSite) -> None:
     command = "ffmpeg -nostdin -v warning -i {} -f rawvideo -pix_fmt yuv420p -fps_mode passthrough pipe:1"
     alone = np.array([decoded_alone(camera) for camera in range(2)])
-    best, live = await played(vp8_site, command)
+    best, live = await run_players(vp8_site, command)
     for path, player in zip(PATHS, (best, live), strict=True):
         assert (player[0], player[2]) == (0, ""), path
     camera = np.frombuffer(live[1], np.uint8).reshape(-1, HEIGHT * 3 // 2, WIDTH)
@@ -83,7 +83,7 @@ async def test_ffmpeg_plays_across_cuts_without_a_warning(vp8_site: ServedSite) 
 @needs_mpv
 async def test_mpv_plays_to_the_end_without_a_warning(vp8_site: ServedSite) -> None:
     command = "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal {}"
-    for path, player in zip(PATHS, await played(vp8_site, command), strict=True):
+    for path, player in zip(PATHS, await run_players(vp8_site, command), strict=True):
         assert player == (0, b"", ""), path
 
 
@@ -124,7 +124,7 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(vp8_site: ServedSi
     assert pulses[-1] > GOPS * GOP - 3
 
 
-async def go_on(served: ServedSite) -> None:
+async def feed_in_real_time(served: ServedSite) -> None:
     """Send epochs at the site's rate: two people, each larger in the other camera every second."""
     frames = 25 * FPS
     for epoch in range(3, frames // STRIDE):
@@ -147,7 +147,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_sit
         page = await browser.new_page(bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.set_default_timeout(PATIENCE_MS)
-        feeding = asyncio.create_task(go_on(vp8_site))
+        feeding = asyncio.create_task(feed_in_real_time(vp8_site))
         await page.goto(f"http://127.0.0.1:{vp8_site.port}/?object=1")
         await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")
         await page.evaluate("document.querySelector('video').dataset.same = 'yes'")

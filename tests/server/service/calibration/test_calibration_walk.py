@@ -36,8 +36,8 @@ MINE = {CSRF_HEADER: "1"}
 @pytest.fixture
 async def wide() -> AsyncIterator[ServedSite]:
     """Serve a site whose pictures are large enough to walk in."""
-    async with aclosing(serve_site(**SITE)) as halls:
-        yield await anext(halls)
+    async with aclosing(serve_site(**SITE)) as sites:
+        yield await anext(sites)
 
 
 async def do(served: ServedSite, **step: Any) -> tuple[int, Any]:

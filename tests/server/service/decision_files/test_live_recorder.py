@@ -17,7 +17,7 @@ A, B = CAMERAS
 LETTERBOXES = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
 
 
-def written(folder: Path) -> dict[str, str]:
+def read_files(folder: Path) -> dict[str, str]:
     return {path.name: path.read_text() for path in folder.rglob("*.*")}
 
 
@@ -27,17 +27,17 @@ def test_skipped_decisions_are_listed_once_there_is_room(
     caplog.set_level(logging.INFO)
     writer = LiveDecisionWriter(tmp_path, CAMERAS, LETTERBOXES)
     writer.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
-    before = written(tmp_path)
+    before = read_files(tmp_path)
     with files_of_at_most(max(map(len, before.values()))):
         for gop in (1, 2, 3):
             writer.add_late(B, [gop * GOP], "tracks late")
             writer.add_late(B, [4 * GOP], "no frame")
             writer.write(decision(gop, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
-            assert written(tmp_path) == before
+            assert read_files(tmp_path) == before
     writer.write(decision(4, choice(1, B), c0=[[(1, *SMALL)]] * GOP))
     writer.add_late(A, [5 * GOP], "tracks late")
     writer.close()
-    after = written(tmp_path)
+    after = read_files(tmp_path)
     frames = [*range(1, GOP + 1), *range(4 * GOP + 1, 5 * GOP + 1)]
     assert [int(line.split(",")[0]) for line in after["choices.csv"].splitlines()[1:]] == frames
     assert [int(line.split(",")[0]) for line in after["c0.txt"].splitlines()] == frames
@@ -57,11 +57,11 @@ def test_a_full_disk_at_the_end_is_logged_and_all_files_are_intact(
 ) -> None:
     writer = LiveDecisionWriter(tmp_path, CAMERAS, LETTERBOXES)
     writer.write(decision(0, choice(1, A)))
-    before = written(tmp_path)
+    before = read_files(tmp_path)
     writer.add_late(B, [7], "tracks late")
     with files_of_at_most(0):
         writer.close()
-    assert written(tmp_path) == before
+    assert read_files(tmp_path) == before
     assert "the end of late.csv could not be written" in caplog.text
 
 

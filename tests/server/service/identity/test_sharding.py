@@ -136,7 +136,7 @@ def test_shard_addresses_are_normalized_to_base_urls() -> None:
 
 
 @pytest.fixture(params=[["http://one:1/", "http://two/x"], []])
-async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
+async def second_service(request: pytest.FixtureRequest) -> AsyncIterator[str]:
     """Serve the second of two shards, with and without configured addresses."""
     service = FedService(small_config(**shard_settings(1, servers=request.param)))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
@@ -149,13 +149,13 @@ async def second(request: pytest.FixtureRequest) -> AsyncIterator[str]:
 
 
 async def test_people_of_another_service_are_listed_and_redirected(
-    second: str, request: pytest.FixtureRequest
+    second_service: str, request: pytest.FixtureRequest
 ) -> None:
     has_address = bool(request.node.callspec.params["second"])
     async with aiohttp.ClientSession() as session:
 
         async def get(path: str) -> tuple[int, str | None, Any]:
-            async with session.get(second + path, allow_redirects=False) as answer:
+            async with session.get(second_service + path, allow_redirects=False) as answer:
                 content = await answer.json() if answer.content_type == "application/json" else None
                 return answer.status, answer.headers.get("Location"), content
 

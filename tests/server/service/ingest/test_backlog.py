@@ -11,7 +11,7 @@ from server.service.ingest.backlog import BacklogMonitor
 REACH = 100  # pulses
 
 
-def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
+def skipped(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     """Return for each measured backlog, in pulses, whether it is skipped."""
     times = iter(number * every_s for number in range(len(behind)))
     monitor = BacklogMonitor(REACH, lambda: next(times))
@@ -29,10 +29,10 @@ def lost(behind: Sequence[int], every_s: float = 1.0) -> list[bool]:
     ids=["in time", "catching up", "not for long", "sometimes"],
 )
 def test_nothing_is_skipped_while_decisions_keep_up_or_catch_up(behind: list[int]) -> None:
-    assert not any(lost(behind))
+    assert not any(skipped(behind))
 
 
 @pytest.mark.parametrize("more", [0, 5, 25])
 def test_a_backlog_that_does_not_shrink_is_skipped_after_three_measurements(more: int) -> None:
     behind = [REACH + 1 + more * number for number in range(3)]
-    assert lost(behind + behind) == [False, False, True] * 2
+    assert skipped(behind + behind) == [False, False, True] * 2

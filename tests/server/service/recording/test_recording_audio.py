@@ -63,7 +63,7 @@ async def served(recording: Path, tmp_path: Path) -> AsyncIterator[ServedSite]:
         yield served
 
 
-def shows(
+def decide_gops(
     served: ServedSite, recording: Path, gops: range, choices: Mapping[int, str | None] | None = None
 ) -> None:
     """Decide some GOPs of the recording: person 1 is in either camera in turn, or as in ``choices``."""
@@ -86,7 +86,7 @@ async def until_written(service: FedService, gops: int) -> None:
         await asyncio.sleep(0.001)
 
 
-def forget(service: FedService) -> None:
+def drop_from_memory(service: FedService) -> None:
     """Drop all but the last GOPs' pictures and audio from memory."""
     assert service.audio_buffer is not None
     service.recorder.recent._frames = GOP
@@ -100,7 +100,7 @@ async def download(served: ServedSite, path: str) -> bytes:
         return await answer.read()
 
 
-def unbroken(stream: bytes, kind: str | None = None) -> tuple[float, float]:
+def check_no_audio_gap(stream: bytes, kind: str | None = None) -> tuple[float, float]:
     """Assert that the audio has no gap; return its first and last time."""
     times, _ = decode_audio(stream, kind)
     assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4)
@@ -111,13 +111,16 @@ async def test_in_a_recording_each_beep_is_with_its_flash_in_any_file(
     served: ServedSite, recording: Path
 ) -> None:
     own = send_audio(served.service, recording)
-    shows(served, recording, range(GOPS))
+    decide_gops(served, recording, range(GOPS))
     await until_written(served.service, GOPS)
-    forget(served.service)
+    drop_from_memory(served.service)
     data = await download(served, f"/objects/1/best.mp4?from=p7&to=p{FRAMES - 2}")
     assert flashes(data) == pytest.approx(BEEP_TIMES, abs=0.001)
     assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
-    assert unbroken(data) == (pytest.approx(GOP / FPS, abs=0.022), pytest.approx(FRAMES / FPS, abs=0.1))
+    assert check_no_audio_gap(data) == (
+        pytest.approx(GOP / FPS, abs=0.022),
+        pytest.approx(FRAMES / FPS, abs=0.1),
+    )
     begin = FORM.frame_at(GOP, FPS)
     assert packets(data) == own[begin : begin + len(packets(data))], "byte for byte the recording's"
     camera = await download(served, f"/cameras/c1/live.mp4?from=p0&to=p{FRAMES}")
@@ -133,20 +136,20 @@ async def test_audio_has_no_gap_where_a_recording_meets_the_live_stream(
     monkeypatch.setattr("server.service.time_shift.time_shift_stream._LEAD_S", 60.0)
     service, half = served.service, GOPS // 2
     own = send_audio(service, recording)
-    shows(served, recording, range(half))
+    decide_gops(served, recording, range(half))
     await until_written(service, half)
     async with served.session.get(f"{path}?from=p0") as answer:
         while not service.splicer.viewers:  # noqa: ASYNC110 — the past is sent first
             await asyncio.sleep(0.001)
         for gop in range(half, GOPS):
-            shows(served, recording, range(gop, gop + 1))
+            decide_gops(served, recording, range(gop, gop + 1))
             await asyncio.sleep(0.005)
         service.splicer.close()
         data = await answer.read()
     kind = "mpegts" if path.endswith("ts") else "mp4"
     assert flashes(data, kind) == pytest.approx(BEEP_TIMES, abs=0.001)
     assert beeps(data, kind) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
-    assert unbroken(data, kind)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
+    assert check_no_audio_gap(data, kind)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
     if kind == "mpegts":
         check_counters(parse_packets(data))
     else:
@@ -158,25 +161,25 @@ async def test_audio_continues_where_no_picture_is_shown_for_long(
 ) -> None:
     send_audio(served.service, recording)
     choices = {gop: A if gop < 2 or gop >= GOPS - 2 else None for gop in range(GOPS)}
-    shows(served, recording, range(GOPS), choices)
+    decide_gops(served, recording, range(GOPS), choices)
     await until_written(served.service, GOPS)
-    forget(served.service)
+    drop_from_memory(served.service)
     data = await download(served, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
     assert beeps(data) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
-    assert unbroken(data)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
+    assert check_no_audio_gap(data)[1] == pytest.approx(FRAMES / FPS, abs=0.03)
 
 
 async def test_audio_that_was_deleted_or_not_recorded_is_silent(served: ServedSite, recording: Path) -> None:
     send_audio(served.service, recording, silent=range(30, 60))
-    shows(served, recording, range(GOPS))
+    decide_gops(served, recording, range(GOPS))
     await until_written(served.service, GOPS)
-    forget(served.service)
+    drop_from_memory(served.service)
     session = served.service.recorder.session
     assert session is not None
     deleted = session.segments[6].first
     session.paths.audio_file(deleted).unlink()
     data = await download(served, f"/objects/1/best.mp4?from=p0&to=p{FRAMES}")
-    unbroken(data)
+    check_no_audio_gap(data)
     _, samples = decode_audio(data)
     assert not samples[31 * FRAME : 59 * FRAME].any()
     assert not samples[(deleted + 1) * 1920 + FRAME : (deleted + 2 * GOP) * 1920 - 2 * FRAME].any()
@@ -199,14 +202,14 @@ async def test_the_audio_of_an_earlier_session_plays_after_a_restart(recording: 
             served.service.connect_cameras(*CAMERAS)
             if not gops.start:
                 send_audio(served.service, recording)
-            shows(served, recording, gops)
+            decide_gops(served, recording, gops)
             await until_written(served.service, len(gops))
             if gops.start:
                 data = await download(served, f"/cameras/c0/live.mp4?from=p0&to=p{FRAMES}")
                 assert beeps(data) == pytest.approx(
                     [time for time in BEEP_TIMES if time < FRAMES / FPS - 0.2], abs=MAX_AV_OFFSET_S
                 )
-                unbroken(data)
+                check_no_audio_gap(data)
 
 
 async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
@@ -241,7 +244,7 @@ async def test_audio_is_deleted_with_its_segments(tmp_path: Path) -> None:
 @needs_ffprobe
 async def test_the_audio_playlist_plays_from_the_disk(served: ServedSite, recording: Path) -> None:
     send_audio(served.service, recording)
-    shows(served, recording, range(GOPS))
+    decide_gops(served, recording, range(GOPS))
     await until_written(served.service, GOPS)
     session = served.service.recorder.session
     assert session is not None
@@ -255,7 +258,7 @@ async def test_a_site_without_audio_records_none(tmp_path: Path, recording: Path
     async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         served.service.recorder.open()
         served.service.connect_cameras(*CAMERAS)
-        shows(served, recording, range(4))
+        decide_gops(served, recording, range(4))
         await until_written(served.service, 4)
         session = served.service.recorder.session
         assert session is not None

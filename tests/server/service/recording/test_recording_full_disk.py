@@ -46,12 +46,12 @@ def opened(folder: Path, clock: ManualClocks, bounds: RetentionLimits = BOUNDS) 
     return store
 
 
-def leave(store: RecordingFolder) -> None:
+def close(store: RecordingFolder) -> None:
     """End a service."""
     store.close()
 
 
-def refused(store: RecordingFolder, clock: ManualClocks, gop: int) -> None:
+def write_on_full_disk(store: RecordingFolder, clock: ManualClocks, gop: int) -> None:
     """Try to write a GOP on a full disk; abandon it as the writer does."""
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         record(store, clock, range(gop, gop + 1))
@@ -65,8 +65,8 @@ def on_disk(folder: Path) -> list[int]:
 
 def files_in(session: RecordingSession) -> set[int]:
     """Return the files that the playlists in memory refer to."""
-    tapes = [camera.index for camera in (*session.cameras.values(), *session.objects.values())]
-    return {stretch.file for tape in tapes for stretch in tape.all}
+    indexes = [camera.index for camera in (*session.cameras.values(), *session.objects.values())]
+    return {stretch.file for tape in indexes for stretch in tape.all}
 
 
 def files_in_playlists(session: RecordingSession) -> set[int]:
@@ -81,7 +81,7 @@ def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: Manu
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
     assert on_disk(tmp_path) == [0, 25, 50, 75]
-    refused(store, clock, 27)
+    write_on_full_disk(store, clock, 27)
     session = store.session
     assert session is not None
     assert on_disk(tmp_path) == [50, 75], "earlier ones have expired"
@@ -98,7 +98,7 @@ def test_old_recordings_are_deleted_from_a_full_disk(tmp_path: Path, clock: Manu
 def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
-    leave(store)
+    close(store)
     clock.now += 2.6
     with files_of_at_most(0):
         restarted = opened(tmp_path, clock)
@@ -112,10 +112,10 @@ def test_a_disk_that_is_full_at_the_start_is_locked_and_cleared(tmp_path: Path, 
 def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
-    leave(store)
+    close(store)
     restarted = opened(tmp_path, clock)
     assert on_disk(tmp_path) == [0, 25, 50, 75]
-    refused(restarted, clock, 27)
+    write_on_full_disk(restarted, clock, 27)
     assert on_disk(tmp_path) == [50, 75]
     assert restarted.session is None, "it could not begin"
     restarted.close()
@@ -124,10 +124,10 @@ def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, cloc
 def test_playlist_entries_without_files_are_dropped_at_a_restart(tmp_path: Path, clock: ManualClocks) -> None:
     store = opened(tmp_path, clock)
     record(store, clock, range(20))
-    refused(store, clock, 27)
+    write_on_full_disk(store, clock, 27)
     assert store.session is not None
     with files_of_at_most(0):
-        leave(store)
+        close(store)
     assert files_in_playlists(store.session) == {0, 25, 50, 75}
     restarted = opened(tmp_path, clock, UNLIMITED)
     (earlier,) = restarted.earlier
@@ -167,7 +167,7 @@ def test_a_full_disk_does_not_stop_the_service_from_starting(tmp_path: Path, clo
     folder = tmp_path / "kept"
     store = opened(folder, clock)
     record(store, clock, range(20))
-    leave(store)
+    close(store)
     service = FedService(small_config(record={"folder": str(folder), "keep_s": 1.5}))
     service.connect_cameras(*CAMERAS)
     with files_of_at_most(0):

@@ -54,7 +54,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-async def loud(recording: Path) -> AsyncIterator[ServedSite]:
+async def site_with_audio(recording: Path) -> AsyncIterator[ServedSite]:
     """A site that has that recording's sound."""
     async for served in serve_site(sound={"source": str(recording)}, http={"viewer_queue_gops": 100}):
         yield served
@@ -86,10 +86,10 @@ async def watched(
 
 @pytest.mark.parametrize(("path", "kind"), [("best.mp4", "mp4"), ("best.ts", "mpegts")])
 async def test_after_every_cut_a_beep_is_with_its_flash(
-    loud: ServedSite, recording: Path, path: str, kind: str
+    site_with_audio: ServedSite, recording: Path, path: str, kind: str
 ) -> None:
-    own = send_audio(loud.service, recording)
-    (data,) = await watched(loud, recording, [f"/objects/1/{path}"])
+    own = send_audio(site_with_audio.service, recording)
+    (data,) = await watched(site_with_audio, recording, [f"/objects/1/{path}"])
     assert flashes(data, kind) == pytest.approx(BEEP_TIMES, abs=0.001)
     assert beeps(data, kind) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
     if kind == "mp4":
@@ -98,11 +98,11 @@ async def test_after_every_cut_a_beep_is_with_its_flash(
 
 
 async def test_audio_has_no_gap_where_pictures_or_audio_are_missing(
-    loud: ServedSite, recording: Path
+    site_with_audio: ServedSite, recording: Path
 ) -> None:
-    send_audio(loud.service, recording, silent=range(60, 80))
+    send_audio(site_with_audio.service, recording, silent=range(60, 80))
     lost = frozenset({13, *range(30, 45), 71})
-    data, ts = await watched(loud, recording, ["/objects/1/best.mp4", "/objects/1/best.ts"], lost)
+    data, ts = await watched(site_with_audio, recording, ["/objects/1/best.mp4", "/objects/1/best.ts"], lost)
     for stream, kind in ((data, "mp4"), (ts, "mpegts")):
         times, samples = decode_audio(stream, kind)
         assert np.diff(times) == pytest.approx(1 / 48_000, abs=1e-4), "without a gap"
@@ -113,14 +113,14 @@ async def test_audio_has_no_gap_where_pictures_or_audio_are_missing(
 
 
 async def test_a_camera_stream_has_audio_at_once_or_silence_half_a_second_later(
-    loud: ServedSite, recording: Path
+    site_with_audio: ServedSite, recording: Path
 ) -> None:
-    service = loud.service
+    service = site_with_audio.service
     own = send_audio(service, recording, silent=range(60, 1000))
     service.connect_cameras(*CAMERAS)
     units = access_units(recording)
     service.ingest.video(video(B, units[0]))
-    answers = [await loud.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
+    answers = [await site_with_audio.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
     for unit in units[1:]:
         service.ingest.video(video(B, unit))
         await asyncio.sleep(0.002)
@@ -136,17 +136,18 @@ async def test_a_camera_stream_has_audio_at_once_or_silence_half_a_second_later(
 
 @pytest.mark.parametrize("parts", [0, 5])
 async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
-    loud: ServedSite, recording: Path, parts: int
+    site_with_audio: ServedSite, recording: Path, parts: int
 ) -> None:
-    send_audio(loud.service, recording)
-    await watched(loud, recording, [])
-    listed = await (await loud.session.get("/objects/1/hls/index.m3u8")).text()
+    send_audio(site_with_audio.service, recording)
+    await watched(site_with_audio, recording, [])
+    listed = await (await site_with_audio.session.get("/objects/1/hls/index.m3u8")).text()
     numbers = [line.removesuffix(".m4s") for line in listed.splitlines() if line.endswith(".m4s")]
     names = [f"{number}.{part}.m4s" for number in numbers for part in range(parts)] or [
         f"{number}.m4s" for number in numbers
     ]
     fetched = [
-        await (await loud.session.get(f"/objects/1/hls/{name}")).read() for name in ("init.mp4", *names)
+        await (await site_with_audio.session.get(f"/objects/1/hls/{name}")).read()
+        for name in ("init.mp4", *names)
     ]
     data = b"".join(fetched)
     times, _ = decode_audio(data)
@@ -157,8 +158,8 @@ async def test_segments_and_their_parts_have_the_audio_of_their_pictures(
     assert beeps(data) == pytest.approx([time for time in BEEP_TIMES if time > began], abs=MAX_AV_OFFSET_S)
 
 
-async def test_all_streams_share_the_bytes_of_the_audio(loud: ServedSite, recording: Path) -> None:
-    service = loud.service
+async def test_all_streams_share_the_bytes_of_the_audio(site_with_audio: ServedSite, recording: Path) -> None:
+    service = site_with_audio.service
     send_audio(service, recording)
     for camera in CAMERAS:
         for unit in encoded(0):
@@ -189,11 +190,11 @@ async def test_a_site_without_audio_has_no_audio_track(served: ServedSite) -> No
     assert b"soun" not in await answer.read()
 
 
-async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(loud: ServedSite) -> None:
-    assert (await loud.get_json("/api/site"))["sound"] == "mp4a.40.2"
+async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(site_with_audio: ServedSite) -> None:
+    assert (await site_with_audio.get_json("/api/site"))["sound"] == "mp4a.40.2"
     (good,) = audio_messages(
         RecordedAudioSource(
-            str(loud.service.config.sound.source), SoundSettings(source="x"), FPS, 0, "stop"
+            str(site_with_audio.service.config.sound.source), SoundSettings(source="x"), FPS, 0, "stop"
         ).until(5)
     )
     for bad in (
@@ -203,15 +204,17 @@ async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(loud: Se
         b'{"first":1,"sizes":[0]}',
         b'{"first":1,"sizes":[7]}',
     ):
-        loud.service.ingest.audio(type(good)(good.key, good.payload, bad))
-    state = loud.service.ingest.states[A]
+        site_with_audio.service.ingest.audio(type(good)(good.key, good.payload, bad))
+    state = site_with_audio.service.ingest.states[A]
     assert state.bad_messages == 5, "of the camera whose process sends it"
     assert state.metrics.last_error is not None
     assert state.metrics.last_error.text.startswith("invalid message: audio: ")
 
 
-async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: ServedSite, recording: Path) -> None:
-    service = loud.service
+async def test_in_videos_with_boxes_a_beep_is_with_its_flash(
+    site_with_audio: ServedSite, recording: Path
+) -> None:
+    service = site_with_audio.service
     own = send_audio(service, recording)
     service.connect_cameras(*CAMERAS)
     for unit in access_units(recording):
@@ -220,7 +223,7 @@ async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: ServedSite, r
     decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
     service.decision_state.put(decisions[0])
     service.splicer.publish_decision(decisions[0])
-    answer = await loud.session.get("/objects/1/best.mp4?overlay=1")
+    answer = await site_with_audio.session.get("/objects/1/best.mp4?overlay=1")
     assert answer.status == 200, await answer.text()
     for decision in decisions[1:]:
         service.splicer.publish_decision(decision)
@@ -236,11 +239,15 @@ async def test_in_videos_with_boxes_a_beep_is_with_its_flash(loud: ServedSite, r
 
 
 @needs_ffprobe
-async def test_ffprobe_reports_no_errors(loud: ServedSite, recording: Path, tmp_path: Path) -> None:
-    send_audio(loud.service, recording)
+async def test_ffprobe_reports_no_errors(
+    site_with_audio: ServedSite, recording: Path, tmp_path: Path
+) -> None:
+    send_audio(site_with_audio.service, recording)
     paths = ["best.mp4", "best.ts"]
     for path, data in zip(
-        paths, await watched(loud, recording, [f"/objects/1/{path}" for path in paths]), strict=True
+        paths,
+        await watched(site_with_audio, recording, [f"/objects/1/{path}" for path in paths]),
+        strict=True,
     ):
         (tmp_path / path).write_bytes(data)
         found = {stream[0]: int(stream[1]) for stream in probed(tmp_path / path, "codec_name,nb_read_frames")}
@@ -250,10 +257,10 @@ async def test_ffprobe_reports_no_errors(loud: ServedSite, recording: Path, tmp_
 
 @needs_chromium
 async def test_chromium_plays_both_to_the_end_where_either_is_missing(
-    loud: ServedSite, recording: Path
+    site_with_audio: ServedSite, recording: Path
 ) -> None:
-    send_audio(loud.service, recording, silent=range(100, 1000))
-    service = loud.service
+    send_audio(site_with_audio.service, recording, silent=range(100, 1000))
+    service = site_with_audio.service
     service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:
         for unit in access_units(recording):
@@ -267,7 +274,7 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(
     parameters = service.stream_format.parameters
     assert parameters is not None
     played = await play_in_chromium(
-        *(loud.port, service.splicer, GOPS, show),
+        *(site_with_audio.port, service.splicer, GOPS, show),
         *(PLAY_JS, "/objects/1/best.mp4", f'video/mp4; codecs="{parameters.codec},mp4a.40.2"', 4),
     )
     assert (played["error"], played["ranges"], played["tracks"]) == ("", 1, [True, True])
@@ -275,9 +282,9 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(
 
 
 async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
-    loud: ServedSite, recording: Path, tmp_path: Path
+    site_with_audio: ServedSite, recording: Path, tmp_path: Path
 ) -> None:
-    service, out = loud.service, tmp_path / "one.mp4"
+    service, out = site_with_audio.service, tmp_path / "one.mp4"
     send_audio(service, recording)
     service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:
@@ -285,7 +292,9 @@ async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
             service.ingest.video(video(camera, unit))
     decide(service, 0, A)
     decide(service, 1, A)
-    recorded = asyncio.create_task(client.record(f"http://127.0.0.1:{loud.port}/", 1, out, seconds=3.3))
+    recorded = asyncio.create_task(
+        client.record(f"http://127.0.0.1:{site_with_audio.port}/", 1, out, seconds=3.3)
+    )
     while not service.splicer.viewers:  # noqa: ASYNC110 — the client comes when it comes
         await asyncio.sleep(0.01)
     for gop in range(2, GOPS):

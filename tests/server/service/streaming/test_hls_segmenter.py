@@ -42,10 +42,10 @@ class Site:
         self.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
     @property
-    def reel(self) -> HlsSegmenter:
-        reel = self.splicer.segmenter_of_person(1)
-        assert reel is not None
-        return reel
+    def segmenter(self) -> HlsSegmenter:
+        segmenter = self.splicer.segmenter_of_person(1)
+        assert segmenter is not None
+        return segmenter
 
     def decoded(self, segments: list[HlsSegment]) -> list[tuple[float, float, NDArray[np.uint8]]]:
         """Return when each picture is shown and until when, in pulses, and the picture."""
@@ -62,7 +62,7 @@ class Site:
             ]
 
 
-def own(camera: int) -> list[NDArray[np.uint8]]:
+def decoded_alone(camera: int) -> list[NDArray[np.uint8]]:
     decoder = av.CodecContext.create("h264", "r")
     packets = [*(av.Packet(unit.data) for unit in encoded(camera, GOPS * GOP)), None]
     return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]
@@ -91,12 +91,12 @@ def test_segments_are_numbered_by_their_pulses_and_listed_when_complete() -> Non
     site = Site()
     for gop in range(9):
         site.show(gop, CAMERAS[gop % 2])
-    assert [segment.number for segment in site.reel.playlist_segments] == [0, 1, 2, 3]
-    assert [segment.until - segment.first for segment in site.reel.playlist_segments] == [2 * GOP] * 4
-    assert site.reel.get(4) is None, "it is not whole"
+    assert [segment.number for segment in site.segmenter.playlist_segments] == [0, 1, 2, 3]
+    assert [segment.until - segment.first for segment in site.segmenter.playlist_segments] == [2 * GOP] * 4
+    assert site.segmenter.get(4) is None, "it is not whole"
     site.splicer.close()
-    assert [segment.number for segment in site.reel.playlist_segments] == [0, 1, 2, 3, 4]
-    assert site.reel.playlist_segments[-1].until - site.reel.playlist_segments[-1].first == GOP
+    assert [segment.number for segment in site.segmenter.playlist_segments] == [0, 1, 2, 3, 4]
+    assert site.segmenter.playlist_segments[-1].until - site.segmenter.playlist_segments[-1].first == GOP
 
 
 def test_a_service_that_starts_later_makes_the_same_segments() -> None:
@@ -105,9 +105,9 @@ def test_a_service_that_starts_later_makes_the_same_segments() -> None:
         early.show(gop, CAMERAS[gop % 3 % 2])
         if gop >= 7:
             late.show(gop, CAMERAS[gop % 3 % 2])
-    assert [segment.number for segment in late.reel.playlist_segments] == list(range(3, 10))
-    for segment in late.reel.playlist_segments[1:]:
-        other = early.reel.get(segment.number)
+    assert [segment.number for segment in late.segmenter.playlist_segments] == list(range(3, 10))
+    for segment in late.segmenter.playlist_segments[1:]:
+        other = early.segmenter.get(segment.number)
         assert other is not None
         assert segment.data == other.data
 
@@ -117,11 +117,11 @@ def test_a_segment_stays_available_for_a_playlists_duration_after_it_left() -> N
     listed = site.splicer.layout.playlist_length
     for gop in range(1000):
         site.show(gop, CAMERAS[0])
-        numbers = [segment.number for segment in site.reel.playlist_segments]
-        assert len(site.reel._segments) <= 2 * listed + 1
+        numbers = [segment.number for segment in site.segmenter.playlist_segments]
+        assert len(site.segmenter._segments) <= 2 * listed + 1
         if numbers and numbers[0] >= listed:
-            assert site.reel.get(numbers[0] - listed) is not None
-            assert site.reel.get(numbers[0] - listed - 2) is None
+            assert site.segmenter.get(numbers[0] - listed) is not None
+            assert site.segmenter.get(numbers[0] - listed - 2) is None
 
 
 def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_camera() -> None:
@@ -133,7 +133,7 @@ def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_came
         site.splicer.segmenter_of_person(2),
         site.splicer.segmenter_of_camera(CAMERAS[0]),
     ]
-    held = {id(reel._segments[0]._chunks[0]) for reel in reels if reel}
+    held = {id(segmenter._segments[0]._chunks[0]) for segmenter in reels if segmenter}
     assert len(held) == 1
 
 
@@ -142,7 +142,7 @@ def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_came
 def test_every_segment_decodes_by_itself_and_together_they_have_no_gap(
     silent: frozenset[int], wishes: list[str]
 ) -> None:
-    site, alone = Site(silent), [own(camera) for camera in range(2)]
+    site, alone = Site(silent), [decoded_alone(camera) for camera in range(2)]
     last = None
     shown: list[NDArray[np.uint8]] = []
     for gop, wish in enumerate(wishes):
@@ -152,12 +152,14 @@ def test_every_segment_decodes_by_itself_and_together_they_have_no_gap(
         assert last is not None
         for pulse in range(gop * GOP, (gop + 1) * GOP):
             shown.append(shown[-1] if gop in silent else alone[last][pulse])
-    for segment in site.reel.playlist_segments:
-        check(site.decoded([segment]), shown, segment.first)
-    check(site.decoded(list(site.reel.playlist_segments)), shown, site.reel.playlist_segments[0].first)
+    for segment in site.segmenter.playlist_segments:
+        check_pictures(site.decoded([segment]), shown, segment.first)
+    check_pictures(
+        site.decoded(list(site.segmenter.playlist_segments)), shown, site.segmenter.playlist_segments[0].first
+    )
 
 
-def check(
+def check_pictures(
     pictures: list[tuple[float, float, NDArray[np.uint8]]], shown: list[NDArray[np.uint8]], first: int
 ) -> None:
     """Compare the shown pictures with the expected ones; pictures of one or two ticks are ignored."""
@@ -175,9 +177,9 @@ def test_the_last_segments_of_a_forgotten_person_stay_available_for_a_while() ->
     for gop in range(5):
         site.show(gop, CAMERAS[0])
     site.splicer.forget([], [])
-    reel = site.reel
-    assert reel.has_ended
-    assert [segment.number for segment in reel.playlist_segments] == [0, 1, 2]
+    segmenter = site.segmenter
+    assert segmenter.has_ended
+    assert [segment.number for segment in segmenter.playlist_segments] == [0, 1, 2]
     for gop in range(5, 200):
         site.splicer.publish_decision(GopDecision(gop * GOP, GOP, (), {}, {}, (), NO_REASON))
     assert site.splicer.segmenter_of_person(1) is None
@@ -190,9 +192,9 @@ def test_segment_numbers_are_consecutive_despite_missing_decisions(absent: int) 
         site.show(gop, CAMERAS[0])
     for gop in range(9 + absent, 20 + absent):
         site.show(gop, CAMERAS[0])
-        numbers = [segment.number for segment in site.reel.playlist_segments]
+        numbers = [segment.number for segment in site.segmenter.playlist_segments]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         assert all(
             segment.until - segment.first <= site.splicer.layout.segment_frames
-            for segment in site.reel.playlist_segments
+            for segment in site.segmenter.playlist_segments
         )

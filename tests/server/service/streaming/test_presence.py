@@ -22,61 +22,61 @@ def decision(
 
 
 @pytest.fixture
-def log() -> PresenceLog:
+def presence_log() -> PresenceLog:
     return PresenceLog(UNSEEN)
 
 
-def test_a_person_who_was_never_seen_is_absent(log: PresenceLog) -> None:
-    log.update(decision(0, {1: [0]}))
-    assert log.presence_of(1) is Presence.PRESENT
-    assert log.presence_of(2) is Presence.ABSENT
+def test_a_person_who_was_never_seen_is_absent(presence_log: PresenceLog) -> None:
+    presence_log.update(decision(0, {1: [0]}))
+    assert presence_log.presence_of(1) is Presence.PRESENT
+    assert presence_log.presence_of(2) is Presence.ABSENT
 
 
 @pytest.mark.parametrize(("place", "present"), [(0, 2), (GOP - 1, 2)])
 def test_a_person_who_leaves_is_present_for_a_while_then_frozen_then_absent(
-    log: PresenceLog, place: int, present: int
+    presence_log: PresenceLog, place: int, present: int
 ) -> None:
-    log.update(decision(0, {1: [place]}))
+    presence_log.update(decision(0, {1: [place]}))
     found = []
     for gop in range(1, 9):
-        log.update(decision(gop, {}))
-        found.append(log.presence_of(1))
+        presence_log.update(decision(gop, {}))
+        found.append(presence_log.presence_of(1))
     held = [Presence.FROZEN] * (found.index(Presence.ABSENT) - present)
     assert found == [Presence.PRESENT] * present + held + [Presence.ABSENT] * (8 - present - len(held))
     assert len(held) == 2
 
 
-def test_one_box_in_any_camera_makes_a_person_present(log: PresenceLog) -> None:
-    log.update(decision(0, {1: [0]}))
-    log.update(decision(9, {1: [GOP - 1]}, camera=B))
-    assert log.presence_of(1) is Presence.PRESENT
+def test_one_box_in_any_camera_makes_a_person_present(presence_log: PresenceLog) -> None:
+    presence_log.update(decision(0, {1: [0]}))
+    presence_log.update(decision(9, {1: [GOP - 1]}, camera=B))
+    assert presence_log.presence_of(1) is Presence.PRESENT
 
 
-def test_merged_numbers_share_when_they_were_seen(log: PresenceLog) -> None:
-    log.update(decision(0, {1: [0], 2: [0]}))
-    log.update(decision(4, {2: [0]}))
-    log.update(decision(5, {}, merged={2: 1}))
-    assert log.presence_of(1) is log.presence_of(2) is Presence.PRESENT
-    log.update(decision(8, {2: [3]}, merged={2: 1}))
-    assert log.presence_of(1) is Presence.PRESENT, "also by boxes that still have the other number"
+def test_merged_numbers_share_when_they_were_seen(presence_log: PresenceLog) -> None:
+    presence_log.update(decision(0, {1: [0], 2: [0]}))
+    presence_log.update(decision(4, {2: [0]}))
+    presence_log.update(decision(5, {}, merged={2: 1}))
+    assert presence_log.presence_of(1) is presence_log.presence_of(2) is Presence.PRESENT
+    presence_log.update(decision(8, {2: [3]}, merged={2: 1}))
+    assert presence_log.presence_of(1) is Presence.PRESENT, "also by boxes that still have the other number"
 
 
-def test_restarted_pulses_make_all_persons_absent(log: PresenceLog) -> None:
-    log.update(decision(100, {1: [0]}))
-    log.update(decision(0, {}))
-    assert log.presence_of(1) is Presence.ABSENT
+def test_restarted_pulses_make_all_persons_absent(presence_log: PresenceLog) -> None:
+    presence_log.update(decision(100, {1: [0]}))
+    presence_log.update(decision(0, {}))
+    assert presence_log.presence_of(1) is Presence.ABSENT
 
 
-def test_a_forgotten_person_is_absent(log: PresenceLog) -> None:
-    log.update(decision(0, {1: [0], 2: [0]}))
-    log.forget({2})
-    assert log.presence_of(1) is Presence.ABSENT
-    assert log.presence_of(2) is Presence.PRESENT
+def test_a_forgotten_person_is_absent(presence_log: PresenceLog) -> None:
+    presence_log.update(decision(0, {1: [0], 2: [0]}))
+    presence_log.forget({2})
+    assert presence_log.presence_of(1) is Presence.ABSENT
+    assert presence_log.presence_of(2) is Presence.PRESENT
 
 
 def test_without_hide_time_a_person_is_present_only_in_gops_that_show_them() -> None:
-    log = PresenceLog(0)
-    log.update(decision(0, {1: [GOP - 1]}))
-    assert log.presence_of(1) is Presence.PRESENT
-    log.update(decision(1, {}))
-    assert log.presence_of(1) is Presence.ABSENT
+    presence_log = PresenceLog(0)
+    presence_log.update(decision(0, {1: [GOP - 1]}))
+    assert presence_log.presence_of(1) is Presence.PRESENT
+    presence_log.update(decision(1, {}))
+    assert presence_log.presence_of(1) is Presence.ABSENT

@@ -28,7 +28,7 @@ FRAMES = 6 * GOP
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownPicture:
     """A decoded picture, when it is shown, and for how many pulses."""
 
     pulse: int
@@ -47,7 +47,7 @@ def captured_units(seed: int, missed: frozenset[int], preset: str) -> tuple[Acce
     return tuple(encoder.encode(pulse, noise[pulse]) for pulse in range(FRAMES) if pulse not in missed)
 
 
-def alone(units: tuple[AccessUnit, ...]) -> dict[int, NDArray[np.uint8]]:
+def decoded_alone(units: tuple[AccessUnit, ...]) -> dict[int, NDArray[np.uint8]]:
     """Decode all that a camera encoded."""
     decoder = av.CodecContext.create("h264", "r")
     frames = [
@@ -56,17 +56,17 @@ def alone(units: tuple[AccessUnit, ...]) -> dict[int, NDArray[np.uint8]]:
     return {unit.pulse: frame.to_ndarray(format="yuv420p") for unit, frame in zip(units, frames, strict=True)}
 
 
-def shown(splicer_head: bytes, pieces: list[bytes]) -> list[Shown]:
+def shown(splicer_head: bytes, pieces: list[bytes]) -> list[ShownPicture]:
     with av.open(io.BytesIO(splicer_head + b"".join(pieces))) as container:
         found = []
         for frame in container.decode(video=0):
             pulse = round(float(frame.time or 0) * FPS)
             duration = round((frame.duration or 0) * FPS / 90_000)
-            found.append(Shown(pulse, duration, frame.to_ndarray(format="yuv420p")))
+            found.append(ShownPicture(pulse, duration, frame.to_ndarray(format="yuv420p")))
         return found
 
 
-async def received(viewer: Subscriber) -> list[bytes]:
+async def read_all(viewer: Subscriber) -> list[bytes]:
     viewer.close()
     async with asyncio.timeout(PATIENCE):
         return [data async for data in viewer]
@@ -92,7 +92,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     frame_buffers = {camera: FrameBuffer(FPS, FRAMES, stream_format) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, stream_format, small_config())
     sent = {camera: captured_units(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
-    own = {camera: alone(units) for camera, units in sent.items()}
+    own = {camera: decoded_alone(units) for camera, units in sent.items()}
     live = {camera: splicer.cameras[camera].subscribe() for camera in CAMERAS}
     for camera, lost_frames in zip(CAMERAS, lost, strict=True):
         for unit in sent[camera]:
@@ -113,7 +113,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
         return
     head = init_segment(stream_format.parameters, WIDTH, HEIGHT)
     for viewer, cameras in [(best, CAMERAS), *((live[camera], (camera,)) for camera in CAMERAS)]:
-        pieces = asyncio.run(received(viewer))
+        pieces = asyncio.run(read_all(viewer))
         if not pieces:
             continue
         pictures = shown(head, pieces)
@@ -130,7 +130,7 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
             assert pictures[-1].pulse + pictures[-1].duration == FRAMES
 
 
-def splicing() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
+def make_splicer() -> tuple[Splicer, dict[str, FrameBuffer], bytes]:
     stream_format = StreamFormat()
     frame_buffers = {camera: FrameBuffer(FPS, 40, stream_format) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, stream_format, small_config())
@@ -146,27 +146,27 @@ def decide(splicer: Splicer, gop: int, camera: str | None) -> None:
 
 
 async def test_a_skipped_frame_affects_no_other_picture() -> None:
-    splicer, frame_buffers, head = splicing()
+    splicer, frame_buffers, head = make_splicer()
     units = captured_units(1, frozenset({7, 8}), "ultrafast")
     for unit in units:
         frame_buffers["c1"].put(unit.pulse, 1, unit.data, key=unit.key)
     decide(splicer, 0, "c1")
     viewer = splicer.persons[1].subscribe()
     decide(splicer, 1, None)
-    pictures = shown(head, await received(viewer))
+    pictures = shown(head, await read_all(viewer))
     assert [(picture.pulse, picture.duration) for picture in pictures[GOP:]] == [
         (5, 1),
         (6, 1),
         (7, 2),
         (9, 1),
     ]
-    own = alone(units)
+    own = decoded_alone(units)
     for picture, pulse in zip(pictures[GOP:], [5, 6, 6, 9], strict=True):
         np.testing.assert_array_equal(picture.picture, own[pulse])
 
 
 async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> None:
-    splicer, _, head = splicing()
+    splicer, _, head = make_splicer()
     viewer = splicer.cameras["c0"].subscribe()
     units = captured_units(0, frozenset(), "ultrafast")
     frame_buffer = FrameBuffer(FPS, 10, StreamFormat())
@@ -177,16 +177,16 @@ async def test_the_last_picture_of_a_silent_camera_stays_until_it_returns() -> N
     for unit in units[GOP + 2 : GOP + 4]:
         splicer.publish_frame("c0", frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key))
     splicer.close()
-    pictures = shown(head, await received(viewer))
+    pictures = shown(head, await read_all(viewer))
     assert [picture.pulse for picture in pictures] == list(range(13 * GOP - 2 * FPS)), (
         "late pictures are not shown"
     )
     for picture in pictures[GOP + 2 :]:
-        np.testing.assert_array_equal(picture.picture, alone(units)[GOP + 1])
+        np.testing.assert_array_equal(picture.picture, decoded_alone(units)[GOP + 1])
 
 
 async def test_a_viewer_who_joins_in_a_long_gap_waits_and_no_queue_grows() -> None:
-    splicer, _, _ = splicing()
+    splicer, _, _ = make_splicer()
     decide(splicer, 0, "c0")
     slow = splicer.persons[1].subscribe()
     for gop in range(8, 2000):
@@ -197,22 +197,22 @@ async def test_a_viewer_who_joins_in_a_long_gap_waits_and_no_queue_grows() -> No
 
 
 async def test_a_stream_continues_after_hours_without_a_picture() -> None:
-    splicer, frame_buffers, _ = splicing()
+    splicer, frame_buffers, _ = make_splicer()
     decide(splicer, 0, "c0")
     viewer = splicer.persons[1].subscribe()
     day = 86_400 * FPS
     for unit in captured_units(0, frozenset(), "ultrafast")[:GOP]:
         frame_buffers["c0"].put(day + unit.pulse, 1, unit.data, key=unit.key)
     decide(splicer, day // GOP, "c0")
-    assert len(await received(viewer)) == 2
+    assert len(await read_all(viewer)) == 2
 
 
 async def test_restarted_pulses_restart_the_stream() -> None:
-    splicer, frame_buffers, _ = splicing()
+    splicer, frame_buffers, _ = make_splicer()
     units = captured_units(0, frozenset(), "ultrafast")
     for unit in units[:GOP]:
         splicer.publish_frame("c0", frame_buffers["c0"].put(100_000 + unit.pulse, 1, unit.data, key=unit.key))
     viewer = splicer.cameras["c0"].subscribe()
     for unit in units[:GOP]:
         splicer.publish_frame("c0", frame_buffers["c0"].put(unit.pulse, 2, unit.data, key=unit.key))
-    assert len(await received(viewer)) == 2 * GOP
+    assert len(await read_all(viewer)) == 2 * GOP

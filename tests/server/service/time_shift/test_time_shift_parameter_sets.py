@@ -57,9 +57,9 @@ async def fetch(served: ServedSite, *paths: str) -> bytes:
 
 @pytest.mark.parametrize("form", ["mp4", "ts", "hls"])
 async def test_time_shift_plays_what_was_live(served: ServedSite, form: str) -> None:
-    reel = served.service.splicer.segmenter_of_person(1)
-    assert reel is not None
-    reel._segments.clear()
+    segmenter = served.service.splicer.segmenter_of_person(1)
+    assert segmenter is not None
+    segmenter._segments.clear()
     if form == "hls":
         names = ["init.mp4", *(f"{number}.m4s" for number in range(GOPS // 2))]
         data = await fetch(served, *(f"/objects/1/hls/{name}" for name in names))

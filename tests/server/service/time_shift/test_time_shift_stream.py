@@ -56,7 +56,7 @@ IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
 
 
 @pytest.fixture
-async def recorded(tmp_path: Path) -> AsyncIterator[ServedSite]:
+async def recorded_site(tmp_path: Path) -> AsyncIterator[ServedSite]:
     """Six GOPs of person 1, in c0, then in c1; all but the last two are on the disk alone."""
     async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         served.service.recorder.recent._frames = GOP
@@ -81,7 +81,7 @@ def decoded(data: bytes) -> list[tuple[int, Picture]]:
         ]
 
 
-async def read(served: ServedSite, path: str) -> list[tuple[int, Picture]]:
+async def fetch(served: ServedSite, path: str) -> list[tuple[int, Picture]]:
     async with served.session.get(path) as answer:
         assert answer.status == 200, await answer.text()
         assert answer.content_type == "video/mp4"
@@ -102,14 +102,16 @@ async def read_up_to(served: ServedSite, path: str, pulse: int, then: int) -> li
                 return decoded(data)
 
 
-async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(recorded: ServedSite) -> None:
+async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(
+    recorded_site: ServedSite,
+) -> None:
     camera = {
         pulse: choices.choices[1]
-        for choices in recorded.service.recorder.recent.choices(0)
+        for choices in recorded_site.service.recorder.recent.choices(0)
         for pulse in range(choices.first, choices.first + GOP)
     }
     assert min(camera) >= 4 * GOP, "the beginning is on the disk alone"
-    shown = await read_up_to(recorded, "/objects/1/best.mp4?from=p7", 6 * GOP, 7)
+    shown = await read_up_to(recorded_site, "/objects/1/best.mp4?from=p7", 6 * GOP, 7)
     assert [pulse for pulse, _ in shown] == list(range(GOP, 7 * GOP))
     used = set()
     for pulse, picture in shown:
@@ -119,8 +121,10 @@ async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(
     assert used == {A, B}
 
 
-async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(recorded: ServedSite) -> None:
-    shown = await read_up_to(recorded, "/cameras/c0/live.mp4?from=p0", 7 * GOP, 7)
+async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(
+    recorded_site: ServedSite,
+) -> None:
+    shown = await read_up_to(recorded_site, "/cameras/c0/live.mp4?from=p0", 7 * GOP, 7)
     assert [pulse for pulse, _ in shown] == list(range(8 * GOP))
     for pulse, picture in shown:
         np.testing.assert_array_equal(picture, own_pictures(A)[pulse])
@@ -136,18 +140,18 @@ async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(
     ],
 )
 async def test_a_range_with_an_end_is_a_download_of_its_frames(
-    recorded: ServedSite, query: str, pulses: range
+    recorded_site: ServedSite, query: str, pulses: range
 ) -> None:
-    recorded.service.pulse0 = 1_763_700_000.0
-    shown = await read(recorded, f"/objects/1/best.mp4?{query}")
+    recorded_site.service.pulse0 = 1_763_700_000.0
+    shown = await fetch(recorded_site, f"/objects/1/best.mp4?{query}")
     assert [pulse for pulse, _ in shown] == list(pulses)
 
 
-async def test_a_download_waits_for_an_end_in_the_future(recorded: ServedSite) -> None:
-    reading = asyncio.create_task(read(recorded, "/objects/1/best.mp4?from=p20&to=p33"))
-    while not recorded.service.splicer.viewers:  # noqa: ASYNC110
+async def test_a_download_waits_for_an_end_in_the_future(recorded_site: ServedSite) -> None:
+    reading = asyncio.create_task(fetch(recorded_site, "/objects/1/best.mp4?from=p20&to=p33"))
+    while not recorded_site.service.splicer.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
-    recorded.service.feed(7, IN_B)
+    recorded_site.service.feed(7, IN_B)
     assert [pulse for pulse, _ in await reading] == list(range(20, 33))
 
 
@@ -159,7 +163,7 @@ async def test_without_a_recording_frames_in_memory_are_played(site_with_people:
         (span,) = available_ranges(source)
         assert (first_available(source, 0), end_of_available(source)) == (span.first, span.end)
         assert first_available(source, span.end) is None
-    assert [pulse for pulse, _ in await read(site_with_people, "/objects/1/best.mp4?from=p0&to=p9")] == list(
+    assert [pulse for pulse, _ in await fetch(site_with_people, "/objects/1/best.mp4?from=p0&to=p9")] == list(
         range(9)
     )
 
@@ -197,59 +201,59 @@ async def test_without_a_recording_frames_in_memory_are_played(site_with_people:
     ],
 )
 async def test_impossible_requests_are_answered_with_a_one_line_error(
-    recorded: ServedSite, path: str, status: int, error: str
+    recorded_site: ServedSite, path: str, status: int, error: str
 ) -> None:
-    assert await recorded.get(path) == (status, {"error": error})
+    assert await recorded_site.get(path) == (status, {"error": error})
 
 
-async def test_spans_list_the_recorded_time(recorded: ServedSite) -> None:
-    recorded.service.pulse0 = 1_763_700_000.0
+async def test_spans_list_the_recorded_time(recorded_site: ServedSite) -> None:
+    recorded_site.service.pulse0 = 1_763_700_000.0
     span = {
         "begins": "2025-11-21T04:40:00.000Z",
         "ends": "2025-11-21T04:40:01.200Z",
         "first": 0,
         "frames": 30,
     }
-    assert (await recorded.get_json("/api/objects/1/past"))["spans"] == [span]
-    assert (await recorded.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
+    assert (await recorded_site.get_json("/api/objects/1/past"))["spans"] == [span]
+    assert (await recorded_site.get_json("/api/cameras/c1/past"))["spans"][0]["frames"] == 35
 
 
-async def test_views_list_the_chosen_cameras(recorded: ServedSite) -> None:
-    async with recorded.session.get("/api/past?from=p0") as answer:
+async def test_views_list_the_chosen_cameras(recorded_site: ServedSite) -> None:
+    async with recorded_site.session.get("/api/past?from=p0") as answer:
         decisions = [json.loads(line) async for line in answer.content]
     chosen = {
         decision["first"] + n: decision["choices"]["1"]
         for decision in decisions
         for n in range(decision["frames"])
     }
-    views = (await recorded.get_json("/api/objects/1/past"))["views"]
+    views = (await recorded_site.get_json("/api/objects/1/past"))["views"]
     assert {view["first"] + n: view["camera"] for view in views for n in range(view["frames"])} == chosen
     assert [view["camera"] for view in views] == [A, B]
-    assert (await recorded.get_json("/api/cameras/c1/past"))["views"] == [
+    assert (await recorded_site.get_json("/api/cameras/c1/past"))["views"] == [
         {"camera": B, "first": 0, "frames": 35}
     ]
 
 
 @pytest.mark.parametrize(("query", "frames"), [("from=p7&to=p24", 17), ("from=p20", 10), ("to=p4", 4)])
 async def test_spans_and_views_are_limited_to_the_requested_range(
-    recorded: ServedSite, query: str, frames: int
+    recorded_site: ServedSite, query: str, frames: int
 ) -> None:
     def cameras(views: list[dict[str, Any]]) -> dict[int, str]:
         return {view["first"] + n: view["camera"] for view in views for n in range(view["frames"])}
 
-    whole = cameras((await recorded.get_json("/api/objects/1/past"))["views"])
-    part = await recorded.get_json(f"/api/objects/1/past?{query}")
+    whole = cameras((await recorded_site.get_json("/api/objects/1/past"))["views"])
+    part = await recorded_site.get_json(f"/api/objects/1/past?{query}")
     begin = int(query.partition("from=p")[2].partition("&")[0] or 0)
     assert [(span["first"], span["frames"]) for span in part["spans"]] == [(begin, frames)]
     assert cameras(part["views"]) == {number: whole[number] for number in range(begin, begin + frames)}
-    span = (await recorded.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
+    span = (await recorded_site.get_json(f"/api/cameras/c1/past?{query}"))["spans"][0]
     assert (span["first"], span["frames"]) == (begin, 15 if query == "from=p20" else frames)
-    beyond_end = await recorded.get_json("/api/objects/1/past?from=p900")
+    beyond_end = await recorded_site.get_json("/api/objects/1/past?from=p900")
     assert beyond_end == {"spans": [], "views": []}
 
 
-async def test_recorded_decisions_have_choices_and_boxes(recorded: ServedSite) -> None:
-    async with recorded.session.get("/api/past?from=p7&to=p24") as answer:
+async def test_recorded_decisions_have_choices_and_boxes(recorded_site: ServedSite) -> None:
+    async with recorded_site.session.get("/api/past?from=p7&to=p24") as answer:
         assert answer.content_type == "application/x-ndjson"
         lines = [json.loads(line) async for line in answer.content]
     assert [line["first"] for line in lines] == [5, 10, 15, 20]
@@ -258,40 +262,40 @@ async def test_recorded_decisions_have_choices_and_boxes(recorded: ServedSite) -
 
 
 async def test_a_viewer_of_time_shift_counts_like_others(
-    recorded: ServedSite, monkeypatch: pytest.MonkeyPatch
+    recorded_site: ServedSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_stream, "_LEAD_S", 0.2)
-    recorder = recorded.service.recorder
-    async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
+    recorder = recorded_site.service.recorder
+    async with recorded_site.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
-        assert (recorder.viewers, recorded.service.splicer.viewers) == (1, 0)
-        async with recorded.session.get("/metrics") as metrics:
+        assert (recorder.viewers, recorded_site.service.splicer.viewers) == (1, 0)
+        async with recorded_site.session.get("/metrics") as metrics:
             assert "myview_viewers 1.0" in (await metrics.text()).splitlines()
         answer.close()
     while recorder.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
 
 
-async def test_a_viewer_of_time_shift_occupies_a_slot_and_frees_it(recorded: ServedSite) -> None:
-    recorder = recorded.service.recorder
-    async with recorded.session.get("/objects/1/best.mp4?from=p0") as answer:
+async def test_a_viewer_of_time_shift_occupies_a_slot_and_frees_it(recorded_site: ServedSite) -> None:
+    recorder = recorded_site.service.recorder
+    async with recorded_site.session.get("/objects/1/best.mp4?from=p0") as answer:
         await answer.content.readany()
-        while not recorded.service.splicer.viewers:  # noqa: ASYNC110
+        while not recorded_site.service.splicer.viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         assert recorder.viewers == 0, "the channel counts from the present on"
         answer.close()
-    while recorder.viewers or recorded.service.splicer.viewers:  # noqa: ASYNC110
+    while recorder.viewers or recorded_site.service.splicer.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
-    assert (await recorded.get("/objects/1/best.mp4?from=p0", "HEAD"))[0] == 200
+    assert (await recorded_site.get("/objects/1/best.mp4?from=p0", "HEAD"))[0] == 200
 
 
-class OnDisk:
+class DiskSource:
     """A source with nothing in memory."""
 
     presence = None
 
-    def __init__(self, *recorded: SessionEntries, end: int) -> None:
-        self.recorded, self.end = recorded, end
+    def __init__(self, *recorded_site: SessionEntries, end: int) -> None:
+        self.recorded, self.end = recorded_site, end
 
     def gop_in_memory(self, pulse: int) -> None:
         del pulse
@@ -300,7 +304,7 @@ class OnDisk:
         del pulse
 
 
-def site_of(store: RecordingFolder) -> tuple[StreamFormat, bytes]:
+def stream_format_and_header(store: RecordingFolder) -> tuple[StreamFormat, bytes]:
     del store
     frame_buffers, header = filled_buffers()
     return frame_buffers[A]._stream_format, header
@@ -322,8 +326,8 @@ async def test_any_range_of_any_recording_is_played_without_a_gap(
     tapes = (
         [SessionEntries(store.session, store.session.objects[1].index)] if 1 in store.session.objects else []
     )
-    source = OnDisk(*tapes, end=len(shown) * GOP)
-    stream_format, header = site_of(store)
+    source = DiskSource(*tapes, end=len(shown) * GOP)
+    stream_format, header = stream_format_and_header(store)
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(start, start + frames))])
     store.close()
@@ -356,8 +360,8 @@ async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> 
     )
     assert store.session is not None
     store.session.paths.camera_file(A, 25).unlink()
-    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=60)
-    stream_format, header = site_of(store)
+    source = DiskSource(SessionEntries(store.session, store.session.objects[1].index), end=60)
+    stream_format, header = stream_format_and_header(store)
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, 60))])
     assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
@@ -372,8 +376,8 @@ async def test_a_person_out_of_view_at_the_end_is_not_waited_for(tmp_path: Path,
         [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(now // GOP)],
     )
     assert store.session is not None
-    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=now)
-    stream_format, header = site_of(store)
+    source = DiskSource(SessionEntries(store.session, store.session.objects[1].index), end=now)
+    stream_format, header = stream_format_and_header(store)
     stream = TimeShiftStream(
         source, GaplessTimeline(stream_format, FPS, GOP), FPS, Broadcaster
     )  # without a GOP
@@ -386,8 +390,8 @@ async def test_a_person_who_returns_after_the_end_does_not_extend_the_download(t
         RecordingFolder(tmp_path, UNLIMITED), [gop_record(gop, {1: A} if gop < 2 else {}) for gop in range(4)]
     )
     assert store.session is not None
-    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
-    stream_format, header = site_of(store)
+    source = DiskSource(SessionEntries(store.session, store.session.objects[1].index), end=4 * GOP)
+    stream_format, header = stream_format_and_header(store)
     broadcaster, back = Broadcaster(), gop_record(8, {1: A}).cameras[A]
     live_pictures = [
         Shown(back.first + at, not at, fragment, boot=1) for at, fragment in enumerate(back.fragments)
@@ -413,8 +417,8 @@ async def test_a_few_seconds_are_sent_at_once_and_the_rest_in_real_time(
 
     monkeypatch.setattr(loop, "time", lambda: now[0])
     monkeypatch.setattr(asyncio, "sleep", slept)
-    stream_format, _ = site_of(store)
-    source = OnDisk(SessionEntries(store.session, store.session.objects[1].index), end=200)
+    stream_format, _ = stream_format_and_header(store)
+    source = DiskSource(SessionEntries(store.session, store.session.objects[1].index), end=200)
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     arrived = [now[0] - 100.0 async for _ in stream.send(PlaybackRange(0))]
     lead = 4.0
@@ -434,7 +438,7 @@ async def test_a_cameras_recording_includes_earlier_sessions(tmp_path: Path) -> 
         for epoch in range(5, 8):
             served.service.feed(epoch, IN_A)
         await until_written(served, 1)
-        shown = await read(served, "/cameras/c0/live.mp4?from=p7&to=p35")
+        shown = await fetch(served, "/cameras/c0/live.mp4?from=p7&to=p35")
         assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
         for pulse, picture in shown:
             if not 4 * GOP <= pulse < 5 * GOP:  # while the service was away the last picture is repeated
@@ -472,7 +476,7 @@ async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbe
         for epoch in range(5, 8):
             served.service.feed(epoch, IN_A)
         await until_written(served, 1)
-        shown = await read(served, "/objects/1/best.mp4?from=p7&to=p35")
+        shown = await fetch(served, "/objects/1/best.mp4?from=p7&to=p35")
         assert [pulse for pulse, _ in shown] == list(range(GOP, 35))
         assert (await served.get_json("/api/objects/1/past"))["spans"][0]["first"] == GOP
         async with served.session.get("/api/past?from=p7") as answer:
