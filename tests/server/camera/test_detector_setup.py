@@ -78,7 +78,7 @@ def test_frames_with_and_without_a_picture_have_histograms_of_one_length(tmp_pat
     assert found.histograms.shape == (0, one.bins)
 
 
-def test_a_detection_file_goes_before_the_kind(tmp_path: Path) -> None:
+def test_a_detection_file_takes_precedence_over_the_kind(tmp_path: Path) -> None:
     (tmp_path / "det.txt").write_text("1,-1,10,20,30,20,1,-1,-1,-1\n", encoding="utf-8")
     one = observer(tmp_path, {"kind": "hog"}, detections="det.txt")
     assert isinstance(one._file, MotFileDetector)

@@ -32,7 +32,7 @@ SECURITY = (DOCS / "how-to" / "secure.md").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make certificates by the very lines of docs/how-to/secure.md."""
+    """Make certificates with the commands of docs/how-to/secure.md."""
     folder = tmp_path_factory.mktemp("bus")
     found = re.search(r"```sh\n(openssl.*?)```", SECURITY, re.DOTALL)
     assert found
@@ -121,11 +121,11 @@ async def test_audio_is_published_by_the_audio_camera_only(settings: ZenohSettin
         bestview.subscribe(SITE.camera("*", "status"), received)
         await received.until(f"{SITE.sound} c1", lambda: c1.publish(SITE.sound, b"c1"))
 
-        def both() -> None:
+        def audio_and_status() -> None:
             c0.publish(SITE.sound, b"c0")
             c0.publish(SITE.camera("c0", "status"), b"after")
 
-        await received.until("c0/status after", both)
+        await received.until("c0/status after", audio_and_status)
         assert f"{SITE.sound} c0" not in received.texts
 
 
@@ -144,16 +144,18 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         lambda: router(settings),
         lambda: Bus.client(settings, "c1"),
         *(partial(Bus.client, stranger, "c0") for stranger in strangers),
-    ) as (bestview, c1, *them):
+    ) as (bestview, c1, *unknown_clients):
         bestview.subscribe(SITE.camera("*", "*"), received)
         alive: list[str] = []
         bestview.watch_alive(SITE.camera("*", "alive"), lambda key, _: alive.append(key))
-        for client in them:
+        for client in unknown_clients:
             client.subscribe("**", received_by_other)
             client.declare_alive(SITE.camera("c0", "alive"))
         c1.declare_alive(SITE.camera("c1", "alive"))
         for number in range(10):  # time enough to be admitted
-            await received.until(f"c1/video {number}", partial(_publish_from_all, [*them, c1], number))
+            await received.until(
+                f"c1/video {number}", partial(_publish_from_all, [*unknown_clients, c1], number)
+            )
         assert not [text for text in received.texts if text.startswith("c0")]
         assert alive == [SITE.camera("c1", "alive")]
         assert not [
@@ -165,8 +167,8 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
 
 
 def _publish_from_all(buses: Sequence[Bus], number: int) -> None:
-    *them, c1 = buses
-    for client in them:
+    *unknown_clients, c1 = buses
+    for client in unknown_clients:
         client.publish(SITE.camera("c0", "video"), b"false")
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
@@ -186,14 +188,14 @@ async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
         c1.subscribe(SITE.camera("c0", topic), received_by_other)
         c1.subscribe(SITE.camera("c1", topic), received_by_other)
 
-        def all_of_it() -> None:
+        def send_all() -> None:
             c1.publish(SITE.camera("c0", topic), b"false")
             auditor.publish(SITE.camera("c0", topic), b"false")
             bestview.publish(SITE.camera("c0", topic), b"there")
             bestview.publish(SITE.camera("c1", topic), b"here")
 
-        await received.until(f"c0/{topic} there", all_of_it)
-        await received_by_other.until(f"c1/{topic} here", all_of_it)
+        await received.until(f"c0/{topic} there", send_all)
+        await received_by_other.until(f"c1/{topic} here", send_all)
         for number in range(5):  # time enough for it to arrive
             await received.until(f"c0/{topic} {number}", partial(_send_commands, bestview, c1, topic, number))
         assert f"c0/{topic} false" not in received.texts
@@ -218,14 +220,14 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
         received_all = ReceivedTexts()
         auditor.subscribe(SITE.camera("c0", "*"), received_all)
 
-        def all_of_it() -> None:
+        def send_all() -> None:
             c0.publish(SITE.camera("c0", "video"), b"seen")
             auditor.publish(SITE.camera("c1", "detections"), b"false")
             c0.publish(SITE.camera("c0", "detections"), b"detections")
 
-        await received.until("c0/detections detections", all_of_it)
-        await received_all.until("c0/video seen", all_of_it)  # it may arrive within a round
-        await received_all.until("c0/detections detections", all_of_it)
+        await received.until("c0/detections detections", send_all)
+        await received_all.until("c0/video seen", send_all)  # it may arrive within a round
+        await received_all.until("c0/detections detections", send_all)
         assert set(received.texts) == {"c0/detections detections"}
         assert set(received_all.texts) == {"c0/video seen", "c0/detections detections"}, (
             "a subscriber sends nothing"
@@ -233,17 +235,17 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
 
 
 async def test_a_further_service_may_subscribe_and_publish_everything(settings: ZenohSettings) -> None:
-    received, told_commands = ReceivedTexts(), ReceivedTexts()
+    received, choices = ReceivedTexts(), ReceivedTexts()
     with open_sessions(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.further_service(settings, "bestview-1"),
     ) as (bestview, c0, second):
         second.subscribe(SITE.camera("*", "tracks"), received)
-        bestview.subscribe(SITE.bestview("choices", 1), told_commands)
+        bestview.subscribe(SITE.bestview("choices", 1), choices)
         await received.until("c0/tracks here", lambda: c0.publish(SITE.camera("c0", "tracks"), b"here"))
         key = SITE.bestview("choices", 1)
-        await told_commands.until(f"{key} chosen", lambda: second.publish(key, b"chosen"))
+        await choices.until(f"{key} chosen", lambda: second.publish(key, b"chosen"))
 
 
 def _users(folder: Path, text: str) -> Path:

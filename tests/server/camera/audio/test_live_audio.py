@@ -29,7 +29,7 @@ FORM = AudioFormat(48_000, 2)
 
 
 def send(path: Path, to: Any) -> None:
-    """Send a recording as a camera does that takes it now: each packet when it has been taken."""
+    """Send a recording in real time, as a camera does."""
     begin = time.monotonic()
     with (
         av.open(str(path)) as recorded,
@@ -46,7 +46,7 @@ def send(path: Path, to: Any) -> None:
 
 @pytest.fixture
 def camera(tmp_path: Path) -> Iterator[str]:
-    """A camera that flashes and beeps, sending what it takes when it takes it; its address."""
+    """The address of a camera that flashes and beeps in real time."""
     path = write_flashes(tmp_path / "own.ts", FRAMES)
 
     class Handler(http.server.BaseHTTPRequestHandler):
@@ -75,7 +75,7 @@ def test_the_audio_of_a_camera_is_received_with_its_video(camera: str) -> None:
     begin = time.monotonic()
     while len(frames) < (FRAMES - 20) / FPS * FORM.rate / FRAME:
         time.sleep(1 / FPS)
-        assert time.monotonic() < begin + PATIENCE, "sound comes"
+        assert time.monotonic() < begin + PATIENCE, "no audio arrives"
         frames += sound.at(100 + int((time.monotonic() - begin) * FPS))
     assert source.take(0) is not None
     source.close()
@@ -91,7 +91,7 @@ def beep_times(frames: list[EncodedAudioFrame], form: AudioFormat = FORM) -> lis
 
 
 def pass_to_source(path: Path, sound: LiveAudioSource, first: int) -> list[EncodedAudioFrame]:
-    """Hand over a recording as a camera would whose pulse numbers are ``first`` ahead of its clock's."""
+    """Pass a recording to the source, with pulse numbers ``first`` ahead of its frames; return its frames."""
     frames: list[EncodedAudioFrame] = []
     with av.open(str(path)) as container:
         sound.opened(container.streams.audio[0])
@@ -104,7 +104,7 @@ def pass_to_source(path: Path, sound: LiveAudioSource, first: int) -> list[Encod
             picture = Fraction(packet.pts * packet.time_base)
             sound.picture(picture)
             number = round(picture * FPS)
-            frames += sound.at(first + number + number % 3 // 2)  # one in three waits for the next pulse
+            frames += sound.at(first + number + number % 3 // 2)  # one in three is late by a pulse
     return frames
 
 
@@ -158,7 +158,7 @@ def shift_packet(packet: av.Packet[Any], seconds: int) -> av.Packet[Any]:
 def test_audio_continues_after_a_time_step_and_after_a_reconnect(
     tmp_path: Path, sends: str, lag: float
 ) -> None:
-    """As that of MPEG-TS does once in 26.5 hours; the sound's steps ``lag`` after the pictures'."""
+    """MPEG-TS times wrap once in 26.5 hours; here the audio's wrap ``lag`` after the pictures'."""
     path = write_flashes(tmp_path / "own.mp4", FRAMES, codec=sends)
     sound, wrap, step = LiveAudioSource(SoundSettings(source="c0"), FPS), 95_443, FRAMES / FPS / 2
     frames: list[EncodedAudioFrame] = []

@@ -50,7 +50,7 @@ FORM = AudioFormat(48_000, 2, "opus")
 
 
 def as_mp4(frames: list[EncodedAudioFrame]) -> bytes:
-    """Return frames 0 to the last one as a stream, silent where there is none."""
+    """Return the frames as a stream from frame 0 on; missing ones are silent."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, FORM.silence) for number in range(max(found) + 1)]
     return audio_init_segment(FORM) + audio_fragment(FORM, data, 0)
@@ -69,7 +69,7 @@ def test_opus_is_passed_on_byte_for_byte(tmp_path: Path, name: str) -> None:
     frames = [*sound.until(0), *sound.until(FRAMES + 10)]
     assert [frame.data for frame in frames] == own
     first = frames[0].number
-    assert first <= 1, "what the encoder looks ahead for is before the first picture"
+    assert first <= 1, "the encoder delay is before the first picture"
     assert [frame.number for frame in frames] == list(range(first, first + len(own)))
     assert beeps(as_mp4(frames)) == pytest.approx(BEEP_TIMES, abs=MAX_AV_OFFSET_S)
 
@@ -84,7 +84,7 @@ def test_opus_is_passed_on_byte_for_byte(tmp_path: Path, name: str) -> None:
         ("short.mkv", "libopus", 48_000, 2, {"frame_duration": "10"}),
     ],
 )
-def test_all_else_is_encoded_to_opus(
+def test_other_codecs_are_encoded_to_opus(
     tmp_path: Path, name: str, codec: str, rate: int, channels: int, options: dict[str, str]
 ) -> None:
     path = write_flashes(tmp_path / name, FRAMES, codec=codec, rate=rate, channels=channels, options=options)
@@ -93,7 +93,7 @@ def test_all_else_is_encoded_to_opus(
     encoder = getattr(sound._framer, "_framer", sound._framer)
     assert isinstance(encoder, AudioEncoder)
     assert {packet_samples(frame.data) for frame in frames} == {960}
-    assert beeps(as_mp4(frames)) == pytest.approx(BEEP_TIMES, abs=0.005), "also for what it looks ahead"
+    assert beeps(as_mp4(frames)) == pytest.approx(BEEP_TIMES, abs=0.005), "the encoder delay is compensated"
 
 
 def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
@@ -106,7 +106,7 @@ def test_a_site_of_aac_encodes_opus(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("channels", [1, 2])
-def test_silence_decodes_to_nothing_at_all(channels: int) -> None:
+def test_silence_decodes_to_zero_samples(channels: int) -> None:
     form = AudioFormat(48_000, channels, "opus")
     data = audio_init_segment(form) + audio_fragment(form, [form.silence] * 20, 7)
     times, samples = decode_audio(data)
@@ -154,7 +154,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 async def served(recording: Path, tmp_path: Path) -> AsyncIterator[ServedSite]:
-    """A site that has that recording's sound, whose first GOP is decided."""
+    """A site with the recording's audio, whose first GOP is decided."""
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     sound = {"source": str(recording), "codec": "opus"}
     async for served in serve_site(sound=sound, record=record, http={"viewer_queue_gops": 100}):
@@ -184,7 +184,7 @@ async def watched(served: ServedSite, *urls: str) -> list[bytes]:
     return [await answer.read() for answer in answers]
 
 
-async def test_streams_live_and_past_have_it_in_step_and_transport_streams_none(
+async def test_live_and_recorded_streams_have_opus_in_sync_and_transport_streams_no_audio(
     served: ServedSite, recording: Path
 ) -> None:
     own = send_audio(served.service, recording)
@@ -234,7 +234,7 @@ async def test_a_download_contains_opus_audio(served: ServedSite, recording: Pat
 
 
 @needs_chromium
-async def test_chromium_plays_it(served: ServedSite, recording: Path) -> None:
+async def test_chromium_plays_opus(served: ServedSite, recording: Path) -> None:
     send_audio(served.service, recording)
     decide(served, range(GOPS))
     parameters = served.service.stream_format.parameters

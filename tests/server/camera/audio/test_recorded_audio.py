@@ -43,7 +43,7 @@ def frames_until(sound: RecordedAudioSource, pulse: int, first: int = 0) -> list
 
 
 def as_adts(frames: list[EncodedAudioFrame], form: AudioFormat) -> bytes:
-    """Return frames 0 to the last one as a stream, silent where there is none."""
+    """Return the frames as a stream from frame 0 on; missing ones are silent."""
     found = {frame.number: frame.data for frame in frames}
     data = [found.get(number, form.silence) for number in range(max(found) + 1)]
     return b"".join(form.adts(len(frame)) + frame for frame in data)
@@ -79,7 +79,7 @@ def test_compatible_audio_is_passed_through_byte_for_byte(tmp_path: Path) -> Non
     ],
 )
 @pytest.mark.parametrize("offset", [0, 7, -3])
-def test_beeps_are_where_the_pictures_are(
+def test_beeps_are_in_sync_with_flashes(
     tmp_path: Path, name: str, codec: str, rate: int, channels: int, offset: int
 ) -> None:
     path = write_flashes(
@@ -96,11 +96,11 @@ def test_beeps_are_where_the_pictures_are(
 
 
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
-def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> None:
+def test_a_looped_recording_stays_in_sync(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "loop.mkv", FRAMES, codec=codec)
     frames = frames_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), 4 * FRAMES)
     assert are_numbers_rising(frames)
-    assert sum(1 for _ in consecutive_runs(frames)) <= 5, "whole but for the places where it begins again"
+    assert sum(1 for _ in consecutive_runs(frames)) <= 5, "without gaps except at the restarts"
     form = STEREO.format
     assert form is not None
     expected = [
@@ -111,29 +111,29 @@ def test_a_recording_that_repeats_stays_in_step(tmp_path: Path, codec: str) -> N
     assert beeps(as_adts(frames, form), "aac") == pytest.approx(expected, abs=0.03)
 
 
-def test_a_recording_with_no_sound_beside_its_pictures_is_silent_and_is_not_read_for_ever(
+def test_a_loop_whose_audio_does_not_overlap_its_pictures_is_silent_and_terminates(
     tmp_path: Path,
 ) -> None:
     path = write_flashes(tmp_path / "loop.mkv", FRAMES)
     sound = RecordedAudioSource(str(path), STEREO, FPS, 0, "loop")
-    sound._start -= 60  # as where the sound begins a minute after the pictures
+    sound._start -= 60  # the audio begins a minute after the pictures
     assert frames_until(sound, 2 * FRAMES) == []
 
 
 @pytest.mark.parametrize("codec", ["aac", "mp3"])
-def test_a_late_start_gives_the_same_audio_frames(tmp_path: Path, codec: str) -> None:
+def test_a_late_start_yields_the_same_audio_frames(tmp_path: Path, codec: str) -> None:
     path = write_flashes(tmp_path / "late.mkv", FRAMES, codec=codec)
     late = 10 * FRAMES
     frames = frames_until(RecordedAudioSource(str(path), STEREO, FPS, 0, "loop"), late + FRAMES, first=late)
     form = STEREO.format
     assert form is not None
-    assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not all that was"
+    assert frames[0].number >= form.frame_at(late, FPS) - 48, "about a second before, not everything"
     moments = beeps(as_adts(frames, form), "aac")
     expected = [(late + n) / FPS for n in range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL)]
     assert [moment for moment in moments if moment > late / FPS] == pytest.approx(expected, abs=0.03)
 
 
-def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
+def test_cover_art_does_not_affect_the_audio_times(tmp_path: Path) -> None:
     path = write_flashes(tmp_path / "plain.mp3", FRAMES, codec="mp3", pictures=False)
     cover = cv2.imencode(".jpg", np.full((60, 60, 3), 120, np.uint8))[1].tobytes()
     content = b"\0image/jpeg\0\x03\0" + cover
@@ -150,7 +150,7 @@ def test_a_records_cover_is_no_picture_that_it_goes_by(tmp_path: Path) -> None:
     assert other == pytest.approx(plain, abs=0.03)
 
 
-def test_one_packet_with_a_time_far_ahead_silences_nothing_behind_it() -> None:
+def test_a_packet_with_a_time_far_ahead_does_not_silence_later_audio() -> None:
     def packet(seconds: float) -> av.Packet[AudioStream]:
         found: av.Packet[AudioStream] = av.Packet(b"sound")
         found.pts, found.time_base = round(seconds * 1000), Fraction(1, 1000)
@@ -160,7 +160,7 @@ def test_one_packet_with_a_time_far_ahead_silences_nothing_behind_it() -> None:
         return [float(time) for time, _ in _in_order(packet(second) for second in seconds)]
 
     assert times(0, 1, 3600, 2, 3) == [0, 1, 2, 3]
-    assert times(0, 1, 60, 61) == [0, 1, 60, 61], "nothing sounded for a minute"
+    assert times(0, 1, 60, 61) == [0, 1, 60, 61], "a minute without audio"
     assert times(0, 3600, 7200, 1, 2) == [0, 3600, 1, 2]
 
 
@@ -181,7 +181,7 @@ def test_audio_that_cannot_be_converted_is_silent_and_logged_once(
 
 @pytest.mark.parametrize("fps", [12.5, 30.0])
 @pytest.mark.parametrize("at_end", ["stop", "loop"])
-def test_sound_is_in_step_with_pictures_of_another_rate_than_the_site_s(
+def test_audio_is_in_sync_with_pictures_of_another_rate(
     tmp_path: Path, fps: float, at_end: Literal["stop", "loop"]
 ) -> None:
     path = write_flashes(tmp_path / "own.mkv", FRAMES)
@@ -216,7 +216,7 @@ def test_sources_without_audio_are_refused(tmp_path: Path) -> None:
 
 
 @given(st.sampled_from([24_000, 32_000, 44_100, 48_000]), st.sampled_from([1, 2]), st.integers(1, 60))
-def test_silence_decodes_to_nothing_at_all(rate: int, channels: int, count: int) -> None:
+def test_silence_decodes_to_zero_samples(rate: int, channels: int, count: int) -> None:
     form = AudioFormat(rate, channels)
     data = count * (form.adts(len(form.silence)) + form.silence)
     with av.open(io.BytesIO(data), format="aac") as container:

@@ -32,15 +32,15 @@ from tracking.motchallenge import MotRow, read_rows, write_rows
 __all__ = ["myview"]
 
 WIDE, HIGH = 96, 64
-WAYS = [(turn, flip) for turn in (0, 90, 180, 270) for flip in (False, True)]
-"""Quarter turns to the left, in degrees, and whether left and right change places after that."""
+ORIENTATIONS = [(turn, flip) for turn in (0, 90, 180, 270) for flip in (False, True)]
+"""Rotations to the left, in degrees, and whether the picture is mirrored afterwards."""
 SITE = RequiredFormat((WIDE, HIGH), 25.0, 10, None)
 
 Picture = NDArray[np.uint8]
 
 
 def corners() -> Picture:
-    """Draw a picture that can be told from itself turned and mirrored: each quarter has a grey of its own."""
+    """Draw a picture whose quarters have different grays, so that rotations and mirrorings differ."""
     picture = np.zeros((HIGH, WIDE, 3), np.uint8)
     for (row, column), grey in {(0, 0): 40, (0, 1): 100, (1, 0): 160, (1, 1): 220}.items():
         picture[row * HIGH // 2 :, column * WIDE // 2 :] = grey
@@ -73,7 +73,7 @@ def write_film(
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-@pytest.mark.parametrize(("turn", "flip"), WAYS)
+@pytest.mark.parametrize(("turn", "flip"), ORIENTATIONS)
 def test_the_display_matrix_is_applied_to_a_recording(
     tmp_path: Path, suffix: str, turn: int, flip: bool
 ) -> None:
@@ -92,18 +92,18 @@ def test_a_site_is_as_high_as_its_upright_first_view(tmp_path: Path) -> None:
 
 
 def test_tracks_of_a_turned_video_are_in_the_upright_picture(tmp_path: Path, myview: RunCommand) -> None:
-    """The detections are as a program has found them that turns pictures, too."""
+    """The detections are in the upright picture, as of a program that applies the rotation."""
     video = write_film(tmp_path / "phone.mp4", 90, frames=30)
     write_rows(tmp_path / "det.txt", [MotRow(n + 1, -1, 20.0, 30.0 + n, 20.0, 30.0, 1.0) for n in range(30)])
     result = myview("track", video, "--det", tmp_path / "det.txt", "--out", tmp_path / "tracks.txt")
     assert result.code == 0, result.err
     rows = read_rows(tmp_path / "tracks.txt")
     assert len(rows) == 30
-    assert max(row.top + row.height for row in rows) > HIGH, "lower than the picture is stored"
+    assert max(row.top + row.height for row in rows) > HIGH, "below the stored picture"
 
 
 @pytest.mark.parametrize("aspect", ["2:1", "3:4"])
-def test_pixels_that_are_not_square_are_made_so(tmp_path: Path, aspect: str) -> None:
+def test_pictures_are_scaled_to_square_pixels(tmp_path: Path, aspect: str) -> None:
     path = write_film(tmp_path / "dv.mp4", frames=2, aspect=aspect)
     width = round(WIDE * Fraction(aspect.replace(":", "/")))
     recording = Recording(str(path))
@@ -183,7 +183,7 @@ def test_a_change_of_size_is_letterboxed_and_logged(tmp_path: Path, caplog: pyte
     )
 
 
-def test_a_cover_is_no_video_and_of_several_videos_the_first_is_taken(
+def test_cover_art_is_skipped_and_the_first_video_stream_is_used(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "two.mkv"
@@ -244,7 +244,7 @@ def test_the_exif_orientation_of_an_image_is_applied(tmp_path: Path, suffix: str
     assert read_video_info(tmp_path).size == folder.size
 
 
-def test_images_of_any_depth_and_kind_are_pictures(tmp_path: Path) -> None:
+def test_images_of_any_bit_depth_and_format_are_read(tmp_path: Path) -> None:
     grey = np.full((HIGH, WIDE), 120, np.uint8)
     kinds = {
         "grey": grey,
@@ -276,9 +276,7 @@ def test_images_of_several_sizes_are_letterboxed_and_logged(
     ]
 
 
-def test_images_that_cannot_be_read_are_counted_and_named(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_unreadable_images_are_counted_and_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     for number in range(5):
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((HIGH, WIDE, 3), 200, np.uint8))
     for number in (1, 2, 4):
@@ -292,7 +290,7 @@ def test_images_that_cannot_be_read_are_counted_and_named(
     ]
 
 
-def test_without_a_site_size_and_rate_are_those_of_the_first_view_that_has_them(tmp_path: Path) -> None:
+def test_without_site_settings_size_and_rate_are_those_of_the_first_view(tmp_path: Path) -> None:
     """A folder of images has a size, and no rate."""
     (tmp_path / "images").mkdir()
     cv2.imwrite(str(tmp_path / "images" / "0.png"), np.zeros((HIGH, WIDE + 1, 3), np.uint8))

@@ -42,7 +42,7 @@ def test_a_view_of_another_rate_shows_the_same_moment_in_the_same_frame(
 ) -> None:
     path = write_video(tmp_path / f"view.{suffix}", 25, fps=own)
     frames = shown(path, fps)
-    assert abs(len(frames) - 25 / own * fps) < 1, "it lasts as long as it does"
+    assert abs(len(frames) - 25 / own * fps) < 1, "of equal duration"
     for pulse, frame in enumerate(frames):
         assert abs(frame / own - pulse / fps) <= max(0.5 / fps, 1 / own) + 1e-9
     if own % fps == 0:
@@ -51,7 +51,7 @@ def test_a_view_of_another_rate_shows_the_same_moment_in_the_same_frame(
 
 @settings(deadline=None, max_examples=10)
 @given(gaps=st.lists(st.integers(1, 12), min_size=2, max_size=24), fps=st.sampled_from([10.0, 25.0, 30.0]))
-def test_pictures_at_uneven_times_are_shown_when_they_were_taken(
+def test_pictures_at_uneven_times_are_shown_at_their_times(
     tmp_path_factory: pytest.TempPathFactory, gaps: list[int], fps: float
 ) -> None:
     times = [ticks / 50 for ticks in accumulate(gaps, initial=0)]
@@ -59,8 +59,8 @@ def test_pictures_at_uneven_times_are_shown_when_they_were_taken(
     frames = shown(path, fps)
     for pulse, frame in enumerate(frames):
         due = pulse / fps
-        assert times[frame] <= due + 0.5 / fps, "none is shown before its time, but for half a frame"
-        assert not [time for time in times[frame + 1 :] if time <= due], "none when a later one is due"
+        assert times[frame] <= due + 0.5 / fps, "none is shown more than half a frame early"
+        assert not [time for time in times[frame + 1 :] if time <= due], "no later one is due"
     assert len(frames) >= times[-1] * fps
 
 
@@ -90,7 +90,7 @@ def test_joined_files_continue_across_restarting_time_stamps(
 
 @pytest.mark.parametrize("b_frames", [0, 2])
 @pytest.mark.parametrize("suffix", ["h264", "avi"])
-def test_pictures_without_times_are_counted_also_where_some_cannot_be_decoded(
+def test_pictures_without_timestamps_are_numbered_even_if_some_are_undecodable(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, suffix: str, b_frames: int
 ) -> None:
     path = write_video(tmp_path / f"raw.{suffix}", 25, b_frames=b_frames)
@@ -119,7 +119,7 @@ def test_missing_frames_do_not_shift_later_ones_and_are_logged(
     frames = shown(write_without_frames(whole, range(10, 12), tmp_path / "lossy.ts"))
     assert len(frames) == 25
     assert frames[:10] == list(range(10))
-    assert frames[20:] == list(range(20, 25)), "the next key picture is where it was"
+    assert frames[20:] == list(range(20, 25)), "the next keyframe is in place"
     assert any(
         re.search(r"lossy.ts: \d+ (damaged frames|frames are missing)", message)
         for message in caplog.messages
@@ -170,7 +170,7 @@ def test_video_without_one_frame_per_pulse_is_not_passed_through(tmp_path: Path)
         PassthroughRecording(str(hole), 0, "stop", RequiredFormat((64, 48), 25.0, 10, None))
 
 
-def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: RunCommand) -> None:
+def test_views_of_two_frame_rates_are_rendered_to_one_length(tmp_path: Path, myview: RunCommand) -> None:
     write_video(tmp_path / "a.mp4", 25, fps=25)
     write_timed(tmp_path / "b.mp4", [n / 30 for n in range(30)], fps=30)
     result = myview("render", tmp_path / "a.mp4", tmp_path / "b.mp4", "--out", tmp_path / "out")
@@ -178,7 +178,7 @@ def test_views_of_two_rates_are_rendered_to_one_length(tmp_path: Path, myview: R
     assert "the views are of different length" not in result.err
 
 
-def test_detections_go_with_the_pictures_that_they_were_made_of(tmp_path: Path, myview: RunCommand) -> None:
+def test_detections_belong_to_the_pictures_they_were_made_from(tmp_path: Path, myview: RunCommand) -> None:
     """A detector counts pictures; tracks count frames of the site's clock."""
     times = [(n + 2 * (n // 10)) / 25 for n in range(40)]  # every now and then two are not taken
     video = write_timed(tmp_path / "phone.mp4", times)

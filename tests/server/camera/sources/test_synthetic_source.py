@@ -73,12 +73,12 @@ def test_a_wrong_address_is_refused_with_the_reason(source: str, reason: str) ->
         (300 * "a" + ".mp4", SourceKind.FILE),  # no name that a file can have, which opening it says
     ],
 )
-def test_the_kind_of_a_source_shows_in_how_it_is_written(source: str, kind: SourceKind) -> None:
+def test_the_kind_of_a_source_follows_from_its_address(source: str, kind: SourceKind) -> None:
     assert source_kind(source) is kind
 
 
 @pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="needs a folder in memory")  # noqa: S108
-def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
+def test_a_recording_in_dev_shm_is_a_file() -> None:
     with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
         recording = Path(folder) / "c0.mp4"
         recording.touch()
@@ -88,12 +88,12 @@ def test_a_recording_in_memory_is_one_though_it_is_below_dev() -> None:
             open_video(str(recording))
 
 
-def test_a_name_that_no_file_can_have_is_refused_in_a_line() -> None:
+def test_an_impossible_file_name_is_refused_in_one_line() -> None:
     with pytest.raises(UserError, match="cannot open this video: File name too long"):
         Recording(300 * "a" + ".mp4", 0, "stop")
 
 
-def test_a_scene_without_a_floor_gives_its_cameras_none() -> None:
+def test_cameras_of_a_scene_without_a_floor_have_no_homography() -> None:
     cameras = [
         {"id": f"c{number}", "source": f"scene:{name}"} for number, name in enumerate(("fish", "court"))
     ]

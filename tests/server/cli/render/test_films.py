@@ -146,7 +146,7 @@ def test_gaps_in_films_are_filled_as_in_live_streams(tmp_path: Path, codec: Code
 
 
 @pytest.mark.parametrize("codec", ["aac", "opus"])
-def test_a_film_has_the_sites_sound_in_sync(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
+def test_a_film_has_the_sites_audio_in_sync(tmp_path: Path, codec: Literal["aac", "opus"]) -> None:
     recording = write_flashes(tmp_path / "flashes.mkv", SOUNDING)
     config = small_config(sound={"source": str(recording), "codec": codec})
     stream_format, track = stream_format_for(config.encode.codec, config.site.size), Soundtrack(config)

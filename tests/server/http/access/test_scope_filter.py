@@ -79,7 +79,7 @@ async def test_only_the_scoped_camera_is_listed_without_others_errors(site: Serv
 async def test_events_are_limited_to_the_scoped_person(site: ServedSite) -> None:
     async with (
         site.session.get("/api/events", headers=bearer("family")) as response,
-        site.session.get("/api/events", headers=bearer("desk")) as all_of_it,
+        site.session.get("/api/events", headers=bearer("desk")) as unscoped_response,
     ):
         site.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
         last = site.service.decision_state.end - 5
@@ -88,10 +88,10 @@ async def test_events_are_limited_to_the_scoped_person(site: ServedSite) -> None
         gops = [content for name, content in received if name == "gop"]
         assert len(gops) > 2
         assert {number for gop in gops for number in people_in(gop)} == {1}
-        every = [content for name, content in await events(all_of_it, last) if name == "gop"]
-        assert {number for gop in every for number in people_in(gop)} == {1, 2}
-        assert [gop["first"] for gop in gops] == [gop["first"] for gop in every]
-        assert [gop["choices"]["1"] for gop in gops] == [gop["choices"]["1"] for gop in every]
+        unscoped = [content for name, content in await events(unscoped_response, last) if name == "gop"]
+        assert {number for gop in unscoped for number in people_in(gop)} == {1, 2}
+        assert [gop["first"] for gop in gops] == [gop["first"] for gop in unscoped]
+        assert [gop["choices"]["1"] for gop in gops] == [gop["choices"]["1"] for gop in unscoped]
 
 
 async def test_events_are_limited_to_the_scoped_camera(site: ServedSite) -> None:
@@ -104,12 +104,12 @@ async def test_events_are_limited_to_the_scoped_camera(site: ServedSite) -> None
 async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "server.service.operator_assist.flag_budget._COOLDOWN_S", -1.0
-    )  # both have a flag, though they are of one
-    troubles = [
+    )  # both people are flagged, although they share an event
+    risk_events = [
         RiskEvent(reason="crossing", tracks=[1, 2], pulse=19, margin=0.5, risk=0.5),
         RiskEvent(reason="track_loss", tracks=[2], pulse=19, margin=0.5, risk=0.5),
     ]
-    track_message = camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=troubles)
+    track_message = camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=risk_events)
     async with site.session.get("/api/events", headers=bearer("family")) as response:
         site.service.ingest.tracks(tracks(track_message))
         site.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
@@ -168,7 +168,7 @@ async def test_playlist_uris_have_the_token_of_the_request(site: ServedSite) -> 
 
 async def test_no_token_is_logged(site: ServedSite, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG)
-    for token in (token_of("desk"), "a wrong one that is as long as a right one"):
+    for token in (token_of("desk"), "a wrong one, as long as a right one"):
         for path in ("/api/objects", "/objects/1/best.mp4", "/api/nothing", "/objects/99/best.mp4"):
             async with site.session.get(path, params={"token": token}) as answer:
                 assert token not in str(answer.headers)
@@ -183,4 +183,4 @@ async def test_no_token_is_logged(site: ServedSite, caplog: pytest.LogCaptureFix
         if record.name.startswith(("server", "aiohttp.server"))
     ]
     assert log
-    assert not any("given" in line or "wrong one" in line for line in log)
+    assert not any("token-of" in line or "wrong one" in line for line in log)

@@ -29,8 +29,8 @@ class Viewer:
     def __init__(self, answer: aiohttp.ClientResponse) -> None:
         self._answer = answer
 
-    async def ends(self) -> None:
-        """Wait until it is ended from the other side."""
+    async def wait_for_end(self) -> None:
+        """Wait until the server ends it."""
         ended = False
         while not ended:
             try:
@@ -39,7 +39,7 @@ class Viewer:
                 ended = True
 
     @property
-    def goes_on(self) -> bool:
+    def is_open(self) -> bool:
         return not self._answer.content.at_eof() and self._answer.content.exception() is None
 
 
@@ -102,19 +102,19 @@ async def test_a_token_with_many_connections_does_not_take_others_streams(
         assert isinstance(newest, Viewer)
         async with served.session.head(path, headers=desk) as answer:
             assert answer.status == 503, "a refused request evicts none"
-        mine = await open_viewer(stack, served, path, **desk)
-        assert isinstance(mine, Viewer)
-        await newest.ends()
+        desk_viewer = await open_viewer(stack, served, path, **desk)
+        assert isinstance(desk_viewer, Viewer)
+        await newest.wait_for_end()
         assert await open_viewer(stack, served, path, **desk) == 503, "more than the others' share"
         assert await open_viewer(stack, served, path, **door) == 503
         for _ in range(3):
             assert isinstance(await open_viewer(stack, served, path, **lead), Viewer), (
-                "operators always get in"
+                "operators are always admitted"
             )
-        assert await open_viewer(stack, served, path, **lead) == 503, "but not for each other's places"
-        for share in (*held, mine):
-            assert isinstance(share, Viewer)
-            await share.ends()
+        assert await open_viewer(stack, served, path, **lead) == 503, "but not in slot of each other"
+        for viewer in (*held, desk_viewer):
+            assert isinstance(viewer, Viewer)
+            await viewer.wait_for_end()
 
 
 async def test_a_stream_that_has_caught_up_can_be_evicted_like_live_ones(tmp_path: Path) -> None:
@@ -123,12 +123,12 @@ async def test_a_stream_that_has_caught_up_can_be_evicted_like_live_ones(tmp_pat
             await open_viewer(stack, served, "/cameras/c0/live.mp4?from=-1", **bearer("door"))
             for _ in range(2)
         ]
-        channel = served.service.splicer.cameras["c0"]
-        while channel.viewers < 2:
+        broadcaster = served.service.splicer.cameras["c0"]
+        while broadcaster.viewers < 2:
             await served.get("/healthz", "HEAD")
         assert isinstance(await open_viewer(stack, served, "/cameras/c0/live.ts", **bearer("desk")), Viewer)
         assert isinstance(flood[1], Viewer)
-        await flood[1].ends()
+        await flood[1].wait_for_end()
 
 
 async def test_without_tokens_shares_are_by_address_and_this_machine_operates() -> None:
@@ -140,40 +140,40 @@ async def test_without_tokens_shares_are_by_address_and_this_machine_operates() 
             assert flood[2] == 503
             assert isinstance(await open_viewer(stack, served, "/objects/1/best.ts"), Viewer)
             assert isinstance(flood[1], Viewer)
-            await flood[1].ends()
+            await flood[1].wait_for_end()
             assert isinstance(flood[0], Viewer)
-            assert flood[0].goes_on
+            assert flood[0].is_open
 
 
 CLIENTS = [*map(ClientIdentity, "abc"), ClientIdentity("o", is_operator=True)]
 
 
 @given(st.lists(st.tuples(st.sampled_from(CLIENTS), st.sampled_from("xy"), st.integers(1, 2)), max_size=40))
-def test_shares_become_equal_and_stay_equal(comes: list[tuple[ClientIdentity, str, int]]) -> None:
-    shares, most, there = FairShare(), 6, dict[Slot, None]()
+def test_shares_become_equal_and_stay_equal(arrivals: list[tuple[ClientIdentity, str, int]]) -> None:
+    shares, limit, slots = FairShare(), 6, dict[Slot, None]()
 
-    def ended(place: Slot) -> None:
-        del there[place]
-        shares.release(place)
+    def release(slot: Slot) -> None:
+        del slots[slot]
+        shares.release(slot)
 
-    for holder, stream, weight in comes:
+    for holder, stream, weight in arrivals:
         before = Counter(
-            {client.key: sum(p.weight for p in there if p.client == client) for client in CLIENTS}
+            {client.key: sum(p.weight for p in slots if p.client == client) for client in CLIENTS}
         )
 
-        place = Slot(holder, stream, lambda: None, weight)
-        place.end = partial(ended, place)
-        if shares.all >= most and not shares.evict_for(holder):
-            others = {key: count for key, count in before.items() if key != holder.key}
-            watching = {key: count for key, count in others.items() if key != "o"}
+        slot = Slot(holder, stream, lambda: None, weight)
+        slot.end = partial(release, slot)
+        if shares.all >= limit and not shares.evict_for(holder):
+            of_others = {key: count for key, count in before.items() if key != holder.key}
+            watching = {key: count for key, count in of_others.items() if key != "o"}
             if holder.is_operator:
                 assert not any(watching.values())
             assert all(count <= before[holder.key] + 1 for count in watching.values())
             continue
-        there[place] = None
-        shares.take(place)
+        slots[slot] = None
+        shares.take(slot)
         after = Counter(
-            {client.key: sum(p.weight for p in there if p.client == client) for client in CLIENTS}
+            {client.key: sum(p.weight for p in slots if p.client == client) for client in CLIENTS}
         )
         lost = [key for key in before if after[key] < before[key]]
         assert "o" not in lost
@@ -184,7 +184,7 @@ def test_shares_become_equal_and_stay_equal(comes: list[tuple[ClientIdentity, st
                 == max(before[key] for key in "abc" if key != holder.key)
                 > before[holder.key] + 1
             )
-    assert shares.all == sum(share.weight for share in there)
+    assert shares.all == sum(slot.weight for slot in slots)
     assert not shares.ending()
 
 

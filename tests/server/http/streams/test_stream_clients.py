@@ -123,27 +123,27 @@ async def test_beyond_the_limit_a_viewer_gets_503_with_retry_after(limit: str) -
 
 
 async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(site_with_people: ServedSite) -> None:
-    channel = site_with_people.service.splicer.persons[1]
+    broadcaster = site_with_people.service.splicer.persons[1]
     stalled = socket.socket()
     stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     stalled.connect(("127.0.0.1", site_with_people.port))
     stalled.sendall(b"GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     reader, writer, _ = await send_request(site_with_people, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
-    while channel.viewers < 2:  # noqa: ASYNC110 — both have come
+    while broadcaster.viewers < 2:  # noqa: ASYNC110 — both have come
         await asyncio.sleep(0.005)
     await reader.readuntil(b"mdat")
     gops = [b"<GOP %05d" % number + bytes([65 + number % 26]) * 100_000 + b">" for number in range(150)]
     for gop in gops:
-        channel.publish(BytesChunk(gop, random_access=True))
+        broadcaster.publish(BytesChunk(gop, random_access=True))
         await reader.readuntil(gop)
-    slow = next(viewer for viewer in channel._subscribers if viewer.lost_gops)
+    slow = next(viewer for viewer in broadcaster._subscribers if viewer.lost_gops)
     assert len(slow._queue) <= site_with_people.service.config.http.viewer_queue_gops
-    assert sum(viewer.lost_gops for viewer in channel._subscribers) == slow.lost_gops, (
+    assert sum(viewer.lost_gops for viewer in broadcaster._subscribers) == slow.lost_gops, (
         "only the slow reader loses"
     )
     if hasattr(socket, "TCP_NOTSENT_LOWAT"):
         assert slow.lost_gops > len(gops) - 50, "small socket buffers: queued data would be shown late"
-    channel.close()
+    broadcaster.close()
     loop, got = asyncio.get_running_loop(), b""
     stalled.setblocking(False)  # noqa: FBT003 — the name of the method says it
     while data := await loop.sock_recv(stalled, 1 << 20):
@@ -156,10 +156,10 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(site_with
 
 
 async def test_a_viewer_that_disconnects_while_blocked_is_removed(site_with_people: ServedSite) -> None:
-    channel = site_with_people.service.splicer.persons[1]
+    broadcaster = site_with_people.service.splicer.persons[1]
     _, writer, _ = await send_request(site_with_people, "GET /objects/1/best.mp4 HTTP/1.0\r\n\r\n")
     for _ in range(100):
-        channel.publish(BytesChunk(bytes(100_000), random_access=True))
+        broadcaster.publish(BytesChunk(bytes(100_000), random_access=True))
         await asyncio.sleep(0)
     writer.transport.abort()
     await deserted(site_with_people)

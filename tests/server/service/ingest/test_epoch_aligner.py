@@ -149,7 +149,7 @@ def test_long_past_epochs_without_windows_are_skipped_at_once() -> None:
     assert aligner.late_messages == {"c0": 1, "c1": 0, "c2": 0}
 
 
-def test_without_cameras_it_skips_to_the_present() -> None:
+def test_without_cameras_epochs_are_skipped_to_the_present() -> None:
     aligner = EpochAligner(CAMERAS, STRIDE, GRACE, max_distance=FAR)
     aligner.frame_received("c0", 1, 0)
     assert aligner.ready(now=0) == []

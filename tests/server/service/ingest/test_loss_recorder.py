@@ -33,7 +33,7 @@ class LossyEpochs:
             self.loss_recorder.record_epoch(Epoch(epoch.number, epoch.last, epoch.tracks, late_ones))
 
 
-def test_a_spell_of_late_tracks_is_logged_when_it_begins_and_when_it_ends(
+def test_a_period_of_late_tracks_is_logged_at_its_start_and_end(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level("INFO")

@@ -97,8 +97,8 @@ def test_streams_continue_after_a_skip_with_one_filler_picture_or_a_gap(
     service: FedService, minutes: int
 ) -> None:
     run_epochs(service, range(BEFORE))
-    channels = [service.splicer.decided_cameras["c0"], *service.splicer.persons.values()]
-    viewers = [channel.subscribe() for channel in channels]
+    broadcasters = [service.splicer.decided_cameras["c0"], *service.splicer.persons.values()]
+    viewers = [broadcaster.subscribe() for broadcaster in broadcasters]
     until, resumed = service.decision_state.end, minutes * HOUR // 60 // ENCODED * ENCODED
     run_epochs(service, range(resumed, resumed + BEFORE))
     for viewer in viewers:

@@ -80,7 +80,7 @@ async def test_every_frame_is_the_chosen_cameras_and_gaps_repeat_the_last_pictur
 
 
 @needs_ffmpeg
-async def test_ffmpeg_plays_it_without_a_warning(tmp_path: Path) -> None:
+async def test_ffmpeg_plays_the_stream_without_a_warning(tmp_path: Path) -> None:
     for name, data in zip(("own.mp4", "own.ts"), await spliced(config()), strict=True):
         (tmp_path / name).write_bytes(data)
         as_pictures = "-f rawvideo -pix_fmt yuv420p -fps_mode passthrough -"
