@@ -28,7 +28,7 @@ def scripted_site() -> ScriptedSite:
 
 @pytest.fixture
 async def site_url(scripted_site: ScriptedSite) -> AsyncIterator[str]:
-    """Serve the hand-made site over real HTTP; give its address."""
+    """Serve the scripted site over real HTTP; return its address."""
     async with _served(scripted_site) as url:
         yield url
 

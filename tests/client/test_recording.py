@@ -32,7 +32,7 @@ HASTY = client.HttpSettings(retries=2, backoff_first=0.01, backoff_most=0.01)
 
 
 def plays(*pieces: bytes, stays: bool = False, step: int = 1000) -> StreamScript:
-    """Send the pieces; then hang up, or stay silent."""
+    """Send the pieces; then disconnect, or stay connected."""
 
     async def play(response: web.StreamResponse) -> None:
         stream = b"".join(pieces)

@@ -90,7 +90,7 @@ async def test_a_trickling_answer_times_out(status: int) -> None:
 
 @asynccontextmanager
 async def serve_bytes(say: Callable[[asyncio.StreamWriter], Awaitable[None]]) -> AsyncIterator[str]:
-    """Answer one request with bytes that need be no HTTP."""
+    """Answer one request with arbitrary bytes."""
     over = asyncio.Event()
 
     async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

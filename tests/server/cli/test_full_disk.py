@@ -83,7 +83,7 @@ async def test_a_disk_that_fills_up_keeps_only_complete_pictures(
     assert "one.mp4" in {path.name for path in out.parent.iterdir()} <= {"one.mp4", "one.vtt", "one.ass"}
     shown = [place for place, _ in pictures(out)]
     assert 0 < len(shown) < FRAMES
-    assert shown == list(range(shown[0], shown[0] + len(shown))), "each is whole"
+    assert shown == list(range(shown[0], shown[0] + len(shown))), "each is complete"
 
 
 async def test_a_recording_without_room_for_sidecar_files_is_kept_without_them(

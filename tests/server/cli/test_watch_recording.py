@@ -67,7 +67,7 @@ async def test_the_recording_begins_at_0_with_unchanged_pictures(served: ServedS
         assert film.streams.video[0].frames == 28 - FIRST, "counted in its table"
         assert film.duration == pytest.approx((28 - FIRST) / FPS * av.time_base)
         film.seek(round(12 / FPS * av.time_base))
-        assert round(float(next(film.decode(video=0)).time or 0) * FPS) == 10, "the key picture before"
+        assert round(float(next(film.decode(video=0)).time or 0) * FPS) == 10, "the keyframe before"
 
 
 async def test_a_live_stream_is_recorded_like_the_past(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_interruptions_do_not_change_the_recording(
             whole = stream(max(0, first // GOP - 1) * GOP, last)  # some of it again
             torn = data.draw(st.integers(0, 20)) if last < 40 else 0
             more = take(record, whole[: len(whole) - torn], data.draw(st.integers(50, 5000)))
-        assert not more, "it is full"
+        assert not more, "the buffer is full"
     remux(part, out, "webm")
     keys = [n for n in range(30) if n % GOP == 0]
     with av.open(str(out)) as film:

@@ -42,7 +42,7 @@ def test_the_server_reads_all_passwords_and_a_client_its_own(tmp_path: Path) -> 
     config = load_config(site(tmp_path))
     assert pulse_users(config) == {"c0": LONG, "bestview": LONG + "!", "auditor": LONG + "?"}
     assert pulse_credentials(config, "c0") == Credentials("c0", LONG)
-    assert LONG not in repr(pulse_credentials(config, "c0")), "nor does it stand in any log"
+    assert LONG not in repr(pulse_credentials(config, "c0")), "nor is it in any log"
 
 
 def test_without_a_file_no_login_is_needed(tmp_path: Path) -> None:

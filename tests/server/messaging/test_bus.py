@@ -327,4 +327,4 @@ async def test_an_item_that_raises_does_not_block_others(caplog: pytest.LogCaptu
     await asyncio.sleep(0)
     assert got == [1.0, 0.5]
     assert "ZeroDivisionError" in caplog.text
-    assert len(caplog.messages) == 1, "one mistake, however often it is made"
+    assert len(caplog.messages) == 1, "repeated errors are one log line"

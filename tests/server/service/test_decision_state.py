@@ -14,7 +14,7 @@ _UNTOLD = cast("SelectionReasons", None)
 
 
 class Counted:
-    """Explains by counting."""
+    """Selection reasons that count queries."""
 
     def __init__(self) -> None:
         self.asked: list[int] = []
@@ -48,7 +48,7 @@ def test_no_reasons_are_kept_without_queries() -> None:
     state = DecisionState(25.0)
     assert all(decided(state, first).asked == [] for first in range(0, 500, 10))
     assert state.explain(9) is None
-    assert state.explain(2, 480) is None, "that was before the first question"
+    assert state.explain(2, 480) is None, "before the first query"
 
 
 def test_reasons_are_kept_for_a_minute_from_the_first_query_on() -> None:

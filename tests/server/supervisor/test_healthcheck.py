@@ -165,7 +165,7 @@ def test_https_checks_use_the_certificate_and_the_token(
     assert main(["bestview"]) == 0
     with monkeypatch.context() as patch:
         patch.setenv("MYVIEW_HEALTH_CERTIFICATE", str(secrets / "public" / "router.pem"))
-        assert main(["bestview"]) == 1, "another certificate is another service: no token is for it"
+        assert main(["bestview"]) == 1, "the token is not sent to a service with another certificate"
     (tmp_path / "token").write_text("wrong", encoding="ascii")
     monkeypatch.setenv("MYVIEW_HEALTH_TOKEN", str(tmp_path / "token"))
     assert main(["camera", "c0"]) == 1

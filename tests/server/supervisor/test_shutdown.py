@@ -20,7 +20,7 @@ from server.system.child_process import defer_termination
 
 @pytest.fixture(params=[signal.SIGTERM, signal.SIGINT])
 def handled(request: pytest.FixtureRequest) -> Iterator[tuple[signal.Signals, list[int]]]:
-    """A signal, and those of its kind that were handled."""
+    """A signal, and its handled occurrences."""
     received: list[int] = []
     before = signal.signal(request.param, lambda number, _: received.append(number))
     yield request.param, received
@@ -105,7 +105,7 @@ def test_a_process_terminated_while_loading_exits_with_0(tmp_path: Path) -> None
         lambda: caught(status.read_text(encoding="ascii"), signal.SIGTERM) or hurried.poll() is not None
     )
     hurried.terminate()
-    assert hurried.wait(PATIENCE) == 0, "it had not read its configuration, which is not there"
+    assert hurried.wait(PATIENCE) == 0, "the missing configuration was not read yet"
 
 
 _CTRL_C = """
@@ -180,7 +180,7 @@ def until_true(condition: Callable[[], bool]) -> None:
 
 
 def waits_for_a_file(pid: int) -> bool:
-    """Return whether a thread of a process is held up in the system call that opens a file."""
+    """Return whether a thread of a process is blocked in the system call that opens a file."""
     opening = {"2", "257", "56"}  # open and openat, as Linux counts them on x86 and ARM
     try:
         calls = [path.read_text(encoding="ascii") for path in Path(f"/proc/{pid}/task").glob("*/syscall")]

@@ -73,7 +73,7 @@ async def test_early_sighups_count_as_one_and_later_ones_separately() -> None:
         await anext(waiting)
         second_wait = asyncio.ensure_future(anext(waiting))
         await asyncio.sleep(0)
-        assert not second_wait.done(), "the early ones were one"
+        assert not second_wait.done(), "early signals are merged into one"
         send_sighup()
         await second_wait
     await waiting.aclose()

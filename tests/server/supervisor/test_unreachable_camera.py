@@ -29,7 +29,7 @@ class Lines(logging.Handler):
         self._more = asyncio.Event()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Take a line."""
+        """Record a line."""
         self.lines.append(record.getMessage())
         self._more.set()
 

@@ -26,7 +26,7 @@ from server.system.descriptors import descriptor_limit, raise_descriptor_limit
 
 @pytest.fixture
 def low_limit() -> Iterator[int]:
-    """Lower this process's soft limit; give the hard one."""
+    """Lower this process's soft limit; yield the hard one."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (512, hard))
     yield hard
@@ -95,7 +95,7 @@ def test_failures_to_accept_are_logged_once_and_connections_are_accepted_later(t
         silent.close()
         with connect(port) as late:
             late.settimeout(PATIENCE)
-            assert late.recv(12) == b"MYVIEW-SYNC ", "it accepts again"
+            assert late.recv(12) == b"MYVIEW-SYNC ", "connections are accepted again"
     log_text = log.read_bytes()
     assert log_text.count(b"cannot be accepted: Too many open files") == 1
     assert b"Traceback" not in log_text

@@ -55,7 +55,7 @@ def built(**changes: Any) -> Config:
 
 
 def written(config: Config) -> str:
-    """Return all that an operator is shown of a configuration."""
+    """Return all texts that an operator sees of a configuration."""
     return "\n".join(f"{setting.key}: {setting.value} {setting.default}" for setting in settings_of(config))
 
 

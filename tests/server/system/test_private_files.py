@@ -44,7 +44,7 @@ def umask(mask: int) -> Iterator[None]:
 
 @contextlib.contextmanager
 def folder_of(user: str, tmp_path: Path) -> Iterator[Path]:
-    """Yield a folder that is open to all, of the user that the tests run as or of another than root."""
+    """Yield a world-readable folder of the current or of an unprivileged user."""
     with contextlib.nullcontext(tmp_path) if user == "current user" else unprivileged_folder() as folder:
         folder.chmod(0o755)
         yield folder

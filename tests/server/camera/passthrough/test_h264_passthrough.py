@@ -284,7 +284,7 @@ def test_jitter_of_one_frame_loses_nothing(phase: int, gop: int, jitter: list[in
 
 
 class NetworkCamera:
-    """Serves a transport stream over HTTP, up to the GOP number ``gops_allowed``."""
+    """Serves a transport stream over HTTP, up to the GOP number ``gop_limit``."""
 
     def __init__(self, gops: list[bytes]) -> None:
         stop = self._stop = threading.Event()

@@ -1,4 +1,4 @@
-"""The buffer waits for punctual peers, and only once for a late one."""
+"""The buffer waits for peers that are in time, and only once for a late one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras of the same ground exchange detections, live as offline; an absent one costs almost no delay."""
+"""Cameras of the same ground exchange detections, live as offline; an absent camera hardly delays others."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def test_upright_video_is_passed_through(tmp_path: Path) -> None:
 
 @pytest.fixture
 def folder_url(tmp_path: Path) -> Iterator[str]:
-    """Serve the test's folder over HTTP; gives the address."""
+    """The address of an HTTP server of the test's folder."""
 
     class Quiet(http.server.SimpleHTTPRequestHandler):
         def log_message(self, *_: object) -> None:

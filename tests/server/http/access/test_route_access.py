@@ -179,7 +179,7 @@ async def test_a_token_for_a_person_follows_a_merge_of_their_number(site: Served
 
 
 async def test_health_checks_need_no_token_and_are_not_rate_limited(site: ServedSite) -> None:
-    wrong = {"Authorization": "Bearer nothing-that-was-given"}
+    wrong = {"Authorization": "Bearer unknown-token"}
     for _ in range(100):
         async with site.session.get("/api/site", headers=wrong) as answer:
             if answer.status == 429:  # too many wrong ones

@@ -58,7 +58,7 @@ async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: 
     grey = [pulse for pulse in narrow if is_gray(narrow[pulse])]
     assert grey == list(range(grey[0], grey[-1] + 1))
     assert len(grey) > 3 * GOP
-    assert np.array_equal(narrow[grey[0] - 1], narrow[grey[0] - 2]), "before it is grey, it stands"
+    assert np.array_equal(narrow[grey[0] - 1], narrow[grey[0] - 2]), "frozen before it is gray"
     assert grey[-1] < max(narrow), "a returned person is shown again"
 
 

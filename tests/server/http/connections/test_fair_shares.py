@@ -111,7 +111,7 @@ async def test_a_token_with_many_connections_does_not_take_others_streams(
             assert isinstance(await open_viewer(stack, served, path, **lead), Viewer), (
                 "operators are always admitted"
             )
-        assert await open_viewer(stack, served, path, **lead) == 503, "but not in slot of each other"
+        assert await open_viewer(stack, served, path, **lead) == 503, "but not in place of each other"
         for viewer in (*held, desk_viewer):
             assert isinstance(viewer, Viewer)
             await viewer.wait_for_end()

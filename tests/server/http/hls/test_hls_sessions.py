@@ -127,7 +127,9 @@ async def test_hls_players_take_slots_and_one_more_gets_503(served: ServedSite, 
         assert await status(served, f"/objects/1/hls/{path}", player) == 200
     assert await viewers_in_metrics(served) == 2
     assert await status(served, f"/objects/1/hls/{path}", "three") == 503
-    assert await status(served, "/objects/2/hls/index.m3u8", "one") == 503, "another stream is another place"
+    assert await status(served, "/objects/2/hls/index.m3u8", "one") == 503, (
+        "another stream needs another slot"
+    )
     async with served.session.get("/objects/1/best.mp4") as answer:
         assert answer.status == 503
     for other in PATHS:

@@ -105,7 +105,7 @@ def parse_playlist(text: str) -> ParsedPlaylist:
             whole[number] = duration
             number += 1
     for segment, its in parts.items():
-        assert its[0].independent, "4.4.3.5: segments are, and so their beginnings"
+        assert its[0].independent, "4.4.3.5: segments are independent, and so are their first parts"
         assert all(part.duration >= 0.85 * part_target for part in its[:-1]), "4.4.4.9"
         if segment in whole:
             assert sum(part.duration for part in its) == pytest.approx(whole[segment], abs=1e-4), "4.4.4.9"
@@ -146,7 +146,7 @@ async def test_a_playlist_is_written_once_per_part_for_all_players(served: Serve
     assert segmenter is not None
     texts = [_cached(segmenter, pulse0) for pulse0 in (None, None, 1_800_000_000.0)]
     assert texts[0] is texts[1]
-    assert texts[1] != texts[2], "the time of day is known now"
+    assert texts[1] != texts[2], "the wall-clock time is known now"
     decide_gops(served, range(PARTS, PARTS + 1))
     assert _cached(segmenter, 1_800_000_000.0) not in texts
     segmenter.end()

@@ -102,9 +102,9 @@ async def test_an_endless_playlist_grows_without_changing_listed_segments(served
     decide_gops(served, range(21))
     await wait_until_written(served, 21)
     before = await fetch_text(served, "/objects/1/hls/index.m3u8?from=p0&to=live")
-    assert segment_numbers(before) == list(range(10)), "the eleventh is not whole"
+    assert segment_numbers(before) == list(range(10)), "the eleventh is incomplete"
     assert "#EXT-X-ENDLIST" not in before
-    assert "#EXT-X-START:TIME-OFFSET=0\n" in before, "or players would begin near the end"
+    assert "#EXT-X-START:TIME-OFFSET=0\n" in before, "otherwise players begin near the end"
     decide_gops(served, range(21, 30))
     after = await fetch_text(served, "/objects/1/hls/index.m3u8?from=p0&to=live")
     assert segment_numbers(after) == list(range(15))

@@ -244,7 +244,7 @@ async def test_a_hanging_worker_does_not_delay_others(drawn: DrawnSite) -> None:
             for _ in range(4):
                 drawn.advance(4)
                 await read_film(plain, 4 * GOP)
-        assert source.lost, "whole GOPs, and not a byte waits for the process in the service"
+        assert source.lost, "whole GOPs, and no queued bytes for the worker"
         os.kill(source.pid, signal.SIGCONT)
 
 

@@ -184,7 +184,7 @@ def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
         for camera in range(2)
         for pulse, picture in enumerate(decoded_alone(camera))
     }
-    assert len(frame_of_picture) == 2 * EPOCHS * STRIDE, "no picture is like another"
+    assert len(frame_of_picture) == 2 * EPOCHS * STRIDE, "all pictures differ"
     shown = [frame_of_picture[picture] for picture in pictures]
     pulses = [pulse for pulse, _ in shown]
     assert all(before <= after for before, after in pairwise(pulses)), path

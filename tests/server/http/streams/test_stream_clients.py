@@ -119,7 +119,7 @@ async def test_beyond_the_limit_a_viewer_gets_503_with_retry_after(limit: str) -
             writer.close()
         await deserted(served)
         async with served.session.get("/objects/1/best.ts") as answer:
-            assert answer.status == 200, "there is room again"
+            assert answer.status == 200, "a slot is free again"
 
 
 async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(site_with_people: ServedSite) -> None:
@@ -150,7 +150,7 @@ async def test_a_slow_viewer_loses_whole_gops_without_affecting_others(site_with
         got += data
     kept = [gop for gop in gops if gop in got]
     assert got.endswith(gops[-1]), "it continues with the newest"
-    assert got.count(b"<GOP") == len(kept) == len(gops) - slow.lost_gops, "and not one is cut"
+    assert got.count(b"<GOP") == len(kept) == len(gops) - slow.lost_gops, "none is incomplete"
     stalled.close()
     writer.close()
 

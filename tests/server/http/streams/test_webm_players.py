@@ -196,7 +196,7 @@ async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(vp8_site: Served
         differences = [np.abs(picture.astype(float) - own_picture).mean() for own_picture in alone]
         assert int(np.argmin(differences)) == pulse, "the picture of its pulse, of the chosen camera"
     plain, boxed = (pictures[f"/objects/1/best.jpg{query}"][0] for query in ("", "?overlay=1"))
-    assert np.abs(plain.astype(float) - boxed).max() > 50, "there are boxes in it"
+    assert np.abs(plain.astype(float) - boxed).max() > 50, "boxes are drawn"
 
 
 async def test_unknown_people_and_webm_of_an_h264_site_are_refused_with_one_line(

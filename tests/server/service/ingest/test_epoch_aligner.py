@@ -256,7 +256,7 @@ def test_a_window_ahead_of_time_does_not_cut_other_cameras_off() -> None:
     late = STRIDE - 1 + GRACE + 1
     assert aligner.ready(now=0) == []
     epochs = aligner.ready(now=late)
-    assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "it was waited for"
+    assert (epochs[0].number, epochs[0].late) == (0, ("c1",)), "c1 was waited for"
     aligner.add_tracks(window("c1", 8))
     taken_out = [epoch for now in range(late, 9 * STRIDE) for epoch in aligner.ready(now)]
     assert "c1" in next(epoch.tracks for epoch in taken_out if epoch.number == 8)

@@ -92,9 +92,7 @@ def test_a_clock_that_jumped_during_recording_is_not_trusted_later_either(
     assert segments_on_disk(tmp_path) == list(range(7))
     clocks.now += 0.75 * TRIAL_S
     records(store, clocks, range(7, 8))
-    assert segments_on_disk(tmp_path) == [4, 5, 6, 7], (
-        "that it was off counts, that its clock jumped does not"
-    )
+    assert segments_on_disk(tmp_path) == [4, 5, 6, 7], "time off counts, a clock jump does not"
     store.close()
 
 
@@ -114,7 +112,7 @@ def test_a_clock_that_is_ahead_at_the_start_deletes_nothing(
     for gop in range(10, 18):
         records(store, clocks, range(gop, gop + 1))
         clocks.now += TRIAL_S / 1000
-    assert segments_on_disk(tmp_path) == list(range(18)), "as long as it is not synchronized"
+    assert segments_on_disk(tmp_path) == list(range(18)), "while it is not synchronized"
     clocks.now += KEEP_S
     records(store, clocks, range(20, 21))
     assert not set(range(8)) & set(segments_on_disk(tmp_path)), "but not kept forever"
@@ -150,7 +148,7 @@ def test_after_a_week_off_old_recordings_are_deleted_soon_if_the_clock_is_synchr
     store.close()
     clocks.power_off(7 * 86_400.0)
     store = opened(tmp_path, clocks, bounds)
-    assert segments_on_disk(tmp_path) == list(range(30)), "there is time to set a clock right that is wrong"
+    assert segments_on_disk(tmp_path) == list(range(30)), "a wrong clock can still be corrected"
     assert [
         message
         for message in caplog.messages
@@ -250,7 +248,7 @@ def test_recordings_made_before_the_clock_was_trusted_do_not_age_by_time_off(
     assert segments_on_disk(tmp_path) == [10, 11, 12, 13]
     store.close()
     opened(tmp_path, clocks, bounds).close()
-    assert segments_on_disk(tmp_path) == [10, 11, 12, 13], "and so it is known later on"
+    assert segments_on_disk(tmp_path) == [10, 11, 12, 13], "the age is known later"
 
 
 def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
@@ -264,7 +262,7 @@ def test_excess_recordings_are_deleted_by_age_though_the_clock_went_back(
     records(store, clocks, range(10, 20))
     store.close()
     early = next(path.name for path in tmp_path.iterdir() if path.is_dir() and path.name != late)
-    assert early < late, "names are by the clock"
+    assert early < late, "names follow the clock"
     size = sum(session.size for session in (*store.earlier, store.session) if session is not None)
     restarted = opened(tmp_path, clocks, RetentionLimits(KEEP_S, size / 1e6, 0.2))
     deleted = sorted(set(range(20)) - set(segments_on_disk(tmp_path)))
@@ -287,7 +285,7 @@ def test_recordings_of_an_earlier_version_are_dated_once(tmp_path: Path, clocks:
     assert "age_clock_at_pulse0" in json.loads(path.read_bytes())
     clocks.now += KEEP_S / 2 - 4.5 * STEP_S
     opened(tmp_path, clocks).close()
-    assert segments_on_disk(tmp_path) == list(range(5, 10)), "by when they were written"
+    assert segments_on_disk(tmp_path) == list(range(5, 10)), "by time of writing"
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", PARTLY, ENDLESS])
@@ -298,7 +296,7 @@ def test_a_damaged_clock_file_deletes_nothing(tmp_path: Path, clocks: ManualCloc
     assert segments_on_disk(tmp_path) == list(range(10))
     clocks.now += KEEP_S - 4.5 * STEP_S
     records(store, clocks, range(10, 11))
-    assert segments_on_disk(tmp_path) == list(range(5, 11)), "its end is new, and gets old"
+    assert segments_on_disk(tmp_path) == list(range(5, 11)), "its end is new and ages"
     store.close()
 
 

@@ -47,7 +47,7 @@ def opened(folder: Path, clock: ManualClocks, bounds: RetentionLimits = BOUNDS) 
 
 
 def close(store: RecordingFolder) -> None:
-    """End a service."""
+    """Close a recording folder as a service does at its end."""
     store.close()
 
 
@@ -117,7 +117,7 @@ def test_old_recordings_are_deleted_before_a_session_begins(tmp_path: Path, cloc
     assert on_disk(tmp_path) == [0, 25, 50, 75]
     write_on_full_disk(restarted, clock, 27)
     assert on_disk(tmp_path) == [50, 75]
-    assert restarted.session is None, "it could not begin"
+    assert restarted.session is None, "the session could not begin"
     restarted.close()
 
 
@@ -154,7 +154,7 @@ def test_files_that_cannot_be_deleted_are_not_forgotten(
     with monkeypatch.context() as patch:
         patch.setattr(Path, "unlink", unlink)
         record(store, clock, range(27, 28))
-    assert on_disk(tmp_path) == [0, 50, 75, 135], "and it is recorded all the same"
+    assert on_disk(tmp_path) == [0, 50, 75, 135], "but it is recorded"
     assert [segment.first for segment in session.segments] == [0, 50, 75, 135]
     assert files_in(session) == {50, 75, 135}, "its pictures are no longer played"
     assert f"{session.paths.camera_file(A, 0)}: Operation not permitted" in caplog.text

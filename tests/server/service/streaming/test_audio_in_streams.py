@@ -55,7 +55,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 async def site_with_audio(recording: Path) -> AsyncIterator[ServedSite]:
-    """A site that has that recording's sound."""
+    """A site with the recording's audio."""
     async for served in serve_site(sound={"source": str(recording)}, http={"viewer_queue_gops": 100}):
         yield served
 
@@ -206,7 +206,7 @@ async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(site_wit
     ):
         site_with_audio.service.ingest.audio(type(good)(good.key, good.payload, bad))
     state = site_with_audio.service.ingest.states[A]
-    assert state.bad_messages == 5, "of the camera whose process sends it"
+    assert state.bad_messages == 5, "of the camera that sends the audio"
     assert state.metrics.last_error is not None
     assert state.metrics.last_error.text.startswith("invalid message: audio: ")
 

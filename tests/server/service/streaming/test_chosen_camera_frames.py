@@ -1,4 +1,4 @@
-"""Every frame of a stream is the chosen camera's, to the pixel, over any cuts; and a wrong one is noticed."""
+"""Every frame of a stream is the chosen camera's, to the pixel, over any cuts; a wrong one is detected."""
 
 from __future__ import annotations
 

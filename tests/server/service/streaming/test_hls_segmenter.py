@@ -93,7 +93,7 @@ def test_segments_are_numbered_by_their_pulses_and_listed_when_complete() -> Non
         site.show(gop, CAMERAS[gop % 2])
     assert [segment.number for segment in site.segmenter.playlist_segments] == [0, 1, 2, 3]
     assert [segment.until - segment.first for segment in site.segmenter.playlist_segments] == [2 * GOP] * 4
-    assert site.segmenter.get(4) is None, "it is not whole"
+    assert site.segmenter.get(4) is None, "it is incomplete"
     site.splicer.close()
     assert [segment.number for segment in site.segmenter.playlist_segments] == [0, 1, 2, 3, 4]
     assert site.segmenter.playlist_segments[-1].until - site.segmenter.playlist_segments[-1].first == GOP

@@ -29,7 +29,7 @@ FRAMES = 6 * GOP
 
 @dataclass(frozen=True)
 class ShownPicture:
-    """A decoded picture, when it is shown, and for how many pulses."""
+    """A decoded picture, its pulse and its duration in pulses."""
 
     pulse: int
     duration: int
@@ -38,7 +38,7 @@ class ShownPicture:
 
 @cache
 def captured_units(seed: int, missed: frozenset[int], preset: str) -> tuple[AccessUnit, ...]:
-    """Encode a camera's pictures, but for those pulses that it misses."""
+    """Encode a camera's pictures except at missed pulses."""
     encoder = Encoder(
         SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
         EncodeSettings.model_validate({"gop": GOP, "preset": preset}),
@@ -48,7 +48,7 @@ def captured_units(seed: int, missed: frozenset[int], preset: str) -> tuple[Acce
 
 
 def decoded_alone(units: tuple[AccessUnit, ...]) -> dict[int, NDArray[np.uint8]]:
-    """Decode all that a camera encoded."""
+    """Decode a camera's own stream."""
     decoder = av.CodecContext.create("h264", "r")
     frames = [
         frame for data in [*units, None] for frame in decoder.decode(av.Packet(data.data) if data else None)

@@ -57,7 +57,7 @@ IN_B: Mapping[str, Mapping[int, Box | None]] = {A: {1: SMALL}, B: {1: LARGE}}
 
 @pytest.fixture
 async def recorded_site(tmp_path: Path) -> AsyncIterator[ServedSite]:
-    """Six GOPs of person 1, in c0, then in c1; all but the last two are on the disk alone."""
+    """Six GOPs of person 1, in c0, then in c1; all but the last two are only on the disk."""
     async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
         served.service.recorder.recent._frames = GOP
         served.service.recorder.open()
@@ -110,7 +110,7 @@ async def test_a_persons_recording_continues_into_the_live_stream_without_a_gap(
         for choices in recorded_site.service.recorder.recent.choices(0)
         for pulse in range(choices.first, choices.first + GOP)
     }
-    assert min(camera) >= 4 * GOP, "the beginning is on the disk alone"
+    assert min(camera) >= 4 * GOP, "the start is only on the disk"
     shown = await read_up_to(recorded_site, "/objects/1/best.mp4?from=p7", 6 * GOP, 7)
     assert [pulse for pulse, _ in shown] == list(range(GOP, 7 * GOP))
     used = set()
@@ -282,7 +282,7 @@ async def test_a_viewer_of_time_shift_occupies_a_slot_and_frees_it(recorded_site
         await answer.content.readany()
         while not recorded_site.service.splicer.viewers:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
-        assert recorder.viewers == 0, "the channel counts from the present on"
+        assert recorder.viewers == 0, "the broadcaster counts from the present on"
         answer.close()
     while recorder.viewers or recorded_site.service.splicer.viewers:  # noqa: ASYNC110
         await asyncio.sleep(0.001)
@@ -364,7 +364,7 @@ async def test_segments_deleted_during_playback_are_left_out(tmp_path: Path) -> 
     stream_format, header = stream_format_and_header(store)
     stream = TimeShiftStream(source, GaplessTimeline(stream_format, FPS, GOP), FPS, lambda: None)
     data = b"".join([chunk.data async for chunk in stream.send(PlaybackRange(0, 60))])
-    assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "bridged, as live"
+    assert [pulse for pulse, _ in decoded(header + data)] == list(range(60)), "filled, as live"
     assert available_ranges(source) == [PulseRange(0, 60)]
 
 

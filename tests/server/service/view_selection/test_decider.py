@@ -216,7 +216,7 @@ def test_a_camera_that_dies_within_the_look_ahead_is_left_at_that_gop() -> None:
     for number in range(3, 8):  # its last words are lost with it
         after += view_decider.step(epoch_of(number, camera_tracks(B, number, story[number][B])))
     assert shown(before) == [A, A]
-    assert shown(after) == [B, B, B, B, B], "no hole, and one cut"
+    assert shown(after) == [B, B, B, B, B], "no gap, and one cut"
     assert after[0].reasons.of(1).views[A].cost is None
 
 

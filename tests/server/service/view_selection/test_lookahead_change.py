@@ -31,7 +31,7 @@ from server.system.errors import UserError
 EPOCHS = 8  # as many as there are pictures of
 MINE = {CSRF_HEADER: "1"}
 Changes = Mapping[int, int]
-"""By epoch before which it is changed: the look-ahead from then on."""
+"""The look-ahead from an epoch on, by epoch."""
 CHANGED = st.dictionaries(st.integers(0, 29), st.integers(GOP, 40), max_size=6)
 
 
