@@ -36,7 +36,7 @@ async def recorded(served: ServedSite, out: Path) -> None:
 
 
 async def stream_size(served: ServedSite, folder: Path) -> int:
-    """Record it on a disk with room enough; give the bytes of its stream."""
+    """Record the stream on a disk with enough space; return its bytes."""
     whole = await client.watch(
         f"http://127.0.0.1:{served.port}", 1, folder / "w.mp4", start="p0", end=f"p{FRAMES}"
     )

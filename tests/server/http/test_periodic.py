@@ -89,7 +89,7 @@ def test_a_half_done_renewal_is_loaded_when_it_is_complete(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     class Context:
-        """One that reads whatever there is."""
+        """A reload that accepts any file."""
 
         sni_callback: object = None
 

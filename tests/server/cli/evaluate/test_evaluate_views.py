@@ -31,7 +31,7 @@ def write(path: Path, lines: list[str]) -> Path:
 
 
 def boxes(places: Mapping[int, str], frames: range = range(1, FRAMES + 1), end: str = "1,1,1") -> list[str]:
-    """Return MOTChallenge rows: everybody at one place all the time."""
+    """Return MOTChallenge rows: everyone at one place all the time."""
     return [f"{frame},{number},{place},{end}" for frame in frames for number, place in places.items()]
 
 

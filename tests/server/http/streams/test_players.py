@@ -196,7 +196,7 @@ def check_order(served: ServedSite, path: str, pictures: list[bytes]) -> None:
 
 
 def pictures_of(film: bytes) -> list[bytes]:
-    """Take the pictures out of a YUV4MPEG2, which has a line before all of them and one before each."""
+    """Return the pictures of a YUV4MPEG2 stream (a header line, and a line before each picture)."""
     _, _, rest = film.partition(b"\n")
     mark = b"FRAME\n"
     whole = len(mark) + WIDTH * HEIGHT * 3 // 2

@@ -59,7 +59,7 @@ async def test_a_flood_does_not_keep_the_service_from_deciding() -> None:
 async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """Half as fast as the pulses: after each epoch they are two further on."""
+    """Decisions are half as fast as the pulses."""
     service, now = service_with_backlog(), itertools.count(0.0, 1.5)
     service._backlog_monitor = BacklogMonitor(2 * STRIDE, lambda: next(now))
     decided, step = list[int](), service._step

@@ -19,7 +19,7 @@ MENDED = STRIDE
 
 
 def late_revision(epoch: int) -> CameraTracks:
-    """Return a camera's word that the two were in each other's place since then."""
+    """Return a revision in which the two people have been exchanged since `MENDED`."""
     last = end_of_epoch(epoch, STRIDE)
     revision = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
     frames = last - MENDED + 1
