@@ -99,9 +99,9 @@ class Session:
                 except FormatChangedError:
                     raise
                 except MediaStreamError as error:
-                    what = "WebM" if self._record.container == "webm" else "fragmented MP4"
+                    container = "WebM" if self._record.container == "webm" else "fragmented MP4"
                     where = f"{address.origin()}: its {address.name}"
-                    raise ContractError(f"{where} is not a {what}: {error}") from error
+                    raise ContractError(f"{where} is not a {container}: {error}") from error
         return False
 
     def _take(self, parts: Iterator[bool]) -> bool:

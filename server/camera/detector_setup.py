@@ -166,6 +166,6 @@ class LetterboxedDetections:
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Return the detections of a frame, with appearance histograms from the site's image."""
-        own = self._file.detect(_NO_IMAGE, None if frame is None else self._frame_number(frame))
-        boxes = self._letterbox.boxes_to_site(own.boxes)
-        return Detections(boxes, own.scores, self._appearance.histograms(image, boxes))
+        from_file = self._file.detect(_NO_IMAGE, None if frame is None else self._frame_number(frame))
+        boxes = self._letterbox.boxes_to_site(from_file.boxes)
+        return Detections(boxes, from_file.scores, self._appearance.histograms(image, boxes))

@@ -205,7 +205,7 @@ class CameraProcess:
             self._queue_for_tracking(pulse.number, None, due)
             return
         self._state = "live"
-        taken = self._clock()
+        captured_at = self._clock()
         unit = await self._run_in(self._video, lambda: self._pipeline.encode(pulse.number, image))
         head = FrameHeader(
             pulse=pulse.number,
@@ -213,7 +213,7 @@ class CameraProcess:
             boot=self._boot,
             after=unit.after,
             due=pulse.due,
-            taken=taken,
+            taken=captured_at,
             encoded=self._clock(),
         )
         self._publish("video", unit.data, msgspec.json.encode(head))
@@ -303,9 +303,9 @@ class CameraProcess:
         )
         self._publish("status", msgspec.json.encode(status))
 
-    def _publish(self, what: str, payload: bytes, attachment: bytes | None = None) -> None:
+    def _publish(self, topic: str, payload: bytes, attachment: bytes | None = None) -> None:
         if self._bus is not None:
-            self._bus.publish(self._keys.camera(self._id, what), payload, attachment)
+            self._bus.publish(self._keys.camera(self._id, topic), payload, attachment)
 
     @staticmethod
     async def _run_in(pool: ThreadPoolExecutor, work: Callable[[], T]) -> T:

@@ -46,8 +46,8 @@ class _Loader(SafeLoader):
             raise yaml.YAMLError("merges (<<) that expand to too many keys")
 
 
-def read_yaml(path: Path, what: str) -> Any:
-    """Read a file's content; ``what`` names it in errors.
+def read_yaml(path: Path, label: str) -> Any:
+    """Read a file's content; ``label`` names it in errors.
 
     Raises:
         UserError: it cannot be read, or is not valid YAML.
@@ -56,7 +56,7 @@ def read_yaml(path: Path, what: str) -> Any:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise UserError(f"{path}: cannot read {what}: {reason}") from error
+        raise UserError(f"{path}: cannot read {label}: {reason}") from error
     try:
         _check_depth(text)
         return _loaded(text)

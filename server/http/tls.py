@@ -73,11 +73,11 @@ class Certificate:
 
     def _load(self) -> ssl.SSLContext:
         context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-        for what, path in (("certificate", self._certificate), ("key", self._key)):
+        for kind, path in (("certificate", self._certificate), ("key", self._key)):
             try:
                 path.read_bytes()
             except OSError as error:
-                raise UserError(f"http.tls.{what}: cannot read {path}: {error.strerror}") from error
+                raise UserError(f"http.tls.{kind}: cannot read {path}: {error.strerror}") from error
         try:
             context.load_cert_chain(self._certificate, self._key, password=_no_password)
         except (OSError, ValueError) as error:  # an SSL error, or a file was removed meanwhile

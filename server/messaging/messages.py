@@ -268,18 +268,18 @@ class ZenohKeys:
 
     site: str
 
-    def camera(self, camera_id: str, what: str) -> str:
+    def camera(self, camera_id: str, topic: str) -> str:
         """Return a camera's key; ``*`` as the id stands for all cameras."""
-        return f"myview/{self.site}/camera/{camera_id}/{what}"
+        return f"myview/{self.site}/camera/{camera_id}/{topic}"
 
     @property
     def sound(self) -> str:
         """The key of the site's audio."""
         return f"myview/{self.site}/sound"
 
-    def bestview(self, what: str, index: int = 0) -> str:
+    def bestview(self, topic: str, index: int = 0) -> str:
         """Return a key of the best-view service with this index."""
-        return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{what}"
+        return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{topic}"
 
 
 def camera_of_key(key: str) -> str:

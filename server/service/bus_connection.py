@@ -49,8 +49,8 @@ class BusConnection:
         else:
             bus = Bus.router(self._config.zenoh, access_control_of(self._config))
         self._bus = bus
-        for what, handler in camera_handlers.items():
-            self.inboxes.append(bus.subscribe(self._keys.camera("*", what), handler))
+        for topic, handler in camera_handlers.items():
+            self.inboxes.append(bus.subscribe(self._keys.camera("*", topic), handler))
         if on_audio is not None:
             self.inboxes.append(bus.subscribe(self._keys.sound, on_audio))
         bus.watch_alive(self._keys.camera("*", "alive"), on_alive)
@@ -61,10 +61,10 @@ class BusConnection:
         """Whether a message waits in any inbox."""
         return any(inbox.waiting for inbox in self.inboxes)
 
-    def send_to_camera(self, what: str, camera: str, payload: bytes) -> None:
-        """Send a camera a message under the key that ends with ``what``."""
+    def send_to_camera(self, topic: str, camera: str, payload: bytes) -> None:
+        """Send a camera a message under the key that ends with ``topic``."""
         if self._bus is not None:
-            self._bus.publish(self._keys.camera(camera, what), payload)
+            self._bus.publish(self._keys.camera(camera, topic), payload)
 
     def publish_choices(self, choices: GopChoices) -> None:
         """Publish the choices of a GOP."""

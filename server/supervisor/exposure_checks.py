@@ -37,8 +37,8 @@ def check_pulses(config: Config) -> None:
     """
     sync = config.sync
     if (sync.users is None or sync.tls.key is None) and not is_loopback(sync.bind):
-        what = f"sync.bind: {sync.bind} lets other machines listen to the pulses"
-        _check_network(config, what, "set sync.users and sync.tls")
+        exposure = f"sync.bind: {sync.bind} lets other machines listen to the pulses"
+        _check_network(config, exposure, "set sync.users and sync.tls")
 
 
 def check_bus(config: Config) -> None:
@@ -52,8 +52,8 @@ def check_bus(config: Config) -> None:
         return
     match = _AUTHORITY.match(zenoh.listen)
     if match is None or not is_loopback(match["host"].strip("[]")):
-        what = f"zenoh.listen: {redact_endpoint(zenoh.listen)} lets other machines send frames and tracks"
-        _check_network(config, what, "use tls/ and set zenoh.users")
+        exposure = f"zenoh.listen: {redact_endpoint(zenoh.listen)} lets other machines send frames and tracks"
+        _check_network(config, exposure, "use tls/ and set zenoh.users")
 
 
 def is_loopback(host: str) -> bool:
@@ -64,9 +64,9 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def _check_network(config: Config, what: str, remedy: str) -> None:
+def _check_network(config: Config, exposure: str, remedy: str) -> None:
     if not config.access.trusted_network:
         raise UserError(
-            f"{what} without authentication: bind it to 127.0.0.1, {remedy}, or, on a trusted "
+            f"{exposure} without authentication: bind it to 127.0.0.1, {remedy}, or, on a trusted "
             "network, set access.trusted_network: true"
         )

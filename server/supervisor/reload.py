@@ -50,7 +50,7 @@ class ReloadPlan:
             "waits for a restart of the best view, which ends streams": self.best_view,
             "waits for a restart of all processes": self.site,
         }
-        effects = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
+        effects = "; ".join(f"{effect}: {', '.join(names)}" for effect, names in parts.items() if names)
         return f"configuration reloaded: {effects or 'no changes'}"
 
 

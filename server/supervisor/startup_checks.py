@@ -11,7 +11,7 @@ from server.config.source_address import SourceKind, source_kind
 from server.system.errors import UserError
 
 
-def check_port_free(host: str, port: int, what: str) -> None:
+def check_port_free(host: str, port: int, label: str) -> None:
     """Check that a port can be listened on.
 
     Raises:
@@ -22,7 +22,7 @@ def check_port_free(host: str, port: int, what: str) -> None:
         try:
             probe.bind((host, port))
         except OSError as error:
-            raise UserError(f"{what}: cannot listen on {host}:{port}: {error.strerror}") from error
+            raise UserError(f"{label}: cannot listen on {host}:{port}: {error.strerror}") from error
 
 
 def check_ports(config: Config) -> None:

@@ -97,10 +97,10 @@ def _subjects(record: logging.LogRecord) -> dict[str, object]:
     values = iter(record.args)
     subjects: dict[str, object] = {}
     for place in _PLACE.finditer(record.msg):
-        what, kind = place.groups()
+        component, kind = place.groups()
         if kind == "%":
             continue
         value = next(values, None)
-        if what is not None and value is not None:
-            subjects.setdefault(what, value)
+        if component is not None and value is not None:
+            subjects.setdefault(component, value)
     return subjects

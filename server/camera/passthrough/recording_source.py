@@ -141,8 +141,8 @@ def _check_file(path: str, offset: int, required: RequiredFormat) -> int:
                 first = packet.pts if first is None else first
                 check.check_frame_time(frame, (packet.pts - first) * unit)
     except (av.error.FFmpegError, ValueError) as error:
-        why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
-        raise IncompatibleStreamError(f"it cannot be read: {why}") from None
+        reason = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
+        raise IncompatibleStreamError(f"it cannot be read: {reason}") from None
     finally:
         opened.container.close()
     if frame < 0:

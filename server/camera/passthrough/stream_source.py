@@ -127,10 +127,10 @@ def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> No
                 f"no GOP begins within {_CHECKED_GOPS * required.gop} frames (encode.gop)"
             )
     except (av.error.InvalidDataError, ValueError) as error:
-        why = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
-        raise IncompatibleStreamError(f"it cannot be read: {why}") from None
+        reason = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)
+        raise IncompatibleStreamError(f"it cannot be read: {reason}") from None
     except av.error.FFmpegError as error:  # the connection broke: the stream may be compatible
-        why = timeout_message(error, READ_S) or ffmpeg_reason(error)
-        raise UserError(f"{redact_address(url)}: it stopped during the check: {why}") from None
+        reason = timeout_message(error, READ_S) or ffmpeg_reason(error)
+        raise UserError(f"{redact_address(url)}: it stopped during the check: {reason}") from None
     finally:
         opened.container.close()

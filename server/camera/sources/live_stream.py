@@ -108,7 +108,7 @@ class LiveStream:
             self._resized = size
             opened.container.close()
             return False
-        has_frames, why = False, "the connection has ended"
+        has_frames, reason = False, "the connection has ended"
         self._silence = _Silence()
         try:
             for packet in opened.container.demux(opened.stream, *self._audio_streams(opened)):
@@ -121,22 +121,22 @@ class LiveStream:
                 elif self._listener is not None:
                     self._listener.packet(cast("av.Packet[AudioStream]", packet))
         except _SizeChangedError as error:
-            why = str(error)  # damage, or a real change: the next connection tells them apart
+            reason = str(error)  # damage, or a real change: the next connection tells them apart
         except (av.error.FFmpegError, OSError) as error:
-            why = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
+            reason = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
         finally:
             opened.container.close()
         if not self._closing.is_set():
-            self._log_away(f"{redact_address(self._url)}: {why}")
+            self._log_away(f"{redact_address(self._url)}: {reason}")
         return has_frames
 
     def _size_message(self, size: tuple[int, int]) -> str:
         return "its images are {}x{} now, they were {}x{}".format(*size, *self.size)
 
-    def _log_away(self, why: str, *, unexpected: bool = False) -> None:
+    def _log_away(self, reason: str, *, unexpected: bool = False) -> None:
         """Log that the camera is away; throttled, as it may come and go."""
-        if (more := self._away_log.record(why)) is not None:
-            log.warning("%s%s; retrying", why, more, exc_info=unexpected)
+        if (more := self._away_log.record(reason)) is not None:
+            log.warning("%s%s; retrying", reason, more, exc_info=unexpected)
 
     def _log_recovered(self) -> None:
         if ended := self._away_log.end():

@@ -60,9 +60,9 @@ def open_video(
             source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
-        why = timeout_message(error, timeout[0]) if timeout else None
+        reason = timeout_message(error, timeout[0]) if timeout else None
         # FFmpeg's text contains the address, and so would a chained traceback.
-        raise UserError(f"{name}: cannot open this video: {why or _reason(source, error)}") from None
+        raise UserError(f"{name}: cannot open this video: {reason or _reason(source, error)}") from None
     if container.format.name == _TEXT:
         container.close()
         raise UserError(

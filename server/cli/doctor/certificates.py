@@ -42,8 +42,8 @@ def router_finding(check: str, certificate: Path, key: Path, authority: Path, ho
     try:
         handshake(certificate, key, authority, host)
     except ssl.SSLCertVerificationError as error:
-        why = error.verify_message
-        text = f"{certificate}: clients that connect to {host} and trust {authority} refuse it: {why}"
+        reason = error.verify_message
+        text = f"{certificate}: clients that connect to {host} and trust {authority} refuse it: {reason}"
         return bad(check, text, "use one that this authority has signed for this host: docs/how-to/secure.md")
     except (ssl.SSLError, OSError, ValueError):
         pass  # reported by the check of the files

@@ -48,12 +48,12 @@ async def port_findings(config: Config) -> tuple[list[Finding], bool]:
             )
             continue
         with report_failure(check, findings):
-            taken = _taken(host, port, check)
-            if taken is None:
+            finding = _taken(host, port, check)
+            if finding is None:
                 findings.append(ok(check, f"{where} is free"))
-            elif isinstance(taken, str):
+            elif isinstance(finding, str):
                 remedy = "use an address of this machine, and a port that this user may bind"
-                findings.append(bad(check, taken, remedy))
+                findings.append(bad(check, finding, remedy))
             else:
                 is_own = runs if check == "zenoh.listen" else await _is_this_site(config, check)
                 runs = runs or is_own

@@ -47,13 +47,13 @@ async def _check_route(check: str, target: Place, setting: str, listener: Place)
             f"{where} cannot be resolved: {reason}",
             "use the server's name or address, as seen from this machine",
         )
-    here = any(map(_is_of_this_machine, addresses))
-    if here and target[1] == listener[1] and await _covers(listener[0], addresses):
+    is_local = any(map(_is_of_this_machine, addresses))
+    if is_local and target[1] == listener[1] and await _covers(listener[0], addresses):
         return ok(check, f"{where} leads to {setting}")
     refusal = await _refusal(target)
     if not refusal:
         return ok(check, f"{where} answers")
-    if here:
+    if is_local:
         text = f"nothing listens at {where}, where cameras connect; {setting} is {listener[0]}:{listener[1]}"
         return bad(check, text, f"make {check} and {setting} agree")
     return warning(check, f"{where} does not answer: {refusal}", "start the site there, or open the firewall")

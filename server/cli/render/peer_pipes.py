@@ -72,15 +72,15 @@ class PeerPipeFactory:
     @contextmanager
     def of(self, camera: str) -> Iterator[PeerPipes]:
         """Yield a camera's ends of the pipes while its process starts; they are closed here afterwards."""
-        own = self._pipes[camera]
+        own_pipe = self._pipes[camera]
         for peer_name in self._peers[camera]:
             if peer_name not in self._handed_over:
                 peer = self._pipes[peer_name]
-                own.incoming[peer_name], peer.outgoing[camera] = multiprocessing.Pipe(duplex=False)
-                peer.incoming[camera], own.outgoing[peer_name] = multiprocessing.Pipe(duplex=False)
+                own_pipe.incoming[peer_name], peer.outgoing[camera] = multiprocessing.Pipe(duplex=False)
+                peer.incoming[camera], own_pipe.outgoing[peer_name] = multiprocessing.Pipe(duplex=False)
         try:
-            yield own
+            yield own_pipe
         finally:
             self._handed_over.add(camera)
-            for connection in (*own.outgoing.values(), *own.incoming.values()):
+            for connection in (*own_pipe.outgoing.values(), *own_pipe.incoming.values()):
                 connection.close()

@@ -190,14 +190,14 @@ def _offsets(recorded: RecordedWalk, calibration: WalkCalibration) -> list[str]:
     lines = []
     for camera in calibration.cameras:
         if camera.offset or camera.offset_error:
-            how = "out of sync" if _is_out_of_sync(camera) else "in sync, within the error"
+            verdict = "out of sync" if _is_out_of_sync(camera) else "in sync, within the error"
             if _is_out_of_sync(camera) and abs(camera.offset) / fps < _DOUBTFUL_S:
-                how = "perhaps out of sync; late foot points look alike: compare two frames first"
+                verdict = "perhaps out of sync; late foot points look alike: compare two frames first"
             if _is_out_of_sync(camera) and camera.camera in recorded.live:
-                how += "; a live camera has no configurable offset"
+                verdict += "; a live camera has no configurable offset"
             frames = f"{camera.offset:+.1f} frames ({camera.offset / fps:+.2f} s)"
             margin = f"± {_SIGNIFICANT * camera.offset_error:.1f}"
-            lines.append(f"{camera.camera}: {frames} later than {first}, {margin}: {how}")
+            lines.append(f"{camera.camera}: {frames} later than {first}, {margin}: {verdict}")
     return lines
 
 

@@ -96,14 +96,14 @@ class StateReplication:
         camera = camera_of_key(message.key)
         if camera not in self._cameras:
             return
-        again = self._started_at is not None and camera in self._reported
+        is_repeated = self._started_at is not None and camera in self._reported
         self._connected_at.pop(camera, None)
         self._reported.add(camera)
         if not message.payload:
             return
         snapshot = msgspec.json.decode(message.payload, type=IdentitySnapshot)
         self._first_free[camera] = first_free_number(snapshot)
-        if again:
+        if is_repeated:
             self._people.reserve_numbers_below(
                 min(snapshot.next_number, trusted_first_free(self._first_free.values()))
             )

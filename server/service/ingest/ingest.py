@@ -82,10 +82,10 @@ class CameraState:
             return "its source delivers no frames; retrying"
         return self.status.load if self.alive and self.status is not None else ""
 
-    def count_bad_message(self, why: Exception | str) -> None:
+    def count_bad_message(self, reason: Exception | str) -> None:
         """Count an invalid message."""
         self.bad_messages += 1
-        self.metrics.record_problem(f"invalid message: {why}")
+        self.metrics.record_problem(f"invalid message: {reason}")
 
 
 @dataclass(frozen=True, slots=True)

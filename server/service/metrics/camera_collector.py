@@ -41,8 +41,8 @@ class CameraCollector(Collector):
             "Load-shedding level of the camera; 0: none.",
             _of_status(lambda status: status.load_level),
         )
-        for what, description, spread in _SPREADS:
-            yield self._spread(what, description, spread)
+        for name, description, spread in _SPREADS:
+            yield self._spread(name, description, spread)
         late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_frames
         yield self._counter(
             "late_windows", "Windows that arrived too late to count.", lambda camera, _: late[camera]
@@ -120,10 +120,10 @@ class CameraCollector(Collector):
         return family
 
     def _spread(
-        self, what: str, description: str, of: Callable[[CameraState], RecentSeconds | None]
+        self, name: str, description: str, of: Callable[[CameraState], RecentSeconds | None]
     ) -> Metric:
         family = GaugeMetricFamily(
-            f"myview_camera_{what}_seconds", description, labels=["camera", "statistic"]
+            f"myview_camera_{name}_seconds", description, labels=["camera", "statistic"]
         )
         for camera, state in self._pipeline.ingest.states.items():
             spread = of(state)
@@ -132,12 +132,12 @@ class CameraCollector(Collector):
                 family.add_metric([camera, "worst"], spread.worst)
         return family
 
-    def _gauge(self, what: str, description: str, value: Value) -> Metric:
-        return self._filled(GaugeMetricFamily(f"myview_camera_{what}", description, labels=["camera"]), value)
+    def _gauge(self, name: str, description: str, value: Value) -> Metric:
+        return self._filled(GaugeMetricFamily(f"myview_camera_{name}", description, labels=["camera"]), value)
 
-    def _counter(self, what: str, description: str, value: Value) -> Metric:
+    def _counter(self, name: str, description: str, value: Value) -> Metric:
         return self._filled(
-            CounterMetricFamily(f"myview_camera_{what}", description, labels=["camera"]), value
+            CounterMetricFamily(f"myview_camera_{name}", description, labels=["camera"]), value
         )
 
     def _filled(self, family: GaugeMetricFamily | CounterMetricFamily, value: Value) -> Metric:

@@ -191,12 +191,12 @@ class AgeClock:
             draft.unlink(missing_ok=True)
             raise
 
-    def _warn_once(self, what: str, off_s: float, counted_from: float = math.nan) -> None:
-        if self._last_warning == what:
+    def _warn_once(self, event: str, off_s: float, counted_from: float = math.nan) -> None:
+        if self._last_warning == event:
             return
-        self._last_warning = what
+        self._last_warning = event
         text = f"recording: by its clock this machine was off for {_duration_text(off_s)}"
-        if what == "unsynchronized":
+        if event == "unsynchronized":
             log.warning(
                 "%s; that does not count for record.keep_s, since the clock is not synchronized (NTP): "
                 "if it is right, set record.trust_clock: true",

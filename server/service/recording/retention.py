@@ -80,8 +80,8 @@ class RetentionPolicy:
             self._log_deleted(expired)
             self._failures.end()
         elif (more := self._failures.record(failed.strerror or "")) is not None:
-            what = f"{failed.filename}: {failed.strerror or failed}{more}"
-            log.error("recording: cannot delete expired segments: %s; tried again each time", what)
+            failure = f"{failed.filename}: {failed.strerror or failed}{more}"
+            log.error("recording: cannot delete expired segments: %s; tried again each time", failure)
 
     def expired(self, sessions: Sequence[RecordingSession]) -> ExpiredSegments:
         """Return what must be deleted of sessions that are sorted by age."""

@@ -115,11 +115,15 @@ class HlsSegment:
     def data(self) -> bytes:
         """The segment as MP4 fragments."""
         filler = list(takewhile(lambda chunk: not chunk.random_access, self._chunks))
-        rest = b"".join(chunk.data_with_audio for chunk in self._chunks[len(filler) :])
+        following = b"".join(chunk.data_with_audio for chunk in self._chunks[len(filler) :])
         audio = b"".join(chunk.audio_fragment for chunk in filler)
         if not filler:
-            return rest
-        return audio + repeat_last_picture(self._lead, self.first, filler[-1].until, self._layout.fps) + rest
+            return following
+        return (
+            audio
+            + repeat_last_picture(self._lead, self.first, filler[-1].until, self._layout.fps)
+            + following
+        )
 
     @property
     def parts(self) -> Sequence[HlsPart]:
