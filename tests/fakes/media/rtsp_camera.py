@@ -117,6 +117,6 @@ def _payloads(unit: AccessUnit) -> Iterator[tuple[bytes, bool]]:
             continue
         offsets = range(1, len(nal), _MAX_BYTES)
         for at in offsets:
-            begun, done = at == offsets[0], at == offsets[-1]
-            head = bytes([nal[0] & 0xE0 | _FU_A, begun << 7 | done << 6 | nal[0] & 0x1F])
-            yield head + nal[at : at + _MAX_BYTES], is_last_unit and done
+            is_first, is_last = at == offsets[0], at == offsets[-1]
+            head = bytes([nal[0] & 0xE0 | _FU_A, is_first << 7 | is_last << 6 | nal[0] & 0x1F])
+            yield head + nal[at : at + _MAX_BYTES], is_last_unit and is_last

@@ -1,7 +1,7 @@
 """A film of two people in the same clothes who meet, occlude each other briefly, and turn back.
 
-A tracker, which expects people to keep walking, exchanges their ids. Afterwards they stand where they came
-from, so that the exchange can be corrected at any time.
+A tracker, which expects people to keep walking, exchanges their ids. Afterwards they stand at their starting
+points, so that the exchange can be corrected at any time.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ async def is_retried(task: asyncio.Task[None], failing: Failing) -> bool:
 
 async def test_lists_are_published_after_a_failed_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.http.api.events._LISTS_EVERY_S", 0.001)
-    service, failing = FedService(small_config()), Failing(RuntimeError("nobody has thought of this"))
+    service, failing = FedService(small_config()), Failing(RuntimeError("unexpected error"))
     events = Events(BestViewService(service))
     events._by_scope = {None: None}  # type: ignore[dict-item]
     monkeypatch.setattr(events, "_publish_changed", failing)
@@ -69,7 +69,7 @@ async def test_tokens_are_checked_after_a_failed_reload_and_expired_requests_end
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.http.access.authorization._CHECK_EVERY_S", 0.001)
-    failing, over = Failing(RuntimeError("nobody has thought of this")), Failing()
+    failing, over = Failing(RuntimeError("unexpected error")), Failing()
     tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("desk"))
     access = AccessControl(Authenticator(tokens, "hall"), lambda number: number)
     monkeypatch.setattr(access.authenticator.file, "reload_if_changed", failing)

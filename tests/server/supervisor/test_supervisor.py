@@ -22,20 +22,20 @@ NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
 
 
 class Process:
-    """A simulated process; ``told`` is the descriptor that it closes once it has loaded."""
+    """A simulated process; ``ready`` is the descriptor that it closes once it has loaded."""
 
     pid = NOBODY
 
-    def __init__(self, arguments: tuple[str, ...], told: int) -> None:
+    def __init__(self, arguments: tuple[str, ...], ready: int) -> None:
         self.arguments = arguments
-        self._told: int | None = told
+        self._ready: int | None = ready
         self.returncode: int | None = None
         self._over = asyncio.Event()
 
     def loaded(self) -> None:
-        if self._told is not None:
-            os.close(self._told)
-        self._told = None
+        if self._ready is not None:
+            os.close(self._ready)
+        self._ready = None
 
     def end(self, code: int) -> None:
         self.loaded()

@@ -46,7 +46,7 @@ class Site:
     """A camera process whose network camera does not answer yet."""
 
     process: asyncio.Task[None]
-    told: Lines
+    log_lines: Lines
     answer: Callable[[], Awaitable[None]]
     """Let the camera answer."""
 
@@ -55,8 +55,8 @@ class Site:
 async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
     """Start a camera process with the site's width and the setting ``h264``."""
     write_video(tmp_path / "c0.mp4", 25)
-    told, log = Lines(), logging.getLogger("server")
-    log.addHandler(told)
+    log_lines, log = Lines(), logging.getLogger("server")
+    log.addHandler(log_lines)
     log.setLevel(logging.INFO)
     app = web.Application()
     app.router.add_static("/", tmp_path)
@@ -79,14 +79,14 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
             await runner.setup()
             await web.TCPSite(runner, "127.0.0.1", port).start()
 
-        return Site(running_tasks[-1], told, answer)
+        return Site(running_tasks[-1], log_lines, answer)
 
     yield begin
     for process in running_tasks:
         process.cancel()
     await asyncio.gather(*running_tasks, return_exceptions=True)
     await runner.cleanup()
-    log.removeHandler(told)
+    log.removeHandler(log_lines)
     log.setLevel(logging.NOTSET)
 
 
@@ -95,11 +95,11 @@ async def test_an_unreachable_camera_is_logged_once_and_runs_when_it_answers(
     begin: Callable[..., Site],
 ) -> None:
     site = begin()
-    await site.told.until(lambda line: "Connection refused; retrying" in line)
+    await site.log_lines.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
-    await site.told.until(lambda line: line.startswith("camera c0 answers, after"))
-    await site.told.until(lambda line: "no best-view service" in line)  # it runs
-    assert sum("Connection refused" in line for line in site.told.lines) == 1
+    await site.log_lines.until(lambda line: line.startswith("camera c0 answers, after"))
+    await site.log_lines.until(lambda line: "no best-view service" in line)  # it runs
+    assert sum("Connection refused" in line for line in site.log_lines.lines) == 1
 
 
 @pytest.mark.timeout(2 * PATIENCE + 10)
@@ -108,7 +108,7 @@ async def test_an_error_of_a_camera_that_answers_late_does_not_end_others(
 ) -> None:
     """An error at the start ends the site, but here the others already run."""
     site = begin(128, "pass")
-    await site.told.until(lambda line: "Connection refused; retrying" in line)
+    await site.log_lines.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
     with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its frames are 64x48"):
         await asyncio.wait_for(site.process, PATIENCE)

@@ -57,7 +57,7 @@ async def test_a_cut_event_has_both_cameras(site_with_people: ServedSite) -> Non
 
 async def test_the_event_of_a_gop_is_sent_before_its_video(served: ServedSite) -> None:
     order: list[str] = []
-    served.service.on_decision.append(lambda _: order.append("told"))
+    served.service.on_decision.append(lambda _: order.append("event"))
     sent = served.service.splicer.publish_decision
 
     def decision(choices: Any) -> None:
@@ -68,7 +68,7 @@ async def test_the_event_of_a_gop_is_sent_before_its_video(served: ServedSite) -
     served.service.connect_cameras(*CAMERAS)
     for epoch in range(4):
         served.service.feed(epoch, {A: {1: SMALL}, B: {}})
-    assert order == ["told", "sent"] * 3
+    assert order == ["event", "sent"] * 3
 
 
 async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(

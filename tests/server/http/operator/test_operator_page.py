@@ -293,7 +293,9 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
         show_people(served)
         await page.reload()
         stage, lines = page.locator("#mark-stage"), page.get_by_label("Zones as YAML")
-        await expect(page.locator("#mark-drawing .area")).to_have_count(2)  # the known one, and one begun
+        await expect(page.locator("#mark-drawing .area")).to_have_count(
+            2
+        )  # the configured one and the one being drawn
         box = await stage.bounding_box()
         assert box is not None
         for x, y in ((0.25, 0.25), (0.75, 0.25)):

@@ -30,7 +30,7 @@ from server.service.rendering.render_pool import CameraView, PersonView, RenderP
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR
 
 FPS = 25
-SOMEBODY = 1
+PERSON = 1
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def difference(image: Image, other: Image) -> float:
 
 
 async def test_boxes_are_drawn_on_their_frames(drawn: DrawnSite) -> None:
-    async with drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as answer:
+    async with drawn.session.get(f"/objects/{PERSON}/best.mp4?overlay=1") as answer:
         assert answer.status == 200
         assert answer.content_type == "video/mp4"
         drawn.advance(3)
@@ -72,7 +72,7 @@ async def test_boxes_are_drawn_on_their_frames(drawn: DrawnSite) -> None:
     for pulse in pulses[:-GOP]:
         image = pictures[pulse][0]
         decision = drawn.decisions[pulse // GOP * GOP]
-        camera = decision.choices[SOMEBODY]
+        camera = decision.choices[PERSON]
         near = {place: difference(image, own[camera][place]) for place in (pulse - 1, pulse, pulse + 1)}
         assert min(near, key=lambda place: near[place]) == pulse
         x, y, width, height = cv2.boundingRect(green(image))
@@ -81,7 +81,7 @@ async def test_boxes_are_drawn_on_their_frames(drawn: DrawnSite) -> None:
             (box,) = [
                 box
                 for box in drawn.decisions[place // GOP * GOP].boxes[camera][place % GOP]
-                if box[0] == SOMEBODY
+                if box[0] == PERSON
             ]
             edges[-1].append(abs(box[1] - x) + abs(box[3] - x - width) + abs(box[4] - y - height))
     before, at, after = np.mean(edges, axis=0)
@@ -101,11 +101,11 @@ async def test_a_still_is_the_newest_frame_and_not_cached(drawn: DrawnSite) -> N
     near = [difference(image, own) for own in decoded(0, 20)]
     assert int(np.argmin(near)) == 19
     drawn.advance()
-    async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg?overlay=1") as answer:
+    async with drawn.session.get(f"/objects/{PERSON}/best.jpg?overlay=1") as answer:
         last = max(drawn.decisions) + GOP - 1
         assert answer.headers["X-MyView-Pulse"] == str(last)
         assert green(picture_of(await answer.read())).sum() > 50
-    async with drawn.session.get(f"/objects/{SOMEBODY}/best.jpg") as answer:
+    async with drawn.session.get(f"/objects/{PERSON}/best.jpg") as answer:
         assert green(picture_of(await answer.read())).sum() < 10
 
 
@@ -144,7 +144,7 @@ async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn
     loop = asyncio.get_running_loop()
     arrival: dict[int, float] = {}
     sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
-    async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg?overlay=1") as answer:
+    async with drawn.session.get(f"/objects/{PERSON}/best.mjpeg?overlay=1") as answer:
         async for part in jpeg_parts(answer):
             arrival[part.pulse] = loop.time()
             if len(arrival) > 4 * GOP:
@@ -152,7 +152,7 @@ async def test_pictures_of_a_person_are_paced_although_they_arrive_in_gops(drawn
     sending.cancel()
     steps = np.diff(sorted(arrival))[GOP:]
     assert (steps == 1).mean() > 0.8, "most pictures are shown, not only one of each GOP"
-    # A busy machine may hand over some GOPs in bursts; test_pictures_parts.py has a clock of its own.
+    # A busy machine may hand over some GOPs in bursts; test_renderer.py uses a test clock.
     gops = [
         [arrival[n] for n in range(first, first + GOP) if n in arrival]
         for first in range(0, max(arrival), GOP)
@@ -177,11 +177,11 @@ async def test_the_requested_rate_limits_pictures(drawn: DrawnSite) -> None:
 
 async def test_one_worker_renders_a_stream_for_all_viewers(drawn: DrawnSite) -> None:
     pictures: RenderPool = drawn.app[SERVICE].rendering
-    film = f"/objects/{SOMEBODY}/best.mp4?overlay=1"
+    film = f"/objects/{PERSON}/best.mp4?overlay=1"
     async with drawn.session.get(film) as one, drawn.session.get(film) as other:
-        async with drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as third:
+        async with drawn.session.get(f"/objects/{PERSON}/best.mjpeg") as third:
             assert (await anext(jpeg_parts(third))).pulse >= 0
-            assert set(pictures.streams) == {PersonView(SOMEBODY)}
+            assert set(pictures.streams) == {PersonView(PERSON)}
             assert pictures.viewers == 3
         drawn.advance(2)
         first, second = await read_film(one, 2 * GOP), await read_film(other, 2 * GOP)
@@ -196,13 +196,13 @@ async def test_a_killed_worker_is_replaced_and_its_streams_continue(
     pictures: RenderPool = drawn.app[SERVICE].rendering
     sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with (
-        drawn.session.get(f"/objects/{SOMEBODY}/best.mp4?overlay=1") as film,
-        drawn.session.get(f"/objects/{SOMEBODY}/best.mjpeg") as series,
+        drawn.session.get(f"/objects/{PERSON}/best.mp4?overlay=1") as film,
+        drawn.session.get(f"/objects/{PERSON}/best.mjpeg") as series,
     ):
         data = await read_film(film, 2 * GOP)
         reading = jpeg_parts(series)
         await anext(reading)
-        source = pictures.streams[PersonView(SOMEBODY)]
+        source = pictures.streams[PersonView(PERSON)]
         assert source.pid is not None
         os.kill(source.pid, signal.SIGKILL)
         while source.restarts == 0:  # noqa: ASYNC110 — the service notices by itself

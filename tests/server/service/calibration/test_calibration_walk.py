@@ -1,4 +1,4 @@
-"""The calibration walk over HTTP: coverage while walking, calibration in a process of its own."""
+"""The calibration walk over HTTP: coverage while walking, calibration in a separate process."""
 
 from __future__ import annotations
 

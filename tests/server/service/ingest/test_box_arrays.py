@@ -11,11 +11,11 @@ from server.messaging.messages import Box
 from server.service.ingest.box_arrays import boxes_array
 
 SIDE = st.floats(-1e6, 1e6)
-TOLD = st.lists(st.lists(st.tuples(SIDE, SIDE, SIDE, SIDE) | st.none(), max_size=20), max_size=6)
+BOXES = st.lists(st.lists(st.tuples(SIDE, SIDE, SIDE, SIDE) | st.none(), max_size=20), max_size=6)
 
 
 @settings(deadline=None, max_examples=100)
-@given(TOLD)
+@given(BOXES)
 def test_boxes_are_converted_exactly_and_hidden_ones_are_nan(sent: list[list[Box | None]]) -> None:
     decoded = msgspec.json.decode(msgspec.json.encode(sent), type=list[list[Box | None]])
     expected = [box or (np.nan,) * 4 for boxes in sent for box in boxes]

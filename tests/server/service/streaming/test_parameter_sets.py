@@ -1,4 +1,4 @@
-"""Cameras with parameter sets of their own: cuts between them and filled gaps are correct."""
+"""Cameras with different parameter sets: cuts between them and filled gaps are correct."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings of cameras with parameter sets of their own play as the live stream did, gaps included."""
+"""Recordings of cameras with different parameter sets play as the live stream did, gaps included."""
 
 from __future__ import annotations
 
