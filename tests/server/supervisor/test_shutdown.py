@@ -61,7 +61,7 @@ def test_a_signal_is_deferred_even_if_another_thread_receives_it(
     assert received in ([number], [number] * 2), "once for repeated signals"
     count = len(received)
     signal.pthread_kill(other_thread, number)
-    until(received, count + 1)  # and it is not put off afterwards
+    until(received, count + 1)  # later signals are not deferred
 
 
 def test_without_a_signal_nothing_happens(handled: tuple[signal.Signals, list[int]]) -> None:
@@ -119,17 +119,17 @@ class CtrlC:
 sys.meta_path.insert(0, CtrlC())
 """
 """Code that presses Ctrl-C while a command still loads."""
-_COMMANDS, _WHAT_IT_NEEDS = "server.cli.site_commands", "server.config.loader"
+_LOADED_FIRST, _LOADED_LATER = "server.cli.site_commands", "server.config.loader"
 """Modules that are loaded before and after the command is known."""
 
 
 @pytest.mark.parametrize(
     ("command", "loads", "code"),
     [
-        (["token", "nobody"], _COMMANDS, -signal.SIGINT),
-        (["render", "none.mp4", "--out", "out", "--config", "none.yaml"], _WHAT_IT_NEEDS, 130),
-        (["up", "none.yaml"], _COMMANDS, 0),
-        (["up", "none.yaml"], _WHAT_IT_NEEDS, 0),
+        (["token", "nobody"], _LOADED_FIRST, -signal.SIGINT),
+        (["render", "none.mp4", "--out", "out", "--config", "none.yaml"], _LOADED_LATER, 130),
+        (["up", "none.yaml"], _LOADED_FIRST, 0),
+        (["up", "none.yaml"], _LOADED_LATER, 0),
     ],
 )
 def test_ctrl_c_while_a_command_loads_ends_it_silently(
@@ -145,7 +145,7 @@ def test_ctrl_c_while_a_command_loads_ends_it_silently(
 
 def test_a_command_started_with_ignored_sigint_ignores_it_while_loading(tmp_path: Path) -> None:
     ignored = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
-    result = pressed(tmp_path, ["token", "nobody"], _COMMANDS, ignored)
+    result = pressed(tmp_path, ["token", "nobody"], _LOADED_FIRST, ignored)
     assert result.returncode == 0, result.stderr
     assert "nobody" in result.stdout
 

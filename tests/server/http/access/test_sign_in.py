@@ -44,7 +44,7 @@ HEADS_OF_PROXIES = (
 
 @pytest.fixture
 async def site(tmp_path: Path) -> AsyncIterator[ServedSite]:
-    """Serve a site that takes a token."""
+    """A site with tokens."""
     async with serve_with_tokens(tmp_path) as served:
         yield served
 

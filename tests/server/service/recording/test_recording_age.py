@@ -49,7 +49,7 @@ def segments_on_disk(folder: Path) -> list[int]:
 
 
 def recorded(folder: Path, clocks: ManualClocks, gops: int = 10) -> None:
-    """Let a service record some GOPs and end."""
+    """Record some GOPs and close the folder."""
     store = opened(folder, clocks)
     records(store, clocks, range(gops))
     store.close()

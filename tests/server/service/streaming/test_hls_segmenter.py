@@ -128,27 +128,27 @@ def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_came
     site = Site()
     choices = tuple(ObjectChoice(number, CAMERAS[0], None, departed=False) for number in (1, 2))
     site.splicer.publish_decision(GopDecision(0, GOP, choices, {}, {}, (), NO_REASON))
-    reels = [
+    segmenters = [
         site.splicer.segmenter_of_person(1),
         site.splicer.segmenter_of_person(2),
         site.splicer.segmenter_of_camera(CAMERAS[0]),
     ]
-    held = {id(segmenter._segments[0]._chunks[0]) for segmenter in reels if segmenter}
-    assert len(held) == 1
+    chunks = {id(segmenter._segments[0]._chunks[0]) for segmenter in segmenters if segmenter}
+    assert len(chunks) == 1
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.frozensets(st.integers(1, 15)), st.lists(st.sampled_from(CAMERAS), min_size=16, max_size=16))
 def test_every_segment_decodes_by_itself_and_together_they_have_no_gap(
-    silent: frozenset[int], wishes: list[str]
+    silent: frozenset[int], cameras: list[str]
 ) -> None:
     site, alone = Site(silent), [decoded_alone(camera) for camera in range(2)]
     last = None
     shown: list[NDArray[np.uint8]] = []
-    for gop, wish in enumerate(wishes):
-        site.show(gop, None if gop in silent else wish)
+    for gop, camera in enumerate(cameras):
+        site.show(gop, None if gop in silent else camera)
         if gop not in silent:
-            last = CAMERAS.index(wish)
+            last = CAMERAS.index(camera)
         assert last is not None
         for pulse in range(gop * GOP, (gop + 1) * GOP):
             shown.append(shown[-1] if gop in silent else alone[last][pulse])
