@@ -20,7 +20,7 @@ from server.supervisor.camera_process import camera_process
 from server.system.errors import UnavailableError
 
 
-class Lines(logging.Handler):
+class LogLines(logging.Handler):
     """A log handler that lets a test wait for lines."""
 
     def __init__(self) -> None:
@@ -33,10 +33,10 @@ class Lines(logging.Handler):
         self.lines.append(record.getMessage())
         self._more.set()
 
-    async def until(self, said: Callable[[str], bool]) -> None:
-        """Wait until a line has this text."""
+    async def until(self, condition: Callable[[str], bool]) -> None:
+        """Wait until a line fulfills a condition."""
         async with asyncio.timeout(PATIENCE):
-            while not any(said(line) for line in self.lines):
+            while not any(condition(line) for line in self.lines):
                 self._more.clear()
                 await self._more.wait()
 
@@ -46,7 +46,7 @@ class Site:
     """A camera process whose network camera does not answer yet."""
 
     process: asyncio.Task[None]
-    log_lines: Lines
+    log_lines: LogLines
     answer: Callable[[], Awaitable[None]]
     """Let the camera answer."""
 
@@ -55,7 +55,7 @@ class Site:
 async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
     """Start a camera process with the site's width and the setting ``h264``."""
     write_video(tmp_path / "c0.mp4", 25)
-    log_lines, log = Lines(), logging.getLogger("server")
+    log_lines, log = LogLines(), logging.getLogger("server")
     log.addHandler(log_lines)
     log.setLevel(logging.INFO)
     app = web.Application()

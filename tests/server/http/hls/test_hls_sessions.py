@@ -29,13 +29,13 @@ class Clock:
         return self.now
 
 
-def reader(stream: int, player: int = 0) -> HlsClient:
+def make_client(stream: int, player: int = 0) -> HlsClient:
     return HlsClient(f"object {stream}", ClientIdentity("10.0.0.1"), "10.0.0.1", f"player {player}")
 
 
 ACTS = st.lists(
     st.tuples(
-        st.sampled_from(["asks", "is answered", "waits"]),
+        st.sampled_from(["request", "response", "wait"]),
         st.integers(0, 1),  # stream
         st.integers(0, 1),  # player
         st.sampled_from([None, "playlist", "part"]),
@@ -52,48 +52,48 @@ def test_players_that_fetched_recently_or_wait_are_counted(
     """Compare with a count over all requests so far."""
     clock = Clock()
     shares = FairShare()
-    readers = HlsSessions(KEPT_S / 3, shares, clock)
+    sessions = HlsSessions(KEPT_S / 3, shares, clock)
     last_request: dict[HlsClient, float] = {}
     open_ones: list[tuple[HlsClient, str | None, ExitStack]] = []
 
-    def least(client: HlsClient) -> int:
-        waiting = [kind for client_reader, kind, _ in open_ones if client_reader == client]
+    def expected_count(client: HlsClient) -> int:
+        waiting = [kind for hls_client, kind, _ in open_ones if hls_client == client]
         most = max((waiting.count(kind) for kind in ("playlist", "part")), default=0)
-        lately = clock.now - last_request.get(client, -KEPT_S) < KEPT_S
-        return max(most, 1 if lately else 0)
+        is_recent = clock.now - last_request.get(client, -KEPT_S) < KEPT_S
+        return max(most, 1 if is_recent else 0)
 
     for act, stream, player, kind, seconds in acts:
-        client_reader = reader(stream, player)
-        if act == "asks":
-            before, one_more = readers.of(client_reader.stream), readers.is_new_viewer(client_reader, kind)
+        hls_client = make_client(stream, player)
+        if act == "request":
+            before, one_more = sessions.of(hls_client.stream), sessions.is_new_viewer(hls_client, kind)
             stack = ExitStack()
-            stack.enter_context(readers.request(client_reader, kind))
-            open_ones.append((client_reader, kind, stack))
-            last_request[client_reader] = clock.now
-            assert readers.of(client_reader.stream) - before == one_more
-        elif act == "is answered" and open_ones:
-            client_reader, _, stack = open_ones.pop(0)
+            stack.enter_context(sessions.request(hls_client, kind))
+            open_ones.append((hls_client, kind, stack))
+            last_request[hls_client] = clock.now
+            assert sessions.of(hls_client.stream) - before == one_more
+        elif act == "response" and open_ones:
+            hls_client, _, stack = open_ones.pop(0)
             stack.close()
-            last_request[client_reader] = clock.now
+            last_request[hls_client] = clock.now
         else:
             clock.now += seconds
         # requests without a part number are answered at once; here all block
-        readers_expected = [reader(one, other) for one in (0, 1) for other in (0, 1)]
-        assert [readers.of(f"object {number}") for number in (0, 1)] == [
+        all_clients = [make_client(one, other) for one in (0, 1) for other in (0, 1)]
+        assert [sessions.of(f"object {number}") for number in (0, 1)] == [
             sum(
-                least(client_reader)
-                for client_reader in readers_expected
-                if client_reader.stream == f"object {number}"
+                expected_count(hls_client)
+                for hls_client in all_clients
+                if hls_client.stream == f"object {number}"
             )
             for number in (0, 1)
         ]
-        assert readers.all == shares.all == sum(map(least, readers_expected))
+        assert sessions.all == shares.all == sum(map(expected_count, all_clients))
     for _, _, stack in open_ones:
         stack.close()
     clock.now += KEPT_S
-    assert readers.all == 0
-    assert not readers._sessions
-    assert not readers._by_stream
+    assert sessions.all == 0
+    assert not sessions._sessions
+    assert not sessions._by_stream
     assert not shares._held
 
 
@@ -153,11 +153,11 @@ async def test_head_takes_no_slot(served: ServedSite) -> None:
 async def test_blocked_players_of_one_address_and_user_agent_are_counted_separately(
     served: ServedSite,
 ) -> None:
-    coming = "/objects/1/hls/index.m3u8?_HLS_msn=3"
-    waiting = [asyncio.create_task(status(served, coming, "same")) for _ in range(2)]
-    while await viewers_in_metrics(served) < 2:  # noqa: ASYNC110 — they come one after the other
+    future_playlist = "/objects/1/hls/index.m3u8?_HLS_msn=3"
+    waiting = [asyncio.create_task(status(served, future_playlist, "same")) for _ in range(2)]
+    while await viewers_in_metrics(served) < 2:  # noqa: ASYNC110 — they arrive one after the other
         await asyncio.sleep(0.005)
-    assert await status(served, coming, "same") == 503
+    assert await status(served, future_playlist, "same") == 503
     assert await status(served, "/objects/1/hls/index.m3u8", "other") == 503
     assert not any(task.done() for task in waiting)
     for epoch in range(5, 16):
