@@ -62,7 +62,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
 """Settings, the restart that a change needs, and another value."""
 
 
-def changed(keys: set[str]) -> Config:
+def changed_config(keys: set[str]) -> Config:
     content: dict[str, Any] = {}
     cameras: dict[str, dict[str, Any]] = {
         camera: {"id": camera, "source": "scene:room"} for camera in CAMERAS
@@ -86,16 +86,16 @@ WINDOW = {"window": 5, "stride": 5, "birth_window": 5}
 @settings(max_examples=20)
 @given(st.sets(st.sampled_from(sorted(CHANGES))))
 def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
-    running, wanted = small_config(), changed(keys)
+    running, wanted = small_config(), changed_config(keys)
     reload = plan_reload(running, wanted)
-    takes = {key: CHANGES[key][0] for key in keys}
-    assert set(reload.live) == {key for key in keys if takes[key] == LIVE}
-    assert set(reload.best_view) == {key for key in keys if takes[key] == BEST_VIEW}
-    assert set(reload.site) == {key for key in keys if takes[key] == SITE}
-    if ALL_CAMERAS in takes.values():
+    effects = {key: CHANGES[key][0] for key in keys}
+    assert set(reload.live) == {key for key in keys if effects[key] == LIVE}
+    assert set(reload.best_view) == {key for key in keys if effects[key] == BEST_VIEW}
+    assert set(reload.site) == {key for key in keys if effects[key] == SITE}
+    if ALL_CAMERAS in effects.values():
         assert reload.cameras == CAMERAS
     else:
-        assert reload.cameras == (("c1",) if CAMERA in takes.values() else ())
+        assert reload.cameras == (("c1",) if CAMERA in effects.values() else ())
     assert set(changed_keys(reload.now, wanted)) == {*reload.best_view, *reload.site}
     repeated = plan_reload(reload.now, wanted)
     assert (repeated.now, repeated.live, repeated.cameras) == (reload.now, (), ())
@@ -214,7 +214,7 @@ async def test_the_operators_page_and_metrics_show_the_difference(found: ConfigF
     assert f"myview_config_differs {float(found.differs)}" in metrics
 
 
-async def until_said(terminal: int, text: bytes) -> None:
+async def wait_for_output(terminal: int, text: bytes) -> None:
     output = b""
     while text not in output:
         output += await asyncio.to_thread(os.read, terminal, 4096)
@@ -233,11 +233,11 @@ async def sync_at_a_terminal(path: Path) -> AsyncIterator[tuple[asyncio.subproce
     )
     os.close(terminal_end)
     try:
-        await until_said(controller, b"pulses at")
+        await wait_for_output(controller, b"pulses at")
         yield process, controller
     finally:
         if process.returncode is None:
-            process.kill()  # nor does anybody read its terminal then
+            process.kill()  # its terminal is not read any more
             await process.wait()
 
 
@@ -251,7 +251,7 @@ async def test_a_process_logs_pending_and_invalid_settings_and_ends_with_its_ter
         ):
             path.write_text(yaml.safe_dump({**content, "site": {"fps": fps}}))
             process.send_signal(signal.SIGHUP)
-            await until_said(terminal, line)
+            await wait_for_output(terminal, line)
         assert process.returncode is None
         os.close(terminal)
         process.send_signal(signal.SIGHUP)

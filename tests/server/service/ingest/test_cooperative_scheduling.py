@@ -91,10 +91,10 @@ async def test_a_cancelled_service_does_not_finish_its_backlog() -> None:
 
 async def test_cooperative_decisions_equal_those_made_at_once() -> None:
     one, other = service_with_backlog(), service_with_backlog()
-    at_once, by_turns = collect_decisions(one), collect_decisions(other)
+    at_once, cooperative = collect_decisions(one), collect_decisions(other)
     one.decide()
     await other.decide_cooperatively()
-    assert [decision.choices for decision in at_once] == [decision.choices for decision in by_turns]
+    assert [decision.choices for decision in at_once] == [decision.choices for decision in cooperative]
     assert len(at_once) > 1
     one.close()
     other.close()

@@ -14,15 +14,15 @@ from server.service.ingest.epoch_aligner import Epoch
 
 LEFT: Box = (10.0, 20.0, 40.0, 110.0)
 RIGHT: Box = (100.0, 20.0, 130.0, 110.0)
-MENDED = STRIDE
+REVISED_FROM = STRIDE
 """The first frame with exchanged identities."""
 
 
 def late_revision(epoch: int) -> CameraTracks:
-    """Return a revision in which the two people have been exchanged since `MENDED`."""
+    """Return a revision in which the two people have been exchanged since `REVISED_FROM`."""
     last = end_of_epoch(epoch, STRIDE)
-    revision = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=MENDED, revised_from=MENDED)
-    frames = last - MENDED + 1
+    revision = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=REVISED_FROM, revised_from=REVISED_FROM)
+    frames = last - REVISED_FROM + 1
     tracks = [msgspec.structs.replace(track, boxes=track.boxes[:1] * frames) for track in revision.tracks]
     return msgspec.structs.replace(revision, tracks=tracks)
 

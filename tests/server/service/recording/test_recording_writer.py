@@ -27,28 +27,28 @@ from server.system.errors import UserError
 
 
 class Disk:
-    """A disk that can be made slow or full."""
+    """A disk that can be slow or full; records the first pulses of written GOPs, and -1 when closed."""
 
     def __init__(self) -> None:
-        self.taken: list[int] = []
-        self.refuses = False
+        self.events: list[int] = []
+        self.is_full = False
         self.abandoned = 0
-        self.open = threading.Event()
-        self.open.set()
-        self.asked = threading.Semaphore(0)
+        self.responds = threading.Event()
+        self.responds.set()
+        self.write_started = threading.Semaphore(0)
 
     def write(self, record: GopRecord) -> None:
-        self.asked.release()
-        assert self.open.wait(PATIENCE)
-        if self.refuses:
+        self.write_started.release()
+        assert self.responds.wait(PATIENCE)
+        if self.is_full:
             raise OSError(28, "No space left on device", "c0/000.mp4")
-        self.taken.append(record.choices.first)
+        self.events.append(record.choices.first)
 
     def abandon(self) -> None:
         self.abandoned += 1
 
     def close(self) -> None:
-        self.taken.append(-1)
+        self.events.append(-1)
 
 
 def writer_on(disk: Disk, most: int = 4, retry_s: float = 0.0) -> WriterThread:
@@ -63,39 +63,39 @@ def test_queued_gops_are_written_before_the_end() -> None:
     for gop in range(20):
         writer.put(gop_record(gop, {1: A}))
     writer.close()
-    assert disk.taken == [*range(0, 20 * GOP, GOP), -1]
+    assert disk.events == [*range(0, 20 * GOP, GOP), -1]
     assert (writer.written, writer.lost) == (20, 0)
 
 
 def test_a_slow_disk_loses_whole_gops_without_blocking() -> None:
     disk = Disk()
-    disk.open.clear()
+    disk.responds.clear()
     writer = writer_on(disk, most=4)
     writer.put(gop_record(0, {1: A}))
-    assert disk.asked.acquire(timeout=PATIENCE), "the first one is being written"
+    assert disk.write_started.acquire(timeout=PATIENCE), "the first one is being written"
     for gop in range(1, 20):
         writer.put(gop_record(gop, {1: A}))
     assert writer.lost == 15
-    disk.open.set()
+    disk.responds.set()
     writer.close()
-    assert disk.taken == [0, 5, 10, 15, 20, -1]
+    assert disk.events == [0, 5, 10, 15, 20, -1]
 
 
 def test_a_full_disk_is_logged_once_retried_and_counted(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     disk = Disk()
-    disk.refuses = True
+    disk.is_full = True
     writer = writer_on(disk, most=100)
     for gop in range(3):
         writer.put(gop_record(gop, {1: A}))
-        assert disk.asked.acquire(timeout=PATIENCE)
+        assert disk.write_started.acquire(timeout=PATIENCE)
     while writer.lost < 3:
         threading.Event().wait(0.001)
     assert writer.error_text == "No space left on device"
-    disk.refuses = False
+    disk.is_full = False
     writer.put(gop_record(3, {1: A}))
     writer.close()
-    assert (disk.taken, disk.abandoned) == ([15, -1], 3)
+    assert (disk.events, disk.abandoned) == ([15, -1], 3)
     assert (writer.written, writer.lost, writer.error_text) == (1, 3, "")
     failed, continued = (record.getMessage() for record in caplog.records)
     assert failed.startswith("recording: cannot write: No space left on device; nothing is recorded")
@@ -109,10 +109,10 @@ def test_a_disk_that_is_full_repeatedly_is_not_logged_each_time(
     disk = Disk()
     writer = writer_on(disk, most=100)
     for gop in range(0, 20, 2):
-        disk.refuses = True
+        disk.is_full = True
         writer.put(gop_record(gop, {1: A}))
         until(lambda gop=gop: writer.lost == gop // 2 + 1)
-        disk.refuses = False
+        disk.is_full = False
         writer.put(gop_record(gop + 1, {1: A}))
         until(lambda gop=gop: writer.written == gop // 2 + 1)
     writer.close()
@@ -127,40 +127,40 @@ def until(condition: Callable[[], bool]) -> None:
 
 def test_a_disk_that_does_not_respond_is_reported() -> None:
     disk = Disk()
-    disk.open.clear()
+    disk.responds.clear()
     writer = writer_on(disk)
     writer.put(gop_record(0, {1: A}))
-    assert disk.asked.acquire(timeout=PATIENCE)
+    assert disk.write_started.acquire(timeout=PATIENCE)
     assert writer._writing_since is not None
     writer._writing_since -= 1000.0
     assert writer.problem.startswith("the disk has not responded for 10")
-    disk.open.set()
+    disk.responds.set()
     until(lambda: writer.written == 1)
     until(lambda: not writer.problem)
     writer.close()
 
 
 def test_an_internal_error_does_not_end_the_recording(caplog: pytest.LogCaptureFixture) -> None:
-    class Mistaken(Disk):
+    class FailingDisk(Disk):
         def write(self, record: GopRecord) -> None:
-            if not self.taken:
-                self.taken.append(-2)
-                raise ValueError("a mistake")
+            if not self.events:
+                self.events.append(-2)
+                raise ValueError("unexpected")
             super().write(record)
 
-    disk = Mistaken()
+    disk = FailingDisk()
     writer = writer_on(disk, most=100)
     for gop in range(3):
         writer.put(gop_record(gop, {1: A}))
     writer.close()
-    assert disk.taken == [-2, 5, 10, -1]
+    assert disk.events == [-2, 5, 10, -1]
     assert (writer.written, writer.lost, writer.error_text) == (2, 1, "")
     assert "internal error" in caplog.text
 
 
 def test_a_full_disk_is_retried_only_after_a_while() -> None:
     disk = Disk()
-    disk.refuses = True
+    disk.is_full = True
     writer = writer_on(disk, most=100, retry_s=1000.0)
     for gop in range(10):
         writer.put(gop_record(gop, {1: A}))
@@ -168,7 +168,7 @@ def test_a_full_disk_is_retried_only_after_a_while() -> None:
     assert (disk.abandoned, writer.lost) == (1, 10)
 
 
-def fed(folder: Path) -> FedService:
+def make_service(folder: Path) -> FedService:
     service = FedService(small_config(record={"folder": str(folder), "segment_s": 1.0}))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     service.connect_cameras(*CAMERAS)
@@ -176,7 +176,7 @@ def fed(folder: Path) -> FedService:
 
 
 def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
-    service = fed(tmp_path / "kept")
+    service = make_service(tmp_path / "kept")
     service.recorder.open()
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}, B: {}})
@@ -188,7 +188,7 @@ def test_a_service_records_what_it_decides(tmp_path: Path) -> None:
 
 
 def test_pictures_that_arrive_after_the_decision_are_recorded_too(tmp_path: Path) -> None:
-    service = fed(tmp_path / "kept")
+    service = make_service(tmp_path / "kept")
     service.recorder.open()
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}})
@@ -207,11 +207,11 @@ def test_pictures_that_arrive_after_the_decision_are_recorded_too(tmp_path: Path
 def test_an_unusable_folder_is_a_one_line_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"record\.folder: .*file: cannot write there"):
-        fed(tmp_path / "file").recorder.open()
-    first = fed(tmp_path / "kept")
+        make_service(tmp_path / "file").recorder.open()
+    first = make_service(tmp_path / "kept")
     first.recorder.open()
     with pytest.raises(UserError, match="another process records there"):
-        fed(tmp_path / "kept").recorder.open()
+        make_service(tmp_path / "kept").recorder.open()
     first.close()
 
 

@@ -79,13 +79,13 @@ pulses = st.frozensets(st.integers(0, FRAMES - 1), max_size=8)
 @given(
     missed=pulses,
     lost=st.tuples(pulses, pulses),
-    wishes=st.lists(st.sampled_from([*CAMERAS, None]), min_size=6, max_size=6),
+    selected_cameras=st.lists(st.sampled_from([*CAMERAS, None]), min_size=6, max_size=6),
     preset=st.sampled_from(["ultrafast", "superfast"]),
 )
 def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     missed: frozenset[int],
     lost: tuple[frozenset[int], frozenset[int]],
-    wishes: list[str | None],
+    selected_cameras: list[str | None],
     preset: str,
 ) -> None:
     stream_format = StreamFormat()
@@ -101,11 +101,11 @@ def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
                     camera, frame_buffers[camera].put(unit.pulse, 1, unit.data, key=unit.key)
                 )
     best = None
-    for number, wish in enumerate(wishes):
-        whole = wish and all(
-            frame_buffers[wish].has(pulse) for pulse in range(number * GOP, (number + 1) * GOP)
+    for number, selected in enumerate(selected_cameras):
+        whole = selected and all(
+            frame_buffers[selected].has(pulse) for pulse in range(number * GOP, (number + 1) * GOP)
         )
-        choice = ObjectChoice(1, wish if whole else None, None, departed=False)
+        choice = ObjectChoice(1, selected if whole else None, None, departed=False)
         splicer.publish_decision(GopDecision(number * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
         best = best or splicer.persons[1].subscribe()
     assert best is not None
