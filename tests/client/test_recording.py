@@ -67,17 +67,17 @@ async def test_the_requested_seconds_are_recorded_unchanged(
 async def test_progress_names_the_camera_and_counts_the_cuts(
     scripted_site: ScriptedSite, site_url: str
 ) -> None:
-    reported = asyncio.Event()
+    events_sent = asyncio.Event()
 
     async def tell(response: web.StreamResponse) -> None:
         cameras = ("c0", "c1", "c1", "c0")
         stream = b"".join(sse_event("gop", gop(100 + GOP * i, camera)) for i, camera in enumerate(cameras))
         await response.write(sse_event("site", SITE) + stream)
-        reported.set()
+        events_sent.set()
         await send_nothing(response)
 
     async def play(response: web.StreamResponse) -> None:
-        await reported.wait()
+        await events_sent.wait()
         await plays(header(), stays=False)(response)
         for pulse in range(100, 121):
             await response.write(fragment(pulse))
