@@ -33,15 +33,15 @@ def cluster(
 
     The affinity of two clusters is the sum of the evidence between their rows, plus the evidence of their
     appearance, which is compared as the mean histograms of whole clusters in every camera that has seen both:
-    the mean of many frames says more than the sum of single comparisons. The two clusters with the highest
-    affinity are merged until no two reach `threshold`. Never merged are clusters with a cannot-link between
-    any two of their rows, clusters without any link between them, and two clusters that are both `unseen`:
-    where nothing is observed nothing changes. Rows that no chain of links connects therefore do not influence
-    each other. Deterministic; ties go to the lowest rows.
+    the mean of many frames is more reliable than the sum of single comparisons. The two clusters with the
+    highest affinity are merged until no two reach `threshold`. Two clusters are not merged if any of their
+    rows have a cannot-link, if no link connects them, or if both are `unseen`: without observations nothing
+    changes. Rows that no chain of links connects therefore do not influence each other. Deterministic; ties
+    go to the lowest rows.
 
     Args:
         evidence: (N, N) symmetric log-likelihood ratios, above 0 for and below 0 against one person.
-        cannot_link: (N, N) symmetric, certainly two people.
+        cannot_link: (N, N) symmetric, pairs that are certainly two people.
         unseen: (N,) not seen recently.
         linked: (N, N) symmetric, pairs with positive evidence.
         appearances: of rows, one entry a camera.

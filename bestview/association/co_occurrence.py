@@ -13,7 +13,7 @@ from bestview.association.sightings import TrackObservations
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 MINIMUM_FRAME_SCORE = -2.0
-"""Least score of a frame, reached 1.7 gates apart: larger distances say no more."""
+"""Least score of a frame, reached 1.7 gates apart: larger distances add nothing."""
 _ROUNDING_MARGIN = 1.0 + 1e-6
 """Factor on the search radius, against rounding."""
 _BANDS = 0.5
@@ -76,17 +76,19 @@ class GroundTrajectories:
     frames: Ints
 
     @classmethod
-    def of(cls, seen: TrackObservations, rows: Ints, camera: Ints) -> GroundTrajectories:
-        """Build them from (T, W) `rows` of the observations, -1: hidden, and the tracks' cameras (T,)."""
-        known = np.isfinite(seen.ground_point[..., 0]) & np.isfinite(seen.ground_covariance[..., 0, 0])
+    def of(cls, observations: TrackObservations, rows: Ints, camera: Ints) -> GroundTrajectories:
+        """Build trajectories from (T, W) `rows` of the observations, -1: hidden, and (T,) camera indices."""
+        known = np.isfinite(observations.ground_point[..., 0]) & np.isfinite(
+            observations.ground_covariance[..., 0, 0]
+        )
         track, frame = np.nonzero(known & (rows >= 0))
         code = rows[track, frame] * max(len(rows), 1) + track
         code, first, line = np.unique(code, return_index=True, return_inverse=True)
         where = np.full((5, code.size, rows.shape[1]), np.nan)
-        where[:2, line, frame] = seen.ground_point[track, frame].T
-        where[2:, line, frame] = seen.ground_covariance[track, frame][:, [0, 0, 1], [0, 1, 1]].T
+        where[:2, line, frame] = observations.ground_point[track, frame].T
+        where[2:, line, frame] = observations.ground_covariance[track, frame][:, [0, 0, 1], [0, 1, 1]].T
         row = rows[track, frame]
-        return cls(row[first], camera[track[first]], where, row, seen.first_frame + frame)
+        return cls(row[first], camera[track[first]], where, row, observations.first_frame + frame)
 
     def scores(self, first: Ints, second: Ints, gate: float) -> Floats:
         """Compute the score of (P,) pairs of trajectories in each frame: (P, W); NaN: not localized."""
@@ -138,8 +140,8 @@ def score_ground_proximity(
     pair = sorted_unique(np.concatenate([new_pairs, lower[present] * rows + higher[present]]))
     # All trajectories of both: an active row has one, unless its track is split within the update.
     first, second = pair // max(rows, 1), pair % max(rows, 1)
-    of, which = expand_counts((stop[first] - start[first]) * (stop[second] - start[second]))
-    first, second, width = first[of], second[of], (stop[second] - start[second])[of]
+    owner, which = expand_counts((stop[first] - start[first]) * (stop[second] - start[second]))
+    first, second, width = first[owner], second[owner], (stop[second] - start[second])[owner]
     one, two = start[first] + which // width, start[second] + which % width
     different = trajectories.camera[one] != trajectories.camera[two]
     first, second, one, two = first[different], second[different], one[different], two[different]
@@ -156,7 +158,7 @@ def score_ground_proximity(
 def overlapping_rectangles(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     """Return the pairs of rectangles that overlap, each once: (P,) and (P,), the lower index first, in order.
 
-    The plane is cut into bands with as many rectangles in each, and in each band a line sweeps over them
+    The plane is cut into bands with equally many rectangles, and in each band a line sweeps over them
     (Bentley and Wood, 1980), so that time is linear in the number of rectangles if each meets a few.
 
     Args:
@@ -181,9 +183,9 @@ def overlapping_rectangles(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     reach = np.searchsorted(key, band * (count + 1) + stop[item])
     at, which = expand_counts(reach - np.arange(key.size) - 1)
     one, two = item[at], item[at + 1 + which]
-    beside = (low[one, 1] <= high[two, 1]) & (low[two, 1] <= high[one, 1])
+    overlapping = (low[one, 1] <= high[two, 1]) & (low[two, 1] <= high[one, 1])
     # A pair that shares several bands counts in the first of them.
-    beside &= band[at] == np.maximum(first[one], first[two])
-    one, two = np.minimum(one, two)[beside], np.maximum(one, two)[beside]
+    overlapping &= band[at] == np.maximum(first[one], first[two])
+    one, two = np.minimum(one, two)[overlapping], np.maximum(one, two)[overlapping]
     order = np.lexsort((two, one))
     return one[order], two[order]

@@ -26,7 +26,7 @@ class GhostCheck:
     """
 
     def __init__(self, homographies: Mapping[str, Floats | None]) -> None:
-        known = {camera: it for camera, it in homographies.items() if it is not None}
+        known = {camera: homography for camera, homography in homographies.items() if homography is not None}
         self._cameras = tuple(known)
         self._homographies = np.array(list(known.values())).reshape(-1, 3, 3)
 
@@ -36,15 +36,17 @@ class GhostCheck:
         """Count the cameras that should see a cluster at its last known position and have no track of it.
 
         Args:
-            cluster: its last localized endpoint counts.
+            cluster: tracklets of one person; the last localized endpoint is its position.
             pictures: width and height in pixels of the cameras that have reported.
-            height: of a person in ground units; NaN: not known yet, and nothing is counted.
+            height: of a person in ground units; NaN: not known yet, the count is 0.
         """
         missing = [camera in pictures and camera not in cluster.cameras for camera in self._cameras]
-        localized = [it.end for it in cluster.tracklets if not np.isnan(it.end.ground_point).any()]
+        localized = [
+            tracklet.end for tracklet in cluster.tracklets if not np.isnan(tracklet.end.ground_point).any()
+        ]
         if not any(missing) or not localized or not height > 0:
             return 0
-        ground_point = max(localized, key=lambda it: it.frame).ground_point
+        ground_point = max(localized, key=lambda endpoint: endpoint.frame).ground_point
         sizes = np.array([pictures.get(camera, (0, 0)) for camera in self._cameras], dtype=np.float64)
         return int((fully_in_view(self._homographies, sizes, ground_point, height) & missing).sum())
 

@@ -22,7 +22,7 @@ from bestview.geometry.ground_plane import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppearanceSample:
-    """Mean color histogram of a track over consecutive frames in which nobody else is in its box.
+    """Mean color histogram of a track over consecutive frames in which no other person is in its box.
 
     Attributes:
         first_frame: the first of these frames.
@@ -44,8 +44,8 @@ class TrackUpdate:
         local_id: the camera's id of the track, unique in the camera's lifetime.
         first_frame: frame of row 0.
         boxes: (M, 4) left, top, right, bottom in pixels per frame; NaN rows where hidden.
-        appearance: samples where nobody else was in the box.
-        picture_height: of the camera, pixels; tells feet that the lower edge cuts off.
+        appearance: samples of frames in which no other person is in the box.
+        picture_height: of the camera, pixels; feet at the lower edge are cut off.
     """
 
     camera: str
@@ -129,19 +129,19 @@ def align_tracks(
 ) -> TrackObservations:
     """Align the tracks of one update on one time axis and project their foot points to the ground.
 
-    Foot points at the lower edge of the picture are cut off and have no ground point. In the boxes of cameras
+    Feet at the lower edge of the picture are cut off and have no ground point. In the boxes of cameras
     that look straight down, `overhead`, people stand in the middle.
 
     Raises:
-        ValueError: a track given twice, boxes that are not (M, 4), a camera without an entry in
+        ValueError: a track that occurs twice, boxes that are not (M, 4), a camera without an entry in
             `homographies`.
     """
     for track in tracks:
         _check(track, homographies)
-    # Sorted by key: nothing below depends on the order in which tracks are given.
+    # Sorted by key, so that the result does not depend on the order of the tracks.
     by_key = {track.key: track for track in tracks}
     if len(by_key) < len(tracks):
-        raise ValueError("one track is given twice in one update")
+        raise ValueError("a track occurs twice in one update")
     keys = tuple(sorted(by_key))
     ordered = [by_key[key] for key in keys]
     first = min((track.first_frame for track in ordered), default=0)

@@ -58,12 +58,12 @@ class Tracklet:
         frame_count: observations.
         uncrowded_frames: observations outside crowds.
         crowd_frames_at_end: how many of the newest observations in a row are in a crowd.
-        appearance: mean histograms where nobody else was in the box.
+        appearance: mean histograms of frames in which no other person is in the box.
         unpublished_frames: frames whose person id has not been published yet.
         published_frames: number of frames by published person id.
         person_id: the assigned person; 0: none yet.
         settled_id: the person id, if settled while the tracklet continues; 0: not settled.
-        confirmed_continuation: an operator said that it is the same person as the predecessor.
+        confirmed_continuation: an operator confirmed that it is the same person as the predecessor.
     """
 
     key: TrackletKey
@@ -100,7 +100,7 @@ class Tracklet:
             self.unpublished_frames.extend(frames)
 
     def publish(self, last_frame: int) -> bool:
-        """Count frames up to `last_frame` as published with the present id; return whether there were any."""
+        """Count frames up to `last_frame` as published with the current id; return whether there are any."""
         frames = [frame for frame in self.unpublished_frames if frame <= last_frame]
         if frames and self.person_id:
             self.published_frames[self.person_id] = self.published_frames.get(self.person_id, 0) + len(frames)
@@ -114,12 +114,12 @@ class Tracklet:
         self.settled_id = person_id if self.settled_id else 0
 
     def continue_as(self, person_id: int, predecessor: Tracklet) -> None:
-        """Take over an operator's correction: the person, and the tracklet that this one continues."""
+        """Apply an operator's correction: the person, and the tracklet that this one continues."""
         self.assign_id(person_id)
         self.predecessor, self.crowd_frames_before, self.confirmed_continuation = predecessor, 0, True
 
     def merge_ids(self, lost: int, kept: int) -> None:
-        """Count frames published with the id `lost` as `kept`: the two turned out to be one person."""
+        """Count frames published with the id `lost` as `kept`: both are one person."""
         frames = self.published_frames.pop(lost, 0)
         if frames:
             self.published_frames[kept] = self.published_frames.get(kept, 0) + frames

@@ -43,22 +43,29 @@ class TrackletCluster:
     @property
     def last_frame(self) -> int:
         """Last frame in which the person was seen."""
-        return max([*(it.end.frame for it in self.tracklets), *(it.last_frame for it in self.people)])
+        return max(
+            [
+                *(tracklet.end.frame for tracklet in self.tracklets),
+                *(person.last_frame for person in self.people),
+            ]
+        )
 
     @cached_property
     def cameras(self) -> set[str]:
         """Cameras that see the person or have seen them."""
         current_cameras = {tracklet.key.camera for tracklet in self.tracklets}
         return current_cameras.union(
-            *(it.appearance.by_camera for it in self.tracklets),
-            *(it.appearance.by_camera for it in self.people),
+            *(tracklet.appearance.by_camera for tracklet in self.tracklets),
+            *(person.appearance.by_camera for person in self.people),
         )
 
     @cached_property
     def appearance(self) -> PersonAppearance:
         """Mean histograms of everything in the cluster."""
         appearance = PersonAppearance()
-        for part in [it.appearance for it in self.people] + [it.appearance for it in self.tracklets]:
+        for part in [person.appearance for person in self.people] + [
+            tracklet.appearance for tracklet in self.tracklets
+        ]:
             appearance.add_all(part)
         return appearance
 
@@ -69,8 +76,8 @@ class TrackletCluster:
         for tracklet in self.tracklets:
             if tracklet.person_id:
                 frames_by_id[tracklet.person_id] = frames_by_id.get(tracklet.person_id, 0) + 1
-            for number, frames in tracklet.published_frames.items():
-                frames_by_id[number] = frames_by_id.get(number, 0) + frames
+            for person_id, frames in tracklet.published_frames.items():
+                frames_by_id[person_id] = frames_by_id.get(person_id, 0) + frames
         return frames_by_id
 
 

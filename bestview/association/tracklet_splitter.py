@@ -1,7 +1,7 @@
-"""Split tracks into tracklets where a tracker may have confused people.
+"""Split tracks into tracklets where the tracker may have confused people.
 
-Trackers confuse people where they occlude each other, and hardly ever elsewhere. A track that leaves a crowd
-or that reappears after a gap starts a new tracklet, whose person is determined anew.
+Trackers confuse people mostly where these occlude each other. A track that leaves a crowd or that reappears
+after a gap starts a new tracklet, whose person is determined again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 _MINIMUM_UNCROWDED_FRAMES = 4
 """Frames outside crowds that a tracklet needs before the next crowd can end it."""
 _STABLE_CLUSTERINGS = 2
-"""Clusterings for which a tracklet must have kept one person id to be settled while it goes on."""
+"""Clusterings for which a tracklet must have kept one person id to be settled while it continues."""
 
 
 class TrackletSplitter:
@@ -41,42 +41,48 @@ class TrackletSplitter:
         self._pending_splits: dict[TrackKey, tuple[int, Tracklet]] = {}
         """Tracks whose next observation starts a new tracklet: its person id and its predecessor."""
         self._recalled_ids: dict[TrackKey, int] = {}
-        """Person ids restored from an earlier run, for tracks that have not been seen yet."""
+        """Person ids restored from an earlier run, for tracks that are not observed yet."""
 
     def update(
-        self, seen: TrackObservations, appearance: Mapping[TrackKey, Sequence[AppearanceSample]]
+        self, observations: TrackObservations, appearance: Mapping[TrackKey, Sequence[AppearanceSample]]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Take in the observations of an update.
+        """Add the observations of an update.
 
         Args:
-            seen: the tracks.
+            observations: of all tracks.
             appearance: samples by track; those in a crowd do not count.
 
         Returns:
-            (T, W) the row in `active` of each observation, -1: none; (T, W) the person id that it is settled
-            to be, 0: it is not settled.
+            (T, W) the row in `active` of each observation, -1: none; (T, W) its settled person id, 0: not
+            settled.
         """
-        rows, settled = np.full(seen.visible.shape, -1), np.zeros(seen.visible.shape, dtype=np.int64)
-        crowded = seen.crowded(self._settings.crowd_iou)
+        rows, settled = (
+            np.full(observations.visible.shape, -1),
+            np.zeros(observations.visible.shape, dtype=np.int64),
+        )
+        crowded = observations.crowded(self._settings.crowd_iou)
         # With a setting of 0 every frame may start a tracklet.
         whole = min(self._settings.crowd_frames, self._settings.gap_frames) > 0
-        for run in observation_runs(seen.visible, crowded, whole=whole):
-            key = seen.keys[run.track]
-            tracklet, frame = self._current.get(key), seen.first_frame + run.start
+        for run in observation_runs(observations.visible, crowded, whole=whole):
+            key = observations.keys[run.track]
+            tracklet, frame = self._current.get(key), observations.first_frame + run.start
             if key in self._pending_splits:
-                number, before = self._pending_splits.pop(key)
-                tracklet = self._start_tracklet(key, _endpoint(seen, run.track, run.start), before)
-                tracklet.continue_as(number, before)
+                person_id, before = self._pending_splits.pop(key)
+                tracklet = self._start_tracklet(key, _endpoint(observations, run.track, run.start), before)
+                tracklet.continue_as(person_id, before)
             elif tracklet is None or self._starts_new_tracklet(tracklet, frame, crowded=run.crowded):
-                tracklet = self._start_tracklet(key, _endpoint(seen, run.track, run.start), tracklet)
+                tracklet = self._start_tracklet(key, _endpoint(observations, run.track, run.start), tracklet)
                 if key in self._recalled_ids:
                     tracklet.assign_id(self._recalled_ids.pop(key))
-            tracklet.add_frames(range(frame, seen.first_frame + run.stop), crowded=run.crowded)
-            tracklet.end = _endpoint(seen, run.track, run.stop - 1)
+            tracklet.add_frames(range(frame, observations.first_frame + run.stop), crowded=run.crowded)
+            tracklet.end = _endpoint(observations, run.track, run.stop - 1)
             rows[run.track, run.start : run.stop] = self._row.get(tracklet.key, -1)
             settled[run.track, run.start : run.stop] = tracklet.settled_id
             for sample in appearance.get(key, ()):
-                first, last = sample.first_frame - seen.first_frame, sample.last_frame - seen.first_frame
+                first, last = (
+                    sample.first_frame - observations.first_frame,
+                    sample.last_frame - observations.first_frame,
+                )
                 if run.start <= last < run.stop and not crowded[run.track, first : last + 1].any():
                     tracklet.appearance.add(key.camera, MeanHistogram.of(sample.histogram, last - first + 1))
         return rows, settled
@@ -97,8 +103,7 @@ class TrackletSplitter:
     def _starts_new_tracklet(self, tracklet: Tracklet, frame: int, *, crowded: bool) -> bool:
         """Return whether an observation in `frame` starts a new tracklet.
 
-        Where neither appearance nor ground point is known there is nothing to compare by, and the tracker is
-        trusted.
+        Without appearance and ground point there is nothing to compare, and the tracker is trusted.
         """
         if not tracklet.appearance.by_camera and np.isnan(tracklet.end.ground_point).any():
             return False
@@ -113,20 +118,24 @@ class TrackletSplitter:
     def showing(self, tracks: Iterable[TrackKey], people: Collection[int]) -> list[Tracklet]:
         """Return the current tracklets of these tracks that are one of these people, in the tracks' order."""
         current = [self._current[key] for key in sorted(set(tracks)) if key in self._current]
-        return [it for it in current if (it.settled_id or it.person_id) in people]
+        return [tracklet for tracklet in current if (tracklet.settled_id or tracklet.person_id) in people]
 
-    def predecessor(self, track: TrackKey, frame: int, number: int) -> Tracklet | None:
-        """Return the newest tracklet of a track that started before a frame; None: the track is not known.
+    def predecessor(self, track: TrackKey, frame: int, person_id: int) -> Tracklet | None:
+        """Return the newest tracklet of a track that started before a frame; None: the track is unknown.
 
-        Of a settled tracklet that is over only the person id is known, which `number` gives.
+        For a settled tracklet that is over, `person_id` gives the id: nothing else is stored.
         """
-        earlier = [it for it in self.active if it.key.track == track and it.start.frame < frame]
+        earlier = [
+            tracklet
+            for tracklet in self.active
+            if tracklet.key.track == track and tracklet.start.frame < frame
+        ]
         current = self._current.get(track)
         if earlier or current is None or current.start.frame < frame:
             return earlier[-1] if earlier else current
         endpoint = TrackletEndpoint(frame - 1, current.start.box, current.start.ground_point)
         return Tracklet(
-            TrackletKey(*track, frame - 1), endpoint, endpoint, person_id=number, settled_id=number
+            TrackletKey(*track, frame - 1), endpoint, endpoint, person_id=person_id, settled_id=person_id
         )
 
     def started_since(self, track: TrackKey, frame: int) -> Tracklet | None:
@@ -138,24 +147,24 @@ class TrackletSplitter:
             else None
         )
 
-    def split_next(self, track: TrackKey, number: int, before: Tracklet) -> None:
+    def split_next(self, track: TrackKey, person_id: int, before: Tracklet) -> None:
         """Start a new tracklet at a track's next observation: its person, and the tracklet it continues."""
-        self._pending_splits[track] = number, before
+        self._pending_splits[track] = person_id, before
 
-    def recall(self, track: TrackKey, number: int) -> None:
-        """Assign a person id to the first tracklet of a track that has not been seen yet."""
+    def recall(self, track: TrackKey, person_id: int) -> None:
+        """Assign a person id to the first tracklet of a track that is not observed yet."""
         if track not in self._current:
-            self._recalled_ids[track] = number
+            self._recalled_ids[track] = person_id
 
     def merge_ids(self, lost: int, kept: int) -> None:
         """Replace a person id that was merged into another."""
         for tracklet in chain(self.active, self._current.values()):
             tracklet.merge_ids(lost, kept)
             tracklet.settled_id = kept if tracklet.settled_id == lost else tracklet.settled_id
-        for track, (number, before) in self._pending_splits.items():
-            self._pending_splits[track] = kept if number == lost else number, before
+        for track, (person_id, before) in self._pending_splits.items():
+            self._pending_splits[track] = kept if person_id == lost else person_id, before
         self._recalled_ids = {
-            it: kept if number == lost else number for it, number in self._recalled_ids.items()
+            track: kept if person_id == lost else person_id for track, person_id in self._recalled_ids.items()
         }
 
     def settleable_rows(self, last_frame: int) -> list[int]:
@@ -172,10 +181,12 @@ class TrackletSplitter:
         old[longest[ends[longest] <= earliest]] = True
         excess = len(ends) - int(old.sum()) - settings.maximum_open_tracklets
         if excess > 0:
-            # Still too many: those with the same id for longest are settled until the next crowd.
+            # If these are too few, those with the same id for longest are settled until the next crowd.
             stable_frames = [
-                it.published_frames.get(it.person_id, 0) if it.person_id == it.main_id else 0
-                for it in self.active
+                tracklet.published_frames.get(tracklet.person_id, 0)
+                if tracklet.person_id == tracklet.main_id
+                else 0
+                for tracklet in self.active
             ]
             most_stable = np.argsort(-np.where(old, 0, stable_frames), kind="stable")[:excess]
             old[
@@ -186,7 +197,7 @@ class TrackletSplitter:
         return [int(row) for row in np.flatnonzero(old)]
 
     def settle(self, old: Iterable[Tracklet], last_frame: int) -> None:
-        """Remove tracklets from the active ones; those that continue keep their settled id."""
+        """Remove tracklets from the active ones; tracks that continue keep the settled id."""
         oldest = last_frame - self._settings.settle_after
         closed = {tracklet.key for tracklet in old}
         for tracklet in self.active:
@@ -197,17 +208,21 @@ class TrackletSplitter:
         self._row = {tracklet.key: row for row, tracklet in enumerate(self.active)}
         # Settled tracks continue; those without an id, or ended long ago, start a new tracklet.
         self._current = {
-            key: it
-            for key, it in self._current.items()
-            if it.key in self._row or (it.settled_id and it.end.frame > oldest)
+            key: tracklet
+            for key, tracklet in self._current.items()
+            if tracklet.key in self._row or (tracklet.settled_id and tracklet.end.frame > oldest)
         }
-        self._pending_splits = {key: it for key, it in self._pending_splits.items() if key in self._current}
+        self._pending_splits = {
+            key: split for key, split in self._pending_splits.items() if key in self._current
+        }
 
 
-def _endpoint(seen: TrackObservations, track: int, column: int) -> TrackletEndpoint:
-    # Copies: an endpoint lives long, and must not keep the arrays of a whole update.
+def _endpoint(observations: TrackObservations, track: int, column: int) -> TrackletEndpoint:
+    # Copies, so that a long-lived endpoint does not keep the arrays of a whole update in memory.
     return TrackletEndpoint(
-        seen.first_frame + column, seen.boxes[track, column].copy(), seen.ground_point[track, column].copy()
+        observations.first_frame + column,
+        observations.boxes[track, column].copy(),
+        observations.ground_point[track, column].copy(),
     )
 
 
@@ -225,7 +240,7 @@ def observation_runs(
 ) -> Iterator[ObservationRun]:
     """Yield runs of observations, (T, W) visible and crowded: only the first frame can start a tracklet.
 
-    `whole`: runs are as long as possible; else each is one frame.
+    With `whole`, runs are as long as possible; without, each is one frame.
     """
     kind = np.where(visible, 1 + crowded, 0)
     kind = np.pad(kind, ((0, 0), (1, 1)))

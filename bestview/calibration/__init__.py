@@ -1,4 +1,4 @@
-"""Calibration: homographies to a common floor, from marked points or from people who walk about."""
+"""Calibration: homographies to a common floor, from marked points or from walking people."""
 
 from bestview.calibration.homography import Floats, fit_homography
 from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings

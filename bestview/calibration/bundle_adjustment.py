@@ -24,7 +24,7 @@ _OFF_FLOOR_ERROR = 20.0
 _MIN_FOOT_ERROR = 0.2
 """Lower bound of the estimated foot error, relative to the settings'."""
 _OFFSET_SPREAD = 100.0
-"""Frames; a weak prior that keeps offsets in place for cameras that nothing constrains."""
+"""Frames; a weak prior that fixes the offsets of cameras without matches."""
 _EVALUATIONS = 12
 _PARTS = 8
 _TINY = 1e-6
@@ -32,12 +32,14 @@ _TINY = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Correspondences:
-    """Samples in which two cameras see one person at the same pulse.
+    """M matches: samples of two cameras that show one person at the same pulse.
 
     Attributes:
-        one: number of the one camera, and `other` of the other.
-        here: sample of the one camera, (M,), and `there` of the other.
-        weight: how much of a new place each is, (M,).
+        one: index of the first camera.
+        other: index of the second.
+        here: (M,) samples of the first camera.
+        there: (M,) samples of the second.
+        weight: (M,) movement in strides, at most 1.
     """
 
     one: int
@@ -56,7 +58,7 @@ class Correspondences:
 
 @dataclass(frozen=True, slots=True)
 class CameraRig:
-    """Cameras on one floor, and the pulse at which each one's frame 0 was taken, (C,)."""
+    """Cameras on one floor, and the pulse of each camera's frame 0, (C,)."""
 
     cameras: tuple[Pinhole, ...]
     offsets: Floats
@@ -74,11 +76,11 @@ def adjust_bundle(
     """Optimize the cameras and their offsets; the pose and offset of the first camera are fixed.
 
     Args:
-        rig: initial cameras; the samples are taken with its offsets.
-        samples: one for each camera.
+        rig: initial cameras, with whose offsets the walks were sampled.
+        samples: of each camera.
         matches: correspondences.
         settings: weights and priors.
-        sharpness: how much more precise foot points are than the settings say.
+        sharpness: how much more precise foot points are than the settings assume.
         fixed_offsets: offsets are known and not optimized.
     """
     count = len(rig.cameras)
@@ -89,22 +91,24 @@ def adjust_bundle(
     if fixed_offsets:
         free[count * PARAMETERS :] = False
     start = np.concatenate([parameters, np.zeros(count)])
-    thinned = [it.thinned() for it in matches]
-    boxes = [select_moving_samples(it, _MAX_HEIGHTS) for it in samples]
+    thinned = [match.thinned() for match in matches]
+    boxes = [select_moving_samples(sample_set, _MAX_HEIGHTS) for sample_set in samples]
     heights = [
-        (it.feet[chosen], it.tall[chosen], it.weight[chosen])
-        for it, chosen in zip(samples, boxes, strict=True)
+        (sample_set.feet[chosen], sample_set.tall[chosen], sample_set.weight[chosen])
+        for sample_set, chosen in zip(samples, boxes, strict=True)
     ]
 
     def errors(values: Floats) -> Floats:
         all_values = start.copy()
         all_values[free] = values
-        later = all_values[count * PARAMETERS :]
+        offset_changes = all_values[count * PARAMETERS :]
         cameras = _cameras(rig, all_values)
-        parts = [later / _OFFSET_SPREAD]
+        parts = [offset_changes / _OFFSET_SPREAD]
         for camera, (where, height, weight) in zip(cameras, heights, strict=True):
             parts += [prior_errors(camera, settings), height_errors(camera, where, height, weight, settings)]
-        parts += [_match_errors(cameras, later, samples, it, settings, sharpness) for it in thinned]
+        parts += [
+            _match_errors(cameras, offset_changes, samples, match, settings, sharpness) for match in thinned
+        ]
         return np.concatenate(parts)
 
     solution = scipy.optimize.least_squares(
@@ -117,38 +121,40 @@ def adjust_bundle(
 
 def floor_residuals(
     cameras: Sequence[Pinhole],
-    later: Floats,
+    offset_changes: Floats,
     samples: Sequence[WalkSamples],
-    it: Correspondences,
+    match: Correspondences,
     settings: WalkSettings,
 ) -> Floats:
     """Compute whitened floor distances between both cameras' foot points, (M, 2); NaN: off the floor.
 
-    `later` is by how many frames each camera's offset is later than the samples were taken with, (C,).
+    `offset_changes` (C,) are those of the offsets since the walks were sampled, frames.
     """
 
     def positions(number: int, index: Indices) -> FloorPositions:
-        boxes = samples[number].boxes[index] - later[number] * samples[number].speed[index]
+        boxes = samples[number].boxes[index] - offset_changes[number] * samples[number].speed[index]
         return project_to_floor(cameras[number], foot_points(boxes), boxes[:, 3] - boxes[:, 1], settings)
 
-    return whitened_differences(positions(it.one, it.here), positions(it.other, it.there), settings)
+    return whitened_differences(
+        positions(match.one, match.here), positions(match.other, match.there), settings
+    )
 
 
 def _match_errors(
     cameras: Sequence[Pinhole],
-    later: Floats,
+    offset_changes: Floats,
     samples: Sequence[WalkSamples],
-    it: Correspondences,
+    match: Correspondences,
     settings: WalkSettings,
     sharpness: float,
 ) -> Floats:
-    residuals = floor_residuals(cameras, later, samples, it, settings) * sharpness
+    residuals = floor_residuals(cameras, offset_changes, samples, match, settings) * sharpness
     distance = np.hypot(*residuals.T)
     valid = np.isfinite(distance)
     distance = np.where(valid, distance, _OFF_FLOOR_ERROR)
     residuals = np.where(valid[:, None], residuals, _OFF_FLOOR_ERROR)
     robust_factor = robust(distance) / np.maximum(distance, 1e-9)
-    return np.asarray((residuals * (robust_factor * np.sqrt(it.weight))[:, None]).ravel())
+    return np.asarray((residuals * (robust_factor * np.sqrt(match.weight))[:, None]).ravel())
 
 
 def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
@@ -159,7 +165,7 @@ def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
 
 
 def estimate_sharpness(residuals: Floats) -> float:
-    """Return how much more precise foot points are than the settings say, from whitened distances, (M, 2)."""
+    """Estimate how much more precise foot points are than the settings assume, from residuals (M, 2)."""
     typical = float(np.median(np.hypot(*residuals.T))) / 1.18 if len(residuals) else 1.0  # Rayleigh's median
     return 1.0 / min(max(typical, _MIN_FOOT_ERROR), 1.0)
 
@@ -169,37 +175,44 @@ def offset_standard_errors(
 ) -> Floats:
     """Return the standard error of each camera's offset, (C,) frames; 0 for the first, the reference.
 
-    The walk is cut into parts. In each the offsets are fitted to its own foot points, with the cameras fixed;
-    the spread between the parts gives the error of the whole. Foot points that are tracked late, or shadows
-    to one side, make parts differ in which people walk another way.
+    The walk is cut into parts. In each the offsets are fitted to the part's foot points, with the cameras
+    fixed; the spread between the parts gives the error of the whole. Late tracking, or shadows to one side,
+    shift the offsets of parts in which people walk in different directions.
     """
     count = len(rig.cameras)
-    start = min((float(it.times.min()) for it in samples if len(it.times)), default=0.0)
-    end = max((float(it.times.max()) for it in samples if len(it.times)), default=0.0) + 1.0
+    start = min(
+        (float(sample_set.times.min()) for sample_set in samples if len(sample_set.times)), default=0.0
+    )
+    end = (
+        max((float(sample_set.times.max()) for sample_set in samples if len(sample_set.times)), default=0.0)
+        + 1.0
+    )
     normal = np.zeros((_PARTS, count, count))
     right_hand_side = np.zeros((_PARTS, count))
-    for it in matches:
+    for match in matches:
         no_shift = np.zeros(count)
-        residuals = floor_residuals(rig.cameras, no_shift, samples, it, settings)
+        residuals = floor_residuals(rig.cameras, no_shift, samples, match, settings)
         slope = np.zeros((len(residuals), 2, count))
-        for camera in (it.one, it.other):
-            later = no_shift.copy()
-            later[camera] = 1.0
-            slope[:, :, camera] = floor_residuals(rig.cameras, later, samples, it, settings) - residuals
-        weight = it.weight / (1.0 + (residuals**2).sum(axis=1))
+        for camera in (match.one, match.other):
+            offset_changes = no_shift.copy()
+            offset_changes[camera] = 1.0
+            slope[:, :, camera] = (
+                floor_residuals(rig.cameras, offset_changes, samples, match, settings) - residuals
+            )
+        weight = match.weight / (1.0 + (residuals**2).sum(axis=1))
         weight = np.where(
             np.isfinite(residuals).all(axis=1) & np.isfinite(slope).all(axis=(1, 2)), weight, 0.0
         )
-        part = (_PARTS * (samples[it.one].times[it.here] - start) / (end - start)).astype(int)
+        part = (_PARTS * (samples[match.one].times[match.here] - start) / (end - start)).astype(int)
         residuals, slope = np.nan_to_num(residuals), np.nan_to_num(slope)
         np.add.at(normal, part, np.einsum("m,mki,mkj->mij", weight, slope, slope))
         np.add.at(right_hand_side, part, -np.einsum("m,mki,mk->mi", weight, slope, residuals))
     # The first camera is fixed; parts are weighted by their information.
     part_offsets = [
-        np.linalg.solve(it[1:, 1:] + _TINY * np.eye(count - 1), goal[1:])
-        for it, goal in zip(normal, right_hand_side, strict=True)
+        np.linalg.solve(matrix[1:, 1:] + _TINY * np.eye(count - 1), goal[1:])
+        for matrix, goal in zip(normal, right_hand_side, strict=True)
     ]
-    information = np.array([np.diag(it)[1:] for it in normal])
+    information = np.array([np.diag(matrix)[1:] for matrix in normal])
     share = information / np.maximum(information.sum(axis=0), _TINY)
     spread = (share**2 * np.array(part_offsets) ** 2).sum(axis=0)
     return np.concatenate([[0.0], np.sqrt(spread)])

@@ -17,9 +17,9 @@ from bestview.calibration.bundle_adjustment import (
 from bestview.calibration.camera_pairs import (
     CameraHypotheses,
     PairAlignment,
+    align_pair,
     compare_samples,
     comparison_pulses,
-    pair_alignment,
 )
 from bestview.calibration.floor_agreement import mutual_matches
 from bestview.calibration.pinhole import EAST, NORTH, PAN, POSE, Pinhole
@@ -33,7 +33,7 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraPair:
-    """Result of aligning two cameras, by their numbers; no alignment: nobody was in both at the same time."""
+    """Alignment of two cameras, given by index; None: no person was tracked by both at the same time."""
 
     one: int
     other: int
@@ -42,25 +42,28 @@ class CameraPair:
     def rejection(self, settings: WalkSettings) -> str | None:
         """Return why the two cannot be placed on one floor; None if they can."""
         if self.alignment is None:
-            return "nobody was seen walking by both at once"
+            return "no person was tracked by both cameras at the same time"
         return next(
             (words for applies, words in _rejection_reasons(self.alignment, settings) if applies), None
         )
 
 
-def _rejection_reasons(it: PairAlignment, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
+def _rejection_reasons(alignment: PairAlignment, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
     """Yield the reasons against placing two cameras on one floor, and whether each applies."""
-    few = f"at only {it.places:.0f} steps of the walk people stand in one place"
+    few = f"the cameras agree at only {alignment.places:.0f} places of the walk"
     needed = f"{settings.minimum_places:.0f} are needed: walk longer where both see"
-    yield it.places < settings.minimum_places, f"{few}; {needed}"
+    yield alignment.places < settings.minimum_places, f"{few}; {needed}"
     enough = f"{100 * settings.minimum_share:.0f} % are needed"
-    share = f"of what both should see they agree about {100 * it.share:.1f} % only; {enough}"
-    yield it.share < settings.minimum_share, share
-    differs = f"where they have people differs by {it.error:.2f} person heights (median)"
-    yield it.error > settings.maximum_error, f"{differs}: are feet hidden, or do people sit?"
-    yield it.merit < settings.minimum_over_chance * it.chance, "they agree hardly better than by chance"
-    line = "the walk that both saw is a straight line: walk in curves, to and fro and sideways"
-    yield it.breadth < settings.minimum_breadth, line
+    share = f"they agree about only {100 * alignment.share:.1f} % of what both should see; {enough}"
+    yield alignment.share < settings.minimum_share, share
+    differs = f"their positions of the same people differ by {alignment.error:.2f} person heights (median)"
+    yield alignment.error > settings.maximum_error, f"{differs}: are feet hidden, or do people sit?"
+    yield (
+        alignment.merit < settings.minimum_over_chance * alignment.chance,
+        "they agree little better than by chance",
+    )
+    line = "the walk that both saw is a straight line: walk in curves and in several directions"
+    yield alignment.breadth < settings.minimum_breadth, line
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +71,10 @@ class CameraGroup:
     """Cameras on one floor.
 
     Attributes:
-        members: their numbers, (C,).
+        members: (C,) indices of the walks.
         rig: their poses; the first is at the origin, its offset 0.
-        samples: one for each, taken with the rig's offsets.
-        matches: correspondences; cameras are numbered within the group.
+        samples: of each camera, with the rig's offsets.
+        matches: correspondences; cameras are indices within the group.
     """
 
     members: tuple[int, ...]
@@ -81,21 +84,21 @@ class CameraGroup:
 
 
 def camera_hypotheses(walk: Walk, settings: WalkSettings) -> CameraHypotheses:
-    """Return possible tilts and heights of a camera: one for a short, a usual and a long focal length."""
+    """Return possible tilts and heights of a camera: one for a short, a typical and a long focal length."""
     samples = sample_walk(walk, comparison_pulses((walk,), settings), 0.0, settings.step, settings.stride)
     if not len(samples.times):
         return CameraHypotheses(walk, ())
     lengths = settings.focal * np.exp(settings.focal_spread * np.array([-1.0, 0.0, 1.0]))
     return CameraHypotheses(
-        walk, tuple(fit_tilt_and_height(samples, walk.size, float(it), settings) for it in lengths)
+        walk, tuple(fit_tilt_and_height(samples, walk.size, float(length), settings) for length in lengths)
     )
 
 
 def align_camera_pairs(walks: Sequence[Walk], settings: WalkSettings) -> list[CameraPair]:
-    """Align every two cameras."""
+    """Align all pairs of cameras."""
     hypotheses = [camera_hypotheses(walk, settings) for walk in walks]
     return [
-        CameraPair(a, b, pair_alignment(hypotheses[a], hypotheses[b], settings))
+        CameraPair(a, b, align_pair(hypotheses[a], hypotheses[b], settings))
         for a, b in combinations(range(len(walks)), 2)
     ]
 
@@ -104,21 +107,21 @@ def group_cameras(
     walks: Sequence[Walk], pairs: Sequence[CameraPair], settings: WalkSettings
 ) -> list[CameraGroup]:
     """Group cameras that share a floor and calibrate each group; isolated cameras are in none."""
-    accepted = [it for it in pairs if it.alignment is not None and it.rejection(settings) is None]
-    accepted.sort(key=lambda it: -_merit(it))
+    accepted = [pair for pair in pairs if pair.alignment is not None and pair.rejection(settings) is None]
+    accepted.sort(key=lambda pair: -_merit(pair))
     group_of = list(range(len(walks)))
     tree = []
-    for it in accepted:
-        if group_of[it.one] != group_of[it.other]:
-            tree.append(it)
+    for pair in accepted:
+        if group_of[pair.one] != group_of[pair.other]:
+            tree.append(pair)
             removed, remaining = (
-                max(group_of[it.one], group_of[it.other]),
-                min(group_of[it.one], group_of[it.other]),
+                max(group_of[pair.one], group_of[pair.other]),
+                min(group_of[pair.one], group_of[pair.other]),
             )
             group_of = [remaining if number == removed else number for number in group_of]
     groups = []
     for first in sorted(set(group_of)):
-        members = tuple(number for number, it in enumerate(group_of) if it == first)
+        members = tuple(number for number, group in enumerate(group_of) if group == first)
         if len(members) > 1:
             groups.append(_build_group(walks, members, tree, accepted, settings))
     return groups
@@ -138,7 +141,9 @@ def _build_group(
     """Chain the alignments of the tree, then adjust all cameras jointly."""
     rig = _chain_poses(members, tree)
     pulses = comparison_pulses([walks[number] for number in members], settings)
-    numbers = [(members.index(it.one), members.index(it.other)) for it in accepted if it.one in members]
+    numbers = [
+        (members.index(pair.one), members.index(pair.other)) for pair in accepted if pair.one in members
+    ]
     samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
     for _ in range(_ROUNDS):
         rig = adjust_bundle(
@@ -156,7 +161,7 @@ def _match_people(
     numbers: Sequence[tuple[int, int]],
     settings: WalkSettings,
 ) -> tuple[list[WalkSamples], list[Correspondences], float]:
-    """Match people between every two aligned cameras."""
+    """Match the samples of all aligned pairs of cameras; return samples, matches and sharpness."""
     samples = [
         sample_walk(walks[number], pulses, float(offset), settings.step, settings.stride)
         for number, offset in zip(members, rig.offsets, strict=True)
@@ -179,37 +184,39 @@ def _match_people(
 
 
 def _chain_poses(members: tuple[int, ...], tree: Sequence[CameraPair]) -> CameraRig:
-    """Place the cameras on the first one's floor one by one, each tilted as in its best alignment."""
+    """Place the cameras on the first one's floor one by one, each with the tilt of its best alignment."""
     cameras: dict[int, Pinhole] = {}
     offsets: dict[int, float] = {members[0]: 0.0}
-    for it in tree:  # the best first
-        for number, place in ((it.one, 0), (it.other, 1)):
-            if number in members and it.alignment is not None:
-                cameras.setdefault(number, it.alignment.rig.cameras[place])
+    for pair in tree:  # best alignment first
+        for number, place in ((pair.one, 0), (pair.other, 1)):
+            if number in members and pair.alignment is not None:
+                cameras.setdefault(number, pair.alignment.rig.cameras[place])
     first = cameras[members[0]].parameters.copy()
     first[POSE] = 0.0
     cameras[members[0]] = replace(cameras[members[0]], parameters=first)
     while len(offsets) < len(members):
-        for it in tree:
-            if it.alignment is None or (it.one in offsets) == (it.other in offsets):
+        for pair in tree:
+            if pair.alignment is None or (pair.one in offsets) == (pair.other in offsets):
                 continue
             known, new, known_index, new_index = (
-                (it.one, it.other, 0, 1) if it.one in offsets else (it.other, it.one, 1, 0)
+                (pair.one, pair.other, 0, 1) if pair.one in offsets else (pair.other, pair.one, 1, 0)
             )
             pose = _pose_relative_to(
-                cameras[known], it.alignment.rig.cameras[known_index], it.alignment.rig.cameras[new_index]
+                cameras[known], pair.alignment.rig.cameras[known_index], pair.alignment.rig.cameras[new_index]
             )
             parameters = cameras[new].parameters.copy()
             parameters[POSE] = pose
             cameras[new] = replace(cameras[new], parameters=parameters)
             offsets[new] = offsets[known] + float(
-                it.alignment.rig.offsets[new_index] - it.alignment.rig.offsets[known_index]
+                pair.alignment.rig.offsets[new_index] - pair.alignment.rig.offsets[known_index]
             )
-    return CameraRig(tuple(cameras[it] for it in members), np.array([offsets[it] for it in members]))
+    return CameraRig(
+        tuple(cameras[member] for member in members), np.array([offsets[member] for member in members])
+    )
 
 
 def _pose_relative_to(known: Pinhole, linked: Pinhole, other: Pinhole) -> np.ndarray:
-    """Return the pose of the other camera on the known one's floor, from their alignment, (3,)."""
+    """Return the pose of `other` on the floor of `known`, from the alignment `linked` to `other`: (3,)."""
     turn = known.parameters[PAN] - linked.parameters[PAN]
     cos, sin = np.cos(turn), np.sin(turn)
     difference = other.parameters[[EAST, NORTH]] - linked.parameters[[EAST, NORTH]]

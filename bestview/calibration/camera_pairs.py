@@ -33,11 +33,11 @@ _MAX_HYPOTHESES = 60
 """Poses tried for each offset."""
 _MAX_REFINED = 3
 """Best poses that are refined."""
-_NEARLY = 0.7
-"""Score relative to the best one from which a pose is refined."""
+_MIN_MATCHES = 8
+"""Matches below which an alignment is not refined."""
 _ROUNDS = 3
 _OFFSET_STEPS = 2
-"""Offsets are tried this many times `step` apart; refinement covers what is between."""
+"""Offsets are tried this many times `step` apart; refinement covers those in between."""
 _MAX_CANDIDATES = 20_000
 """Candidate matches beyond which pulses are left out."""
 
@@ -56,11 +56,10 @@ class PairAlignment:
 
     Attributes:
         rig: both of them; the first is at the origin, its offset 0.
-        places: number of places at which they agree about who stands there.
-        share: share of what both could see about which they agree.
-        breadth: how broad the walk is that both saw: standard deviation across its main direction,
-            person heights.
-        error: how far apart they place the same people, person heights (median).
+        places: number of places at which both have the same person.
+        share: matched share of the samples that both cameras could see.
+        breadth: standard deviation of the common walk across its main direction, person heights.
+        error: median distance between both cameras' positions of a person, person heights.
         chance: the merit of an alignment by chance.
     """
 
@@ -77,18 +76,20 @@ class PairAlignment:
         return self.places * self.share
 
 
-def pair_alignment(
+def align_pair(
     one: CameraHypotheses, other: CameraHypotheses, settings: WalkSettings
 ) -> PairAlignment | None:
-    """Align two cameras; None if nobody walked in both at the same time."""
+    """Align two cameras; None: they have no samples of the same pulse."""
     best = _best_alignment(one, other, settings)
     if best is None:
         return None
     by_chance = [
-        _best_alignment(one, replace(other, walk=it), settings)
-        for it in (time_reversed(other.walk), halves_swapped(other.walk))
+        _best_alignment(one, replace(other, walk=walk), settings)
+        for walk in (time_reversed(other.walk), halves_swapped(other.walk))
     ]
-    return replace(best, chance=max((it.merit for it in by_chance if it is not None), default=0.0))
+    return replace(
+        best, chance=max((alignment.merit for alignment in by_chance if alignment is not None), default=0.0)
+    )
 
 
 def comparison_pulses(walks: Sequence[Walk], settings: WalkSettings) -> Floats:
@@ -111,18 +112,18 @@ def _best_alignment(
         there = sample_walk(other.walk, pulses, float(offset), settings.step, settings.stride)
         candidates = candidate_matches(here, there)
         if len(candidates.here) > _MAX_CANDIDATES:
-            fewer = pulses[:: -(-len(candidates.here) // _MAX_CANDIDATES)]
-            candidates = _subset(candidates, np.isin(here.times[candidates.here], fewer))
+            kept_pulses = pulses[:: -(-len(candidates.here) // _MAX_CANDIDATES)]
+            candidates = _subset(candidates, np.isin(here.times[candidates.here], kept_pulses))
         trials += [
-            (places, float(offset), it)
-            for places, it in _score_poses(one, here, other, there, candidates, settings)
+            (places, float(offset), pose)
+            for places, pose in _score_poses(one, here, other, there, candidates, settings)
         ]
-    trials.sort(key=lambda it: (-it[0], abs(it[1])))
+    trials.sort(key=lambda trial: (-trial[0], abs(trial[1])))
     alignments = [
         _refine_alignment(one, here, other, pulses, offset, pose, settings)
         for _, offset, pose in trials[:_MAX_REFINED]
     ]
-    return max(alignments, key=lambda it: it.merit, default=None)
+    return max(alignments, key=lambda alignment: alignment.merit, default=None)
 
 
 def _subset(candidates: CandidateMatches, chosen: np.ndarray) -> CandidateMatches:
@@ -146,12 +147,12 @@ def _score_poses(
     candidates: CandidateMatches,
     settings: WalkSettings,
 ) -> list[tuple[float, RelativePose]]:
-    """Return the best poses with the number of places at which the cameras then agree, best first."""
-    own_positions = [project_to_floor(view, here.feet, here.tall, settings) for view in one.poses]
+    """Return the poses with the most places at which the cameras agree, and their number, best first."""
+    positions = [project_to_floor(view, here.feet, here.tall, settings) for view in one.poses]
     other_positions = [project_to_floor(view, there.feet, there.tall, settings) for view in other.poses]
     scored = []
-    for pose in propose_relative_poses(own_positions, other_positions, candidates, _MAX_HYPOTHESES):
-        transformed = own_positions[pose.here].transformed(pose.rotation, pose.translation)
+    for pose in propose_relative_poses(positions, other_positions, candidates, _MAX_HYPOTHESES):
+        transformed = positions[pose.here].transformed(pose.rotation, pose.translation)
         distances = whitened_differences(
             select_positions(transformed, candidates.here),
             select_positions(other_positions[pose.there], candidates.there),
@@ -160,7 +161,7 @@ def _score_poses(
         scored.append(
             (total_agreement(pair_agreement(distances, candidates, settings.gate), candidates), pose)
         )
-    scored.sort(key=lambda it: -it[0])
+    scored.sort(key=lambda entry: -entry[0])
     return scored[:_MAX_REFINED]
 
 
@@ -218,9 +219,6 @@ def _refine_alignment(
     )
 
 
-_MIN_MATCHES = 8
-
-
 def compare_samples(
     cameras: Sequence[Pinhole],
     samples: Sequence[WalkSamples],
@@ -228,10 +226,10 @@ def compare_samples(
     settings: WalkSettings,
     gate: float,
 ) -> tuple[Floats, Floats]:
-    """Return the whitened distances of all candidates (P, 2), and the agreement of pairs of tracks, (K,)."""
+    """Compute whitened distances of all candidates, (P, 2), and the agreement of pairs of tracks, (K,)."""
     first, second = (
-        project_to_floor(camera, it.feet, it.tall, settings)
-        for camera, it in zip(cameras, samples, strict=True)
+        project_to_floor(camera, camera_samples.feet, camera_samples.tall, settings)
+        for camera, camera_samples in zip(cameras, samples, strict=True)
     )
     distances = whitened_differences(
         select_positions(first, candidates.here), select_positions(second, candidates.there), settings

@@ -1,4 +1,4 @@
-"""Agreement of two cameras that are placed on one floor about who stands where."""
+"""How well two cameras on one floor agree about people's positions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bestview.calibration.samples import CandidateMatches, Indices, WalkSamples
 from bestview.calibration.walk_settings import WalkSettings
 
 _EDGE = 0.04
-"""Share of the picture at each edge where somebody may be cut off."""
+"""Share of the picture at each edge where people may be cut off."""
 _SMALL = 0.06
 """Share of the picture's height below which detection is unreliable."""
 
@@ -24,8 +24,8 @@ class FloorPositions:
     """One camera's samples on the floor.
 
     Attributes:
-        position: of each, (S, 2) person heights; NaN: off the floor.
-        covariance: east-east, east-north and north-north, (S, 3).
+        position: (S, 2) person heights; NaN: off the floor.
+        covariance: (S, 3) east-east, east-north and north-north.
     """
 
     position: Floats
@@ -83,7 +83,7 @@ def select_positions(positions: FloorPositions, index: NDArray[np.intp]) -> Floo
 
 
 def pair_agreement(distances: Floats, candidates: CandidateMatches, gate: float) -> Floats:
-    """Count places at which each pair of tracks agrees, less those at which it does not: (P, 2) -> (K,)."""
+    """Count places at which each pair of tracks agrees, minus those at which it does not: (P, 2) -> (K,)."""
     closeness = 1.0 - (distances**2).sum(axis=1) / gate**2
     votes = np.clip(np.nan_to_num(closeness, nan=-1.0), -1.0, 1.0) * candidates.weight
     return np.asarray(np.bincount(candidates.pair, votes, len(candidates.tracks)))
@@ -129,12 +129,12 @@ def mutual_matches(
 def covisible_agreement(
     cameras: Sequence[Pinhole], samples: Sequence[WalkSamples], chosen: Sequence[Indices]
 ) -> float:
-    """Return the share of what both cameras could see about which they agree, 0 to 1.
+    """Return the matched share of the samples that both cameras could see: geometric mean of both, 0 to 1.
 
     Args:
         cameras: the two cameras.
-        samples: of each of them.
-        chosen: the samples that were matched with the other's, (M,) of each.
+        samples: of each camera.
+        chosen: (M,) indices of the matched samples of each camera.
     """
     agreements = []
     for own, index in ((0, chosen[0]), (1, chosen[1])):
@@ -151,7 +151,7 @@ def covisible_agreement(
 
 
 def fully_in_view(camera: Pinhole, samples: WalkSamples, other: Pinhole) -> NDArray[np.bool_]:
-    """Return which of a camera's samples the other camera has completely in view, and large enough, (S,)."""
+    """Return which samples the other camera shows completely and large enough to be detected: (S,)."""
     feet = other.picture(camera.floor(samples.feet))
     heights = other.heights(feet)
     width, height = other.size

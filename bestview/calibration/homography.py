@@ -15,13 +15,13 @@ Floats = NDArray[np.float64]
 
 
 def fit_homography(source: Floats, target: Floats) -> Floats:
-    """Fit the homography that maps source to target points with the least squared error at the target.
+    """Fit the homography that maps source to target points with least squared error in the target plane.
 
     The direct linear transform on normalized points, refined by Gauss-Newton steps.
 
     Args:
-        source: points, (N, 2), four at least.
-        target: their images, (N, 2).
+        source: (N, 2), at least four points.
+        target: (N, 2) their images.
 
     Returns:
         The (3, 3) matrix; its last entry is 1 where that is possible.
@@ -30,7 +30,7 @@ def fit_homography(source: Floats, target: Floats) -> Floats:
         ValueError: the points determine none: too few, or (all but one of) them on a line.
     """
     if len(source) < MIN_POINTS:
-        raise ValueError(f"{len(source)} points: a homography takes {MIN_POINTS}")
+        raise ValueError(f"{len(source)} points: a homography needs {MIN_POINTS}")
     to_source, from_target = _normalizer(source), _normalizer(target)
     x, y = _apply(to_source, source), _apply(from_target, target)
     # The left singular vectors are not needed: in full they would be a matrix of (2N)^2 entries.
@@ -76,7 +76,7 @@ def _equations(x: Floats, y: Floats) -> Floats:
 
 
 def _gauss_newton(homography: Floats, x: Floats, y: Floats) -> Floats:
-    """Refine by Gauss-Newton steps, as long as they reduce the error at the target."""
+    """Refine by Gauss-Newton steps, as long as they reduce the error."""
     best = homography / np.linalg.norm(homography)
     least = _error(best, x, y)
     for _ in range(_STEPS):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bestview.calibration.homography import MIN_POINTS, Floats, apply_homography, fit_homography
 
 _MIN_POINTS_TO_NAME = 6
-"""Pairs needed to name the wrong ones: of five pairs any four can be fitted exactly."""
+"""Pairs needed to identify wrong ones: of five pairs any four can be fitted exactly."""
 _MOST_TRIALS = 500
 """Quadruples tried; up to eleven pairs have fewer."""
 _SEED = 1
@@ -30,9 +30,9 @@ class PointSettings:
         ValueError: a setting is out of range.
     """
 
-    # How far a pair may be off in the picture, as a share of how far the camera's points are spread there.
+    # Allowed error of a pair in the picture, as a share of the diagonal of the points' bounding box.
     tolerance: float = 0.02
-    # The most pairs that may be named as wrong, as a share; where more would have to be, all are doubtful.
+    # Largest share of pairs that is reported as wrong; with more, all pairs are in doubt.
     maximum_inconsistent_share: float = 0.34
 
     def __post_init__(self) -> None:
@@ -49,8 +49,8 @@ class MarkedPoints:
 
     Attributes:
         camera: its name, for messages.
-        image: pixels of the camera's own picture, (N, 2).
-        floor: the same places on the floor, (N, 2), in the user's unit.
+        image: (N, 2) pixels of the camera's own picture.
+        floor: (N, 2) the same places on the floor, in the user's unit.
     """
 
     camera: str
@@ -67,7 +67,7 @@ def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
 def describe_inconsistency(
     points: MarkedPoints, errors: Floats, allowed: float, settings: PointSettings
 ) -> str:
-    """Return an error message that names the inconsistent pairs, if they can be determined."""
+    """Return an error message that names the inconsistent pairs, if they can be identified."""
     count = len(points.image)
     fits = _consensus(points, allowed) if count >= _MIN_POINTS_TO_NAME else np.ones(count, dtype=bool)
     wrong = np.flatnonzero(~fits)
@@ -87,12 +87,12 @@ def describe_inconsistency(
     return (
         f"camera {points.camera}: {'pair' if one else 'pairs'} {named} "
         f"{'contradicts' if one else 'contradict'} the others: {far} off, where the others are within "
-        f"{off[fits].max():.1f}; mend or remove {'it' if one else 'them'}"
+        f"{off[fits].max():.1f}; correct or remove {'it' if one else 'them'}"
     )
 
 
 def _consensus(points: MarkedPoints, allowed: float) -> NDArray[np.bool_]:
-    """Return which pairs the best homography through four of them agrees with, (N,)."""
+    """Return which pairs agree with the best homography through four of them: (N,) bool."""
     count = len(points.image)
     best, best_score = np.ones(count, dtype=bool), (0, 0.0)
     for four in _point_quadruples(count):

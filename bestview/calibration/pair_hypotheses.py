@@ -1,4 +1,4 @@
-"""Hypotheses of two cameras' relative pose, each from one pair of tracks that may be one person.
+"""Hypotheses of the relative pose of two cameras, each from a pair of tracks that may be one person.
 
 People's heights give each camera's tilt and height; a track is then a curve on the floor in person heights,
 and two curves of one person differ by a rotation and a translation (Procrustes).
@@ -15,8 +15,8 @@ from bestview.calibration.floor_agreement import FloorPositions
 from bestview.calibration.homography import Floats
 from bestview.calibration.samples import CandidateMatches
 
-_LEAST_MOMENTS = 5
-_LEAST_SPREAD = 0.3
+_MIN_PULSES = 5
+_MIN_SPREAD = 0.3
 """Variance of positions, person heights squared, below which a track is too short to align."""
 _NOISE = 0.1
 
@@ -48,7 +48,7 @@ def propose_relative_poses(
         for b, other in enumerate(there)
         for pose in _poses_of_views(a, one, b, other, candidates)
     ]
-    poses.sort(key=lambda it: -it.merit)
+    poses.sort(key=lambda pose: -pose.merit)
     return poses[:maximum]
 
 
@@ -64,7 +64,7 @@ def _poses_of_views(
 
     def total(values: np.ndarray) -> np.ndarray:
         real, imaginary = (
-            np.bincount(candidates.pair, weight * it, size) for it in (values.real, values.imag)
+            np.bincount(candidates.pair, weight * part, size) for part in (values.real, values.imag)
         )
         return np.asarray(real + 1j * imaginary)
 
@@ -73,12 +73,12 @@ def _poses_of_views(
     safe_count = np.maximum(count, 1e-9)
     x_mean, y_mean = total(x) / safe_count, total(y) / safe_count
     x, y = x - x_mean[candidates.pair], y - y_mean[candidates.pair]
-    x_spread, y_spread = (total(np.abs(it) ** 2).real / safe_count for it in (x, y))
+    x_spread, y_spread = (total(np.abs(positions) ** 2).real / safe_count for positions in (x, y))
     cross_spread = total(np.conj(x) * y) / safe_count
     residual = x_spread + y_spread - 2 * np.abs(cross_spread)
     smaller_spread = np.minimum(x_spread, y_spread)
     merit = np.where(
-        (pulse_count >= _LEAST_MOMENTS) & (smaller_spread > _LEAST_SPREAD),
+        (pulse_count >= _MIN_PULSES) & (smaller_spread > _MIN_SPREAD),
         count * smaller_spread / (np.maximum(residual, 0) + _NOISE),
         0.0,
     )

@@ -15,7 +15,7 @@ from bestview.calibration.homography import Floats
 
 PARAMETERS = 8
 FOCAL, ASPECT, TILT, ROLL, CAMERA_HEIGHT, PAN, EAST, NORTH = range(PARAMETERS)
-"""Places in the array of parameters: log of the focal length in picture widths, log of how much taller than
+"""Indices of the parameters: log of the focal length in picture widths, log of how much taller than
 wide a pixel's picture is, angles of the optical axis below the horizon and about itself, log of the height
 above the floor, direction on the floor, and position there (person heights, radians)."""
 
@@ -33,7 +33,7 @@ class Pinhole:
     """A camera.
 
     Attributes:
-        parameters: (8,), see above.
+        parameters: (8,), in the order of `FOCAL` to `NORTH`.
         size: width and height of the picture, pixels.
     """
 

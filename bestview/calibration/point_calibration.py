@@ -34,7 +34,7 @@ class PointFit:
 
 
 def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> PointFit:
-    """Fit the homography of a camera to its marked points: least squares in the picture.
+    """Fit the homography of a camera to its marked points by least squares in the picture.
 
     Raises:
         CalibrationError: too few pairs, pairs on a line, pairs that contradict each other, or pairs above
@@ -65,7 +65,7 @@ def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> P
 def fit_cameras(
     cameras: Sequence[MarkedPoints], settings: PointSettings | None = None
 ) -> dict[str, PointFit]:
-    """Fit every camera; they must all see one floor from above.
+    """Fit all cameras, which must see one floor from above.
 
     Raises:
         CalibrationError: as `fit_points`; or one camera's floor is mirrored against the others'.
@@ -98,15 +98,15 @@ def _check(points: MarkedPoints) -> None:
     for place, words in ((points.image, "in the picture"), (points.floor, "on the floor")):
         if not np.isfinite(place).all():
             raise CalibrationError(f"camera {points.camera}: a point {words} is not a finite number")
-    seen, stood = (list(map(tuple, it.tolist())) for it in (points.image, points.floor))
-    for here, there, words in (
-        (seen, stood, "in the picture and two on the floor"),
-        (stood, seen, "on the floor and two in the picture"),
+    image, floor = (list(map(tuple, side.tolist())) for side in (points.image, points.floor))
+    for source, target, words in (
+        (image, floor, "in the picture and two on the floor"),
+        (floor, image, "on the floor and two in the picture"),
     ):
-        before: dict[tuple[float, ...], int] = {}
-        for second, spot in enumerate(here):
-            first = before.setdefault(spot, second)
-            if there[first] != there[second]:
+        first_index: dict[tuple[float, ...], int] = {}
+        for second, point in enumerate(source):
+            first = first_index.setdefault(point, second)
+            if target[first] != target[second]:
                 raise CalibrationError(
                     f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point {words}"
                 )

@@ -14,7 +14,10 @@ from bestview.geometry.ground_plane import foot_points
 Indices = NDArray[np.intp]
 
 LEAST_WEIGHT = 0.02
-"""Weight of a sample without movement: standing people add little information."""
+"""Weight of a sample without movement."""
+_WALKING_WEIGHT = 0.3
+"""Weight from which a sample counts as walking."""
+_MIN_WALKING_SAMPLES = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +25,11 @@ class WalkSamples:
     """One camera's boxes at some pulses.
 
     Attributes:
-        times: pulse of each, (S,), rising within a track.
-        track: index of the track in the walk, (S,).
-        boxes: left, top, right, bottom in pixels, (S, 4).
-        speed: movement of the box per frame, (S, 4) pixels.
-        weight: how much of a new place each is, (S,), 0 to 1.
+        times: (S,) pulse of each, rising within a track.
+        track: (S,) index of the track in the walk.
+        boxes: (S, 4) left, top, right, bottom in pixels.
+        speed: (S, 4) movement of the box per frame, pixels.
+        weight: (S,) movement per step in strides, at most 1: standing people add little information.
     """
 
     times: Floats
@@ -51,25 +54,28 @@ def sample_walk(walk: Walk, pulses: Floats, offset: float, step: int, stride: fl
 
     Args:
         walk: of one camera.
-        pulses: sampled, (T,), rising.
-        offset: the pulse at which the camera's frame 0 was taken.
+        pulses: (T,) rising.
+        offset: the pulse of the camera's frame 0.
         step: frames over which movement is measured, and between the pulses.
-        stride: the movement that is a new place, in box heights.
+        stride: movement with full weight, box heights.
     """
     times, track, boxes, speed = [np.empty(0)], [np.empty(0, np.intp)], [np.empty((0, 4))], [np.empty((0, 4))]
-    for number, it in enumerate(walk.tracks):
+    for number, walk_track in enumerate(walk.tracks):
         at = pulses[
-            np.searchsorted(pulses, it.first_frame + offset) : np.searchsorted(
-                pulses, it.end_frame - 1 + offset, "right"
+            np.searchsorted(pulses, walk_track.first_frame + offset) : np.searchsorted(
+                pulses, walk_track.end_frame - 1 + offset, "right"
             )
         ]
         before, after = (
-            np.clip(at - offset + way, it.first_frame, it.end_frame - 1) for way in (-step, step)
+            np.clip(at - offset + change, walk_track.first_frame, walk_track.end_frame - 1)
+            for change in (-step, step)
         )
         times.append(at)
         track.append(np.full(len(at), number))
-        boxes.append(it.at(at - offset))
-        speed.append((it.at(after) - it.at(before)) / np.maximum(after - before, 1e-9)[:, None])
+        boxes.append(walk_track.at(at - offset))
+        speed.append(
+            (walk_track.at(after) - walk_track.at(before)) / np.maximum(after - before, 1e-9)[:, None]
+        )
     joined = np.concatenate(boxes)
     rate = np.concatenate(speed)
     moved = np.hypot(*foot_points(rate).T) * step / np.maximum(joined[:, 3] - joined[:, 1], 1e-9)
@@ -79,14 +85,14 @@ def sample_walk(walk: Walk, pulses: Floats, offset: float, step: int, stride: fl
 
 @dataclass(frozen=True, slots=True)
 class CandidateMatches:
-    """All pairs of two cameras' samples of one pulse: each may be one person.
+    """All pairs of two cameras' samples of one pulse; each may be one person.
 
     Attributes:
-        here: sample of the one camera, (P,).
-        there: sample of the other, (P,).
-        pair: index of the pair of tracks, (P,), 0 to K - 1.
-        tracks: the two tracks of each pair, (K, 2).
-        weight: how much of a new place each is, (P,).
+        here: (P,) sample of the first camera.
+        there: (P,) sample of the second.
+        pair: (P,) index of the pair of tracks, 0 to K - 1.
+        tracks: (K, 2) the two tracks of each pair.
+        weight: (P,) the larger of both samples' weights.
     """
 
     here: Indices
@@ -97,7 +103,7 @@ class CandidateMatches:
 
 
 def candidate_matches(one: WalkSamples, other: WalkSamples) -> CandidateMatches:
-    """Pair every sample of the one camera with every sample of the other at the same pulse."""
+    """Pair every sample of one camera with every sample of the other at the same pulse."""
     order = np.argsort(other.times, kind="stable")
     sorted_times = other.times[order]
     low = np.searchsorted(sorted_times, one.times, "left")
@@ -117,7 +123,3 @@ def select_moving_samples(samples: WalkSamples, maximum: int) -> Indices:
     if len(walking) < _MIN_WALKING_SAMPLES:
         walking = np.arange(len(samples.times))
     return walking[:: max(1, -(-len(walking) // maximum))]
-
-
-_WALKING_WEIGHT = 0.3
-_MIN_WALKING_SAMPLES = 30

@@ -22,7 +22,7 @@ _FOCAL_ERROR = 0.01
 
 
 def prior_errors(camera: Pinhole, settings: WalkSettings) -> Floats:
-    """Return how unusual a camera is, (4,) standard deviations."""
+    """Compute the deviations of a camera's parameters from their priors: (4,) standard deviations."""
     parameters = camera.parameters
     return np.array(
         [
@@ -37,7 +37,7 @@ def prior_errors(camera: Pinhole, settings: WalkSettings) -> Floats:
 def height_errors(
     camera: Pinhole, feet: Floats, heights: Floats, weight: Floats, settings: WalkSettings
 ) -> Floats:
-    """Return robust errors of people's apparent heights, (N,) standard deviations."""
+    """Compute robust errors of people's apparent heights: (N,) standard deviations."""
     with np.errstate(invalid="ignore", divide="ignore"):
         log_ratio = np.log(camera.heights(feet) / heights)
     log_ratio = np.where(np.isfinite(log_ratio), log_ratio, _OFF_FLOOR_ERROR) / settings.person_height_spread

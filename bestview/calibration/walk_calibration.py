@@ -32,16 +32,16 @@ class CameraCalibration:
 
     Attributes:
         camera: its name.
-        floor: number of its floor; cameras with one number share one.
-        homography: its pixels to the floor, (3, 3), a person being `person` tall.
-        offset: the pulse at which its frame 0 was taken, frames, against the first camera of its floor.
-        offset_error: the standard error of the offset, frames.
-        image: foot points that another camera saw too, (N, 2) pixels.
-        position: mean of both cameras' positions of them, (N, 2) on the floor.
+        floor: number of its floor, shared by the cameras of one group.
+        homography: (3, 3) from its pixels to the floor, in the unit of `person`.
+        offset: pulse of its frame 0, relative to the first camera of its floor, frames.
+        offset_error: standard error of the offset, frames.
+        image: (N, 2) foot points that were matched with another camera, pixels.
+        position: (N, 2) mean of both cameras' positions of them on the floor.
         heights: distance between both positions on the floor, in person heights.
-        picture: distance of the other's position in this picture, as a share of its diagonal.
-        thirds: share of these foot points in the left, middle and right third of the picture, (3,).
-        depth_ratio: how many times as tall the nearest of them appear as the farthest.
+        picture: distance of the other's position, projected into this picture, as a share of its diagonal.
+        thirds: (3,) share of these foot points in the left, middle and right third of the picture.
+        depth_ratio: apparent height of the nearest of them over that of the farthest.
     """
 
     camera: str
@@ -59,7 +59,7 @@ class CameraCalibration:
 
 @dataclass(frozen=True, slots=True)
 class UncalibratedCamera:
-    """A camera without a place on a floor, and why."""
+    """A camera that could not be placed on a floor, and why."""
 
     camera: str
     reason: str
@@ -67,7 +67,7 @@ class UncalibratedCamera:
 
 @dataclass(frozen=True, slots=True)
 class WalkCalibration:
-    """Result of a calibration.
+    """Calibration of all cameras.
 
     Attributes:
         cameras: those that could be placed, in the order given.
@@ -85,19 +85,19 @@ class WalkCalibration:
 def calibrate_from_walks(
     walks: Sequence[Walk], settings: WalkSettings | None = None, person: float = 1.75
 ) -> WalkCalibration:
-    """Calibrate cameras on one floor from what they saw of people who walked about while all of them ran.
+    """Calibrate cameras on common floors from the tracks of people who walked through their views.
 
     Args:
-        walks: one for each camera, two at least.
+        walks: of each camera, at least two.
         settings: of the comparison.
         person: how tall people are in the unit of the floor.
 
     Raises:
-        CalibrationError: no two cameras could be placed on one floor, or not all at once; the text says why.
+        CalibrationError: no two cameras could be placed on one floor, or one agrees with none of its floor.
     """
     settings = settings or WalkSettings()
     if len(walks) < 2:  # noqa: PLR2004 — two cameras
-        raise CalibrationError("a walk takes two cameras at least, which see the same floor")
+        raise CalibrationError("at least two cameras that see the same floor are needed")
     pairs = align_camera_pairs(walks, settings)
     groups = group_cameras(walks, pairs, settings)
     if not groups:
@@ -105,21 +105,23 @@ def calibrate_from_walks(
     grouped = {number for group in groups for number in group.members}
     left_out = []
     for number in sorted(set(range(len(walks))) - grouped):
-        best = max((it for it in pairs if number in (it.one, it.other)), key=_alignment_merit)
+        best = max((pair for pair in pairs if number in (pair.one, pair.other)), key=_alignment_merit)
         left_out.append(UncalibratedCamera(walks[number].camera, _rejection_text(walks, best, settings)))
-    offset_errors = [offset_standard_errors(it.rig, it.samples, it.matches, settings) for it in groups]
+    offset_errors = [
+        offset_standard_errors(group.rig, group.samples, group.matches, settings) for group in groups
+    ]
     calibrated = [
         _camera(walks[number].camera, floor, group, place, errors, person)
         for floor, (group, errors) in enumerate(zip(groups, offset_errors, strict=True))
         for place, number in enumerate(group.members)
     ]
     order = {walk.camera: number for number, walk in enumerate(walks)}
-    off = [_correspondence_errors(group, it, it.other) for group in groups for it in group.matches]
+    off = [_correspondence_errors(group, match, match.other) for group in groups for match in group.matches]
     return WalkCalibration(
-        tuple(sorted(calibrated, key=lambda it: order[it.camera])),
+        tuple(sorted(calibrated, key=lambda calibration: order[calibration.camera])),
         tuple(left_out),
-        _summarize([it.heights for it in off]),
-        _summarize([it.picture for it in off]),
+        _summarize([pair_errors.heights for pair_errors in off]),
+        _summarize([pair_errors.picture for pair_errors in off]),
     )
 
 
@@ -133,27 +135,38 @@ class _CorrespondenceErrors:
     position: Floats
 
 
-def _correspondence_errors(group: CameraGroup, it: Correspondences, own: int) -> _CorrespondenceErrors:
-    """Compute the errors of one of the two cameras of some correspondences."""
-    index, across, there = (it.here, it.other, it.there) if own == it.one else (it.there, it.one, it.here)
+def _correspondence_errors(group: CameraGroup, match: Correspondences, own: int) -> _CorrespondenceErrors:
+    """Compute the errors of camera `own` of some correspondences."""
+    index, across, there = (
+        (match.here, match.other, match.there) if own == match.one else (match.there, match.one, match.here)
+    )
     camera = group.rig.cameras[own]
     image = group.samples[own].feet[index]
-    mine = camera.floor(image)
-    other = group.rig.cameras[across].floor(group.samples[across].feet[there])
-    aside = np.hypot(*(camera.picture(other) - image).T) / np.hypot(*camera.size)
-    return _CorrespondenceErrors(np.hypot(*(mine - other).T), aside, image, (mine + other) / 2)
+    position = camera.floor(image)
+    other_position = group.rig.cameras[across].floor(group.samples[across].feet[there])
+    picture_error = np.hypot(*(camera.picture(other_position) - image).T) / np.hypot(*camera.size)
+    return _CorrespondenceErrors(
+        np.hypot(*(position - other_position).T), picture_error, image, (position + other_position) / 2
+    )
 
 
 def _camera(
     name: str, floor: int, group: CameraGroup, own: int, errors: Floats, person: float
 ) -> CameraCalibration:
-    off = [_correspondence_errors(group, it, own) for it in group.matches if own in (it.one, it.other)]
-    image, place = np.concatenate([it.image for it in off]), np.concatenate([it.position for it in off])
+    off = [
+        _correspondence_errors(group, match, own)
+        for match in group.matches
+        if own in (match.one, match.other)
+    ]
+    image, place = (
+        np.concatenate([pair.image for pair in off]),
+        np.concatenate([pair.position for pair in off]),
+    )
     if not len(image):
-        raise CalibrationError(f"{name}: on one floor with all others it agrees with none: try without it")
+        raise CalibrationError(f"{name}: agrees with no other camera of its floor: calibrate without it")
     tall = group.rig.cameras[own].heights(image)
     third = np.clip((3 * image[:, 0] / group.rig.cameras[own].size[0]).astype(int), 0, 2)
-    left, middle, right = (float(it) for it in np.bincount(third, minlength=3) / max(1, len(third)))
+    left, middle, right = (float(share) for share in np.bincount(third, minlength=3) / max(1, len(third)))
     shift = np.array([floor * _FLOOR_DISTANCE, 0.0])
     moved = np.eye(3)
     moved[:2, 2] = shift * person
@@ -166,8 +179,8 @@ def _camera(
         offset_error=float(errors[own]),
         image=image,
         position=(place + shift) * person,
-        heights=_summarize([it.heights for it in off]),
-        picture=_summarize([it.picture for it in off]),
+        heights=_summarize([pair.heights for pair in off]),
+        picture=_summarize([pair.picture for pair in off]),
         thirds=(left, middle, right),
         depth_ratio=float(np.nanquantile(tall, 0.95) / np.nanquantile(tall, 0.05)),
     )

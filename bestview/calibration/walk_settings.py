@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class WalkSettings:
-    """How people's foot points are compared, and when that is enough for a calibration.
+    """Settings of the comparison of foot points, and thresholds that a calibration must reach.
 
     Lengths are in person heights, angles in radians.
 
@@ -15,38 +15,38 @@ class WalkSettings:
         ValueError: a setting that is not above 0, or `maximum_offset` below it.
     """
 
-    # Frames that a camera may be early or late against another; 0: they are in step.
+    # Largest time offset between two cameras, frames; 0: they are synchronized.
     maximum_offset: int = 75
-    # Frames between the moments at which feet are compared.
+    # Frames between the pulses that are compared.
     step: int = 5
-    # How well boxes find the feet, standard deviations in box heights, and on the floor in person heights.
+    # Standard deviations of foot points: in box heights, and on the floor in person heights.
     foot_sideways: float = 0.05
     foot_upwards: float = 0.15
     foot_floor: float = 0.15
-    # Feet within so many standard deviations of each other may be one person's.
+    # Distance in standard deviations within which two foot points may be of one person ...
     gate: float = 2.0
-    # ... and within so many they surely stand at one place, once the cameras are where they should be.
+    # ... and the same once the cameras are aligned.
     final_gate: float = 1.0
-    # How much people's boxes differ in height: standard deviation of the logarithm.
+    # Spread of the heights of people's boxes: standard deviation of the logarithm.
     person_height_spread: float = 0.1
-    # What cameras are usually like: focal length in picture widths, and how far it may be from that (standard
-    # deviation of the logarithm); the same of the ratio of a pixel's sides, of the roll, and of the height.
+    # Priors of cameras: focal length in picture widths, and its spread (standard deviation of the logarithm);
+    # spread of the ratio of a pixel's sides, and of the roll; height and its spread.
     focal: float = 0.85
     focal_spread: float = 0.35
     aspect_spread: float = 0.02
     roll_spread: float = 0.05
     camera_height: float = 2.0
     camera_height_spread: float = 1.0
-    # Two cameras belong together if they agree at so many places at least (a place is `stride` from the one
-    # before), about so large a share of all that both could see, and so many times as well as they do when
-    # the other's walk is run backwards, or its second half first.
+    # Two cameras are placed on one floor if they agree at this many places (`stride` apart), if this share of
+    # the samples that both could see is matched, and if they agree this many times as well as with the walk
+    # of one reversed in time or its halves swapped.
     minimum_places: float = 12.0
     stride: float = 0.15
     minimum_share: float = 0.45
     minimum_over_chance: float = 1.5
-    # ... and have people at one place to within this (median).
+    # Largest median distance between their positions of a person.
     maximum_error: float = 0.25
-    # A walk less broad than this is a line (standard deviation of its places across its main direction).
+    # Standard deviation of the walk across its main direction, below which it is a straight line.
     minimum_breadth: float = 0.25
 
     def __post_init__(self) -> None:

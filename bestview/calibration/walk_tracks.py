@@ -1,4 +1,4 @@
-"""Walks: the tracks of people who walked about, as one camera saw them."""
+"""Walks: tracks of walking people in one camera."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class WalkTrack:
 
     Attributes:
         first_frame: the frame of the first box.
-        boxes: left, top, right, bottom in pixels, (F, 4); NaN where unseen or unusable.
+        boxes: (F, 4) left, top, right, bottom in pixels; NaN: not detected, or unusable.
     """
 
     first_frame: int
@@ -58,7 +58,7 @@ class Walk:
     @property
     def end_frame(self) -> int:
         """The frame after the last one with a person."""
-        return max((it.end_frame for it in self.tracks), default=0)
+        return max((track.end_frame for track in self.tracks), default=0)
 
 
 def build_walk(
@@ -69,18 +69,18 @@ def build_walk(
     boxes: Floats,
     step: int = 5,
 ) -> Walk:
-    """Build tracks from the rows of a file, without the boxes that the picture's edge cuts off.
+    """Build the walk of a camera from rows of detections, without boxes that the picture's edge cuts off.
 
-    Boxes are averaged over about a step, so that a lifted foot is not a movement aside.
+    Boxes are averaged over about a step, so that lifted feet do not count as movement.
 
     Args:
         camera: its name.
         size: width and height of its picture, pixels.
-        frames: the frame of each row, (N,).
-        ids: the track of each row, (N,).
-        boxes: left, top, right, bottom of each row in pixels, (N, 4).
-        step: frames in which nobody walks far, as in `WalkSettings`. Longer gaps split a track; the boxes of
-            shorter ones are interpolated.
+        frames: (N,) the frame of each row.
+        ids: (N,) the track of each row.
+        boxes: (N, 4) left, top, right, bottom of each row in pixels.
+        step: frames over which boxes are averaged, as in `WalkSettings`. Longer gaps split a track; the boxes
+            of shorter ones are interpolated.
     """
     frame, track_id = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
     inside = ~boxes_at_edge(boxes, size)
@@ -88,10 +88,10 @@ def build_walk(
     for number in np.unique(track_id):
         rows = np.flatnonzero((track_id == number) & inside)
         rows = rows[np.argsort(frame[rows], kind="stable")]
-        # A long gap splits a track: the person may have been confused with another.
+        # Across a long gap the tracker may have confused people.
         parts = np.split(rows, np.flatnonzero(np.diff(frame[rows]) > step) + 1)
         tracks += [_track(frame[part], boxes[part], step) for part in parts if len(part) > 1]
-    return Walk(camera, size, tuple(sorted(tracks, key=lambda it: (it.first_frame, it.end_frame))))
+    return Walk(camera, size, tuple(sorted(tracks, key=lambda track: (track.first_frame, track.end_frame))))
 
 
 def boxes_at_edge(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
@@ -125,7 +125,8 @@ def _moving_average(boxes: Floats, half: int) -> Floats:
 def time_reversed(walk: Walk) -> Walk:
     """Return the walk with time running backwards, within the same frames."""
     return replace(
-        walk, tracks=tuple(WalkTrack(walk.end_frame - it.end_frame, it.boxes[::-1]) for it in walk.tracks)
+        walk,
+        tracks=tuple(WalkTrack(walk.end_frame - track.end_frame, track.boxes[::-1]) for track in walk.tracks),
     )
 
 
@@ -133,8 +134,12 @@ def halves_swapped(walk: Walk) -> Walk:
     """Return the walk with its second half before its first."""
     half = walk.end_frame // 2
     parts = []
-    for it in walk.tracks:
-        cut = min(max(half - it.first_frame, 0), len(it.boxes))
-        parts += [WalkTrack(it.first_frame + walk.end_frame - half, it.boxes[:cut])] if cut > 1 else []
-        parts += [WalkTrack(it.first_frame + cut - half, it.boxes[cut:])] if len(it.boxes) - cut > 1 else []
+    for track in walk.tracks:
+        cut = min(max(half - track.first_frame, 0), len(track.boxes))
+        parts += [WalkTrack(track.first_frame + walk.end_frame - half, track.boxes[:cut])] if cut > 1 else []
+        parts += (
+            [WalkTrack(track.first_frame + cut - half, track.boxes[cut:])]
+            if len(track.boxes) - cut > 1
+            else []
+        )
     return replace(walk, tracks=tuple(parts))

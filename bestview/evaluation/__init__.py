@@ -1,4 +1,4 @@
-"""Evaluation of view selections: ground truth of view quality, the offline optimum, and scores beside it."""
+"""Evaluation of view selections: ground truth of view quality, offline optimum, and scores."""
 
 from bestview.evaluation.ground_truth import (
     NO_PERSON,

@@ -19,8 +19,8 @@ class ViewGroundTruth:
     """True quality of every view of K people, N frames, C cameras.
 
     Attributes:
-        cost: (K, N, C) float64, view cost in [0, 1]: the share of the best view's size quality that the view
-            lacks; 1 where the person is not visible.
+        cost: (K, N, C) float64, view cost in [0, 1]: 1 minus the view's size quality over that of the best
+            view; 1 where the person is not visible.
         visible: (K, N, C) bool, where the person really is visible.
     """
 
@@ -49,7 +49,7 @@ def view_ground_truth(
         shown: (K, N, C) the share of each person that shows, in [0, 1]; negative where it is not known,
             which counts as all of it.
         sizes: (C, 2) width and height of each camera's picture, pixels.
-        minimum_visible_share: in [0, 1]; 0: everybody with a box is visible.
+        minimum_visible_share: in [0, 1]; 0: everyone with a box is visible.
 
     Raises:
         ValueError: shapes that do not fit, or a picture without area.
@@ -64,9 +64,9 @@ def view_ground_truth(
 
 
 def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int64]:
-    """Compute the exact offline optimum of section III: the whole recording is known, a cut may be anywhere.
+    """Compute the exact offline optimum of section III: the whole recording is known, every cut is allowed.
 
-    Frames that are not evaluated are left out: those around such a gap are taken as neighbors.
+    Frames that are not evaluated are left out; the frames around such a gap count as neighbors.
 
     Returns:
         (K, N) camera indices; -1 in frames that are not evaluated.
@@ -78,13 +78,13 @@ def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int6
     for person_views, evaluated, cost in zip(views, truth.evaluated, truth.cost, strict=True):
         frames = int(np.count_nonzero(evaluated))
         anywhere = np.ones(frames, dtype=bool)
-        person_views[evaluated] = select_views(cost[None, evaluated], _UNKNOWN, switch_cost, anywhere).views[
-            0
-        ]
+        person_views[evaluated] = select_views(
+            cost[None, evaluated], _NO_PREVIOUS_VIEW, switch_cost, anywhere
+        ).views[0]
     return views
 
 
-_UNKNOWN = np.array([NO_CAMERA])
+_NO_PREVIOUS_VIEW = np.array([NO_CAMERA])
 
 
 def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""Scores of a view selection, beside the offline optimum."""
+"""Scores of a view selection, relative to the offline optimum."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bestview.view_selection import NO_CAMERA, NO_VIEW_COST
 
 _SECONDS_PER_MINUTE = 60.0
 _ROUNDING = 1e-9
-"""Frames: costs that differ by less are sums in another order."""
+"""Difference of costs, in frames, below which they are equal but for the order of summation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +21,14 @@ class ViewScore:
 
     Attributes:
         frames: object-frames that count.
-        agreement: share of them in which the choice is the optimum's.
-        regret: extra cost over the optimum's, as a share of item (0: as good; infinite: the optimum is free).
+        agreement: share of them in which the selection equals the optimum.
+        regret: extra cost over the optimum's, as a share of it (0: as good; infinite: the optimum costs 0).
         visible: share of them in which the object is visible in the chosen camera.
-        chosen: share of them in which there is a choice at all.
+        chosen: share of them in which a camera is chosen.
         cuts_per_minute: cuts per minute of an object's stream.
         optimum_cuts_per_minute: the same for the optimum.
         shortest_shot: frames between the closest two cuts; 0 where there are fewer than two.
-        cost: of the choice, in frames of not seeing the object; `regret` compares item with the next.
+        cost: of the selection, in frames without the object; `regret` compares it with the next.
         optimum_cost: of the optimum.
     """
 
@@ -68,8 +68,8 @@ def score_views(
     """Score `views` against the exact offline optimum of section III over the whole recording.
 
     Frames in which no camera could show the object are left out, of the selection and of the optimum alike;
-    the frames around such a gap are taken as neighbors. A frame without a view costs 1, and no cut is counted
-    to item or from item to the camera before.
+    the frames around such a gap count as neighbors. A frame without a view costs 1, and returning from it to
+    the camera before is no cut.
 
     Args:
         cost: (K, N, C) true view cost in [0, 1] per object, frame and camera.
@@ -139,13 +139,13 @@ def _object_totals(
 
 
 def _share(extra: float, whole: float) -> float:
-    """Return a part of the whole; of a whole that is 0 but for rounding, 0 or infinity."""
+    """Return `extra` as a share of `whole`; of a whole that is 0 but for rounding, 0 or infinity."""
     if whole > _ROUNDING:
         return float(extra / whole)
     return float("inf") if extra > _ROUNDING else 0.0
 
 
 def cut_frames(views: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the frames at which (F,) views change the camera; to a frame without a view is no change."""
+    """Return the frames at which (F,) views change the camera; frames without a view are skipped."""
     selected = np.flatnonzero(views >= 0)
     return np.asarray(selected[1:][views[selected[1:]] != views[selected[:-1]]])

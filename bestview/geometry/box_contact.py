@@ -25,11 +25,11 @@ def boxes_touching_others(
 
     Args:
         boxes: (V, 4) pixels, without hidden ones.
-        picture: (V,) picture that each is in.
+        picture: (V,) index of the picture of each.
         others: (B, 4) likewise.
-        other_pictures: (B,) picture that each of these is in.
+        other_pictures: (B,) index of the picture of each.
         picture_count: how many pictures there are.
-        size: width and height of each, pixels.
+        size: width and height of each picture, pixels.
     """
     left, top, right, bottom = _cells(others, size)
     edges = np.zeros((picture_count, _ROWS + 1, _COLUMNS + 1), dtype=np.int64)

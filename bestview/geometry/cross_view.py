@@ -1,4 +1,4 @@
-"""Cross-view scoring: detections confirmed or doubted by what other cameras detect at the place."""
+"""Cross-view scoring: detection scores corrected by the detections of other cameras at the same place."""
 
 from __future__ import annotations
 
@@ -34,22 +34,16 @@ _OVERLAP_MARGIN = 0.25
 
 @dataclass(frozen=True, slots=True)
 class CrossViewSettings:
-    """How much a camera's detection scores follow what other cameras detect at the same pulse."""
+    """How much the detections of other cameras at the same pulse change a camera's detection scores."""
 
-    enabled: bool = True  # false: every camera tracks by what it sees itself
-    confirmation_boost: float = (
-        0.6  # share of the doubt in a box that another camera's very same one takes away
-    )
-    absence_penalty: float = (
-        0.2  # share of a box's score that is lost where another camera plainly sees nobody
-    )
-    gate_heights: float = 0.3  # how margin apart two cameras may see the same feet, in person heights
-    foot_sideways: float = 0.05  # how well boxes find the feet: standard deviation in box heights, across
-    foot_upwards: float = 0.15  # and up and down
-    minimum_occluder_score: float = 0.3  # least score of a box that may hide who is behind it
-    clear_view_share: float = (
-        0.5  # share of a body that must be in plain view for its absence to say anything
-    )
+    enabled: bool = True  # false: every camera keeps its own scores
+    confirmation_boost: float = 0.6  # share of 1 - score that is added for a certain confirmation
+    absence_penalty: float = 0.2  # share of the score that is lost if another camera clearly sees no person
+    gate_heights: float = 0.3  # distance at which feet in two cameras may be of one person, person heights
+    foot_sideways: float = 0.05  # standard deviations of foot points in box heights: across
+    foot_upwards: float = 0.15  # and along the line of sight
+    minimum_occluder_score: float = 0.3  # least score of a box that counts as an occluder
+    clear_view_share: float = 0.5  # visible share of a body above which its absence counts
 
     def __post_init__(self) -> None:
         for name in ("confirmation_boost", "absence_penalty", "minimum_occluder_score", "clear_view_share"):
@@ -96,10 +90,9 @@ def rescore_detections(
 ) -> Floats:
     """Return a camera's detection scores (K,), corrected by the detections of other cameras.
 
-    With `a` the confirmation by another camera that detects a person at the same ground point, and `d` the
-    evidence of one that has a clear view of an empty place, each the maximum over the cameras: `s +
-    confirmation_boost a (1 - s) - absence_penalty d s`. Cameras that are not given and boxes without ground
-    point change nothing.
+    ``s + confirmation_boost a (1 - s) - absence_penalty d s``, where `a` is the confirmation by a camera that
+    detects a person at the same ground point and `d` the evidence of a camera with a clear view of an empty
+    place, each the maximum over the cameras. Boxes without ground point keep their score.
     """
     confirmation, absence = np.zeros(detections.scores.shape), np.zeros(detections.scores.shape)
     for camera, other_detections in others:
@@ -119,9 +112,9 @@ def rescore_detections(
 
 
 def views_overlap(own: CameraGeometry, other: CameraGeometry) -> bool:
-    """Return whether the other camera sees ground that a camera sees, or nearly so.
+    """Return whether two cameras see common ground, within a margin.
 
-    Tested at points all over the camera's picture and below it as margin as boxes reach.
+    Tested on a grid over the camera's picture and a margin below it, as far as boxes may reach.
     """
     width, height = own.size
     x, y = np.meshgrid(
@@ -140,7 +133,7 @@ def _confirmation(
     other_detections: CameraDetections,
     settings: CrossViewSettings,
 ) -> Floats:
-    """Compute how surely the other camera detects a person at each box's ground point: (K,)."""
+    """Compute how certainly the other camera detects a person at each box's ground point: (K,), 0 to 1."""
     if not len(other_detections.scores):
         return np.zeros(detections.scores.shape)
     own_points, own_covariance = _foot_positions(own, detections.boxes, settings)
@@ -175,7 +168,7 @@ def _clear_absence(
     other_detections: CameraDetections,
     settings: CrossViewSettings,
 ) -> Floats:
-    """Compute how clearly the other camera would see each person: (K,), 0 to 1.
+    """Compute how clear the other camera's view of each person is: (K,), 0 to 1.
 
     Tested at points all over the body: inside the picture, outside ignored regions and not behind a detected
     box. Above the share `clear_view_share` of visible points it rises linearly to 1.
@@ -199,7 +192,7 @@ def _clear_absence(
 def _body_points(
     own: CameraGeometry, boxes: Floats, other: CameraGeometry, settings: CrossViewSettings
 ) -> Floats:
-    """Return points all over where the other camera would see each person: (K, P, 2), NaN: not in view."""
+    """Return points all over each person, projected into the other camera: (K, P, 2), NaN: behind it."""
     ground, _ = _foot_positions(own, boxes, settings)
     foot = from_ground(other.homography, ground)
     # The size of a pixel on the ground gives the height of the person in the other picture.

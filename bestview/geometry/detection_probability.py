@@ -1,4 +1,4 @@
-"""Detection probability by image position, learned from people whom other cameras see there."""
+"""Detection probability by image position, learned from people that other cameras see there."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _ROWS, _COLUMNS = 18, 32
 _SMOOTHING_CELLS = 3
 """Cells averaged in each direction: the accuracy of foot points."""
 _MIN_CAMERA_RATE = 0.5
-"""Least detection rate of a camera that the rates of its cells are compared with."""
+"""Lower bound of a camera's detection rate, to which the rates of its cells are compared."""
 _OCCLUSION_RATE, _OCCLUSION_MARGIN = 0.04, 0.02
 """Miss rate explained by occlusion alone, and the excess over it at which misses count in full."""
 
 
 class DetectionProbabilityMap:
-    """Estimates how likely each camera detects a person who stands at a place.
+    """Estimates the probability that a camera detects a person at a place in its picture.
 
     The probability at a place is ``(detections + w camera) / (trials + w)`` over the cells around it, with
-    `w` the `cell_prior_weight`, and the camera's ``(detections + v prior) / (trials + v)`` over all of its
-    picture, with `v` the `camera_prior_weight`.
+    `w` the `cell_prior_weight` and `camera` the probability over the whole picture, ``(detections + v prior)
+    / (trials + v)``, with `v` the `camera_prior_weight`.
 
     Args:
         cameras: C.
@@ -57,7 +57,7 @@ class DetectionProbabilityMap:
     def learn(
         self, camera: Ints, feet: Floats, detected: Mask, weight: Floats | float, retention: float
     ) -> None:
-        """Count trials: people who stand in a camera's view, and whether it detected them.
+        """Count trials: people in a camera's view, and whether it detected them.
 
         Args:
             camera: (V,) camera of each trial.
@@ -91,9 +91,9 @@ class DetectionProbabilityMap:
     def trust(self, camera: Ints, feet: Floats) -> Floats:
         """Return the probability that cameras (V,) show undetected people at (V, 2) pixels: (V,) in [0, 1].
 
-        ``min(p / max(own, 0.5), 1) · min(max((1 - own - 0.04) / 0.02, 0), 1)``, with `p` the probability
-        there and `own` that of the whole camera. A camera that detects nearly everybody misses only people
-        who are occluded.
+        ``min(p / max(c, 0.5), 1) · min(max((1 - c - 0.04) / 0.02, 0), 1)``, with `p` the probability at the
+        place and `c` that of the whole camera. A camera that detects almost everyone misses only people who
+        are occluded.
         """
         relative_rate = np.minimum(
             self.probability(camera, feet) / np.maximum(self._camera_rate, _MIN_CAMERA_RATE)[camera], 1.0

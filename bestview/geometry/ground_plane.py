@@ -16,14 +16,14 @@ _MAX_CONDITION = 1e12
 
 
 def validate_homography(matrix: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Return the homography (image pixels -> ground plane) as a (3, 3) float64 array, if it is one.
+    """Return a homography (image pixels -> ground plane) as a (3, 3) float64 array.
 
     Args:
-        matrix: anything that NumPy makes an array of.
+        matrix: anything that NumPy converts to an array.
         name: of the camera, for the message.
 
     Raises:
-        ValueError: in one line that names `name`: not 3x3, not finite numbers, or not invertible.
+        ValueError: not 3x3, not finite numbers, or not invertible. The message is one line with `name`.
     """
     try:
         homography = np.array(matrix, dtype=np.float64)
@@ -65,7 +65,7 @@ def to_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) -> N
     """Map image points to the ground plane: (..., 2) pixels -> (..., 2) ground units.
 
     A point on or above the horizon has no ground point and becomes NaN, as does a NaN point. The ground is
-    taken to lie below the horizon in the picture (a camera that is not upside down). Here and below, the
+    assumed below the horizon in the picture (a camera that is not upside down). Here and below, the
     homography is one for all, (3, 3), or has leading axes that broadcast: (..., 3, 3).
     """
     mapped = _homogeneous(homography, points)
@@ -80,7 +80,7 @@ def from_ground(homography: NDArray[np.float64], points: NDArray[np.float64]) ->
     """
     mapped = _homogeneous(np.asarray(np.linalg.inv(homography), dtype=np.float64), points)
     pixels = mapped[..., :2] / np.where(mapped[..., 2] != 0, mapped[..., 2], np.nan)[..., None]
-    # Behind the camera lines of sight meet the picture upside down: above the horizon.
+    # Points behind the camera are projected above the horizon.
     in_front = _depth(homography, _homogeneous(homography, pixels)) > 0
     return np.where(in_front[..., None], pixels, np.nan)
 
@@ -95,7 +95,7 @@ def horizon_row(homography: NDArray[np.float64], x: float) -> float | None:
 def shows_ground(homography: NDArray[np.float64], size: tuple[int, int]) -> bool:
     """Return whether any of a picture (width, height) lies below the horizon, and so can show the ground.
 
-    Nothing does if the camera is tilted past straight down, or hangs upside down: its ground ends below.
+    No part does if the camera is tilted beyond straight down, or is mounted upside down.
     """
     width, height = size
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
@@ -103,7 +103,7 @@ def shows_ground(homography: NDArray[np.float64], size: tuple[int, int]) -> bool
 
 
 def ground_handedness(homography: NDArray[np.float64]) -> int:
-    """Return how the ground's axes turn in the picture, below the horizon: 1 as its own, -1 against.
+    """Return whether the ground's axes have the same handedness as the picture's: 1, or -1 if mirrored.
 
     It is the same in every picture of a floor that is seen from above (Hartley and Zisserman, 2.4.1: the sign
     of a homography's Jacobian is that of its determinant over the third coordinate cubed).
@@ -129,9 +129,9 @@ def camera_height(homography: NDArray[np.float64], x: float) -> float | None:
 def feet_cut_off(
     boxes: NDArray[np.float64], picture_height: float | NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return whose feet the picture's lower edge cuts off: (..., 4), and heights that broadcast -> (...).
+    """Return which boxes' feet the picture's lower edge cuts off: (..., 4), heights that broadcast -> (...).
 
-    They have no ground point. A box that reaches beyond the edge was extrapolated, and is trusted.
+    They have no ground point. A box that reaches beyond the edge was extrapolated and counts as complete.
     """
     return np.asarray(np.abs(boxes[..., 3] / picture_height - 1.0) < _EDGE)
 
@@ -152,7 +152,7 @@ def foot_covariance(
     """Compute the covariance of each foot point on the ground: (..., 4) -> (..., 2, 2) ground units squared.
 
     Boxes are accurate to within `sideways` and `upwards` (standard deviations, shares of their height). On
-    the ground the latter is long and along the line of sight: distance is what a camera knows least.
+    the ground the latter is long and along the line of sight: distance is least certain.
     """
     height = boxes[..., 3] - boxes[..., 1]
     axes = (
@@ -180,7 +180,7 @@ def _homogeneous(homography: NDArray[np.float64], points: NDArray[np.float64]) -
 
 def _depth(homography: NDArray[np.float64], mapped: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the homogeneous third coordinate, signed so that it is positive below the horizon."""
-    # Far down the picture the y term rules the sign; a plan view (no y term) has no horizon.
+    # Far down the picture the y term determines the sign; a view from above (no y term) has no horizon.
     down = homography[..., 2, 1]
     sign = np.where(down != 0, np.sign(down), np.sign(mapped[..., 2]))
     return np.asarray(mapped[..., 2] * sign)

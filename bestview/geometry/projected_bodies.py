@@ -1,4 +1,4 @@
-"""Projection of people into cameras that do not detect them, from where other cameras see them stand."""
+"""Projection of people into cameras that do not detect them, from their positions in other cameras."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _SIDEWAYS, _UPWARDS = 0.05, 0.15
-"""Standard deviation of foot points in box heights, by which cameras that see one person are weighted."""
+"""Standard deviations of foot points in box heights, by which the cameras that see a person are weighted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class BodyEstimates:
     """Position and size of people at M moments, each one person in one frame.
 
     Attributes:
-        ground_point: (M, 2) ground units; NaN: no camera knows.
+        ground_point: (M, 2) ground units; NaN: unknown.
         height: (M,) in ground units, likewise.
         aspect_ratio: (M,) width of the box over its height, likewise.
         known_by: (M, C) whether that camera localized the person.
@@ -79,27 +79,27 @@ def estimate_bodies(
     return BodyEstimates(np.stack(mean[:2], axis=1), mean[2], mean[3], known_by)
 
 
-def project_feet(of: BodyEstimates, homographies: Floats) -> Floats:
+def project_feet(bodies: BodyEstimates, homographies: Floats) -> Floats:
     """Project foot points into each camera's picture, (M, C, 2) pixels; NaN: behind it, or unknown.
 
     Args:
-        of: M bodies.
+        bodies: M of them.
         homographies: (C, 3, 3) pixels -> ground.
     """
-    return from_ground(homographies, of.ground_point[:, None])
+    return from_ground(homographies, bodies.ground_point[:, None])
 
 
-def project_boxes(of: BodyEstimates, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
+def project_boxes(bodies: BodyEstimates, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
     """Project (V,) bodies into pictures in which their feet are at (V, 2) pixels: (V, 4) boxes.
 
     Args:
-        of: M bodies.
-        moment: (V,) body of each.
+        bodies: M of them.
+        moment: (V,) index of the body of each view.
         foot: (V, 2) pixels.
-        homographies: (V, 3, 3) pixels -> ground, of the camera of each.
+        homographies: (V, 3, 3) pixels -> ground, of each view's camera.
     """
     x, y = foot[:, 0], foot[:, 1]
     pixel = person_heights(homographies, np.stack([x, y - 1.0, x, y], axis=1))
-    height = of.height[moment] / pixel
-    half_width = height * of.aspect_ratio[moment] / 2.0
+    height = bodies.height[moment] / pixel
+    half_width = height * bodies.aspect_ratio[moment] / 2.0
     return np.stack([x - half_width, y - height, x + half_width, y], axis=1)

@@ -68,7 +68,7 @@ class ViewQuality:
 def compute_view_quality(tracks: TrackWindow, layout: CameraLayout, settings: QualitySettings) -> ViewQuality:
     """Multiply all terms: the product over the terms *t* of ``1 - weight (1 - t)``.
 
-    A product, since no term makes up for another: a person who is covered is not seen, however large. The
+    A product, since no term compensates for another: an occluded person is not visible, however large. The
     weight is the largest share by which a term can lower the quality.
 
     Raises:

@@ -24,7 +24,7 @@ def areas_inside_picture(boxes: Floats, pictures: Floats) -> Floats:
 
 
 def areas(boxes: Floats) -> Floats:
-    """Return the area of each box, (..., 4) -> (...); 0 where its sides are the wrong way round."""
+    """Return the area of each box, (..., 4) -> (...); 0 where its sides are in reverse order."""
     width, height = boxes[..., 2] - boxes[..., 0], boxes[..., 3] - boxes[..., 1]
     return np.asarray(np.maximum(width, 0.0) * np.maximum(height, 0.0))
 
@@ -78,7 +78,7 @@ def centering_score(boxes: Floats, pictures: Floats) -> Floats:
 
 
 def visible_share(boxes: Floats, pictures: Floats) -> Floats:
-    """Return the share of the person inside the picture, as far as the box tells.
+    """Estimate the share of the person inside the picture from the box.
 
     ``area(box in picture) / area(box)``, times ``1 - 0.05 n`` for the nearer of the upper and lower edge,
     times ``1 - n (1 - min(width / (0.37 height), 1))`` for the nearer side edge, with `n` how near it is:

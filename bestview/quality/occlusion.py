@@ -1,4 +1,4 @@
-"""Occlusion term of view quality: the share of a person that other people leave visible."""
+"""Occlusion term of view quality: the share of a person that other people do not cover."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bestview.quality.framing import Floats, area_shares
 Ints = NDArray[np.int64]
 
 _FOOT_TOLERANCE = 0.05
-"""Heights by which feet must be lower to be nearer for sure: the accuracy of foot points."""
+"""Heights by which feet must be lower to be certainly nearer: the accuracy of foot points."""
 
 _FULLY_VISIBLE_SHARE = 0.5
 """Uncovered share of a box from which a person counts as fully visible: people do not fill their boxes."""
@@ -19,8 +19,8 @@ _FULLY_VISIBLE_SHARE = 0.5
 def unoccluded_share(boxes: Floats, cameras: Ints) -> Floats:
     """Return twice the share of each box that no nearer person covers, at most 1.
 
-    Lower feet in the picture are nearer. With *a* the covered share of the box and *p*, in [0, 1], how surely
-    the other person is nearer, the share left is the product of ``1 - p a`` over all others in the picture,
+    Lower feet in the picture are nearer. With *a* the covered share of the box and *p*, in [0, 1], the
+    certainty that the other person is nearer, the share left is the product of ``1 - p a`` over all others,
     in the tracks' order. ``p = 1/2 + d / 0.1`` within [0, 1], where *d* is how much lower their feet are, in
     heights of the larger of the two boxes.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class QualitySettings:
-    """For each term, the largest share of a view's quality that it can take away: 0 to 1.
+    """Weights of the terms: the largest share by which each can lower a view's quality, 0 to 1.
 
     0 leaves the term out; with ``size`` 1 and all others 0 the quality is the paper's (as a length).
 
@@ -16,13 +16,13 @@ class QualitySettings:
     """
 
     size: float = 1.0  # how large the person is in the picture
-    truncation: float = 1.0  # how much of the person the picture's edges leave
-    occlusion: float = 0.25  # how much of the person other people leave to be seen
-    centering: float = 0.0  # how near the middle of the picture
-    sharpness: float = 0.0  # how much detail there is
-    facing: float = 0.0  # walking towards the camera, not away from it; needs the ground
-    confidence: float = 0.0  # how surely the track is there: mean score over its window, 0 where hidden
-    relative: bool = True  # a view's cost is measured by the best view of the moment; false is the paper
+    truncation: float = 1.0  # share of the person inside the picture
+    occlusion: float = 0.25  # share of the person that other people do not cover
+    centering: float = 0.0  # how near the person is to the middle of the picture
+    sharpness: float = 0.0  # detail of the picture inside the box
+    facing: float = 0.0  # walking towards the camera; needs a homography
+    confidence: float = 0.0  # mean detection score of the track over its window, 0 where hidden
+    relative: bool = True  # cost relative to the best view of the same frame; false: as in the paper
 
     def __post_init__(self) -> None:
         for name, weight in self.weights.items():
@@ -34,7 +34,7 @@ class QualitySettings:
     @property
     def weights(self) -> dict[str, float]:
         """The weights by the terms' names, in the terms' order."""
-        return {it.name: getattr(self, it.name) for it in fields(self) if it.name != "relative"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "relative"}
 
     @property
     def terms(self) -> tuple[str, ...]:

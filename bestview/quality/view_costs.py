@@ -19,8 +19,8 @@ def view_cost(quality: Floats) -> Floats:
 def relative_quality(quality: Floats, axis: int) -> Floats:
     """Divide each view's quality by that of the best view of the same object in the same frame.
 
-    The best view then has quality 1 however far away everybody is, and the cost ``1 - quality`` is the share
-    of it that is lost: a cut has the same value in a narrow room and on a wide square.
+    The best view then has quality 1 however far away the person is, and the cost ``1 - quality`` is the share
+    of it that is lost: a cut has the same price in a narrow room and on a wide square.
 
     Args:
         quality: in [0, 1]; 0 where hidden.
@@ -34,7 +34,7 @@ def relative_quality(quality: Floats, axis: int) -> Floats:
 
 
 def relative_view_quality(quality: Floats, moment: NDArray[np.int64], moments: int) -> Floats:
-    """Divide by the best view's quality for a list of views.
+    """Divide each view's quality by that of the best view, for a list of views.
 
     Args:
         quality: (R,) of views, in [0, 1].
@@ -46,5 +46,5 @@ def relative_view_quality(quality: Floats, moment: NDArray[np.int64], moments: i
     """
     best = np.zeros(moments)
     np.maximum.at(best, moment, quality)
-    of = best[moment]
-    return np.asarray(quality / np.where(of > 0, of, 1.0))
+    best_quality = best[moment]
+    return np.asarray(quality / np.where(best_quality > 0, best_quality, 1.0))

@@ -21,17 +21,17 @@ class GopCosts:
         cost: S times (C, K), the sum over the GOP's frames; infinite: the camera cannot be shown. Objects are
             innermost: they are the long axis, so that every step of the program is one vector operation.
         frames: (S,) float64, how many frames each GOP stands for.
-        shows_nobody: S times (C, K), where a camera does not show the object; None where it is not needed.
+        hidden: S times (C, K), where a camera does not show the object; None where it is not needed.
     """
 
     cost: Sequence[NDArray[np.float64]]
     frames: NDArray[np.float64]
-    shows_nobody: Sequence[NDArray[np.bool_] | None]
+    hidden: Sequence[NDArray[np.bool_] | None]
 
     def for_people(self, people: NDArray[np.int64]) -> GopCosts:
         """Return the costs of some of the people, by index."""
-        shows_nobody = [None if gop is None else gop[:, people] for gop in self.shows_nobody]
-        return GopCosts([gop[:, people] for gop in self.cost], self.frames, shows_nobody)
+        hidden = [None if gop is None else gop[:, people] for gop in self.hidden]
+        return GopCosts([gop[:, people] for gop in self.cost], self.frames, hidden)
 
 
 def solve_dynamic_program(
@@ -95,7 +95,7 @@ def solve_with_minimum_shot(
     older shot allows more, so staying never costs more than cutting to the same camera.
 
     Args:
-        gops: with `shows_nobody`.
+        gops: with `hidden`.
         previous: (K,) the camera before the window; -1: none yet.
         shot_ages: (K,) its age, 1 to `minimum_shot_gops`.
         switch_cost: of one cut.
@@ -117,9 +117,9 @@ def solve_with_minimum_shot(
         next_age_cost = np.concatenate([next_cost[1:], next_cost[-1:]])  # a GOP older
         stay = cost[s] + next_age_cost
         leave = best + switch_cost < stay
-        blind = gops.shows_nobody[s]
-        if blind is not None:
-            leave[:-1] &= blind
+        hidden = gops.hidden[s]
+        if hidden is not None:
+            leave[:-1] &= hidden
         if s < decided_gops:
             leaves[s], cut_to[s], possible[s] = leave, np.argmin(cut_cost, axis=0), has_camera
         no_view_cost = NO_VIEW_COST * gops.frames[s]

@@ -1,4 +1,4 @@
-"""Views of people whom a camera does not detect: missed for a while, or inferred from other cameras."""
+"""Views of people that a camera does not detect: missed for a while, or inferred from other cameras."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def add_missed_detections(views: VisibleViews, last: LastDetections, decay_frame
     """Keep views of people who are not detected any more, with decaying quality.
 
     *n* frames after the last detection a view has ``1 - n / decay_frames`` of its quality, until the camera
-    detects the person again. Detectors miss people for moments, which should not cause cuts.
+    detects the person again. Detectors miss people for short times, which should not cause cuts.
 
     Args:
         views: detected ones.

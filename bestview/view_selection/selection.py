@@ -64,13 +64,13 @@ def select_views(
         cost: (K, N, C) c(n, b) per object, frame and camera; infinite: it cannot be shown.
         previous: (K,) b_(-1), the camera index just before the window; -1: none yet.
         switch_cost: lambda, the cost of one cut, in units of one frame's view cost.
-        cut_allowed: (N,) where a cut may happen; entry 0 says whether frame 0 may differ from `previous`.
+        cut_allowed: (N,) where a cut may happen; entry 0: whether frame 0 may differ from `previous`.
         minimum_shot_gops: least length of a shot in GOPs; up to 1 is the paper's program.
         shot_ages: (K,) for how many GOPs `previous` has been shown, at least 1; None: long enough to be left.
         weight: (N,) number of frames that each frame stands for, above 0; None: one. Above 1 for the last
             ones the window is extrapolated: a view that stays better is worth a cut then.
         decided_gops: for how many GOPs views are returned, at least 1; None: for all. Saves time where the
-            window moves on by one GOP and the rest is decided again.
+            window moves on by one GOP and later GOPs are decided again.
 
     Raises:
         ValueError: shapes that do not fit, a cost that is not a number, a negative switching cost, or a
@@ -96,7 +96,7 @@ def select_views(
         else np.zeros(objects)
     )
     if starts.size:
-        gops = _sum_by_gop(cost, frame_weights, starts, mark_empty=minimum_shot_gops > 1)
+        gops = _sum_by_gop(cost, frame_weights, starts, mark_hidden=minimum_shot_gops > 1)
         selected, gop_costs = select_views_by_gop(
             gops, previous, switch_cost, minimum_shot_gops, shot_ages, decided_gops
         )
@@ -148,7 +148,7 @@ def _check(
         raise ValueError(f"previous names a camera outside -1 .. {cameras - 1}")
     if not 0 <= switch_cost < np.inf:
         raise ValueError(f"the switching cost is {switch_cost}, not a number >= 0")
-    # min() is NaN when any entry is: one pass finds both defects.
+    # min() is NaN if any entry is: one pass checks both.
     if cost.size and not cost.min() > -np.inf:
         raise ValueError("a view cost is not a number, or minus infinity")
 
@@ -159,7 +159,7 @@ def _continue_running_gop(
     previous: NDArray[np.int64],
     views: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Fill in the GOP that started before the window: (K, R, C) costs of its rest; nothing can be decided.
+    """Fill in the GOP that started before the window, from (K, R, C) costs of its remaining frames.
 
     Returns:
         (K,) the cost of those views.
@@ -176,22 +176,22 @@ def _sum_by_gop(
     frame_weights: NDArray[np.float64],
     starts: NDArray[np.int64],
     *,
-    mark_empty: bool,
+    mark_hidden: bool,
 ) -> GopCosts:
     """Sum the (K, N, C) costs, weighted by frame, over each GOP that starts in the window."""
     by_frame = cost.transpose(1, 2, 0)
     first = int(starts[0])
     window, starts, frame_weights = by_frame[first:], starts - first, frame_weights[first:]
-    gop_costs, gops_without_object = [], []
+    gop_costs, hidden = [], []
     for start, end in pairwise([*starts.tolist(), len(window)]):
         # Frame after frame, so that the order of the sums does not depend on how many objects there are.
         total = _weighted(window[start], frame_weights[start])
         for n in range(start + 1, end):
             total = total + _weighted(window[n], frame_weights[n])
         gop_costs.append(total)
-        empty = window[start:end].min(axis=0) >= NO_VIEW_COST if mark_empty else None
-        gops_without_object.append(empty if empty is None else empty | np.isinf(total))
-    return GopCosts(gop_costs, np.add.reduceat(frame_weights, starts), gops_without_object)
+        not_shown = window[start:end].min(axis=0) >= NO_VIEW_COST if mark_hidden else None
+        hidden.append(None if not_shown is None else not_shown | np.isinf(total))
+    return GopCosts(gop_costs, np.add.reduceat(frame_weights, starts), hidden)
 
 
 def _weighted(cost: NDArray[np.float64], frames: float) -> NDArray[np.float64]:

@@ -37,7 +37,7 @@ class VisibleViews:
     person_count: int
     detected_count: int | None = None
 
-    def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats, *, mark_empty: bool) -> GopCosts:
+    def gops(self, first: int, starts: NDArray[np.bool_], weight: Floats, *, mark_hidden: bool) -> GopCosts:
         """Sum the costs over the GOPs of a window.
 
         A GOP costs ``sum of w(n) - sum of w(n) quality(n)``, each sum view after view; infinitely much if the
@@ -47,7 +47,7 @@ class VisibleViews:
             first: frame at which the window starts, which is the first of a GOP.
             starts: (M,) where GOPs start in the window; the first entry is true.
             weight: (M,) number of frames that each frame stands for.
-            mark_empty: whether to mark where a camera is known not to show the person.
+            mark_hidden: whether to mark where a camera is known not to show the person.
         """
         frames, cameras = len(weight), self.available.shape[1]
         gop = np.cumsum(starts) - 1
@@ -66,8 +66,8 @@ class VisibleViews:
             self.available[first : first + frames], np.flatnonzero(starts), axis=0
         )
         cost[unavailable] = np.inf
-        if not mark_empty:
+        if not mark_hidden:
             return GopCosts(list(cost), frame_weights, [None] * count)
         detected = cell if self.detected_count is None else cell[rows < self.detected_count]
-        empty = np.bincount(detected, minlength=cells).reshape(cost.shape) == 0
-        return GopCosts(list(cost), frame_weights, list(empty | unavailable[:, :, None]))
+        hidden = np.bincount(detected, minlength=cells).reshape(cost.shape) == 0
+        return GopCosts(list(cost), frame_weights, list(hidden | unavailable[:, :, None]))

@@ -89,13 +89,13 @@ class AffinityFusion:
         for row, tracklet in enumerate(tracklets):
             open_rows[tracklet.key.camera].append(row)
         for row, appearance in enumerate(
-            [it.appearance for it in tracklets] + [it.appearance for it in people]
+            [tracklet.appearance for tracklet in tracklets] + [person.appearance for person in people]
         ):
             for name, histogram in appearance.by_camera.items():
                 by_camera[name].append((row, histogram))
         appearances = []
-        for camera, seen in by_camera.items():
-            comparable = comparable_histograms(seen, len(tracklets))
+        for camera, histograms in by_camera.items():
+            comparable = comparable_histograms(histograms, len(tracklets))
             if len(comparable) > 1:
                 rows = np.array([row for row, _ in comparable], dtype=np.int64)
                 total = np.array([histogram.histogram_sum for _, histogram in comparable])

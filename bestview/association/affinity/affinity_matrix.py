@@ -1,4 +1,4 @@
-"""Affinity matrix: evidence about pairs of tracklets and people, sparse, in rows that come and go.
+"""Affinity matrix: sparse evidence about pairs of tracklets and people, with rows that come and go.
 
 The rows are the active tracklets, then the people with settled tracklets. Evidence is summed up update by
 update and never recomputed. Only pairs with more evidence than having been at different places at the same
@@ -102,8 +102,8 @@ class AffinityMatrix:
         self._cannot_link.set(first, second, np.ones((first.size, 1)))
 
     def forbid_merging(self, first: Sequence[RowKey], second: Sequence[RowKey]) -> None:
-        """Add cannot-links between each of some rows and each of some others."""
-        rows = [[self._row_of[it] for it in side if it in self._row_of] for side in (first, second)]
+        """Add cannot-links between every row of `first` and every row of `second`."""
+        rows = [[self._row_of[key] for key in side if key in self._row_of] for side in (first, second)]
         first_rows, second_rows = np.meshgrid(*(np.array(side, dtype=np.int64) for side in rows))
         self.add_cannot_links(first_rows.ravel(), second_rows.ravel())
 
@@ -112,7 +112,7 @@ class AffinityMatrix:
         return self._cannot_link.find(*self._names_of(first, second)) >= 0
 
     def any_cannot_link(self, first: Sequence[int], second: Sequence[int]) -> bool:
-        """Return whether there is a cannot-link between any of some rows and any of some others."""
+        """Return whether any row of `first` has a cannot-link to any row of `second`."""
         first_rows, second_rows = np.meshgrid(
             np.array(first, dtype=np.int64), np.array(second, dtype=np.int64)
         )
@@ -184,7 +184,9 @@ class AffinityMatrix:
         pairs = [(kept, lost) for kept, lost in pairs if lost in self._row_of]
         if not pairs:
             return
-        kept, lost = (np.array([self._row_of[it[side]] for it in pairs], dtype=np.int64) for side in (0, 1))
+        kept, lost = (
+            np.array([self._row_of[pair[side]] for pair in pairs], dtype=np.int64) for side in (0, 1)
+        )
         into = np.arange(len(self))
         into[lost] = kept
         self._merge_ground_evidence(into)
@@ -200,7 +202,9 @@ class AffinityMatrix:
         """Sum the ground evidence of merged rows; `into` (N,) is the row that each goes into."""
         # The rows merged into each row, itself included.
         order = np.argsort(into, kind="stable")
-        begin, end = (np.searchsorted(into[order], np.arange(into.size), side=it) for it in ("left", "right"))
+        begin, end = (
+            np.searchsorted(into[order], np.arange(into.size), side=side) for side in ("left", "right")
+        )
         size = end - begin
         first, second = into[self._rows_of(self._ground.first)], into[self._rows_of(self._ground.second)]
         touched = (size[first] > 1) | (size[second] > 1)

@@ -1,4 +1,4 @@
-"""Evidence from the order of tracklets: continued tracks, reappearances nearby, and impossible distances."""
+"""Evidence from the order of tracklets: continued tracks, reappearances, and impossible distances."""
 
 from __future__ import annotations
 
@@ -23,15 +23,17 @@ _IMPOSSIBLE_REACH = 2.0
 def continuation_evidence(tracklet: Tracklet, settings: IdentitySettings) -> float:
     """Compute the evidence that a tracklet is the same person as its predecessor in the track.
 
-    A confirmation by an operator is worth as much as the ground can say against it.
+    A confirmation by an operator weighs as much as the largest ground evidence against it.
     """
     if tracklet.confirmed_continuation:
         return settings.maximum_ground_evidence
-    worth = settings.continuation_evidence * np.exp(
+    evidence = settings.continuation_evidence * np.exp(
         -tracklet.crowd_frames_before / settings.continuation_decay_frames
     )
     return float(
-        worth if tracklet.gap <= settings.gap_frames else worth * np.exp(-tracklet.gap / _GAP_DECAY_FRAMES)
+        evidence
+        if tracklet.gap <= settings.gap_frames
+        else evidence * np.exp(-tracklet.gap / _GAP_DECAY_FRAMES)
     )
 
 
@@ -64,16 +66,16 @@ class EndpointArrays:
         cls, tracklets: Sequence[Tracklet], camera: NDArray[np.int64], calibrated: NDArray[np.bool_]
     ) -> EndpointArrays:
         """Build the arrays; (N,) `camera` and whether it is `calibrated`."""
-        begins, ends = [it.start for it in tracklets], [it.end for it in tracklets]
+        begins, ends = [tracklet.start for tracklet in tracklets], [tracklet.end for tracklet in tracklets]
         return cls(
             camera=camera,
             calibrated=calibrated,
-            first_frame=np.array([it.frame for it in begins], dtype=np.int64),
-            last_frame=np.array([it.frame for it in ends], dtype=np.int64),
-            start=np.array([it.box for it in begins]).reshape(-1, 4),
-            end=np.array([it.box for it in ends]).reshape(-1, 4),
-            start_ground=np.array([it.ground_point for it in begins]).reshape(-1, 2),
-            end_ground=np.array([it.ground_point for it in ends]).reshape(-1, 2),
+            first_frame=np.array([endpoint.frame for endpoint in begins], dtype=np.int64),
+            last_frame=np.array([endpoint.frame for endpoint in ends], dtype=np.int64),
+            start=np.array([endpoint.box for endpoint in begins]).reshape(-1, 4),
+            end=np.array([endpoint.box for endpoint in ends]).reshape(-1, 4),
+            start_ground=np.array([endpoint.ground_point for endpoint in begins]).reshape(-1, 2),
+            end_ground=np.array([endpoint.ground_point for endpoint in ends]).reshape(-1, 2),
         )
 
 
@@ -87,7 +89,7 @@ def reappearance_evidence(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Compare where one tracklet of a pair ends with where the other starts shortly afterwards.
 
-    The distance is measured in what a person can walk in that time: on the ground, or in box heights of the
+    The distance is relative to what a person can walk in that time: on the ground, or in box heights of the
     image if the camera has no homography.
 
     Args:
@@ -117,8 +119,8 @@ def reappearance_evidence(
     )
     share = distance / reach
     comparable = ~np.isnan(share)
-    worth = np.where(same_camera, settings.reappearance_evidence * np.maximum(1.0 - share, 0.0), 0.0)
-    evidence[pair[comparable]] = worth[comparable]
+    base_evidence = np.where(same_camera, settings.reappearance_evidence * np.maximum(1.0 - share, 0.0), 0.0)
+    evidence[pair[comparable]] = base_evidence[comparable]
     too_far[pair[comparable]] = share[comparable] > _IMPOSSIBLE_REACH
     return evidence, too_far
 

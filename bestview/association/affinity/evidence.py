@@ -54,11 +54,12 @@ class PairEvidence:
             walking_speed,
         )
         number_of = {camera: i for i, camera in enumerate(calibrated)}
-        self._camera = np.array([number_of[it.key.camera] for it in tracklets], dtype=np.int64)
-        ground = np.array([calibrated[it.key.camera] for it in tracklets], dtype=np.bool_)
+        self._camera = np.array([number_of[tracklet.key.camera] for tracklet in tracklets], dtype=np.int64)
+        ground = np.array([calibrated[tracklet.key.camera] for tracklet in tracklets], dtype=np.bool_)
         self._endpoints = EndpointArrays.of(tracklets, self._camera, ground)
         self._published_id = np.array(
-            [it.main_id for it in tracklets] + [it.person_id for it in people], dtype=np.int64
+            [tracklet.main_id for tracklet in tracklets] + [person.person_id for person in people],
+            dtype=np.int64,
         )
         self._continuation = self._continuations(tracklets, people)
 

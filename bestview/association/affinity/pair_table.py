@@ -48,7 +48,7 @@ class SparsePairTable:
         return self._at(_codes(first, second))
 
     def get(self, first: Ints, second: Ints) -> Floats:
-        """Return the values of (P,) pairs, (P, C); zeros where present is no entry."""
+        """Return the values of (P,) pairs: (P, C), zeros for pairs without an entry."""
         index = self.find(first, second)
         values = np.zeros((index.size, self.values.shape[1]))
         values[index >= 0] = self.values[index[index >= 0]]

@@ -1,4 +1,4 @@
-"""Appearance between cameras without common ground: all tracklets of two cameras compared at once."""
+"""Appearance evidence between cameras without common ground: all tracklets of two cameras are compared."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class CrossCameraAppearance:
                 rivals = affinity.cannot_link(row_of[camera][i], row_of[camera][j])
                 different_people.append(within[i[rivals], j[rivals]])
         self.equalizer.add_different_people(np.concatenate([np.zeros(0), *reversed(different_people)]))
-        scores = score_score_matrixs(
+        scores = score_pairs(
             cameras,
             [self._calibrated[names[camera.start]] for camera in cameras],
             distances_between,
@@ -153,7 +153,7 @@ class PairScores:
         )
 
 
-def score_score_matrixs(
+def score_pairs(
     cameras: Sequence[slice],
     calibrated: Sequence[bool],
     distances_between: Callable[[slice, slice], NDArray[np.float64]],
@@ -196,7 +196,7 @@ def _score_matrix(distances: NDArray[np.float64], gate: float) -> NDArray[np.flo
 
 
 def _unambiguous_pairs(gate_ratio: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return the pairs of the best assignment of (A, B) distances that no exchange comes close to."""
+    """Return the pairs of the best assignment of (A, B) distances for which no exchange is nearly as good."""
     rows, columns = gate_ratio.shape
     # Padded with the cost of a gate for rows and columns without a partner.
     square = np.ones((rows + columns, rows + columns))

@@ -15,7 +15,7 @@ from bestview.association.tracklet import Tracklet
 Floats = NDArray[np.float64]
 
 _CONTINUOUS_GAP = 3
-"""Gap in frames within which a continued track teaches how much one person's appearance varies."""
+"""Gap in frames within which a continued track shows how much one person's appearance varies."""
 _HISTORY_LIMIT = 500
 """Stored distances of each kind and camera."""
 
@@ -24,7 +24,7 @@ class DistanceScales:
     """Learns from active tracklets, and stores the distances of settled ones.
 
     Args:
-        frames: that a histogram needs to teach anything.
+        frames: that a histogram needs to be used.
     """
 
     def __init__(self, frames: int) -> None:
@@ -70,9 +70,9 @@ class DistanceScales:
         rows: Sequence[int],
         tracklets: Sequence[Tracklet],
         affinity: AffinityMatrix,
-        of: Collection[int],
+        selected_rows: Collection[int],
     ) -> tuple[Floats, Floats]:
-        """Return the distances of tracklets `of` to their predecessors, and to all that are other people."""
+        """Return the distances of selected tracklets to their predecessors, and to those of other people."""
         histograms = {
             row: histogram
             for row in rows
@@ -86,7 +86,7 @@ class DistanceScales:
         mean = np.array([histograms[row].mean for row in rows])
         distance = bhattacharyya_distances(mean, mean)
         row_of = np.array(rows, dtype=np.int64)
-        selected = np.isin(row_of, np.array(list(of), dtype=np.int64))
+        selected = np.isin(row_of, np.array(list(selected_rows), dtype=np.int64))
         same_person: list[float] = []
         for i in np.flatnonzero(selected).tolist():
             tracklet = tracklets[rows[i]]

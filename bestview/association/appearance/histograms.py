@@ -35,7 +35,7 @@ class MeanHistogram:
 
     @classmethod
     def of(cls, histogram: Floats, frames: int) -> MeanHistogram:
-        """Build it from the mean histogram (B,) of some frames; an invalid one counts no frames."""
+        """Build it from the (B,) mean histogram of `frames` frames; an invalid one counts as no frames."""
         total = float(histogram.sum())
         if not np.isfinite(total) or total <= 0 or float(histogram.min()) < 0:
             return cls(np.zeros_like(histogram), 0)
@@ -49,7 +49,7 @@ class MeanHistogram:
 
 @dataclass(slots=True)
 class PersonAppearance:
-    """Mean histograms of one person, by camera, from frames in which nobody else is in the box."""
+    """Mean histograms of one person, by camera, from frames in which no other person is in the box."""
 
     by_camera: dict[str, MeanHistogram] = field(default_factory=dict)
 
@@ -109,7 +109,7 @@ class HistogramEqualizer:
         """Return the distance below which two histograms are likely of one person.
 
         At most `maximum`, and at most `share` of the lower quartile of the distances between different
-        people: where everyone looks alike, appearance matches no one.
+        people: where all look alike, appearance decides nothing.
         """
         if len(self._different) < _ENOUGH_PAIRS:
             return maximum

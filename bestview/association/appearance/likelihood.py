@@ -18,7 +18,7 @@ _DEFAULT_DIFFERENT, _DEFAULT_SAME_SHARE, _MAXIMUM_SAME_SHARE = 0.2, 0.4, 0.6
 
 @dataclass(frozen=True, slots=True)
 class DistanceScale:
-    """What distances between histograms mean in a camera.
+    """Typical distances between histograms in a camera.
 
     Attributes:
         same_person: the typical distance between histograms of one person.
@@ -80,7 +80,7 @@ class CameraAppearances:
         rows: (K,) rising.
         histogram_sum: (K, B) sums of normalized histograms.
         frame_count: (K,) frames in them.
-        scale: what distances mean here.
+        scale: typical distances in this camera.
     """
 
     rows: Ints
@@ -114,7 +114,7 @@ def appearance_evidence(
     scale: DistanceScale,
     weights: AppearanceWeights,
 ) -> Floats:
-    """Compute appearance evidence: `typical` at one person's typical distance, minus it at others'.
+    """Compute appearance evidence: `typical` at one person's typical distance, its negative at two people's.
 
     It is linear in between and beyond, up to `maximum`. Histograms of fewer frames, (N,) `first_frames` and
     `second_frames`, than `full_weight_frames` weigh less.

@@ -19,9 +19,9 @@ class Merge:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Split:
-    """A track that a camera showed as `kept` turned out to be `split_off`, somebody else.
+    """A track that was published as person `kept` turned out to be another person, `split_off`.
 
-    `kept` is not necessarily seen any more: if two people exchanged their tracks, there are two splits.
+    Person `kept` may not be visible any more. If two people swapped tracks, there are two splits.
     """
 
     kept: int
@@ -36,7 +36,7 @@ class IdCorrections:
         self._last: dict[TrackletKey, int] = {}
 
     def update(self, person_ids: Mapping[TrackletKey, int], merged: Sequence[Merge]) -> tuple[Split, ...]:
-        """Compare the ids of the visible tracklets with their last ones; a merge is no split.
+        """Return the splits since the last update; merged ids are not splits.
 
         A tracklet without an id, whose new person is not confirmed yet, is compared once it has one.
         """
@@ -54,11 +54,11 @@ class IdCorrections:
         return tuple(sorted(splits))
 
     def split_off(self, keys: Iterable[TrackletKey], person_id: int) -> None:
-        """Take over ids that an operator assigned: they are no splits to report."""
+        """Store ids that an operator assigned, so that they are not reported as splits."""
         self._last.update((key, person_id) for key in keys if key in self._last)
 
     def reassign_each(self, changed: Mapping[TrackletKey, tuple[int, int]]) -> None:
-        """Take over ids that an operator assigned, given with the ids before and after."""
+        """Store ids that an operator assigned, given as ids before and after."""
         for key, (_, person_id) in changed.items():
             self.split_off([key], person_id)
 
@@ -74,25 +74,26 @@ def swap_tracks(
     frame: int,
     person_ids: tuple[int, int],
 ) -> dict[TrackletKey, tuple[int, int]]:
-    """Let each of two tracks continue, from a frame on, what the other one was before.
+    """Swap the people of two tracks from a frame on.
 
-    The tracklet that started in that frame or later becomes the other's person. If a track was not split
+    A tracklet that started in that frame or later becomes the other track's person. If a track was not split
     since, its next observation starts a new tracklet. Tracklets of other cameras that started since and were
-    taken for one of the two are swapped as well.
+    assigned to one of the two are swapped as well.
 
     Args:
         tracklets: of all tracks; changed in place.
         people: ids of the remembered people.
         tracks: of one camera.
-        frame: the first in which each of the two shows the other's person.
-        person_ids: of the people before it, for tracklets that are settled and over.
+        frame: the first in which each track shows the other's person.
+        person_ids: of the two tracks before that frame, for tracklets that are settled and over.
 
     Returns:
         The ids before and after of each changed tracklet; a track that is split only later counts as if a
         tracklet had started in that frame. Empty if one of the two had no id.
     """
     first, second = (
-        tracklets.predecessor(track, frame, number) for track, number in zip(tracks, person_ids, strict=True)
+        tracklets.predecessor(track, frame, person_id)
+        for track, person_id in zip(tracks, person_ids, strict=True)
     )
     if first is None or second is None:
         return {}
@@ -100,19 +101,19 @@ def swap_tracks(
     if not first_id or not second_id or first_id == second_id:
         return {}
     changed, already_wrong = {}, 0
-    for track, own_before, other_before, number in (
+    for track, predecessor, other_predecessor, person_id in (
         (tracks[0], first, second, second_id),
         (tracks[1], second, first, first_id),
     ):
         current = tracklets.started_since(track, frame)
-        previous_id = _id_of(own_before if current is None else current, people)
-        already_wrong += previous_id == first_id + second_id - number
-        if previous_id and previous_id != number:
-            changed[TrackletKey(*track, frame) if current is None else current.key] = previous_id, number
+        previous_id = _id_of(predecessor if current is None else current, people)
+        already_wrong += previous_id == first_id + second_id - person_id
+        if previous_id and previous_id != person_id:
+            changed[TrackletKey(*track, frame) if current is None else current.key] = previous_id, person_id
         if current is None:
-            tracklets.split_next(track, number, other_before)
+            tracklets.split_next(track, person_id, other_predecessor)
         else:
-            current.continue_as(number, other_before)
+            current.continue_as(person_id, other_predecessor)
     if already_wrong == len(tracks):
         for tracklet in tracklets.active:
             previous_id = tracklet.person_id
@@ -128,5 +129,5 @@ def swap_tracks(
 
 def _id_of(tracklet: Tracklet, people: Container[int]) -> int:
     """Return the person id of a tracklet, settled or not; 0: no remembered person."""
-    number = tracklet.settled_id or tracklet.person_id or tracklet.main_id
-    return number if number in people else 0
+    person_id = tracklet.settled_id or tracklet.person_id or tracklet.main_id
+    return person_id if person_id in people else 0

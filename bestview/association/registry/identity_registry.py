@@ -32,9 +32,9 @@ class IdentityUpdate:
             newest tracklet that has started.
         created: ids assigned for the first time.
         returned: ids of people who had departed and are back.
-        departed: ids of people whom no camera has seen for a while; they are remembered.
+        departed: ids of people that no camera has seen for a while; they are remembered.
         merged: ids that turned out to be one person.
-        split: ids that turned out to stand for somebody else.
+        split: tracks that turned out to show another person.
     """
 
     person_ids: Mapping[TrackletKey, int]
@@ -48,7 +48,7 @@ class IdentityUpdate:
 class IdentityRegistry:
     """Associates the cameras' tracks with persons, update by update.
 
-    Tracks are split into tracklets where a tracker may have confused people (`TrackletSplitter`). Pairs of
+    Tracks are split into tracklets where the tracker may have confused people (`TrackletSplitter`). Pairs of
     tracklets collect evidence of being one person: ground position, appearance, continuity and published ids.
     Every few frames all tracklets of the last seconds are clustered (`cluster`), where two that are seen
     simultaneously in one camera are two people, and each cluster gets the id that most of its frames were
@@ -86,7 +86,10 @@ class IdentityRegistry:
         self._people = PersonStore(settings, len(self._homographies))
         # Whether a person should be detected is only known for views in which people stand upright.
         self._ghost_check = GhostCheck(
-            {it: None if it in self._overhead else matrix for it, matrix in self._homographies.items()}
+            {
+                camera: None if camera in self._overhead else matrix
+                for camera, matrix in self._homographies.items()
+            }
         )
         self._pictures: Mapping[str, tuple[int, int]] = {}
         self._affinity = AffinityMatrix(settings)
@@ -114,18 +117,18 @@ class IdentityRegistry:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
         previous_frame, self._last_frame = self._last_frame, last_frame
         self._pictures = pictures or {}
-        seen = align_tracks(tracks, self._homographies, self._foot_error, self._overhead)
-        self._height_estimate.learn(seen.person_heights)
-        rows, settled = self._splitter.update(seen, {track.key: track.appearance for track in tracks})
+        observations = align_tracks(tracks, self._homographies, self._foot_error, self._overhead)
+        self._height_estimate.learn(observations.person_heights)
+        rows, settled = self._splitter.update(observations, {track.key: track.appearance for track in tracks})
         self._visible_settled_ids = np.unique(settled[settled > 0])
         # Each pair of track and person once, instead of once a frame.
         id_count = int(settled.max(initial=0)) + 1
         track, person_id = np.divmod(
             np.unique((np.arange(len(settled))[:, None] * id_count + settled)[settled > 0]), id_count
         )
-        cameras = [seen.keys[it].camera for it in track.tolist()]
-        self._people.add_sighting(zip(person_id.tolist(), cameras, strict=True), last_frame)
-        self._add_evidence(seen, rows, settled, last_frame)
+        cameras = [observations.keys[row].camera for row in track.tolist()]
+        self._people.add_sightings(zip(person_id.tolist(), cameras, strict=True), last_frame)
+        self._add_evidence(observations, rows, settled, last_frame)
         tracklets = self._splitter.active
         created: tuple[int, ...] = ()
         merged: tuple[Merge, ...] = ()
@@ -135,9 +138,9 @@ class IdentityRegistry:
         if clusters_now:
             created, merged = self._cluster(last_frame)
             published = {
-                it.key: it.person_id
-                for it in tracklets
-                if it.publish(last_frame - self._settings.publish_after)
+                tracklet.key: tracklet.person_id
+                for tracklet in tracklets
+                if tracklet.publish(last_frame - self._settings.publish_after)
             }
         returned, departed = self._people.update_presence(tracklets, last_frame)
         split = self._corrections.update(published, merged)
@@ -153,26 +156,30 @@ class IdentityRegistry:
         remembered.
 
         Returns:
-            The new person's id; None: none of the tracks is one of these people now.
+            The new person's id; None: none of the tracks shows one of these people now.
         """
         if self._last_frame is None:
             return None
-        known_ids = [number for number in sorted(people) if number in self._people]
+        known_ids = [person_id for person_id in sorted(people) if person_id in self._people]
         shown = self._splitter.showing(tracks, known_ids)
         if not shown:
             return None
-        new_id = self._people.split_off(known_ids, {it.key.camera for it in shown}, self._last_frame)
+        new_id = self._people.split_off(
+            known_ids, {tracklet.key.camera for tracklet in shown}, self._last_frame
+        )
         for tracklet in shown:
             tracklet.assign_id(new_id)
         split_keys = {tracklet.key for tracklet in shown}
-        rows = [it.key for it in self._splitter.active]
+        rows = [tracklet.key for tracklet in self._splitter.active]
         others = [
-            it.key for it in self._splitter.active if it.person_id in known_ids and it.key not in split_keys
+            tracklet.key
+            for tracklet in self._splitter.active
+            if tracklet.person_id in known_ids and tracklet.key not in split_keys
         ]
         self._affinity.add_rows([new_id, *known_ids])
         self._corrections.split_off(split_keys, new_id)
         self._affinity.forbid_merging(
-            [new_id, *(it for it in rows if it in split_keys)], [*known_ids, *others]
+            [new_id, *(key for key in rows if key in split_keys)], [*known_ids, *others]
         )
         return new_id
 
@@ -181,21 +188,21 @@ class IdentityRegistry:
     ) -> tuple[Split, ...]:
         """Apply an operator's correction: two tracks of a camera swapped their people in this frame.
 
-        From that frame on each track continues the person of the other. Tracklets of other cameras that were
-        since taken for one of the two are swapped as well.
+        From that frame on each track shows the person of the other. Tracklets of other cameras that were
+        assigned to one of the two since are swapped as well.
 
         Args:
             first: one track.
             second: the other track.
             frame: the first in which each of them shows the other's person.
-            person_ids: of the people before it, for tracklets that are settled and over.
+            person_ids: of the two tracks before that frame, for tracklets that are settled and over.
 
         Returns:
             The splits to report; none if the evidence has corrected the swap already, or a track has no id.
         """
         splits = swap_tracks(self._splitter, self._people, (first, second), frame, person_ids)
         self._corrections.reassign_each(splits)
-        return tuple(sorted({Split(was, number, key.camera) for key, (was, number) in splits.items()}))
+        return tuple(sorted({Split(old_id, new_id, key.camera) for key, (old_id, new_id) in splits.items()}))
 
     @property
     def next_id(self) -> int:
@@ -203,11 +210,11 @@ class IdentityRegistry:
         return self._people.next_id
 
     def reserve_below(self, person_id: int) -> None:
-        """Assign only ids from this one on: an earlier run has used those below."""
+        """Assign only ids from this one on: those below were used by an earlier run."""
         self._people.reserve_below(person_id)
 
     def recall(self, track: TrackKey, person_id: int, frame: int) -> None:
-        """Restore the person of a track that has not been seen yet, from a run that ended with a frame.
+        """Restore the person of a track that is not observed yet, from a run that ended with frame `frame`.
 
         It counts like a published id: later observations may override it.
         """
@@ -232,7 +239,11 @@ class IdentityRegistry:
         return self._ghost_check.count_missing_cameras(cluster, self._pictures, self._height_estimate.height)
 
     def _add_evidence(
-        self, seen: TrackObservations, rows: NDArray[np.int64], settled: NDArray[np.int64], last_frame: int
+        self,
+        observations: TrackObservations,
+        rows: NDArray[np.int64],
+        settled: NDArray[np.int64],
+        last_frame: int,
     ) -> None:
         """Add the update's evidence about pairs of tracklets to the affinity matrix."""
         known_ids = [person.person_id for person in self._people.comparable_people(last_frame)]
@@ -243,10 +254,10 @@ class IdentityRegistry:
             # Settled tracklets that continue have the row of their person.
             position = np.minimum(np.searchsorted(known_ids, settled), len(known_ids) - 1)
             rows = np.where(np.array(known_ids)[position] == settled, count + position, rows)
-        camera = np.array([self._camera_index[key.camera] for key in seen.keys], dtype=np.int64)
+        camera = np.array([self._camera_index[key.camera] for key in observations.keys], dtype=np.int64)
         affinity.add_cannot_links(*simultaneous_pairs(rows, camera))
         if self._gate() > 0:
-            trajectories = GroundTrajectories.of(seen, rows, camera)
+            trajectories = GroundTrajectories.of(observations, rows, camera)
             proximity = score_ground_proximity(
                 trajectories, self._gate(), count, affinity.proximity_pairs(), len(affinity)
             )
@@ -281,7 +292,7 @@ class IdentityRegistry:
         self._fusion.remember_distances(rows, self._splitter.active, self._affinity)
         settled = [self._splitter.active[row] for row in rows]
         settled_rows = [(tracklet.main_id, tracklet.key) for tracklet in settled if tracklet.main_id]
-        self._affinity.add_rows(number for number, _ in settled_rows)
+        self._affinity.add_rows(person_id for person_id, _ in settled_rows)
         self._affinity.merge(settled_rows)
         self._people.settle(settled)
         self._splitter.settle(settled, last_frame)

@@ -39,7 +39,9 @@ class PersonStore:
         """Return the people who take part in clustering, by id: seen recently, with a settled tracklet."""
         earliest = frame - self._settings.comparable_frames
         return [
-            it for _, it in sorted(self._by_id.items()) if it.settled_frames and it.last_frame >= earliest
+            person
+            for _, person in sorted(self._by_id.items())
+            if person.settled_frames and person.last_frame >= earliest
         ]
 
     def assign_ids(
@@ -55,7 +57,8 @@ class PersonStore:
         `count_missing_cameras` counts the cameras that should see a cluster and do not.
         """
         published = [
-            {it: n for it, n in cluster.published_frames.items() if it in self._by_id} for cluster in clusters
+            {number: frames for number, frames in cluster.published_frames.items() if number in self._by_id}
+            for cluster in clusters
         ]
         for cluster, person_id in zip(clusters, assign_ids(published), strict=True):
             cluster.person_id = person_id
@@ -69,7 +72,9 @@ class PersonStore:
                     person.add_sighting(tracklet.key.camera, tracklet.end.frame)
                 for before in cluster.people:
                     person.add_sighting(before.camera, before.last_frame)
-        self._reidentifier.learn_covisible_cameras((it for it in clusters if it.person_id), frame)
+        self._reidentifier.learn_covisible_cameras(
+            (cluster for cluster in clusters if cluster.person_id), frame
+        )
         return created, self._merge(clusters, frame)
 
     def _assign_new_ids(
@@ -82,12 +87,14 @@ class PersonStore:
     ) -> tuple[int, ...]:
         """Assign ids to clusters that were seen often enough: a new one, or that of a lost person."""
         new = [
-            it
-            for it in clusters
-            if it.tracklets and not it.person_id and self._is_confirmed(it, frame, count_missing_cameras)
+            cluster
+            for cluster in clusters
+            if cluster.tracklets
+            and not cluster.person_id
+            and self._is_confirmed(cluster, frame, count_missing_cameras)
         ]
-        new.sort(key=lambda it: (it.first_frame, it.rows[0]))
-        by_id = {it.person_id: it for it in clusters if it.person_id}
+        new.sort(key=lambda cluster: (cluster.first_frame, cluster.rows[0]))
+        by_id = {cluster.person_id: cluster for cluster in clusters if cluster.person_id}
         lost = [
             LostPerson(person, by_id.get(person_id))
             for person_id, person in sorted(self._by_id.items())
@@ -138,7 +145,7 @@ class PersonStore:
         return tuple(merged)
 
     def split_off(self, people: Iterable[int], cameras: Iterable[str], frame: int) -> int:
-        """Create a person whom some cameras see and who was taken for these people; return the id."""
+        """Create a person that these cameras see and that was confused with these people; return the id."""
         new = Person(self.next_id)
         self.next_id += 1
         self._by_id[new.person_id] = new
@@ -152,7 +159,7 @@ class PersonStore:
         self.next_id = max(self.next_id, person_id)
 
     def recall(self, person_id: int, frame: int) -> None:
-        """Restore a person who was seen before a frame."""
+        """Restore a person last seen in a frame."""
         self.reserve_below(person_id + 1)
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
@@ -169,16 +176,16 @@ class PersonStore:
                 person.appearance.add_all(tracklet.appearance)
                 person.settled_frames += tracklet.published_frames[person.person_id]
 
-    def add_sighting(self, seen: Iterable[tuple[int, str]], frame: int) -> None:
+    def add_sightings(self, sightings: Iterable[tuple[int, str]], frame: int) -> None:
         """Record sightings of people by settled tracklets that continue."""
-        for person_id, camera in seen:
+        for person_id, camera in sightings:
             if person_id in self._by_id:
                 self._by_id[person_id].add_sighting(camera, frame)
 
     def update_presence(
         self, tracklets: Iterable[Tracklet], frame: int
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the ids of people who returned, and of people whom no camera has seen for a while."""
+        """Return the ids of people who returned, and of people that no camera has seen for a while."""
         for tracklet in tracklets:
             person = self._by_id.get(tracklet.person_id)
             if person is not None:
@@ -197,9 +204,9 @@ class PersonStore:
         settings = self._settings
         settled_before = frame - settings.settle_after
         candidates = sorted(
-            (it.last_frame, person_id)
-            for person_id, it in self._by_id.items()
-            if it.departed and it.last_frame < settled_before
+            (person.last_frame, person_id)
+            for person_id, person in self._by_id.items()
+            if person.departed and person.last_frame < settled_before
         )
         surplus = len(candidates) - settings.maximum_departed_people
         for i, (last, person_id) in enumerate(candidates):
@@ -211,15 +218,15 @@ def _successors(clusters: Sequence[TrackletCluster]) -> dict[int, int]:
     """Return for each published id that no cluster has the id of the cluster with most of its frames."""
     best: dict[int, tuple[int, int]] = {}
     for cluster in clusters:
-        for number, frames in cluster.published_frames.items():
-            if cluster.person_id and frames > best.get(number, (0, 0))[0]:
-                best[number] = (frames, cluster.person_id)
+        for person_id, frames in cluster.published_frames.items():
+            if cluster.person_id and frames > best.get(person_id, (0, 0))[0]:
+                best[person_id] = (frames, cluster.person_id)
     assigned = {cluster.person_id for cluster in clusters}
-    return {number: successor for number, (_, successor) in best.items() if number not in assigned}
+    return {person_id: successor for person_id, (_, successor) in best.items() if person_id not in assigned}
 
 
 def assign_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
-    """Assign an id to each of G clusters, 0 where none is left.
+    """Assign one of the published ids to each of G clusters; 0: none.
 
     The assignment maximizes the total number of frames that keep their published id.
 
@@ -236,7 +243,7 @@ def assign_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
         for person_id, count in frames.items():
             frames_kept[cluster, column[person_id]] = count
     rows, columns = scipy.optimize.linear_sum_assignment(frames_kept, maximize=True)
-    for cluster, at in zip(rows.tolist(), columns.tolist(), strict=True):
-        if frames_kept[cluster, at] > 0:
-            assigned[cluster] = person_ids[at]
+    for cluster, place in zip(rows.tolist(), columns.tolist(), strict=True):
+        if frames_kept[cluster, place] > 0:
+            assigned[cluster] = person_ids[place]
     return assigned

@@ -19,7 +19,7 @@ class Person:
         departed: reported as departed, and not back yet.
         appearance: of the settled tracklets.
         settled_frames: their frames that were published with this id.
-        unused_since: frame since which no cluster has had the id; -1: one has it.
+        unused_since: frame since which no cluster has the id; -1: one has it.
     """
 
     person_id: int

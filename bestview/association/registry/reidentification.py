@@ -65,7 +65,7 @@ class Reidentifier:
         """Learn from clusters which cameras see the same people simultaneously: their views overlap."""
         since = frame - self._settings.clustering_interval
         for cluster in clusters:
-            cameras = {it.key.camera for it in cluster.tracklets if it.end.frame >= since}
+            cameras = {tracklet.key.camera for tracklet in cluster.tracklets if tracklet.end.frame >= since}
             self._covisible_cameras.update(combinations(sorted(cameras), 2))
 
     def match(
@@ -76,15 +76,23 @@ class Reidentifier:
         cross_camera: CrossCameraAppearance,
         frame: int,
     ) -> list[int]:
-        """Return for each new cluster the index of the lost person it is, or -1."""
+        """Return for each new cluster the index of the lost person that it matches, or -1."""
         allowed = [
-            self._may_match(one, other, affinity, cross_camera, frame) for one in new for other in lost
+            self._may_match(cluster, lost_person, affinity, cross_camera, frame)
+            for cluster in new
+            for lost_person in lost
         ]
         possible = np.array(allowed, dtype=np.bool_).reshape(len(new), len(lost))
         if not possible.any():
             return [-1] * len(new)
-        appearances = [it.appearance for it in new], [it.appearance for it in lost]
-        arrivals, departures = [_first_sighting(it) for it in new], [it.person.last_sighting for it in lost]
+        appearances = (
+            [cluster.appearance for cluster in new],
+            [lost_person.appearance for lost_person in lost],
+        )
+        arrivals, departures = (
+            [_first_sighting(cluster) for cluster in new],
+            [lost_person.person.last_sighting for lost_person in lost],
+        )
         time = self._travel.evidence(arrivals, departures)
         by_appearance = match_by_appearance(
             cross_camera.equalizer, *appearances, possible, cross_camera.same_person_gate
@@ -115,7 +123,7 @@ class Reidentifier:
         cross_camera: CrossCameraAppearance,
         frame: int,
     ) -> bool:
-        """Return whether appearance and travel time alone may match a new cluster with a lost person."""
+        """Return whether a new cluster may be matched with a lost person by appearance and travel time."""
         known_cluster = lost.cluster
         if known_cluster is None:
             # A person who took part in clustering and has no cluster is in that of another id.
@@ -133,8 +141,8 @@ class Reidentifier:
 
 
 def _first_sighting(new: TrackletCluster) -> CameraSighting:
-    """Return where and when a cluster was seen first."""
-    frame, camera = min((it.start.frame, it.key.camera) for it in new.tracklets)
+    """Return the camera and frame in which a cluster was seen first."""
+    frame, camera = min((tracklet.start.frame, tracklet.key.camera) for tracklet in new.tracklets)
     return CameraSighting(camera, frame)
 
 

@@ -192,7 +192,7 @@ class ViewDecider:
         part = window.part(first, lookahead, since < first + frames)
         before = self._shots.of(part.numbers)
         starts = np.arange(lookahead) % self._config.encode.gop == 0
-        gops = part.gops(starts, weight, mark_empty=self.min_shot_gops > 1)
+        gops = part.gops(starts, weight, mark_hidden=self.min_shot_gops > 1)
         (views,), _ = select_views_by_gop(
             gops, before.cameras, self.switch_cost, self.min_shot_gops, before.gops, decided_gops=1
         )

@@ -133,9 +133,9 @@ class LookaheadPart:
         """(K,) the people's numbers, rising."""
         return self.window.numbers[self.people]
 
-    def gops(self, starts: Mask, weight: Floats, *, mark_empty: bool) -> GopCosts:
+    def gops(self, starts: Mask, weight: Floats, *, mark_hidden: bool) -> GopCosts:
         """Return the costs of the GOPs that begin at the mask's frames (N,), frames weighted by (N,)."""
-        gops = self.window.effective_views.gops(self.first, starts, weight, mark_empty=mark_empty)
+        gops = self.window.effective_views.gops(self.first, starts, weight, mark_hidden=mark_hidden)
         return gops if len(self.people) == len(self.window.numbers) else gops.for_people(self.people)
 
     def views(self, number: int) -> Ints:

@@ -58,10 +58,10 @@ def test_gops_cost_the_same_to_the_bit(seed: int, first: int, data: st.DataObjec
     frames = data.draw(st.integers(1, FRAMES - first))
     starts = [True, *data.draw(st.lists(st.booleans(), min_size=frames - 1, max_size=frames - 1))]
     weight = np.random.default_rng(seed).uniform(0.5, 5.0, frames)
-    found = views.gops(first, np.array(starts), weight, mark_empty=True)
+    found = views.gops(first, np.array(starts), weight, mark_hidden=True)
     expected = slowly(views, worth, first, starts, weight)
     assert np.array(found.cost).tolist() == np.array(expected.cost).tolist()
-    assert np.array(found.shows_nobody).tolist() == np.array(expected.shows_nobody).tolist()
+    assert np.array(found.hidden).tolist() == np.array(expected.hidden).tolist()
     assert found.frames.tolist() == expected.frames.tolist()
 
 
@@ -76,7 +76,7 @@ def test_selection_by_gop_equals_selection_by_frame(seed: int, minimum_shot_gops
     cost = np.where(views.available[:, :, None], 1.0 - np.nan_to_num(worth), np.inf).transpose(2, 0, 1)
     by_frames = select_views(cost, previous, 0.7, starts, minimum_shot_gops, shot_ages, weight)
     _, costs = select_views_by_gop(
-        views.gops(0, starts, weight, mark_empty=True), previous, 0.7, minimum_shot_gops, shot_ages
+        views.gops(0, starts, weight, mark_hidden=True), previous, 0.7, minimum_shot_gops, shot_ages
     )
     np.testing.assert_allclose(costs, by_frames.costs, rtol=1e-12)
 
@@ -85,8 +85,8 @@ def test_costs_of_a_subset_of_people_are_unchanged() -> None:
     views, _ = drawn(3)
     starts, weight = np.arange(FRAMES) % 2 == 0, np.ones(FRAMES)
     everybody, some = (
-        views.gops(0, starts, weight, mark_empty=True),
-        views.gops(0, starts, weight, mark_empty=True).for_people(np.array([1, 3])),
+        views.gops(0, starts, weight, mark_hidden=True),
+        views.gops(0, starts, weight, mark_hidden=True).for_people(np.array([1, 3])),
     )
     assert np.array(some.cost).tolist() == np.array(everybody.cost)[:, :, [1, 3]].tolist()
-    assert np.array(some.shows_nobody).tolist() == np.array(everybody.shows_nobody)[:, :, [1, 3]].tolist()
+    assert np.array(some.hidden).tolist() == np.array(everybody.hidden)[:, :, [1, 3]].tolist()
