@@ -1,4 +1,4 @@
-"""Tables of pairs follow who is in play, and sums over updates are what a plain reading of the rule gives."""
+"""The affinity matrix equals a reference with dictionaries, while rows come, go and are merged."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ ROWS = range(10)
 PAIR = st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1])
 
 
-class Plain:
-    """The same by names: what is known of each pair in a dictionary."""
+class ReferenceMatrix:
+    """Reference implementation: dictionaries by row keys."""
 
     def __init__(self) -> None:
         self.rows: list[RowKey] = []
         self.cannot_link: set[frozenset[RowKey]] = set()
         self.proximity_pairs: dict[frozenset[RowKey], tuple[float, int]] = {}
-        self.stood: dict[RowKey, set[int]] = {}
+        self.frames_of: dict[RowKey, set[int]] = {}
 
     def set_rows(self, rows: list[RowKey]) -> None:
         self.rows = rows
@@ -36,23 +36,23 @@ class Plain:
         self.proximity_pairs = {
             pair: known for pair, known in self.proximity_pairs.items() if pair <= set(rows)
         }
-        self.stood = {row: self.stood.get(row, set()) for row in rows}
+        self.frames_of = {row: self.frames_of.get(row, set()) for row in rows}
 
-    def elsewhere(self, one: RowKey, two: RowKey) -> tuple[float, int]:
-        """What there is to say of two who never met: they were about at once."""
-        common = len(self.stood[one] & self.stood[two])
+    def default_evidence(self, one: RowKey, two: RowKey) -> tuple[float, int]:
+        """Return the evidence of a pair without entry: its common frames were at different places."""
+        common = len(self.frames_of[one] & self.frames_of[two])
         return max(-2.0 * common / SETTINGS.ground_correlation_frames, -CAP), min(common, 3)
 
     def ground_evidence(self, one: RowKey, two: RowKey) -> tuple[float, int]:
-        return self.proximity_pairs.get(frozenset((one, two)), self.elsewhere(one, two))
+        return self.proximity_pairs.get(frozenset((one, two)), self.default_evidence(one, two))
 
     def add_presence(self, row: RowKey, frame: int) -> None:
-        self.stood[row].add(frame)
+        self.frames_of[row].add(frame)
 
-    def let_go(self) -> None:
-        """Forget that those met who are elsewhere as much as anybody."""
+    def drop_capped_pairs(self) -> None:
+        """Drop entries at the cap whose default evidence is at the cap as well."""
         for pair, (evidence, _) in list(self.proximity_pairs.items()):
-            if evidence <= -CAP and self.elsewhere(*pair)[0] <= -CAP:
+            if evidence <= -CAP and self.default_evidence(*pair)[0] <= -CAP:
                 del self.proximity_pairs[pair]
 
     def merge(self, kept: RowKey, lost: RowKey) -> None:
@@ -65,25 +65,25 @@ class Plain:
             if one in self.proximity_pairs or two in self.proximity_pairs:
                 (a, b), (c, d) = self.ground_evidence(kept, other), self.ground_evidence(lost, other)
                 self.proximity_pairs[one] = a + c, max(b, d)
-        self.stood[kept] |= self.stood[lost]
+        self.frames_of[kept] |= self.frames_of[lost]
         self.set_rows([row for row in self.rows if row != lost])
 
 
 def name(row: int) -> RowKey:
-    """Return a tracklet for the even rows, a person's past for the others."""
+    """Return a tracklet key for even rows, a person id for odd ones."""
     return TrackletKey("c0", row, 0) if row % 2 == 0 else row
 
 
 @settings(deadline=None, max_examples=150)
 @given(st.data())
 def test_tables_keep_their_entries_while_rows_are_added_and_removed(data: st.DataObject) -> None:
-    affinity, plain = AffinityMatrix(SETTINGS), Plain()
+    affinity, reference = AffinityMatrix(SETTINGS), ReferenceMatrix()
     for time in range(data.draw(st.integers(1, 6))):
         rows: list[RowKey] = [
             name(row) for row in data.draw(st.lists(st.integers(0, 9), unique=True, min_size=2))
         ]
         affinity.set_rows(rows)
-        plain.set_rows(rows)
+        reference.set_rows(rows)
         for i, j in data.draw(st.lists(PAIR, max_size=5, unique_by=frozenset)):
             one, two = i % len(rows), j % len(rows)
             pair = frozenset((rows[one], rows[two]))
@@ -91,42 +91,44 @@ def test_tables_keep_their_entries_while_rows_are_added_and_removed(data: st.Dat
                 continue
             if data.draw(st.booleans()):
                 affinity.add_cannot_links(np.array([one, two]), np.array([two, one]))
-                plain.cannot_link.add(pair)
+                reference.cannot_link.add(pair)
                 continue
             score, frames = data.draw(st.integers(-9, 9)), data.draw(st.integers(1, 2))
             affinity.add_ground_evidence(
                 np.array([one]), np.array([two]), np.array([float(score)]), np.array([frames])
             )
-            evidence, common = plain.ground_evidence(rows[one], rows[two])
+            evidence, common = reference.ground_evidence(rows[one], rows[two])
             evidence = min(max(evidence + score / SETTINGS.ground_correlation_frames, -CAP), CAP)
-            plain.proximity_pairs[pair] = evidence, min(common + frames, 3)
+            reference.proximity_pairs[pair] = evidence, min(common + frames, 3)
         for row in data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=4, unique=True)):
-            frames_of = data.draw(st.sets(st.integers(0, 9), max_size=8))
-            about = np.array(sorted(frames_of), dtype=np.int64) + 10 * time
-            affinity.add_presence(np.full(about.size, row), about)
-            for frame in about.tolist():
-                plain.add_presence(rows[row], frame)
-            plain.let_go()
+            frame_set = data.draw(st.sets(st.integers(0, 9), max_size=8))
+            localized_frames = np.array(sorted(frame_set), dtype=np.int64) + 10 * time
+            affinity.add_presence(np.full(localized_frames.size, row), localized_frames)
+            for frame in localized_frames.tolist():
+                reference.add_presence(rows[row], frame)
+            reference.drop_capped_pairs()
         if data.draw(st.booleans()):
             affinity.merge([(rows[0], rows[1])])
-            plain.merge(rows[0], rows[1])
-            affinity.set_rows(plain.rows)
-        size = len(plain.rows)
+            reference.merge(rows[0], rows[1])
+            affinity.set_rows(reference.rows)
+        size = len(reference.rows)
         one, two = (side.ravel() for side in np.indices((size, size)))
         different = one != two
         one, two = one[different], two[different]
-        pairs = [(plain.rows[i], plain.rows[j]) for i, j in zip(one.tolist(), two.tolist(), strict=True)]
-        assert affinity.cannot_link(one, two).tolist() == [
-            frozenset(pair) in plain.cannot_link for pair in pairs
+        pairs = [
+            (reference.rows[i], reference.rows[j]) for i, j in zip(one.tolist(), two.tolist(), strict=True)
         ]
-        known = [plain.ground_evidence(*pair) for pair in pairs]
+        assert affinity.cannot_link(one, two).tolist() == [
+            frozenset(pair) in reference.cannot_link for pair in pairs
+        ]
+        known = [reference.ground_evidence(*pair) for pair in pairs]
         expected = [evidence if common >= 3 else 0.0 for evidence, common in known]
         assert affinity.ground_evidence(one, two).tolist() == expected
         met = {
-            frozenset((plain.rows[i], plain.rows[j]))
+            frozenset((reference.rows[i], reference.rows[j]))
             for i, j in zip(*affinity.proximity_pairs(), strict=True)
         }
-        assert met == set(plain.proximity_pairs)
+        assert met == set(reference.proximity_pairs)
 
 
 @settings(deadline=None, max_examples=100)
@@ -134,44 +136,41 @@ def test_tables_keep_their_entries_while_rows_are_added_and_removed(data: st.Dat
 def test_merging_many_rows_at_once_equals_merging_one_by_one(data: st.DataObject) -> None:
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     into = {row: int(rng.integers(4)) for row in range(4, 10) if rng.random() < 0.7}
-    simultaneous_pairs, in_turn = AffinityMatrix(SETTINGS), AffinityMatrix(SETTINGS)
+    at_once, one_by_one = AffinityMatrix(SETTINGS), AffinityMatrix(SETTINGS)
     one, two = np.triu_indices(10, 1)
-    met, apart, alike = (np.flatnonzero(rng.random(one.size) < 0.4) for _ in range(3))
-    # Whole numbers, so that the order of sums does not matter; those who never met were not about.
-    score, worth = rng.integers(-4, 5, one.size) * 2.0, rng.integers(1, 3, one.size) * 1.0
-    for affinity in (simultaneous_pairs, in_turn):
+    met, rivals, alike = (np.flatnonzero(rng.random(one.size) < 0.4) for _ in range(3))
+    # Whole numbers, so that the order of sums does not matter; pairs without entry have no common frames.
+    score, appearance_score = rng.integers(-4, 5, one.size) * 2.0, rng.integers(1, 3, one.size) * 1.0
+    for affinity in (at_once, one_by_one):
         affinity.set_rows([name(row) for row in ROWS])
         affinity.add_ground_evidence(one[met], two[met], score[met], np.full(met.size, 3))
-        affinity.add_cannot_links(one[apart], two[apart])
-        affinity.add_appearance_evidence(one[alike], two[alike], worth[alike])
-    simultaneous_pairs.merge([(name(kept), name(lost)) for lost, kept in into.items()])
+        affinity.add_cannot_links(one[rivals], two[rivals])
+        affinity.add_appearance_evidence(one[alike], two[alike], appearance_score[alike])
+    at_once.merge([(name(kept), name(lost)) for lost, kept in into.items()])
     for lost, kept in into.items():
-        in_turn.merge([(name(kept), name(lost))])
-    left = [name(row) for row in ROWS if row not in into]
-    one, two = np.triu_indices(len(left), 1)
-    for affinity in (simultaneous_pairs, in_turn):
-        affinity.set_rows(left)
+        one_by_one.merge([(name(kept), name(lost))])
+    remaining = [name(row) for row in ROWS if row not in into]
+    one, two = np.triu_indices(len(remaining), 1)
+    for affinity in (at_once, one_by_one):
+        affinity.set_rows(remaining)
     for table in ("ground_evidence", "cannot_link", "appearance_evidence"):
-        assert (
-            getattr(simultaneous_pairs, table)(one, two).tolist()
-            == getattr(in_turn, table)(one, two).tolist()
-        )
+        assert getattr(at_once, table)(one, two).tolist() == getattr(one_by_one, table)(one, two).tolist()
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 60)), max_size=12), st.sampled_from([10, 100]))
 def test_presence_counts_recent_common_frames(steps: list[tuple[int, int]], frames: int) -> None:
-    presence, stood, now = PresenceBitmap(frames), [set[int]() for _ in range(4)], 0
+    presence, frames_of, now = PresenceBitmap(frames), [set[int]() for _ in range(4)], 0
     presence.set_rows(np.full(4, -1))
     for row, later in steps:
         now += later
-        stood[row] |= {now, now + 1}
-        stood[0] |= {now}
+        frames_of[row] |= {now, now + 1}
+        frames_of[0] |= {now}
         presence.add_presence(np.array([row, row, 0]), np.array([now, now + 1, now]))
     one, two = np.triu_indices(4, 1)
     common = presence.common(one, two, 1000)
     for i, j, count in zip(one.tolist(), two.tolist(), common.tolist(), strict=True):
-        both = stood[i] & stood[j]
+        both = frames_of[i] & frames_of[j]
         assert len([frame for frame in both if frame > now - frames]) <= count <= len(both)
     for enough in (1, 2, 3):
         assert presence.common(one, two, enough).tolist() == np.minimum(common, enough).tolist()
@@ -179,7 +178,7 @@ def test_presence_counts_recent_common_frames(steps: list[tuple[int, int]], fram
 
 @st.composite
 def updates(draw: st.DrawFn) -> tuple[TrackObservations, np.ndarray, np.ndarray]:
-    """Draw tracks of three cameras that stand about, some of which are cut within the update."""
+    """Draw tracks of standing people in three cameras, some of which are split within the update."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     tracks = draw(st.integers(0, 6))
     camera = np.sort(rng.integers(0, 3, tracks))
@@ -201,35 +200,35 @@ def updates(draw: st.DrawFn) -> tuple[TrackObservations, np.ndarray, np.ndarray]
 def test_ground_scores_are_summed_over_common_frames(
     update: tuple[TrackObservations, np.ndarray, np.ndarray], gate: float
 ) -> None:
-    seen, rows, camera = update
+    observations, rows, camera = update
     count = int(rows.max(initial=-1)) + 1
     met_before = [(i, j) for i in range(count) for j in range(i + 1, count) if (i * j) % 5 == 1]
     expected: dict[frozenset[int], list[float]] = {}
     for one in range(len(rows)):
         for two in range(one):
             for frame in range(FRAMES):
-                apart = seen.ground_point[one, frame] - seen.ground_point[two, frame]
-                if camera[one] == camera[two] or np.isnan(apart).any():
+                difference = observations.ground_point[one, frame] - observations.ground_point[two, frame]
+                if camera[one] == camera[two] or np.isnan(difference).any():
                     continue
                 metric = (
-                    seen.ground_covariance[one, frame]
-                    + seen.ground_covariance[two, frame]
+                    observations.ground_covariance[one, frame]
+                    + observations.ground_covariance[two, frame]
                     + gate**2 * np.eye(2)
                 )
-                score = max(1.0 - float(apart @ np.linalg.solve(metric, apart)), -2.0)
+                score = max(1.0 - float(difference @ np.linalg.solve(metric, difference)), -2.0)
                 pair = frozenset((int(rows[one, frame]), int(rows[two, frame])))
                 expected.setdefault(pair, []).append(score)
-    # Who is far away all the time, and always was, is not worth a line.
+    # Pairs that were never close have no entry.
     met_rows = {frozenset(pair) for pair in met_before}
-    expected = {it: of for it, of in expected.items() if max(of) > -2.0 or it in met_rows}
+    expected = {pair: scores for pair, scores in expected.items() if max(scores) > -2.0 or pair in met_rows}
     before = np.array(met_before, dtype=np.int64).reshape(-1, 2)
     met = score_ground_proximity(
-        GroundTrajectories.of(seen, rows, camera), gate, count, (before[:, 0], before[:, 1]), count
+        GroundTrajectories.of(observations, rows, camera), gate, count, (before[:, 0], before[:, 1]), count
     )
     pairs = [frozenset(pair) for pair in zip(met.first.tolist(), met.second.tolist(), strict=True)]
     assert len(set(pairs)) == len(pairs)
     assert dict(zip(pairs, met.frame_count.tolist(), strict=True)) == {
-        it: len(of) for it, of in expected.items()
+        pair: len(scores) for pair, scores in expected.items()
     }
     np.testing.assert_allclose(met.score, [sum(expected[pair]) for pair in pairs], atol=1e-9)
 
@@ -248,6 +247,6 @@ def test_simultaneous_pairs_are_all_pairs_of_a_frame_and_camera(
         if camera[one] == camera[two] and min(rows[one, frame], rows[two, frame]) >= 0
     }
     assert {
-        frozenset(it)
-        for it in zip(*(side.tolist() for side in simultaneous_pairs(rows, camera)), strict=True)
+        frozenset(pair)
+        for pair in zip(*(side.tolist() for side in simultaneous_pairs(rows, camera)), strict=True)
     } == (expected)

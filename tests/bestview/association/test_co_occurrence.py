@@ -1,4 +1,4 @@
-"""Sweeping finds every pair that overlaps, and pairs are written out as loops would."""
+"""The sweep finds every overlapping pair, and index helpers equal nested loops."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_every_overlapping_pair_of_rectangles_is_found_once(
     low = rng.uniform(0, 10, (count, 2))
     high = low + rng.uniform(0, size, (count, 2)) * rng.choice([1.0, 100.0], (count, 1), p=[0.9, 0.1])
     if whole:
-        # Corners that meet exactly, and many at one place.
+        # Touching corners, and many rectangles at one place.
         low, high = np.floor(low), np.floor(high)
     one, two = overlapping_rectangles(low, high)
     expected = [
@@ -67,10 +67,10 @@ def test_runs_cover_all_observations_and_end_where_crowding_changes(
     assert sightings == [(int(i), int(k)) for i, k in np.argwhere(visible)]
     assert all((crowded[run.track, run.start : run.stop] == run.crowded).all() for run in runs)
     for one, two in pairwise(runs):
-        goes_on = (one.track, one.stop, one.crowded) == (
+        continues = (one.track, one.stop, one.crowded) == (
             two.track,
             two.start,
             two.crowded,
         )
-        assert not (whole and goes_on)
+        assert not (whole and continues)
     assert whole or all(run.stop == run.start + 1 for run in runs)

@@ -1,4 +1,4 @@
-"""One person is one number in every camera, and stays it."""
+"""A person has one id in every camera and keeps it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bestview import (
 from fakes.bestview.identity_scenes import (
     BLIND,
     CALIBRATED,
-    HOWEVER_MANY,
+    OPEN_TRACKLET_LIMITS,
     STRIDE,
     VIEWS,
     Stay,
@@ -36,15 +36,15 @@ from fakes.bestview.identity_scenes import (
 )
 
 
-@HOWEVER_MANY
-def test_a_person_has_one_id_in_every_camera(most: int) -> None:
+@OPEN_TRACKLET_LIMITS
+def test_a_person_has_one_id_in_every_camera(maximum_open: int) -> None:
     stays = [
         Stay("south", 4, 0, 999, (0, 0)),
         Stay("west", 9, 0, 999, (0, 0)),
         Stay("south", 5, 0, 999, (3, 1)),
         Stay("west", 8, 0, 999, (3, 1)),
     ]
-    last = known(play(registry(maximum_open_tracklets=most), stays, 60))
+    last = known(play(registry(maximum_open_tracklets=maximum_open), stays, 60))
     assert last["south", 4] == last["west", 9]
     assert last["south", 5] == last["west", 8]
     assert sorted(last.values()) == [1, 1, 2, 2]
@@ -57,22 +57,22 @@ def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
 
 
-@HOWEVER_MANY
-def test_simultaneous_tracks_of_a_camera_are_two_people_however_close(most: int) -> None:
+@OPEN_TRACKLET_LIMITS
+def test_simultaneous_tracks_of_a_camera_are_two_people_however_close(maximum_open: int) -> None:
     stays = [*both(1, (0, 0)), *both(2, (0.3, 0.3))]
-    last = known(play(registry(maximum_open_tracklets=most), stays, 100))
+    last = known(play(registry(maximum_open_tracklets=maximum_open), stays, 100))
     assert last["south", 1] != last["south", 2]
     assert last["west", 1] != last["west", 2]
     assert last["south", 1] == last["west", 1]
 
 
-@HOWEVER_MANY
-def test_people_keep_their_ids_when_a_camera_restarts(most: int) -> None:
+@OPEN_TRACKLET_LIMITS
+def test_people_keep_their_ids_when_a_camera_restarts(maximum_open: int) -> None:
     people = [(-2.0, -2.0), (2.0, -1.0), (0.0, 3.0)]
     stays = [Stay("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
     stays += [Stay("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
     stays += [Stay("west", 101 + i, 150, 999, at) for i, at in enumerate(people)]
-    seen = play(registry(maximum_open_tracklets=most), stays, 200)
+    seen = play(registry(maximum_open_tracklets=maximum_open), stays, 200)
     again = known(seen[: (150 // STRIDE) + 5])  # five updates after it came back
     assert [again["west", 101 + i] for i in range(3)] == [again["south", 1 + i] for i in range(3)]
     assert max(max(update.person_ids.values(), default=0) for update in seen) == 3
@@ -91,9 +91,7 @@ def test_an_impossible_distance_means_another_person() -> None:
     assert numbers(play(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
 
 
-@pytest.mark.parametrize(
-    "settings", [{}, {"comparable_frames": 250}], ids=["compared like everybody", "found again"]
-)
+@pytest.mark.parametrize("settings", [{}, {"comparable_frames": 250}], ids=["clustered", "reidentified"])
 def test_a_returning_person_with_the_same_appearance_gets_the_id_back(settings: dict[str, int]) -> None:
     stays = [Stay("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
     stays += [Stay("south", 10, 450, 999, (4, 2), coat=3), Stay("south", 11, 450, 999, (-4, 2), coat=7)]
@@ -114,10 +112,10 @@ def test_similar_people_do_not_get_each_others_ids_back() -> None:
 def test_reappearance_reach_depends_on_time_not_on_frames(fps: float, people: int) -> None:
     here = Stay("south", 1, 0, 30, (-4, 0), coat=3)
     there = Stay("south", 2, 46, 999, (1.7, 0), coat=3)
-    who = IdentityRegistry(
+    identities = IdentityRegistry(
         replace(IdentitySettings(), confirmation_frames=5, clustering_interval=5), CALIBRATED, fps=fps
     )
-    assert len({*known(play(who, [here, there], 200)).values()}) == people
+    assert len({*known(play(identities, [here, there], 200)).values()}) == people
 
 
 def test_without_calibration_only_distinctive_appearance_links_cameras() -> None:
@@ -136,7 +134,7 @@ def test_without_calibration_only_distinctive_appearance_links_cameras() -> None
 
 
 def test_later_evidence_corrects_an_id_and_reports_it() -> None:
-    # Too far apart to be one at first, they turn out to walk as one.
+    # Two tracks are too far apart to be one person at first, and at the same place later.
     apart = [Stay("south", 1, 0, 99, (0, 0)), Stay("west", 1, 0, 99, (0, 6))]
     joined = [Stay("south", 1, 100, 999, (0, 0)), Stay("west", 1, 100, 999, (0, 0))]
     seen = play(registry(), [*apart, *joined], 400)
@@ -145,10 +143,12 @@ def test_later_evidence_corrects_an_id_and_reports_it() -> None:
     assert numbers(seen[-1]) == {("south", 1): 1, ("west", 1): 1}
 
 
-@HOWEVER_MANY
-@pytest.mark.parametrize("dressed", [True, False], ids=["by looks and ground", "by ground alone"])
-def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(most: int, *, dressed: bool) -> None:
-    # Two meet before one camera and part again, and its tracker has exchanged them; another camera sees all.
+@OPEN_TRACKLET_LIMITS
+@pytest.mark.parametrize("dressed", [True, False], ids=["appearance and ground", "ground alone"])
+def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(
+    maximum_open: int, *, dressed: bool
+) -> None:
+    # Two people meet and part in one camera, whose tracker swaps them; another camera tracks both correctly.
     def meeting(camera: str, local: int, place: float, speed: float, start: int = 0, end: int = 999) -> Stay:
         return Stay(camera, local, start, end, (place, 0), (speed, 0), dressed * (1 + 2 * (place > 0)))
 
@@ -158,7 +158,7 @@ def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(most: int
     ]
     stays += [meeting("south", 1, -3, 0.03, end=100), meeting("south", 2, 3, -0.03, end=100)]
     stays += [meeting("south", 2, -3, 0.03, start=101), meeting("south", 1, 3, -0.03, start=101)]
-    seen = play(registry(maximum_open_tracklets=most), stays, 200)
+    seen = play(registry(maximum_open_tracklets=maximum_open), stays, 200)
     before, after = known(seen[: 80 // STRIDE]), known(seen)
     assert len({before["south", 1], before["south", 2]}) == 2
     assert after["south", 1] == before["south", 2]
@@ -166,8 +166,8 @@ def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(most: int
     assert not [update.merged for update in seen if update.merged]
 
 
-def test_a_person_who_shared_an_id_gets_one_of_their_own_and_it_is_reported() -> None:
-    # One camera sees two who walk as one and then part; the others see the one who stays.
+def test_a_person_who_shared_an_id_gets_a_new_one_and_the_split_is_reported() -> None:
+    # One camera tracks two people as one until they part; the others see only the one who stays.
     together = [Stay(camera, 1, 0, 150, (0, 0)) for camera in VIEWS]
     apart = [Stay(camera, 1, 151, 999, (4, 3) if camera == "west" else (0, 0)) for camera in VIEWS]
     updated = play(registry(), [*together, *apart], 500)
@@ -177,18 +177,18 @@ def test_a_person_who_shared_an_id_gets_one_of_their_own_and_it_is_reported() ->
 
 
 def test_truncated_feet_have_no_ground_point() -> None:
-    near = Stay("south", 1, 0, 999, (0, -7))  # 3 m before the camera: the feet are far below the picture
+    near = Stay("south", 1, 0, 999, (0, -7))  # 3 m from the camera: the feet are far below the picture
     cut = 480.0
     other = Stay("west", 1, 0, 999, (0, -5))  # stands where a foot at the edge of the south picture would
 
     def seen(height: float) -> IdentityUpdate:
-        who = registry()
+        identities = registry()
         for last in range(STRIDE - 1, 200, STRIDE):
             south = near.track(last - STRIDE + 1, last)
             boxes = south.boxes.copy()
             boxes[:, 3] = np.minimum(boxes[:, 3], cut)
             south = replace(south, boxes=boxes, picture_height=height)
-            update = who.update([south, other.track(last - STRIDE + 1, last)], last)
+            update = identities.update([south, other.track(last - STRIDE + 1, last)], last)
         return update
 
     assert numbers(seen(np.inf)) == {("south", 1): 1, ("west", 1): 1}
@@ -229,10 +229,10 @@ def test_simultaneous_tracks_of_a_camera_never_share_an_id(data: st.DataObject) 
             assert len(here) == len(dict.fromkeys(here))
 
 
-@HOWEVER_MANY
-def test_a_person_settled_while_visible_does_not_depart(most: int) -> None:
+@OPEN_TRACKLET_LIMITS
+def test_a_person_settled_while_visible_does_not_depart(maximum_open: int) -> None:
     seen = play(
-        registry(maximum_open_tracklets=most, departed_after=60, settle_after=100),
+        registry(maximum_open_tracklets=maximum_open, departed_after=60, settle_after=100),
         both(1, (0, 0), end=400),
         600,
     )
@@ -243,7 +243,7 @@ def test_a_person_settled_while_visible_does_not_depart(most: int) -> None:
 
 
 def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
-    who = registry(
+    identities = registry(
         forget_after=200,
         maximum_departed_people=5,
         comparable_frames=100,
@@ -252,15 +252,17 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     )
     stays = [Stay("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
     sizes = []
-    for _ in updates(who, stays, 3000):
-        open_ = who._splitter
-        sizes.append((len(who._people), len(open_.active), len(open_._current), len(who._affinity)))
+    for _ in updates(identities, stays, 3000):
+        open_ = identities._splitter
+        sizes.append(
+            (len(identities._people), len(open_.active), len(open_._current), len(identities._affinity))
+        )
     assert max(max(size) for size in sizes) <= 20
     assert sizes[-1][0] <= 10
 
 
 @pytest.mark.parametrize(
-    "nothing",
+    "zero_settings",
     [
         {name: 0}
         for name in (
@@ -276,10 +278,10 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     + [{"confirmation_frames": 0, "comparable_frames": 5000, "merge_after": 500, "settle_after": 20}],
     ids=", ".join,
 )
-def test_minimal_settings_work_while_cameras_come_and_go(nothing: Mapping[str, int]) -> None:
-    # Looks of other sizes, of no size and of nothing; boxes that shake; tracks that pause and begin anew.
+def test_minimal_settings_work_while_cameras_come_and_go(zero_settings: Mapping[str, int]) -> None:
+    # Histograms of different sizes, empty and zero ones; noisy boxes; tracks that pause and restart.
     random = np.random.default_rng(1)
-    who = registry({"south": CALIBRATED["south"], "west": None}, **nothing)
+    identities = registry({"south": CALIBRATED["south"], "west": None}, **zero_settings)
     updates = []
     for last in range(STRIDE - 1, 1000, STRIDE):
         tracks = []
@@ -289,11 +291,11 @@ def test_minimal_settings_work_while_cameras_come_and_go(nothing: Mapping[str, i
                     continue
                 left = 100.0 * local + 0.1 * last * (local - 1.5)
                 boxes = np.array([left, 100.0, left + 40.0, 220.0]) + random.normal(0, 4, (STRIDE, 4))
-                look = random.random(random.choice([0, 8, 8, 16])) if local else np.zeros(8)
-                glimpse = AppearanceSample(last - STRIDE + 1, last, look)
+                histogram = random.random(random.choice([0, 8, 8, 16])) if local else np.zeros(8)
+                sample = AppearanceSample(last - STRIDE + 1, last, histogram)
                 run = 1 + local + 4 * (last // 400)
-                tracks.append(TrackUpdate(camera, run, last - STRIDE + 1, boxes, (glimpse,)))
-        updates.append(who.update(tracks, last))
+                tracks.append(TrackUpdate(camera, run, last - STRIDE + 1, boxes, (sample,)))
+        updates.append(identities.update(tracks, last))
         assert all(number >= 1 for number in numbers(updates[-1]).values())
     assert known(updates)
 
@@ -310,13 +312,13 @@ def test_invalid_arguments_are_refused_in_one_line() -> None:
     refused("shape", replace(track, boxes=np.zeros((15, 3))))
     refused("histogram", replace(track, appearance=(AppearanceSample(0, 3, np.zeros((2, 2))),)))
     refused("of frames 3 to 20", replace(track, appearance=(AppearanceSample(3, 20, np.zeros(2)),)))
-    refused("given twice", track, track)
+    refused("occurs twice", track, track)
     with pytest.raises(ValueError, match="of camera south is not invertible"):
         IdentityRegistry(IdentitySettings(), {"south": np.ones((3, 3))})
-    who = registry()
-    who.update([track], 14)
+    identities = registry()
+    identities.update([track], 14)
     with pytest.raises(ValueError, match="comes after"):
-        who.update([track], 14)
+        identities.update([track], 14)
     with pytest.raises(ValueError, match="memory"):
         IdentitySettings(cross_camera_memory=1.5)
     with pytest.raises(ValueError, match="gate"):
@@ -330,31 +332,31 @@ def test_no_tracks_are_no_people() -> None:
 
 
 def test_a_person_is_reidentified_by_appearance_in_a_camera_without_common_ground() -> None:
-    # On one ground, but the two never see anybody at once.
+    # Also on a common ground, since the two cameras never see a person at the same time.
     for homographies in (CALIBRATED, BLIND):
         stays = [Stay("south", coat, 0, 100, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
         stays += [Stay("west", 9 - coat, 300, 999, (-2, coat - 3.0), coat=coat) for coat in (1, 3, 5)]
-        who = known(play(registry(homographies), stays, 400))
-        assert [who["west", 9 - coat] for coat in (1, 3, 5)] == [who["south", coat] for coat in (1, 3, 5)]
+        ids = known(play(registry(homographies), stays, 400))
+        assert [ids["west", 9 - coat] for coat in (1, 3, 5)] == [ids["south", coat] for coat in (1, 3, 5)]
 
 
 def test_travel_times_separate_people_who_look_alike() -> None:
     def stays() -> Iterator[Stay]:
-        # One after the other goes from south to west in 200 frames, each in a coat of their own...
+        # People with different coats go from south to west in 200 frames, one after the other ...
         for i in range(8):
             begin = 350 * i
             yield Stay("south", 1 + i, begin, begin + 60, (0, 0), coat=1 + i % 6)
             yield Stay("west", 1 + i, begin + 260, begin + 320, (0, 0), coat=1 + i % 6)
-        # ... then two in like coats leave, one long after the other, and after the usual time one comes who
-        # looks as much like either, as the western camera shows coats.
+        # ... then two with similar coats leave at different times, and after the usual travel time of the
+        # second a person arrives whose coat is as similar to either.
         yield Stay("south", 21, 2800, 2860, (0, 0), coat=6.7)
         yield Stay("south", 22, 2800, 3300, (3, 0), coat=7.3)
         yield Stay("west", 21, 3500, 3600, (0, 0), coat=6.4)
 
-    def who(**changes: float) -> dict[tuple[str, int], int]:
+    def ids_with(**changes: float) -> dict[tuple[str, int], int]:
         return known(play(registry(BLIND, comparable_frames=20, **changes), list(stays()), 3600))
 
-    times, alone = who(), who(maximum_travel_evidence=0.0)
+    times, alone = ids_with(), ids_with(maximum_travel_evidence=0.0)
     assert times["south", 21] != times["south", 22]
     assert times["west", 21] == times["south", 22]
-    assert alone["west", 21] not in {alone["south", 21], alone["south", 22]}, "by looks it may be either"
+    assert alone["west", 21] not in {alone["south", 21], alone["south", 22]}, "appearance alone is ambiguous"

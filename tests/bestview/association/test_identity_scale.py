@@ -1,4 +1,4 @@
-"""A site of many halls is as many sites of one hall: who cannot meet has no say in who is who."""
+"""Identities in a site of many halls equal those of separate sites, at linear cost."""
 
 from __future__ import annotations
 
@@ -21,59 +21,59 @@ def ground(hall: int) -> NDArray[np.float64]:
 
 
 def walks() -> NDArray[np.float64]:
-    """Everybody's places in a hall, (people, frames, 2) metres: straight ahead, and back from the walls."""
+    """Return positions in a hall, (people, frames, 2) metres: straight lines, reflected at the walls."""
     rng = np.random.default_rng(4)
-    turn = rng.uniform(0, 2 * np.pi, PEOPLE)
-    pace = 0.05 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    way = rng.uniform(0, SIDE, (PEOPLE, 1, 2)) + pace[:, None] * np.arange(STRIDE * UPDATES)[:, None]
-    return np.asarray(SIDE - np.abs(way % (2 * SIDE) - SIDE))
+    heading = rng.uniform(0, 2 * np.pi, PEOPLE)
+    velocity = 0.05 * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    unfolded = rng.uniform(0, SIDE, (PEOPLE, 1, 2)) + velocity[:, None] * np.arange(STRIDE * UPDATES)[:, None]
+    return np.asarray(SIDE - np.abs(unfolded % (2 * SIDE) - SIDE))
 
 
 def tracks(hall: int, update: int, places: NDArray[np.float64]) -> list[TrackUpdate]:
-    """What two cameras say of a hall: both see the same, but for noise, and all but some of the time."""
+    """Return the tracks of two cameras over a hall, with noise and gaps."""
     found = []
     first = STRIDE * update
     coats = np.random.default_rng(0).dirichlet(np.full(16, 0.3), PEOPLE)
     for camera in (2 * hall, 2 * hall + 1):
         rng = np.random.default_rng([camera % 2, update])
         for person in range(PEOPLE):
-            # Everybody is lost for a while now and then, and then is another track.
-            turn, rest = divmod(update + 5 * person + 3 * (camera % 2), 15)
-            if rest >= 12:
+            # Every track is lost for a while from time to time, and another one follows.
+            track_number, phase = divmod(update + 5 * person + 3 * (camera % 2), 15)
+            if phase >= 12:
                 continue
             feet = (places[person, first : first + STRIDE] + rng.normal(0, 0.1, (STRIDE, 2))) / PIXEL
             boxes = np.column_stack([feet - np.array([20, 170]), feet + np.array([20, 0])])
-            look = AppearanceSample(first, first + STRIDE - 1, coats[person] * rng.uniform(0.8, 1.2, 16))
-            found.append(TrackUpdate(f"c{camera:03d}", 100 * turn + person, first, boxes, (look,)))
+            sample = AppearanceSample(first, first + STRIDE - 1, coats[person] * rng.uniform(0.8, 1.2, 16))
+            found.append(TrackUpdate(f"c{camera:03d}", 100 * track_number + person, first, boxes, (sample,)))
     return found
 
 
-def carried(halls: range) -> tuple[list[dict[tuple[int, str, int, int], int]], int]:
-    """Who is who after each update, by place in the hall and track; and how many pairs are known of."""
+def run_halls(halls: range) -> tuple[list[dict[tuple[int, str, int, int], int]], int]:
+    """Return the ids after each update, by hall and tracklet, and the number of pair entries."""
     names = {f"c{camera:03d}": ground(camera // 2) for hall in halls for camera in (2 * hall, 2 * hall + 1)}
-    who = IdentityRegistry(IdentitySettings(), dict(names))
-    places, told = walks(), []
+    identities = IdentityRegistry(IdentitySettings(), dict(names))
+    places, ids_by_update = walks(), []
     for update in range(UPDATES):
-        seen = [track for hall in halls for track in tracks(hall, update, places)]
-        numbers = who.update(seen, STRIDE * (update + 1) - 1).person_ids
-        told.append(
+        track_updates = [track for hall in halls for track in tracks(hall, update, places)]
+        numbers = identities.update(track_updates, STRIDE * (update + 1) - 1).person_ids
+        ids_by_update.append(
             {
-                (int(it.camera[1:]) // 2, it.camera, it.local_id, it.first_frame): number
-                for it, number in numbers.items()
+                (int(key.camera[1:]) // 2, key.camera, key.local_id, key.first_frame): number
+                for key, number in numbers.items()
             }
         )
-    return told, who.pair_count
+    return ids_by_update, identities.pair_count
 
 
 @pytest.fixture(scope="module")
 def together() -> tuple[list[dict[tuple[int, str, int, int], int]], int]:
-    return carried(range(4))
+    return run_halls(range(4))
 
 
 def test_pair_entries_grow_linearly_with_the_number_of_halls(
     together: tuple[list[dict[tuple[int, str, int, int], int]], int],
 ) -> None:
-    _, alone = carried(range(1))
+    _, alone = run_halls(range(1))
     assert alone > 0
     assert together[1] == 4 * alone
 
@@ -82,11 +82,11 @@ def test_pair_entries_grow_linearly_with_the_number_of_halls(
 def test_identities_in_a_hall_do_not_depend_on_other_halls(
     hall: int, together: tuple[list[dict[tuple[int, str, int, int], int]], int]
 ) -> None:
-    alone, _ = carried(range(hall, hall + 1))
-    for mine, theirs in zip(alone, together[0], strict=True):
-        here = {key: number for key, number in theirs.items() if key[0] == hall}
-        assert here.keys() == mine.keys()
-        pairs = {(mine[key], here[key]) for key in mine}
-        # Numbers differ, but each stands for one of the others.
+    alone, _ = run_halls(range(hall, hall + 1))
+    for ids_alone, ids_together in zip(alone, together[0], strict=True):
+        here = {key: number for key, number in ids_together.items() if key[0] == hall}
+        assert here.keys() == ids_alone.keys()
+        pairs = {(ids_alone[key], here[key]) for key in ids_alone}
+        # Ids may differ, but correspond one to one.
         assert len(pairs) == len({one for one, _ in pairs}) == len({two for _, two in pairs})
     assert max(alone[-1].values()) >= PEOPLE // 2

@@ -1,4 +1,4 @@
-"""Somebody's word that whom a camera shows is somebody else holds against the evidence."""
+"""A split by an operator holds against the evidence."""
 
 from __future__ import annotations
 
@@ -9,48 +9,48 @@ from hypothesis import strategies as st
 
 from bestview import Split, TrackKey
 from bestview.association.registry.identity_registry import IdentityUpdate
-from fakes.bestview.identity_scenes import HOWEVER_MANY, both, known, numbers, play, registry
+from fakes.bestview.identity_scenes import OPEN_TRACKLET_LIMITS, both, known, numbers, play, registry
 
 WEST = TrackKey("west", 1)
 TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (1, 2, 3)]
 
 
-def told(updates: Sequence[IdentityUpdate]) -> list[Split]:
-    return [it for update in updates for it in update.split]
+def published_splits(updates: Sequence[IdentityUpdate]) -> list[Split]:
+    return [split for update in updates for split in update.split]
 
 
-@HOWEVER_MANY
-def test_a_split_off_track_gets_a_new_id_and_keeps_it(most: int) -> None:
-    who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
-    assert known(play(who, stays, 100)) == {("south", 1): 1, ("west", 1): 1}
-    assert who.split_off([WEST], [1]) == 2
-    after = play(who, stays, 400, start=100)
+@OPEN_TRACKLET_LIMITS
+def test_a_split_off_track_gets_a_new_id_and_keeps_it(maximum_open: int) -> None:
+    identities, stays = registry(maximum_open_tracklets=maximum_open), both(1, (0, 0))
+    assert known(play(identities, stays, 100)) == {("south", 1): 1, ("west", 1): 1}
+    assert identities.split_off([WEST], [1]) == 2
+    after = play(identities, stays, 400, start=100)
     for update in after:
         for key, number in update.person_ids.items():
             assert number == (2 if key.camera == "west" else 1)
-    assert told(after) == []
-    assert all(it.merged == () for it in after)
-    assert who.split_off([WEST], [1]) is None
-    assert who.split_off([WEST], [2]) == 3  # also where it was settled, of which updates say nothing
+    assert published_splits(after) == []
+    assert all(update.merged == () for update in after)
+    assert identities.split_off([WEST], [1]) is None
+    assert identities.split_off([WEST], [2]) == 3  # also a settled tracklet, which updates do not contain
 
 
-@HOWEVER_MANY
-def test_all_tracks_of_a_person_can_be_split_off_together(most: int) -> None:
-    who, stays = registry(maximum_open_tracklets=most), both(1, (0, 0))
-    play(who, stays, 100)
-    assert who.split_off([WEST, TrackKey("south", 1)], [1]) == 2
-    after = play(who, stays, 300, start=100)
+@OPEN_TRACKLET_LIMITS
+def test_all_tracks_of_a_person_can_be_split_off_together(maximum_open: int) -> None:
+    identities, stays = registry(maximum_open_tracklets=maximum_open), both(1, (0, 0))
+    play(identities, stays, 100)
+    assert identities.split_off([WEST, TrackKey("south", 1)], [1]) == 2
+    after = play(identities, stays, 300, start=100)
     assert {number for update in after for number in update.person_ids.values()} <= {2}
-    assert told(after) == []
+    assert published_splits(after) == []
 
 
 def test_a_split_from_another_person_changes_nothing() -> None:
-    who, stays = registry(), both(1, (0, 0))
-    assert who.split_off([WEST], [1]) is None
-    play(who, stays, 100)
-    assert who.split_off([WEST], [7]) is None
-    assert who.split_off([TrackKey("west", 9)], [1]) is None
-    assert set(known(play(who, stays, 200, start=100)).values()) == {1}
+    identities, stays = registry(), both(1, (0, 0))
+    assert identities.split_off([WEST], [1]) is None
+    play(identities, stays, 100)
+    assert identities.split_off([WEST], [7]) is None
+    assert identities.split_off([TrackKey("west", 9)], [1]) is None
+    assert set(known(play(identities, stays, 200, start=100)).values()) == {1}
 
 
 @settings(deadline=None, max_examples=8)
@@ -61,29 +61,29 @@ def test_a_split_from_another_person_changes_nothing() -> None:
     )
 )
 def test_after_any_corrections_simultaneous_tracks_of_a_camera_have_different_ids(
-    said: list[tuple[int, set[TrackKey], int]],
+    corrections: list[tuple[int, set[TrackKey], int]],
 ) -> None:
-    who = registry()
+    identities = registry()
     stays = [
-        it for local, at in ((1, (0.0, 0.0)), (2, (2.0, 1.0)), (3, (-2.0, 2.0))) for it in both(local, at)
+        stay for local, at in ((1, (0.0, 0.0)), (2, (2.0, 1.0)), (3, (-2.0, 2.0))) for stay in both(local, at)
     ]
-    given_so: set[int] = set()
+    new_ids: set[int] = set()
     for step in range(12):
-        for update in play(who, stays, 10 * step + 10, start=10 * step):
+        for update in play(identities, stays, 10 * step + 10, start=10 * step):
             for camera in ("south", "west"):
                 shown = [number for (of, _), number in numbers(update).items() if of == camera]
                 assert len(shown) == len(set(shown))
-        for at, tracks, number in said:
+        for at, tracks, number in corrections:
             if at == step:
-                new = who.split_off(tracks, [number])
-                assert new is None or new not in given_so
-                given_so.add(new or 0)
+                new = identities.split_off(tracks, [number])
+                assert new is None or new not in new_ids
+                new_ids.add(new or 0)
 
 
 def test_a_split_off_id_is_never_reused() -> None:
-    who, stays = registry(), both(1, (0, 0))
-    play(who, stays, 100)
-    new = who.split_off([WEST], [1])
-    after = known(play(who, [*stays, *both(5, (4, 1), start=100)], 300, start=100))
+    identities, stays = registry(), both(1, (0, 0))
+    play(identities, stays, 100)
+    new = identities.split_off([WEST], [1])
+    after = known(play(identities, [*stays, *both(5, (4, 1), start=100)], 300, start=100))
     assert after["south", 5] == after["west", 5]
     assert after["south", 5] not in {1, new}

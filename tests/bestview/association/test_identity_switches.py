@@ -1,4 +1,4 @@
-"""Two tracks are said to have taken each other's person over: numbers follow the people, in every camera."""
+"""After an operator's correction of swapped tracks, ids follow the people in every camera."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bestview import Split, TrackKey
 from fakes.bestview.identity_scenes import (
     BLIND,
     CALIBRATED,
-    HOWEVER_MANY,
+    OPEN_TRACKLET_LIMITS,
     Stay,
     known,
     numbers,
@@ -21,33 +21,33 @@ from fakes.bestview.identity_scenes import (
 )
 
 ONE, TWO = TrackKey("south", 1), TrackKey("south", 2)
-TAKEN = 100
+SWAP_FRAME = 100
 """The first frame in which each of two tracks follows the other's person."""
 
 
 def meeting(apart: float, coats: tuple[int, int] = (3, 3)) -> list[Stay]:
-    """Two who pass each other before one camera, whose tracker takes each for the other as they do."""
+    """Return the tracks of two people who pass each other in one camera, whose tracker swaps them."""
     ways = [((-3.0, 0.0), (0.03, 0.0)), ((3.0, apart), (-0.03, 0.0))]
     stays = []
     for person, (start, speed) in enumerate(ways):
         before, after = 1 + person, 2 - person
-        stays.append(Stay("south", before, 0, TAKEN - 1, start, speed, coats[person]))
-        stays.append(Stay("south", after, TAKEN, 999, start, speed, coats[person]))
+        stays.append(Stay("south", before, 0, SWAP_FRAME - 1, start, speed, coats[person]))
+        stays.append(Stay("south", after, SWAP_FRAME, 999, start, speed, coats[person]))
     return stays
 
 
-@HOWEVER_MANY
+@OPEN_TRACKLET_LIMITS
 @pytest.mark.parametrize("apart", [0.8, 3.0], ids=["in a crowd", "side by side"])
-@pytest.mark.parametrize("told", [115, 170], ids=["soon", "later"])
-def test_swapped_tracks_exchange_their_ids(most: int, apart: float, told: int) -> None:
-    who, stays = registry(BLIND, maximum_open_tracklets=most), meeting(apart)
-    before = known(play(who, stays, told))
+@pytest.mark.parametrize("corrected_at", [115, 170], ids=["soon", "later"])
+def test_swapped_tracks_exchange_their_ids(maximum_open: int, apart: float, corrected_at: int) -> None:
+    identities, stays = registry(BLIND, maximum_open_tracklets=maximum_open), meeting(apart)
+    before = known(play(identities, stays, corrected_at))
     assert before == {ONE: 1, TWO: 2}
-    more = known(play(who, stays, told + 5, start=told))
-    assert {**before, **more} == before, "nothing tells them apart but somebody's word"
-    splits = who.swap_tracks(ONE, TWO, TAKEN, (1, 2))
+    more = known(play(identities, stays, corrected_at + 5, start=corrected_at))
+    assert {**before, **more} == before, "the evidence does not correct the swap"
+    splits = identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2))
     assert splits == (Split(1, 2, "south"), Split(2, 1, "south"))
-    after = play(who, stays, 500, start=told + 5)
+    after = play(identities, stays, 500, start=corrected_at + 5)
     for update in after:
         assert numbers(update).get(ONE, 2) == 2
         assert numbers(update).get(TWO, 1) == 1
@@ -56,43 +56,43 @@ def test_swapped_tracks_exchange_their_ids(most: int, apart: float, told: int) -
 
 
 def test_tracklets_of_other_cameras_since_the_swap_are_swapped_too() -> None:
-    # The other camera shares no ground, loses both as they pass, and finds them by what the first one says.
-    who, stays = registry({**CALIBRATED, "west": CALIBRATED["west"]}), meeting(0.8)
+    # The other camera loses both as they pass, and gets their ids from the first one.
+    identities, stays = registry({**CALIBRATED, "west": CALIBRATED["west"]}), meeting(0.8)
     stays += [
         Stay("west", 5, 0, 90, (-3.0, 0.0), (0.03, 0.0), 3),
         Stay("west", 6, 0, 90, (3.0, 0.8), (-0.03, 0.0), 3),
         Stay("west", 7, 120, 999, (-3.0, 0.0), (0.03, 0.0), 3),
         Stay("west", 8, 120, 999, (3.0, 0.8), (-0.03, 0.0), 3),
     ]
-    seen = known(play(who, stays, 180))
+    seen = known(play(identities, stays, 180))
     assert len(set(seen.values())) == 2
-    who.swap_tracks(ONE, TWO, TAKEN, (1, 2))
-    after = known(play(who, stays, 400, start=180))
+    identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2))
+    after = known(play(identities, stays, 400, start=180))
     assert after["south", 1] == after["west", 8] == seen["west", 6]
     assert after["south", 2] == after["west", 7] == seen["west", 5]
 
 
 def test_a_swap_that_the_evidence_already_corrected_reports_no_split() -> None:
-    who, stays = registry(), meeting(0.8)
+    identities, stays = registry(), meeting(0.8)
     stays += [
         Stay("west", 5, 0, 999, (-3.0, 0.0), (0.03, 0.0), 3),
         Stay("west", 6, 0, 999, (3.0, 0.8), (-0.03, 0.0), 3),
     ]
-    play(who, stays, 80)
-    seen = known(play(who, stays, 180, start=80))
+    play(identities, stays, 80)
+    seen = known(play(identities, stays, 180, start=80))
     assert seen[TWO] == seen["west", 5]
     assert seen[ONE] == seen["west", 6]
-    assert who.swap_tracks(ONE, TWO, TAKEN, (1, 2)) == ()
-    assert known(play(who, stays, 300, start=180)) == seen
+    assert identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2)) == ()
+    assert known(play(identities, stays, 300, start=180)) == seen
 
 
 def test_tracks_without_an_id_are_not_swapped() -> None:
-    who, stays = registry(BLIND), meeting(0.8)
-    assert who.swap_tracks(ONE, TWO, TAKEN, (1, 2)) == ()
-    play(who, stays, 115)
-    assert who.swap_tracks(ONE, TrackKey("south", 9), TAKEN, (1, 9)) == ()
-    assert who.swap_tracks(ONE, ONE, TAKEN, (1, 1)) == ()
-    assert who.swap_tracks(ONE, TWO, 0, (0, 0)) == (), "before that frame neither was there"
+    identities, stays = registry(BLIND), meeting(0.8)
+    assert identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2)) == ()
+    play(identities, stays, 115)
+    assert identities.swap_tracks(ONE, TrackKey("south", 9), SWAP_FRAME, (1, 9)) == ()
+    assert identities.swap_tracks(ONE, ONE, SWAP_FRAME, (1, 1)) == ()
+    assert identities.swap_tracks(ONE, TWO, 0, (0, 0)) == (), "no track existed before that frame"
 
 
 TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (1, 2, 3)]
@@ -106,30 +106,32 @@ TRACKS = [TrackKey(camera, local) for camera in ("south", "west") for local in (
     )
 )
 def test_after_any_corrections_simultaneous_tracks_of_a_camera_have_different_ids(
-    said: list[tuple[int, TrackKey, TrackKey, int]],
+    corrections: list[tuple[int, TrackKey, TrackKey, int]],
 ) -> None:
-    who = registry()
+    identities = registry()
     stays = [
         Stay(camera, local, 0, 999, at)
         for local, at in ((1, (0.0, 0.0)), (2, (2.0, 1.0)), (3, (-2.0, 2.0)))
         for camera in ("south", "west")
     ]
     for step in range(16):
-        for update in play(who, stays, 10 * step + 10, start=10 * step):
+        for update in play(identities, stays, 10 * step + 10, start=10 * step):
             for camera in ("south", "west"):
                 shown = [number for (of, _), number in numbers(update).items() if of == camera]
                 assert len(shown) == len(set(shown))
-        for at, one, two, frame in said:
+        for at, one, two, frame in corrections:
             if at == step and one.camera == two.camera:
-                who.swap_tracks(one, two, frame, (1, 2))
+                identities.swap_tracks(one, two, frame, (1, 2))
 
 
 def test_nothing_is_stored_for_tracks_that_never_reappear() -> None:
-    who = registry(BLIND)
-    stays = [replace(it, end=min(it.end, 199)) for it in meeting(3.0)]
+    identities = registry(BLIND)
+    stays = [replace(stay, end=min(stay.end, 199)) for stay in meeting(3.0)]
     stays.append(Stay("south", 9, 0, 999, (0.0, 5.0)))
-    play(who, stays, 200)
-    assert who.swap_tracks(ONE, TWO, 190, (1, 2))
-    assert set(who._splitter._pending_splits) == {ONE, TWO}, "their next sightings begin new parts"
-    play(who, stays, 900, start=200)
-    assert not who._splitter._pending_splits
+    play(identities, stays, 200)
+    assert identities.swap_tracks(ONE, TWO, 190, (1, 2))
+    assert set(identities._splitter._pending_splits) == {ONE, TWO}, (
+        "their next observations start new tracklets"
+    )
+    play(identities, stays, 900, start=200)
+    assert not identities._splitter._pending_splits

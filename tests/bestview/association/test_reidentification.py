@@ -1,4 +1,4 @@
-"""Who is found again by looks is nobody else's likeness; and what a distance between looks says."""
+"""Re-identification by appearance is unambiguous; appearance evidence falls with distance."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ COSTS = st.one_of(st.just(np.nan), st.integers(0, 12).map(float))
 
 @st.composite
 def people(draw: st.DrawFn) -> list[PersonAppearance]:
-    """Draw how some people look, each in some of two cameras, with histograms of one of two sizes."""
+    """Draw appearances of some people, each in some of two cameras, with histograms of one of two sizes."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     found = []
     for _ in range(draw(st.integers(0, 5))):
-        looks = PersonAppearance()
+        appearance = PersonAppearance()
         for camera in draw(st.sets(st.sampled_from(["c0", "c1"]))):
             bins = draw(st.sampled_from([BINS, BINS, 2 * BINS]))
-            looks.add(camera, MeanHistogram.of(rng.dirichlet(np.full(bins, 0.3)), 30))
-        found.append(looks)
+            appearance.add(camera, MeanHistogram.of(rng.dirichlet(np.full(bins, 0.3)), 30))
+        found.append(appearance)
     return found
 
 
@@ -52,7 +52,9 @@ def test_an_unambiguous_minimum_is_far_below_the_rest_of_its_row_and_column(data
     for i in range(high):
         for j in range(wide):
             rivals = [*np.delete(cost[i], j), *np.delete(cost[:, j], i)]
-            worse = all(np.isnan(it) or (it >= cost[i, j] and it >= RATIO * cost[i, j]) for it in rivals)
+            worse = all(
+                np.isnan(rival) or (rival >= cost[i, j] and rival >= RATIO * cost[i, j]) for rival in rivals
+            )
             assert clear[i, j] == (not np.isnan(cost[i, j]) and worse)
 
 
@@ -66,7 +68,7 @@ def test_matches_are_one_to_one_and_possible(
     possible = np.array(flat, dtype=np.bool_).reshape(shape)
     answer = match_by_appearance(HistogramEqualizer(), found, lost, possible, gate)
     assert len(answer) == len(found)
-    again = [who for who in answer if who >= 0]
+    again = [index for index in answer if index >= 0]
     assert len(again) == len(dict.fromkeys(again))
     distance = appearance_distances(HistogramEqualizer(), found, lost)
     for new, old in enumerate(answer):
@@ -100,26 +102,26 @@ def test_appearance_is_compared_in_common_cameras_where_there_are_any(
 
 
 def test_an_incomparable_histogram_counts_as_none() -> None:
-    looks = PersonAppearance()
+    appearance = PersonAppearance()
     for histogram in (np.zeros(0), np.zeros(BINS), np.full(BINS, np.nan), np.full(BINS, -1.0)):
-        looks.add("c0", MeanHistogram.of(histogram, 5))
-    assert looks.by_camera == {}
+        appearance.add("c0", MeanHistogram.of(histogram, 5))
+    assert appearance.by_camera == {}
     assert match_by_appearance(
-        HistogramEqualizer(), [looks], [looks], np.ones((1, 1), dtype=np.bool_), 1.0
+        HistogramEqualizer(), [appearance], [appearance], np.ones((1, 1), dtype=np.bool_), 1.0
     ) == [-1]
 
 
-DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda it: np.array(it, dtype=np.float64))
+DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda values: np.array(values, dtype=np.float64))
 
 
 @settings(deadline=None, max_examples=200)
 @given(DISTANCES, DISTANCES, st.floats(0, 1), st.floats(0, 1), st.integers(0, 20), st.integers(0, 20))
 def test_appearance_evidence_falls_with_distance_within_its_cap(
-    own: np.ndarray, others: np.ndarray, one: float, two: float, frames: int, more: int
+    same_person: np.ndarray, different_people: np.ndarray, one: float, two: float, frames: int, more: int
 ) -> None:
     weights, scale = (
         AppearanceWeights(typical=3.0, maximum=4.0, full_weight_frames=8),
-        DistanceScale.learned(own, others),
+        DistanceScale.learned(same_person, different_people),
     )
     assert 0.0 <= scale.same_person <= scale.different_people
 
@@ -129,7 +131,7 @@ def test_appearance_evidence_falls_with_distance_within_its_cap(
 
     near, far = sorted((one, two))
     assert evidence(near, frames) >= evidence(far, frames)
-    assert abs(evidence(one, frames + more)) >= abs(evidence(one, frames)), "more frames say more"
+    assert abs(evidence(one, frames + more)) >= abs(evidence(one, frames)), "more frames have more weight"
     assert abs(evidence(one, frames)) <= weights.maximum * min(frames / weights.full_weight_frames, 1.0)
     if scale.different_people > 1e-6:
         assert evidence(scale.same_person, 8) == pytest.approx(weights.typical)

@@ -1,4 +1,4 @@
-"""Tracks are cut where they may have been confused, and nowhere else; looks count outside crowds."""
+"""Tracks are split where people may have been confused, and nowhere else; crowds give no appearance."""
 
 from __future__ import annotations
 
@@ -17,42 +17,44 @@ LEFT, RIGHT, ONTO_LEFT = (0.0, 0.0, 10.0, 20.0), (100.0, 0.0, 110.0, 20.0), (2.0
 
 
 def track(
-    local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *looks: AppearanceSample
+    local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *samples: AppearanceSample
 ) -> TrackUpdate:
     rows = np.array([box or (np.nan,) * 4 for box in boxes])
-    return TrackUpdate("c0", local, first, rows, looks)
+    return TrackUpdate("c0", local, first, rows, samples)
 
 
-def seen_at(frame: int) -> AppearanceSample:
+def sample_at(frame: int) -> AppearanceSample:
     return AppearanceSample(frame, frame, np.array([1.0, 3.0]))
 
 
-def taken(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
+def split_tracks(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
     tracklets = TrackletSplitter(IdentitySettings())
     for tracks in updates:
         rows, _ = tracklets.update(
-            align_tracks(tracks, {"c0": None}, FEET), {it.key: it.appearance for it in tracks}
+            align_tracks(tracks, {"c0": None}, FEET), {track.key: track.appearance for track in tracks}
         )
         assert rows.max(initial=-1) < len(tracklets.active)
     return tracklets
 
 
-def looking(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> TrackUpdate:
+def track_with_samples(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> TrackUpdate:
     """Return a track whose every sighting has an appearance sample."""
-    return track(local, first, boxes, *(seen_at(first + i) for i, box in enumerate(boxes) if box))
+    return track(local, first, boxes, *(sample_at(first + i) for i, box in enumerate(boxes) if box))
 
 
 def spans(tracklets: TrackletSplitter, local: int) -> list[tuple[int, int]]:
-    mine = [it for it in tracklets.active if it.key.track == TrackKey("c0", local)]
-    return [(it.key.first_frame, it.end.frame) for it in mine]
+    tracklets_of_track = [
+        tracklet for tracklet in tracklets.active if tracklet.key.track == TrackKey("c0", local)
+    ]
+    return [(tracklet.key.first_frame, tracklet.end.frame) for tracklet in tracklets_of_track]
 
 
 def test_a_track_that_leaves_a_crowd_starts_a_new_tracklet() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4
-    tracklets = taken([track(1, 0, [LEFT] * 12, seen_at(0)), track(2, 0, met, seen_at(0))])
+    tracklets = split_tracks([track(1, 0, [LEFT] * 12, sample_at(0)), track(2, 0, met, sample_at(0))])
     assert spans(tracklets, 1) == spans(tracklets, 2) == [(0, 7), (8, 11)]
-    assert [it.crowd_frames_before for it in tracklets.active] == [0, 3, 0, 3]
-    assert [it.predecessor for it in tracklets.active] == [
+    assert [tracklet.crowd_frames_before for tracklet in tracklets.active] == [0, 3, 0, 3]
+    assert [tracklet.predecessor for tracklet in tracklets.active] == [
         None,
         tracklets.active[0],
         None,
@@ -62,14 +64,14 @@ def test_a_track_that_leaves_a_crowd_starts_a_new_tracklet() -> None:
 
 def test_short_overlaps_and_short_gaps_start_no_tracklet() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 2 + [RIGHT] * 3 + [None] * 9 + [RIGHT] * 3
-    assert spans(taken([track(1, 0, [LEFT] * 22), track(2, 0, met, seen_at(0))]), 2) == [(0, 21)]
+    assert spans(split_tracks([track(1, 0, [LEFT] * 22), track(2, 0, met, sample_at(0))]), 2) == [(0, 21)]
     away = [RIGHT] * 5 + [None] * 11 + [RIGHT] * 3
-    assert spans(taken([track(2, 0, away, seen_at(0))]), 2) == [(0, 4), (16, 18)]
+    assert spans(split_tracks([track(2, 0, away, sample_at(0))]), 2) == [(0, 4), (16, 18)]
 
 
 def test_without_appearance_the_track_is_not_split() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4 + [None] * 20 + [RIGHT] * 3
-    assert spans(taken([track(1, 0, [LEFT] * 12), track(2, 0, met)]), 2) == [(0, 34)]
+    assert spans(split_tracks([track(1, 0, [LEFT] * 12), track(2, 0, met)]), 2) == [(0, 34)]
 
 
 def test_appearance_samples_in_a_crowd_do_not_count() -> None:
@@ -77,10 +79,12 @@ def test_appearance_samples_in_a_crowd_do_not_count() -> None:
     met = [RIGHT] * 4 + [ONTO_LEFT] * 2
     crowded = AppearanceSample(3, 4, coat)
     alone = AppearanceSample(0, 2, coat)
-    tracklets = taken([track(1, 0, [LEFT] * 6), track(2, 0, met, alone, crowded)])
-    [look] = [it.appearance.by_camera["c0"] for it in tracklets.active if it.key.local_id == 2]
-    assert look.frame_count == 3
-    np.testing.assert_allclose(look.mean, [0.25, 0.75])
+    tracklets = split_tracks([track(1, 0, [LEFT] * 6), track(2, 0, met, alone, crowded)])
+    [histogram] = [
+        tracklet.appearance.by_camera["c0"] for tracklet in tracklets.active if tracklet.key.local_id == 2
+    ]
+    assert histogram.frame_count == 3
+    np.testing.assert_allclose(histogram.mean, [0.25, 0.75])
 
 
 def test_of_too_many_tracklets_the_longest_unseen_settle_first_but_not_before_publication() -> None:
@@ -90,30 +94,30 @@ def test_of_too_many_tracklets_the_longest_unseen_settle_first_but_not_before_pu
     tracks = [track(n, 0, [(50.0 * n, 0.0, 50.0 * n + 10, 20.0)] * (10 * n)) for n in range(1, 6)]
     tracklets = TrackletSplitter(few)
     tracklets.update(align_tracks(tracks, {"c0": None}, FEET), {})
-    assert [it.end.frame for it in tracklets.active] == [9, 19, 29, 39, 49]
-    assert tracklets.settleable_rows(49) == [0, 1], "the third was told just now"
-    assert tracklets.settleable_rows(60) == [0, 1, 2], "two are left"
+    assert [tracklet.end.frame for tracklet in tracklets.active] == [9, 19, 29, 39, 49]
+    assert tracklets.settleable_rows(49) == [0, 1], "the third was published just now"
+    assert tracklets.settleable_rows(60) == [0, 1, 2], "two remain"
     assert tracklets.settleable_rows(119) == [0, 1, 2]
     assert tracklets.settleable_rows(130) == [0, 1, 2]
     assert tracklets.settleable_rows(139) == [0, 1, 2, 3]
 
 
 def test_a_tracklet_settled_without_an_id_is_followed_by_a_new_one() -> None:
-    tracklets = taken([track(1, 0, [LEFT] * 5)])
+    tracklets = split_tracks([track(1, 0, [LEFT] * 5)])
     tracklets.settle(list(tracklets.active), 200)
     again = [track(1, 201, [LEFT] * 5)]
-    rows, firm = tracklets.update(align_tracks(again, {"c0": None}, FEET), {})
+    rows, settled = tracklets.update(align_tracks(again, {"c0": None}, FEET), {})
     assert rows.tolist() == [[0] * 5]
-    assert not firm.any()
+    assert not settled.any()
     assert spans(tracklets, 1) == [(201, 205)]
 
 
 def test_a_tracklet_that_is_settled_while_it_continues_is_not_split() -> None:
-    tracklets = taken([track(1, 0, [LEFT] * 5)])
+    tracklets = split_tracks([track(1, 0, [LEFT] * 5)])
     tracklets.active[0].published_frames[7] = 5
     tracklets.settle(list(tracklets.active), 5)
-    rows, firm = tracklets.update(align_tracks([track(1, 5, [LEFT] * 5)], {"c0": None}, FEET), {})
-    assert (rows.tolist(), firm.tolist()) == ([[-1] * 5], [[7] * 5])
+    rows, settled = tracklets.update(align_tracks([track(1, 5, [LEFT] * 5)], {"c0": None}, FEET), {})
+    assert (rows.tolist(), settled.tolist()) == ([[-1] * 5], [[7] * 5])
     assert not tracklets.active
 
 
@@ -128,13 +132,13 @@ def test_tracklets_do_not_depend_on_how_frames_are_grouped_into_updates(data: st
     }
     cuts = sorted(data.draw(st.sets(st.integers(1, frames - 1), max_size=5)))
     updates = [
-        [looking(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
+        [track_with_samples(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
         for a, b in zip([0, *cuts], [*cuts, frames], strict=True)
     ]
-    whole = taken([looking(local, 0, rows) for local, rows in boxes.items() if any(rows)])
-    parts = taken(*updates)
+    whole = split_tracks([track_with_samples(local, 0, rows) for local, rows in boxes.items() if any(rows)])
+    parts = split_tracks(*updates)
     for local in (1, 2):
         assert spans(parts, local) == spans(whole, local)
-        assert sum(it.frame_count for it in whole.active if it.key.local_id == local) == sum(
-            map(bool, boxes[local])
-        )
+        assert sum(
+            tracklet.frame_count for tracklet in whole.active if tracklet.key.local_id == local
+        ) == sum(map(bool, boxes[local]))

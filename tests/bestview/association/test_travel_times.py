@@ -1,4 +1,4 @@
-"""Times from camera to camera say who has come: learned from who surely went there, and nothing before."""
+"""Travel times between cameras are learned from certain re-identifications and become evidence."""
 
 from __future__ import annotations
 
@@ -16,46 +16,46 @@ from bestview.association.affinity.travel_times import CameraSighting, TravelTim
 
 CAMERAS = ("c0", "c1", "c2")
 SETTINGS = IdentitySettings(travel_frames=1000, travel_half_weight_count=5.0, maximum_travel_evidence=4.0)
-WAY = st.tuples(st.sampled_from(CAMERAS), st.sampled_from(CAMERAS), st.integers(-50, 1500))
+TRANSITIONS = st.tuples(st.sampled_from(CAMERAS), st.sampled_from(CAMERAS), st.integers(-50, 1500))
 
 
-def plain(ways: list[tuple[str, str, int]], lost: str, found: str, frames: int) -> float:
-    """The rule, read plainly: from the list of all ways."""
+def reference_evidence(transitions: list[tuple[str, str, int]], lost: str, found: str, frames: int) -> float:
+    """Compute the evidence from the list of all transitions."""
     edges = travel_time_bins(SETTINGS.travel_frames).tolist()
 
     def bin_of(time: int) -> int:
         return next((i for i, (low, high) in enumerate(pairwise(edges)) if low <= time < high), -1)
 
-    out = [(b, bin_of(time)) for a, b, time in ways if a == lost and bin_of(time) >= 0]
-    mine, last = bin_of(frames), len(edges) - 2
-    if mine < 0 or not out:
+    departures = [(b, bin_of(time)) for a, b, time in transitions if a == lost and bin_of(time) >= 0]
+    bin_index, last = bin_of(frames), len(edges) - 2
+    if bin_index < 0 or not departures:
         return 0.0
-    into = [place for b, place in out if b == found]
-    here = sum(
+    bins = [place for b, place in departures if b == found]
+    weight_in_bin = sum(
         share
-        for place in into
-        for beside, share in ((-1, 0.25), (0, 0.5), (1, 0.25))
-        if min(max(place + beside, 0), last) == mine
+        for place in bins
+        for offset, share in ((-1, 0.25), (0, 0.5), (1, 0.25))
+        if min(max(place + offset, 0), last) == bin_index
     )
-    share_of_camera = (len(into) + 1 / len(CAMERAS)) / (len(out) + 1)
-    share_of_time = (edges[mine + 1] - edges[mine]) / (edges[-1] - edges[0])
-    density = (here / share_of_time + 1) / (len(into) + 1)
-    said = min(max(log(len(CAMERAS) * share_of_camera * density), -4.0), 4.0)
-    return len(out) / (len(out) + 5.0) * said
+    share_of_camera = (len(bins) + 1 / len(CAMERAS)) / (len(departures) + 1)
+    share_of_time = (edges[bin_index + 1] - edges[bin_index]) / (edges[-1] - edges[0])
+    density = (weight_in_bin / share_of_time + 1) / (len(bins) + 1)
+    evidence = min(max(log(len(CAMERAS) * share_of_camera * density), -4.0), 4.0)
+    return len(departures) / (len(departures) + 5.0) * evidence
 
 
 @settings(deadline=None, max_examples=200)
-@given(st.lists(WAY, max_size=30), WAY)
+@given(st.lists(TRANSITIONS, max_size=30), TRANSITIONS)
 def test_travel_evidence_equals_the_reference(
-    ways: list[tuple[str, str, int]], asked: tuple[str, str, int]
+    transitions: list[tuple[str, str, int]], query: tuple[str, str, int]
 ) -> None:
     travel = TravelTimeModel(SETTINGS, len(CAMERAS))
-    for lost, found, frames in ways:
+    for lost, found, frames in transitions:
         travel.learn(CameraSighting(lost, 100), CameraSighting(found, 100 + frames))
-    lost, found, frames = asked
-    said = travel.evidence([CameraSighting(found, 70 + frames)], [CameraSighting(lost, 70)])
-    assert said.shape == (1, 1)
-    assert said[0, 0] == pytest.approx(plain(ways, lost, found, frames))
+    lost, found, frames = query
+    evidence = travel.evidence([CameraSighting(found, 70 + frames)], [CameraSighting(lost, 70)])
+    assert evidence.shape == (1, 1)
+    assert evidence[0, 0] == pytest.approx(reference_evidence(transitions, lost, found, frames))
 
 
 def test_usual_travel_times_raise_the_evidence_and_unusual_ones_lower_it() -> None:
@@ -69,11 +69,11 @@ def test_usual_travel_times_raise_the_evidence_and_unusual_ones_lower_it() -> No
         CameraSighting("c2", 160),
         CameraSighting("c1", 5000),
     ]
-    usual, soon, late, elsewhere, ages = travel.evidence(found, [CameraSighting("c0", 0)])[:, 0].tolist()
+    usual, soon, late, elsewhere, too_late = travel.evidence(found, [CameraSighting("c0", 0)])[:, 0].tolist()
     assert usual > 1.0
     assert max(soon, late, elsewhere) < -1.0
-    assert ages == 0.0, "who has been away for longer than a way takes"
-    assert not travel.evidence(found, [CameraSighting("c2", 0)]).any(), "nobody has come from there yet"
+    assert too_late == 0.0, "away for longer than any transition"
+    assert not travel.evidence(found, [CameraSighting("c2", 0)]).any(), "no transition from there is known"
 
 
 def test_old_transitions_fade_and_memory_is_bounded() -> None:
@@ -82,10 +82,10 @@ def test_old_transitions_fade_and_memory_is_bounded() -> None:
         travel.learn(CameraSighting("c0", i), CameraSighting("c1", i + 30))
     for i in range(150):
         travel.learn(CameraSighting("c0", i), CameraSighting("c1", i + 700))
-    then, now = travel.evidence(
+    old, new = travel.evidence(
         [CameraSighting("c1", 30), CameraSighting("c1", 700)], [CameraSighting("c0", 0)]
     )[:, 0]
-    assert now > then
+    assert new > old
     assert sum(times.sum() for times in travel._departures["c0"].arrivals.values()) <= 64
 
 

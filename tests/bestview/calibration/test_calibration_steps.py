@@ -1,4 +1,4 @@
-"""The parts that calibration from walks is put together from, against the plain way to say what they do."""
+"""The steps of calibration from walks, compared with simple references."""
 
 from __future__ import annotations
 
@@ -98,17 +98,17 @@ def test_candidate_matches_pair_samples_of_the_same_pulse(random: np.random.Gene
     pulses = np.arange(-20.0, 120.0, 4.0)
     here = sample_walk(one, pulses, 0.0, 2, 0.15)
     there = sample_walk(other, pulses, offset, 2, 0.15)
-    met = candidate_matches(here, there)
+    candidates = candidate_matches(here, there)
     expected = {
         (a, b)
         for a in range(len(here.times))
         for b in range(len(there.times))
         if here.times[a] == there.times[b]
     }
-    assert set(zip(met.here.tolist(), met.there.tolist(), strict=True)) == expected
-    for index in range(len(met.here)):
-        pair = (here.track[met.here[index]], there.track[met.there[index]])
-        assert tuple(met.tracks[met.pair[index]]) == pair
+    assert set(zip(candidates.here.tolist(), candidates.there.tolist(), strict=True)) == expected
+    for index in range(len(candidates.here)):
+        pair = (here.track[candidates.here[index]], there.track[candidates.there[index]])
+        assert tuple(candidates.tracks[candidates.pair[index]]) == pair
 
 
 @settings(deadline=None, max_examples=30)
@@ -146,28 +146,32 @@ def test_matches_are_one_to_one_at_each_pulse_and_near(random: np.random.Generat
     one, other = (Walk(name, SIZE, tracks(random, 4)) for name in "ab")
     pulses = np.arange(0.0, 90.0, 3.0)
     here, there = (sample_walk(walk, pulses, 0.0, 3, 0.15) for walk in (one, other))
-    met = candidate_matches(here, there)
-    off = random.normal(0, 1.0, (len(met.here), 2))
-    places = pair_agreement(off, met, 2.0)
-    for pair in range(len(met.tracks)):
-        mine = met.pair == pair
-        counted = np.clip(1 - (off[mine] ** 2).sum(axis=1) / 4, -1, 1) * met.weight[mine]
+    candidates = candidate_matches(here, there)
+    off = random.normal(0, 1.0, (len(candidates.here), 2))
+    places = pair_agreement(off, candidates, 2.0)
+    for pair in range(len(candidates.tracks)):
+        own_rows = candidates.pair == pair
+        counted = np.clip(1 - (off[own_rows] ** 2).sum(axis=1) / 4, -1, 1) * candidates.weight[own_rows]
         assert places[pair] == pytest.approx(counted.sum())
-    chosen = mutual_matches(off, places, here, there, met, 2.0)
-    assert len(set(met.here[chosen])) == len(set(met.there[chosen])) == len(chosen)
+    chosen = mutual_matches(off, places, here, there, candidates, 2.0)
+    assert len(set(candidates.here[chosen])) == len(set(candidates.there[chosen])) == len(chosen)
     assert (np.hypot(*off[chosen].T) < 2.0).all()
-    assert total_agreement(places, met) <= np.maximum(places, 0).sum() + 1e-9
+    assert total_agreement(places, candidates) <= np.maximum(places, 0).sum() + 1e-9
 
 
 @settings(deadline=None, max_examples=20)
 @given(seeds)
 def test_reversed_and_swapped_walks_hold_the_same_boxes(random: np.random.Generator) -> None:
     walk = Walk("a", SIZE, tracks(random, 4))
-    count = sum(len(it.boxes) for it in walk.tracks)
-    assert sum(len(it.boxes) for it in time_reversed(walk).tracks) == count
-    assert count - 2 * len(walk.tracks) <= sum(len(it.boxes) for it in halves_swapped(walk).tracks) <= count
+    count = sum(len(track.boxes) for track in walk.tracks)
+    assert sum(len(track.boxes) for track in time_reversed(walk).tracks) == count
+    assert (
+        count - 2 * len(walk.tracks)
+        <= sum(len(track.boxes) for track in halves_swapped(walk).tracks)
+        <= count
+    )
     for wrong in (time_reversed(walk), halves_swapped(walk)):
-        assert all(it.first_frame >= 0 for it in wrong.tracks)
+        assert all(track.first_frame >= 0 for track in wrong.tracks)
         assert wrong.end_frame <= walk.end_frame
 
 
@@ -177,8 +181,8 @@ def test_truncated_boxes_are_dropped_and_long_gaps_split_a_track() -> None:
     boxes = np.array([box] * 40)
     boxes[5] = [100.0, 260.0, 140.0, 360.0]  # at the lower edge
     walk = build_walk("a", SIZE, frames, [1] * 40, boxes)
-    assert [(it.first_frame, it.end_frame) for it in walk.tracks] == [(0, 20), (40, 60)]
-    assert np.allclose(walk.tracks[0].boxes[5], box)  # between its neighbours
+    assert [(track.first_frame, track.end_frame) for track in walk.tracks] == [(0, 20), (40, 60)]
+    assert np.allclose(walk.tracks[0].boxes[5], box)  # interpolated
     assert build_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2)).tracks == ()
 
 
@@ -192,10 +196,10 @@ def test_a_walk_of_another_rate_is_averaged_over_the_same_time(
     half = step // 2
     middle = [boxes[at - half : at + half + 1].mean(axis=0) for at in range(half, 30 - half)]
     assert np.allclose(track.boxes[half : 30 - half], middle)
-    whitened_differences = build_walk(
+    with_gaps = build_walk(
         "a", SIZE, [0, 1, 1 + step, 2 + step, 3 + 2 * step, 4 + 2 * step], [1] * 6, boxes[:6], step
     )
-    assert [it.first_frame for it in whitened_differences.tracks] == [0, 3 + 2 * step]
+    assert [track.first_frame for track in with_gaps.tracks] == [0, 3 + 2 * step]
 
 
 def test_a_line_has_no_breadth() -> None:
@@ -211,10 +215,10 @@ def test_the_offset_error_grows_with_the_noise() -> None:
     for noise in (0.005, 0.05):
         random = np.random.default_rng(3)
         cameras, path = (camera_at(-4, -1), camera_at(1, -4.5)), stroll(np.random.default_rng(3), 500)
-        views = [seen("c", it, [path], random, noise=Noise(noise, noise)) for it in cameras]
-        samples = [sample_walk(it, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for it in views]
-        met = candidate_matches(*samples)
-        matches = Correspondences(0, 1, met.here, met.there, met.weight)
+        views = [seen("c", camera, [path], random, noise=Noise(noise, noise)) for camera in cameras]
+        samples = [sample_walk(view, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for view in views]
+        candidates = candidate_matches(*samples)
+        matches = Correspondences(0, 1, candidates.here, candidates.there, candidates.weight)
         first, second = offset_standard_errors(CameraRig(cameras, np.zeros(2)), samples, [matches], SETTINGS)
         assert first == 0.0
         errors.append(second)

@@ -1,4 +1,4 @@
-"""Marked points: the homography comes back, and what is wrong is named."""
+"""Calibration from marked points recovers the homography, and names wrong pairs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from bestview.calibration import (
 
 
 def camera_over_floor(random: np.random.Generator) -> Floats:
-    """A homography from a picture of 640x360 to metres, of a camera that looks down on the floor."""
+    """Return the homography of a camera that looks down on the floor: 640x360 pixels to metres."""
     focal, tilt, turn = random.uniform(350, 900), random.uniform(0.2, 1.2), random.uniform(0, 6.28)
     forward = np.array([np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), -np.sin(tilt)])
     right = np.cross(forward, (0, 0, 1.0))
@@ -33,7 +33,7 @@ def camera_over_floor(random: np.random.Generator) -> Floats:
 
 
 def marked(random: np.random.Generator, count: int) -> tuple[MarkedPoints, Floats]:
-    """Exact pairs spread over the lower part of the picture, and the homography."""
+    """Return exact pairs spread over the lower part of the picture, and the homography."""
     homography = camera_over_floor(random)
     corners = np.array([[40, 200], [600, 210], [50, 350], [610, 340]], dtype=float)
     image = np.concatenate([corners, random.uniform((30, 200), (610, 350), (count, 2))])[:count]
@@ -54,7 +54,7 @@ def test_exact_pairs_give_the_homography(random: np.random.Generator, count: int
 
 
 def test_memory_is_linear_in_the_number_of_pairs() -> None:
-    points, truth = marked(np.random.default_rng(0), 50_000)  # a matrix that many to a side has 20 gigabytes
+    points, truth = marked(np.random.default_rng(0), 50_000)  # a square matrix of that size has 20 gigabytes
     found = fit_homography(points.image, points.floor)
     assert np.allclose(to_ground(found, points.image[:4]), to_ground(truth, points.image[:4]), atol=1e-4)
 
@@ -122,13 +122,13 @@ def test_corners_in_another_order_are_refused() -> None:
 
 def test_a_camera_with_exchanged_floor_coordinates_is_named() -> None:
     random = np.random.default_rng(5)
-    cameras = [MarkedPoints(f"c{number}", *_both(marked(random, 6)[0])) for number in range(3)]
+    cameras = [MarkedPoints(f"c{number}", *_coordinates(marked(random, 6)[0])) for number in range(3)]
     cameras[1] = MarkedPoints("c1", cameras[1].image, cameras[1].floor[:, ::-1])
     with pytest.raises(CalibrationError, match="camera c1: its floor is mirrored against that of c0"):
         fit_cameras(cameras)
 
 
-def _both(points: MarkedPoints) -> tuple[Floats, Floats]:
+def _coordinates(points: MarkedPoints) -> tuple[Floats, Floats]:
     return points.image, points.floor
 
 

@@ -1,4 +1,4 @@
-"""Walks: cameras are found from nothing but people's boxes, and walks that say too little are refused."""
+"""Calibration from walks finds cameras from people's boxes alone, and refuses insufficient walks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ def test_one_walking_person_calibrates_two_cameras_and_their_offset(seed: int, o
     given = walks(random, (WEST, SOUTH), [stroll(random, 450)], (0, offset))
     found = calibrate_from_walks(given, WalkSettings(maximum_offset=30), PERSON)
     assert found.uncalibrated == ()
-    errors = error_on_floor([it.homography for it in found.cameras], (WEST, SOUTH), MIDDLE, PERSON)
+    errors = error_on_floor(
+        [calibration.homography for calibration in found.cameras], (WEST, SOUTH), MIDDLE, PERSON
+    )
     assert np.median(errors) < 0.1  # person heights
     assert errors.max() < 0.4
     assert found.cameras[0].offset == 0.0
@@ -47,9 +49,11 @@ def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
     ghost = WalkTrack(0, box + sway)
     given[1] = replace(given[1], tracks=(*given[1].tracks, ghost))
     found = calibrate_from_walks(given, WalkSettings(maximum_offset=0), PERSON)
-    errors = error_on_floor([it.homography for it in found.cameras], (WEST, SOUTH), MIDDLE, PERSON)
+    errors = error_on_floor(
+        [calibration.homography for calibration in found.cameras], (WEST, SOUTH), MIDDLE, PERSON
+    )
     assert np.median(errors) < 0.1
-    assert [it.offset for it in found.cameras] == [0.0, 0.0]
+    assert [calibration.offset for calibration in found.cameras] == [0.0, 0.0]
 
 
 def test_calibration_is_deterministic() -> None:
@@ -66,14 +70,14 @@ def test_a_camera_that_sees_other_people_is_not_calibrated() -> None:
     given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, 0))
     elsewhere = seen("c2", WEST, [stroll(random, 300)], random)
     found = calibrate_from_walks([given[0], elsewhere, given[1]], WalkSettings(maximum_offset=0), PERSON)
-    assert [it.camera for it in found.cameras] == ["c0", "c1"]
+    assert [calibration.camera for calibration in found.cameras] == ["c0", "c1"]
     (left_out,) = found.uncalibrated
     assert left_out.camera == "c2"
     assert "c2" in left_out.reason
 
 
 def straight(frames: int) -> Floats:
-    """To and fro on a line across both pictures."""
+    """Return a path back and forth on a line across both pictures."""
     along = 1.5 * np.sin(np.arange(frames) * 0.02)
     return np.column_stack([along, 0.4 * along])
 
@@ -88,14 +92,14 @@ def test_a_straight_line_is_refused() -> None:
 def test_standing_still_is_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [np.zeros((400, 2))], (0, 0))
-    with pytest.raises(CalibrationError, match=r"nobody was seen walking by both|walk longer where both see"):
+    with pytest.raises(CalibrationError, match=r"no person was tracked by both|walk longer where both see"):
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
 def test_people_seen_by_one_camera_after_the_other_are_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, -1000))
-    with pytest.raises(CalibrationError, match="nobody was seen walking by both at once"):
+    with pytest.raises(CalibrationError, match="no person was tracked by both cameras at the same time"):
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
@@ -109,8 +113,8 @@ def test_different_people_are_refused() -> None:
 
 
 def test_an_empty_walk_and_a_single_camera_are_refused() -> None:
-    nobody = [Walk(name, SIZE, ()) for name in ("c0", "c1")]
-    with pytest.raises(CalibrationError, match="nobody was seen walking by both at once"):
-        calibrate_from_walks(nobody)
-    with pytest.raises(CalibrationError, match="two cameras at least"):
-        calibrate_from_walks(nobody[:1])
+    empty = [Walk(name, SIZE, ()) for name in ("c0", "c1")]
+    with pytest.raises(CalibrationError, match="no person was tracked by both cameras at the same time"):
+        calibrate_from_walks(empty)
+    with pytest.raises(CalibrationError, match="at least two cameras"):
+        calibrate_from_walks(empty[:1])

@@ -37,8 +37,8 @@ CALIBRATED: Mapping[str, NDArray[np.float64] | None] = {
     side: np.asarray(np.linalg.inv(view), float) for side, view in VIEWS.items()
 }
 BLIND: Mapping[str, NDArray[np.float64] | None] = dict.fromkeys(VIEWS)
-HOWEVER_MANY = pytest.mark.parametrize("most", [400, 0], ids=["few", "too many at once"])
-"""With more tracklets than this limit, certain identities are decided at once."""
+OPEN_TRACKLET_LIMITS = pytest.mark.parametrize("maximum_open", [400, 0], ids=["few", "too many at once"])
+"""Values of `maximum_open_tracklets`: above it, certain identities are settled at once."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,12 @@ class Stay:
 
     def track(self, first: int, last: int) -> TrackUpdate:
         boxes = np.full((last - first + 1, 4), np.nan)
-        seen = range(max(first, self.start), min(last, self.end) + 1)
-        for frame in seen:
+        visible = range(max(first, self.start), min(last, self.end) + 1)
+        for frame in visible:
             boxes[frame - first] = self.box(frame)
-        appearance = (AppearanceSample(seen[0], seen[-1], coat(self.coat)),) if seen and self.coat else ()
+        appearance = (
+            (AppearanceSample(visible[0], visible[-1], coat(self.coat)),) if visible and self.coat else ()
+        )
         return TrackUpdate(self.camera, self.local_id, first, boxes, appearance)
 
 
@@ -79,9 +81,9 @@ def play(
     stays: Sequence[Stay],
     frames: int,
     start: int = 0,
-    speaking: Mapping[str, tuple[int, int]] | None = None,
+    pictures: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[IdentityUpdate]:
-    return list(updates(registry, stays, frames, start, speaking))
+    return list(updates(registry, stays, frames, start, pictures))
 
 
 def updates(
@@ -89,7 +91,7 @@ def updates(
     stays: Sequence[Stay],
     frames: int,
     start: int = 0,
-    speaking: Mapping[str, tuple[int, int]] | None = None,
+    pictures: Mapping[str, tuple[int, int]] | None = None,
 ) -> Iterator[IdentityUpdate]:
     for last in range(start + STRIDE - 1, frames, STRIDE):
         first = last - STRIDE + 1
@@ -102,7 +104,7 @@ def updates(
                     boxes = np.where(np.isnan(track.boxes), before.boxes, track.boxes)
                     track = replace(track, boxes=boxes, appearance=(*before.appearance, *track.appearance))
                 tracks[stay.camera, stay.local_id] = track
-        yield registry.update(list(tracks.values()), last, speaking)
+        yield registry.update(list(tracks.values()), last, pictures)
 
 
 def registry(
@@ -115,9 +117,9 @@ def both(local: int, place: tuple[float, float], start: int = 0, end: int = 999)
     return [Stay("south", local, start, end, place), Stay("west", local, start, end, place)]
 
 
-def known(seen: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
+def known(identity_updates: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
     """Return the person of each track after these updates, by camera and local id."""
-    every = {key: number for update in seen for key, number in update.person_ids.items()}
+    every = {key: number for update in identity_updates for key, number in update.person_ids.items()}
     newest = {key.track: number for key, number in sorted(every.items())}
     return {(key.camera, key.local_id): number for key, number in newest.items() if number}
 

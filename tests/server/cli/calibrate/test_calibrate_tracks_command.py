@@ -76,7 +76,7 @@ def test_a_walk_in_one_place_is_refused_and_nothing_is_written(run: RunCommand, 
     write_walk(tmp_path / "tracks", 100, lambda frames: np.zeros((len(frames), 2)))
     code, out, err = run("tracks", "--size", "640x360", "--shift", "0", "--out", "ground.json")
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert err.startswith("myview: calibrate: c0 and c1: nobody was seen walking by both at once")
+    assert err.startswith("myview: calibrate: c0 and c1: no person was tracked by both cameras at the same")
     assert [path.name for path in tmp_path.iterdir()] == ["tracks"]
 
 
