@@ -1,4 +1,4 @@
-"""What is visible, what the best views would have been, and who stands for whom, against trying all."""
+"""Ground truth of views, the offline optimum, and the matching of objects, compared with exhaustive search."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ SQUARE, WIDE = [100.0, 100.0], [200.0, 200.0]
 
 def truth_of(boxes: list[list[float]], shown: list[float], least: float = 0.25) -> ViewGroundTruth:
     """Return one person's views in one frame of several cameras."""
-    laid = np.array(boxes)[None, None]
+    boxes_by_camera = np.array(boxes)[None, None]
     sizes = np.array([SQUARE] * len(boxes))
-    return view_ground_truth(laid, np.array(shown)[None, None], sizes, least)
+    return view_ground_truth(boxes_by_camera, np.array(shown)[None, None], sizes, least)
 
 
 def test_a_view_costs_its_share_below_the_largest_view() -> None:
@@ -65,13 +65,16 @@ def test_the_optimum_is_the_cheapest_of_all_sequences(seed: int, switch_cost: fl
         on = visible[person].any(axis=1)
         assert (views[person] >= 0).tolist() == on.tolist()
         assert total(cost[person, on], views[person, on].tolist(), switch_cost) == pytest.approx(
-            min(total(cost[person, on], it, switch_cost) for it in product(range(3), repeat=int(on.sum())))
+            min(
+                total(cost[person, on], sequence, switch_cost)
+                for sequence in product(range(3), repeat=int(on.sum()))
+            )
         )
 
 
 def total(cost: np.ndarray, views: tuple[int, ...] | list[int], switch_cost: float) -> float:
-    seen = sum(float(cost[frame, view]) for frame, view in enumerate(views))
-    return seen + switch_cost * sum(a != b for a, b in pairwise(views))
+    view_costs = sum(float(cost[frame, view]) for frame, view in enumerate(views))
+    return view_costs + switch_cost * sum(a != b for a, b in pairwise(views))
 
 
 @settings(deadline=None, max_examples=80)
@@ -79,12 +82,14 @@ def total(cost: np.ndarray, views: tuple[int, ...] | list[int], switch_cost: flo
 def test_objects_are_matched_to_people_optimally(people: int, objects: int, seed: int) -> None:
     matches = np.random.default_rng(seed).integers(0, 5, (people, objects))
     found = match_objects_to_people(matches).tolist()
-    somebody = [it for it in found if it != NO_PERSON]
-    assert len(set(somebody)) == len(somebody), "one person has one object"
-    reached = sum(int(matches[person, thing]) for thing, person in enumerate(found) if person != NO_PERSON)
+    matched = [person for person in found if person != NO_PERSON]
+    assert len(set(matched)) == len(matched), "one person has one object"
+    reached = sum(int(matches[person, item]) for item, person in enumerate(found) if person != NO_PERSON)
     square = np.zeros((4, 4), dtype=np.int64)
     square[:people, :objects] = matches
-    assert reached == max(sum(int(square[a, b]) for b, a in enumerate(way)) for way in permutations(range(4)))
+    assert reached == max(
+        sum(int(square[a, b]) for b, a in enumerate(order)) for order in permutations(range(4))
+    )
 
 
 def test_an_object_without_matches_has_no_person() -> None:

@@ -1,4 +1,4 @@
-"""A score tells good choices from bad ones, and none is better than the optimum."""
+"""Scores of view selections: the optimum has no regret, and no selection has less."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Boxes touch those that share a cell of the picture with them, and no others of other pictures."""
+"""Boxes touch others that share a cell of the same picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CELL = 10.0
 
 
 def cells(box: np.ndarray) -> set[tuple[int, int]]:
-    """Return the cells that a box touches, in order."""
+    """Return the cells that a box touches."""
     return {
         (row, column)
         for row in range(36)
@@ -35,8 +35,12 @@ def drawn(rng: np.random.Generator, count: int) -> np.ndarray:
 def test_boxes_touch_if_they_share_a_cell(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     boxes, others = drawn(rng, 12), drawn(rng, count)
-    picture, theirs = rng.integers(0, 3, 12), rng.integers(0, 3, count)
-    told = boxes_touching_others(boxes, picture, others, theirs, 3, SIZE)
-    for box, at, touched in zip(boxes, picture, told, strict=True):
-        beside = [cells(box) & cells(it) for it, there in zip(others, theirs, strict=True) if there == at]
-        assert touched == any(beside)
+    picture, other_pictures = rng.integers(0, 3, 12), rng.integers(0, 3, count)
+    touching = boxes_touching_others(boxes, picture, others, other_pictures, 3, SIZE)
+    for box, box_picture, touched in zip(boxes, picture, touching, strict=True):
+        shared_cells = [
+            cells(box) & cells(other)
+            for other, other_picture in zip(others, other_pictures, strict=True)
+            if other_picture == box_picture
+        ]
+        assert touched == any(shared_cells)

@@ -1,4 +1,4 @@
-"""Feet through a homography come to stand where the person stands."""
+"""Foot points map to the ground point of the person, and back."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_distance_is_less_certain_than_direction() -> None:
     across, along = np.sqrt(spreads[:, 0, 0]), np.sqrt(spreads[:, 1, 1])
     assert across == pytest.approx([0.05 * 1.75] * 2)  # a share of the person's height, near or far
     assert (along > across).all()
-    assert along[1] == pytest.approx(2 * along[0])  # level rays meet the ground ever more flatly
+    assert along[1] == pytest.approx(2 * along[0])  # the angle between ray and ground decreases
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_ground_points_project_to_the_picture_unless_behind_the_camera(
     assert np.isnan(from_ground(homography, np.array([np.nan, y]))).all()
 
 
-def test_feet_on_the_lower_edge_are_cut_off_and_boxes_beyond_it_are_trusted() -> None:
+def test_feet_on_the_lower_edge_are_cut_off_and_boxes_beyond_it_are_complete() -> None:
     bottoms = np.array([100.0, 470.0, 476.0, 480.0, 484.0, 490.0, 560.0])
     boxes = np.stack([np.zeros(7), np.zeros(7), np.full(7, 50.0), bottoms], axis=-1)
     assert feet_cut_off(boxes, 480.0).tolist() == [False, False, True, True, True, False, False]
@@ -173,5 +173,5 @@ def test_a_box_from_overhead_has_its_foot_point_in_the_middle() -> None:
 
 
 def test_an_inverted_overhead_box_has_height_zero() -> None:
-    inside_out = np.array([[140.0, 200.0, 100.0, 240.0]])  # warnings are errors in tests
-    assert upright_from_overhead(inside_out).tolist() == [[140.0, 220.0, 100.0, 220.0]]
+    inverted = np.array([[140.0, 200.0, 100.0, 240.0]])  # warnings are errors in tests
+    assert upright_from_overhead(inverted).tolist() == [[140.0, 220.0, 100.0, 220.0]]

@@ -1,4 +1,4 @@
-"""Who stands somewhere looks in each camera as its homography says."""
+"""Bodies estimated from one camera's boxes are projected into all cameras by their homographies."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from fakes.bestview.walkers import SIZE, camera_at
 
 EAST, SOUTH = camera_at(4.0, 0.0), camera_at(0.0, -3.0)
 CAMERAS = (EAST, SOUTH)
-GROUNDS = np.array([it.homography() for it in CAMERAS])
+GROUNDS = np.array([camera.homography() for camera in CAMERAS])
 BOTTOM = np.array([SIZE[1], SIZE[1]], dtype=float)
 
 
-def box_in(camera: Pinhole, place: np.ndarray, slim: float = 0.4) -> np.ndarray:
+def box_in(camera: Pinhole, place: np.ndarray, aspect_ratio: float = 0.4) -> np.ndarray:
     """Return the box of a person one unit tall at a place, (2,) person heights."""
     x, y = camera.picture(place)
     tall = float(camera.heights(np.array([x, y])))
-    return np.array([x - slim * tall / 2, y - tall, x + slim * tall / 2, y])
+    return np.array([x - aspect_ratio * tall / 2, y - tall, x + aspect_ratio * tall / 2, y])
 
 
-def in_all(body: BodyEstimates, grounds: np.ndarray) -> np.ndarray:
+def boxes_in_all_cameras(body: BodyEstimates, grounds: np.ndarray) -> np.ndarray:
     """Return the boxes of one body in all cameras, (C, 4)."""
-    foot, everyone = project_feet(body, grounds)[0], np.zeros(len(grounds), int)
-    return project_boxes(body, everyone, foot, grounds)
+    foot, body_index = project_feet(body, grounds)[0], np.zeros(len(grounds), int)
+    return project_boxes(body, body_index, foot, grounds)
 
 
 @settings(deadline=None, max_examples=60)
@@ -36,11 +36,11 @@ def test_a_body_is_projected_into_its_own_and_the_other_camera(
     east: float, north: float, camera: int
 ) -> None:
     place = np.array([east, north])
-    own, other = (box_in(it, place) for it in (CAMERAS[camera], CAMERAS[1 - camera]))
+    own, other = (box_in(view, place) for view in (CAMERAS[camera], CAMERAS[1 - camera]))
     body = estimate_bodies(own[None], np.array([camera]), np.array([0]), 1, GROUNDS, BOTTOM)
     assert body.ground_point[0] == pytest.approx(place, abs=1e-6)
     assert body.known_by[0].tolist() == [camera == 0, camera == 1]
-    boxes = in_all(body, GROUNDS)
+    boxes = boxes_in_all_cameras(body, GROUNDS)
     assert boxes[camera] == pytest.approx(own, abs=1e-6)
     foot = (boxes[1 - camera][0] + boxes[1 - camera][2]) / 2, boxes[1 - camera][3]
     assert foot == pytest.approx(((other[0] + other[2]) / 2, other[3]), abs=1e-6)
@@ -50,7 +50,7 @@ def test_a_body_is_projected_into_its_own_and_the_other_camera(
 
 def test_the_nearer_camera_has_more_weight() -> None:
     near, far = camera_at(2.5, 0.0), camera_at(-9.0, 0.0)
-    grounds = np.array([it.homography() for it in (near, far)])
+    grounds = np.array([camera.homography() for camera in (near, far)])
     boxes = np.array([box_in(near, np.array([0.0, 0.0])), box_in(far, np.array([0.5, 0.0]))])
     body = estimate_bodies(boxes, np.array([0, 1]), np.array([0, 0]), 1, grounds, BOTTOM)
     assert 0.0 < body.ground_point[0, 0] < 0.1
@@ -73,9 +73,9 @@ def test_points_behind_a_camera_are_not_projected() -> None:
     away = camera_at(1.0, 0.0, towards=(5.0, 0.0))
     grounds = np.array([SOUTH.homography(), away.homography()])
     body = estimate_bodies(box_in(SOUTH, place)[None], np.array([0]), np.array([0]), 1, grounds, BOTTOM)
-    seen = in_all(body, grounds)
-    assert np.isfinite(seen[0]).all()
-    assert np.isnan(seen[1]).all()
+    boxes = boxes_in_all_cameras(body, grounds)
+    assert np.isfinite(boxes[0]).all()
+    assert np.isnan(boxes[1]).all()
 
 
 @settings(deadline=None, max_examples=40)
@@ -87,16 +87,16 @@ def test_means_equal_those_computed_one_by_one(seed: int) -> None:
     boxes = np.array([box_in(CAMERAS[c], place) for c, place in zip(camera, places, strict=True)])
     together = estimate_bodies(boxes, camera, moment, 6, GROUNDS, BOTTOM)
     for one in range(6):
-        mine = moment == one
-        alone = estimate_bodies(boxes[mine], camera[mine], np.zeros(mine.sum(), int), 1, GROUNDS, BOTTOM)
-        for told, known in zip(
+        rows = moment == one
+        alone = estimate_bodies(boxes[rows], camera[rows], np.zeros(rows.sum(), int), 1, GROUNDS, BOTTOM)
+        for value, expected in zip(
             (together.ground_point[one], together.height[one], together.known_by[one]),
             (alone.ground_point[0], alone.height[0], alone.known_by[0]),
             strict=True,
         ):
-            assert np.array_equal(told, known, equal_nan=True), "to the bit: whoever else is there"
-        if mine.any():
-            low, high = places[mine].min(axis=0), places[mine].max(axis=0)
+            assert np.array_equal(value, expected, equal_nan=True), "bit for bit, independent of other bodies"
+        if rows.any():
+            low, high = places[rows].min(axis=0), places[rows].max(axis=0)
             assert (
                 (together.ground_point[one] >= low - 1e-6) & (together.ground_point[one] <= high + 1e-6)
             ).all()

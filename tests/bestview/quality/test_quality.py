@@ -1,4 +1,4 @@
-"""A bigger picture of the person is a better view; a hidden person is the worst."""
+"""Size quality: larger views are better, and a hidden person has quality 0."""
 
 from __future__ import annotations
 

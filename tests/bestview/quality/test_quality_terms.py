@@ -1,4 +1,4 @@
-"""Each term of a view's quality says what its name says, and all of them together are one product."""
+"""The terms of view quality, and their weighted product."""
 
 from __future__ import annotations
 
@@ -37,15 +37,17 @@ def walk(x: float, y: float, frames: int = 15) -> NDArray[np.float64]:
     return np.array([box(50, 200)]) + steps[None]
 
 
-def looks(*homographies: NDArray[np.float64] | None) -> CameraLayout:
+def layout_of(*homographies: NDArray[np.float64] | None) -> CameraLayout:
     cameras = homographies or (None,)
     return CameraLayout((WIDTH, HEIGHT), np.tile(PICTURE, (len(cameras), 1)), cameras, FPS)
 
 
-def seen(boxes: NDArray[np.float64], sure: float = 1.0, sharp: float = np.nan) -> TrackWindow:
+def tracks_of(boxes: NDArray[np.float64], confidence: float = 1.0, sharpness: float = np.nan) -> TrackWindow:
     """Return a window of tracks of camera 0."""
     tracks = len(boxes)
-    return TrackWindow(boxes, np.zeros(tracks, dtype=np.int64), np.full(tracks, sure), np.full(tracks, sharp))
+    return TrackWindow(
+        boxes, np.zeros(tracks, dtype=np.int64), np.full(tracks, confidence), np.full(tracks, sharpness)
+    )
 
 
 def only(**weights: float) -> QualitySettings:
@@ -69,10 +71,10 @@ def test_a_slim_box_at_a_side_edge_is_truncated_by_its_width() -> None:
     assert visible_share(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
     away = np.array([box(gap, 20, slim) for gap in (0.0, 0.6, 1.2, 30.0)])
     assert visible_share(away, PICTURE) == pytest.approx([0.5, 0.75, 1.0, 1.0]), (
-        "clear of it, people may be slim"
+        "away from the edge a slim box is complete"
     )
     beyond = np.array([box(-slim / 2, 20, slim), box(WIDTH - slim / 2, 20, slim)])
-    assert visible_share(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the part outside is told once"
+    assert visible_share(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the area outside counts only once"
 
 
 def test_centering_is_one_in_the_middle() -> None:
@@ -80,43 +82,43 @@ def test_centering_is_one_in_the_middle() -> None:
     assert centering_score(boxes, PICTURE) == pytest.approx([1.0, 0.0, 1 - 25 / np.hypot(50, 40)])
 
 
-def left_of(*boxes: list[float], cameras: tuple[int, ...] | None = None) -> list[float]:
+def unoccluded(*boxes: list[float], cameras: tuple[int, ...] | None = None) -> list[float]:
     """Return the visible share of each box in one frame, by default all in one picture."""
-    of = np.array(cameras or [0] * len(boxes), dtype=np.int64)
-    return [float(it) for it in unoccluded_share(np.array(boxes)[:, None], of)[:, 0]]
+    camera_of = np.array(cameras or [0] * len(boxes), dtype=np.int64)
+    return [float(share) for share in unoccluded_share(np.array(boxes)[:, None], camera_of)[:, 0]]
 
 
 def test_the_person_with_lower_feet_occludes_the_other() -> None:
     near, far = box(20, 30), box(22, 20, 10, 40)
-    assert left_of(near, far) == pytest.approx([1.0, 2 * (1 - 8 * 30 / 400)])
-    assert left_of(near, far, cameras=(0, 1)) == [1.0, 1.0], "of two pictures"
+    assert unoccluded(near, far) == pytest.approx([1.0, 2 * (1 - 8 * 30 / 400)])
+    assert unoccluded(near, far, cameras=(0, 1)) == [1.0, 1.0], "in different pictures"
 
 
 def test_half_a_visible_box_scores_one_and_none_scores_zero() -> None:
-    half, nobody = box(25, 30), box(20, 30)
+    half, covering = box(25, 30), box(20, 30)
     behind = box(20, 20, 10, 40)
-    assert left_of(behind, half) == [1.0, 1.0]
-    assert left_of(behind, [15, 10, 35, 80]) == [0.0, 1.0]
-    assert left_of(behind, nobody)[0] == pytest.approx(2 * 0.25)
+    assert unoccluded(behind, half) == [1.0, 1.0]
+    assert unoccluded(behind, [15, 10, 35, 80]) == [0.0, 1.0]
+    assert unoccluded(behind, covering)[0] == pytest.approx(2 * 0.25)
 
 
 def test_at_equal_distance_both_people_are_half_occluded() -> None:
-    assert left_of(box(20, 20), box(20, 20)) == [1.0, 1.0], "half of the box may be covered, in both"
+    assert unoccluded(box(20, 20), box(20, 20)) == [1.0, 1.0], "half of each box may be covered"
 
 
 BOX = st.tuples(
     *(st.integers(0, 30).map(float) for _ in "xy"), *(st.integers(0, 20).map(float) for _ in "wh")
-).map(lambda it: box(*it))
+).map(lambda sides: box(*sides))
 TRACKS = st.lists(
     st.tuples(st.integers(0, 2), st.lists(BOX | st.just([np.nan] * 4), min_size=3, max_size=3)), max_size=9
 )
 
 
-def slowly(boxes: NDArray[np.float64], cameras: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Work out who is hidden pair by pair."""
+def reference_occlusion(boxes: NDArray[np.float64], cameras: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Compute the occlusion pair by pair."""
     values = np.ones(boxes.shape[:2])
     for i, n in np.ndindex(*values.shape):
-        free, a = 1.0, boxes[i, n]
+        visible, a = 1.0, boxes[i, n]
         for j, b in enumerate(boxes[:, n]):
             width = min(a[2], b[2]) - max(a[0], b[0])
             height = min(a[3], b[3]) - max(a[1], b[1])
@@ -124,10 +126,10 @@ def slowly(boxes: NDArray[np.float64], cameras: NDArray[np.int64]) -> NDArray[np
                 continue
             lower = (b[3] - a[3]) / max(a[3] - a[1], b[3] - b[1])
             nearer = min(max(0.5 + lower / 0.1, 0.0), 1.0)
-            if j < i:  # as the lower one of the two says it
+            if j < i:  # computed from the lower index, as in the implementation
                 nearer = 1.0 - min(max(0.5 + (a[3] - b[3]) / max(a[3] - a[1], b[3] - b[1]) / 0.1, 0.0), 1.0)
-            free *= 1.0 - nearer * (width * height / ((a[3] - a[1]) * (a[2] - a[0])))
-        values[i, n] = min(free / 0.5, 1.0)
+            visible *= 1.0 - nearer * (width * height / ((a[3] - a[1]) * (a[2] - a[0])))
+        values[i, n] = min(visible / 0.5, 1.0)
     return values
 
 
@@ -138,16 +140,18 @@ def test_occlusion_equals_the_reference(
 ) -> None:
     cameras = np.array([camera for camera, _ in tracks], dtype=np.int64)
     boxes = np.array([boxes for _, boxes in tracks]).reshape(-1, 3, 4)
-    assert unoccluded_share(boxes, cameras).tolist() == slowly(boxes, cameras).tolist(), "to the bit"
+    assert unoccluded_share(boxes, cameras).tolist() == reference_occlusion(boxes, cameras).tolist(), (
+        "to the bit"
+    )
 
 
 def test_walking_towards_the_camera_scores_one_and_away_zero() -> None:
-    comes, goes, across, stands = (
-        facing_score(walk(*way), FLOOR, FPS)[0] for way in ((0.0, 3.0), (0.0, -3.0), (3.0, 0.0), (0.0, 0.0))
+    towards, away, across, standing = (
+        facing_score(walk(*step), FLOOR, FPS)[0] for step in ((0.0, 3.0), (0.0, -3.0), (3.0, 0.0), (0.0, 0.0))
     )
-    assert comes > 0.9
-    assert goes == pytest.approx(1 - comes)
-    assert (across, stands) == (pytest.approx(0.5), pytest.approx(0.5))
+    assert towards > 0.9
+    assert away == pytest.approx(1 - towards)
+    assert (across, standing) == (pytest.approx(0.5), pytest.approx(0.5))
 
 
 def test_slow_walking_counts_less_and_hidden_frames_do_not_count() -> None:
@@ -167,7 +171,7 @@ def test_the_direction_towards_the_camera_comes_from_the_ground() -> None:
 def test_size_alone_without_relative_costs_is_the_papers_quality() -> None:
     boxes = np.random.default_rng(1).uniform(0, 80, (3, 4, 4))
     boxes[..., 2:] += boxes[..., :2]
-    found = compute_view_quality(seen(boxes), looks(None, None), only(size=1.0))
+    found = compute_view_quality(tracks_of(boxes), layout_of(None, None), only(size=1.0))
     assert found.term_names == ("size",)
     np.testing.assert_allclose(found.quality, size_quality(boxes, WIDTH, HEIGHT))
 
@@ -184,7 +188,7 @@ def test_quality_is_the_product_of_the_weighted_terms(weights: dict[str, float],
     boxes[rng.random((6, 5)) < 0.3] = np.nan
     terms = QualitySettings(**{**weights, "size": 1.0})
     tracks = TrackWindow(boxes, rng.integers(0, 2, 6), rng.random(6), rng.random(6))
-    found = compute_view_quality(tracks, looks(FLOOR, None), terms)
+    found = compute_view_quality(tracks, layout_of(FLOOR, None), terms)
     there = ~np.isnan(boxes[..., 0])
     expected = np.ones(there.shape)
     for name, term in zip(found.term_names, found.terms, strict=True):
@@ -198,12 +202,12 @@ def test_quality_is_the_product_of_the_weighted_terms(weights: dict[str, float],
 
 def test_unmeasured_sharpness_counts_as_one_and_low_confidence_lowers_quality() -> None:
     boxes = np.array(box(20, 20)).reshape(1, 1, 4)
-    assert compute_view_quality(seen(boxes), looks(), only(sharpness=1.0)).quality.item() == 1.0
+    assert compute_view_quality(tracks_of(boxes), layout_of(), only(sharpness=1.0)).quality.item() == 1.0
     assert compute_view_quality(
-        seen(boxes, sharp=0.4), looks(), only(sharpness=0.5)
+        tracks_of(boxes, sharpness=0.4), layout_of(), only(sharpness=0.5)
     ).quality.item() == pytest.approx(0.7)
     assert compute_view_quality(
-        seen(boxes, sure=0.4), looks(), only(confidence=1.0)
+        tracks_of(boxes, confidence=0.4), layout_of(), only(confidence=1.0)
     ).quality.item() == pytest.approx(0.4)
 
 
@@ -227,14 +231,16 @@ def test_invalid_weights_and_shapes_are_refused() -> None:
         QualitySettings(facing=1.5)
     with pytest.raises(ValueError, match="all weights are 0"):
         only()
-    of = np.zeros(2, dtype=np.int64)
+    camera = np.zeros(2, dtype=np.int64)
     with pytest.raises(ValueError, match="boxes have shape"):
-        compute_view_quality(seen(np.zeros((1, 2))), looks(), QualitySettings())
+        compute_view_quality(tracks_of(np.zeros((1, 2))), layout_of(), QualitySettings())
     with pytest.raises(ValueError, match="confidence has shape"):
         compute_view_quality(
-            TrackWindow(np.zeros((2, 1, 4)), of, np.ones(1), np.ones(2)), looks(), QualitySettings()
+            TrackWindow(np.zeros((2, 1, 4)), camera, np.ones(1), np.ones(2)), layout_of(), QualitySettings()
         )
     with pytest.raises(ValueError, match=r"a camera outside 0 \.\. 0"):
         compute_view_quality(
-            TrackWindow(np.zeros((2, 1, 4)), of + 1, np.ones(2), np.ones(2)), looks(), QualitySettings()
+            TrackWindow(np.zeros((2, 1, 4)), camera + 1, np.ones(2), np.ones(2)),
+            layout_of(),
+            QualitySettings(),
         )

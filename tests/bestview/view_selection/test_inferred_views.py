@@ -87,9 +87,9 @@ def test_every_view_occurs_once_with_the_larger_inferred_quality(seed: int) -> N
     rng = np.random.default_rng(seed)
     kind, quality = rng.integers(0, 5, INFERRED_SHAPE), rng.uniform(0.1, 1.0, (2, *INFERRED_SHAPE))
     every = list(np.ndindex(INFERRED_SHAPE))
-    detected = {it: float(quality[0][it]) for it in every if kind[it] == 1}
-    missed = {it: float(quality[0][it]) for it in every if kind[it] in {2, 3}}
-    inferred = {it: float(quality[1][it]) for it in every if kind[it] in {3, 4}}
+    detected = {view: float(quality[0][view]) for view in every if kind[view] == 1}
+    missed = {view: float(quality[0][view]) for view in every if kind[view] in {2, 3}}
+    inferred = {view: float(quality[1][view]) for view in every if kind[view] in {3, 4}}
     frames, cameras, people, qualities = (np.array(side) for side in columns(detected | missed))
     available = np.ones(INFERRED_SHAPE[:2], dtype=np.bool_)
     views = VisibleViews(frames, cameras, people, qualities, available, PEOPLE, detected_count=len(detected))
@@ -99,5 +99,5 @@ def test_every_view_occurs_once_with_the_larger_inferred_quality(seed: int) -> N
     )
     by_view = quality_by_view(views)
     assert dict(list(by_view.items())[: views.detected_count]) == detected
-    larger = {it: max(missed.get(it, 0.0), inferred.get(it, 0.0)) for it in missed | inferred}
+    larger = {view: max(missed.get(view, 0.0), inferred.get(view, 0.0)) for view in missed | inferred}
     assert by_view == detected | larger

@@ -1,4 +1,4 @@
-"""The window's choice is the best there is, and breaks off nowhere."""
+"""View selection equals exhaustive search over all allowed sequences."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ INF = np.inf
 
 
 def choose(cost: list[list[float]], previous: int, switch_cost: float, cuts: list[bool]) -> list[int]:
-    """Choose for one object, from its (N, C) costs."""
+    """Select views of one object from its (N, C) costs."""
     choices = select_views(np.array([cost], float), np.array([previous]), switch_cost, np.array(cuts))
     return [int(view) for view in choices.views[0]]
 
 
-def price(
+def total_cost(
     cost: NDArray[np.float64],
     views: tuple[int, ...],
     previous: int,
     switch_cost: float,
     weight: NDArray[np.float64] | None = None,
 ) -> float:
-    """Cost of one object's views over its (N, C) costs, written the slow and obvious way."""
+    """Compute the cost of one object's views from its (N, C) costs."""
     total, current = 0.0, previous
     frame_weights = np.ones(len(cost)) if weight is None else weight
     for frame, view in enumerate(views):
@@ -42,7 +42,7 @@ def price(
     return total
 
 
-def keeps(  # every shot is long enough, or was left where its camera showed nobody
+def keeps_minimum_shot(
     cost: NDArray[np.float64],
     views: tuple[int, ...],
     starts: list[int],
@@ -50,14 +50,15 @@ def keeps(  # every shot is long enough, or was left where its camera showed nob
     least: int,
     shot_ages: int,
 ) -> bool:
+    """Return whether every shot is long enough, or left where its camera does not show the object."""
     current, age = previous, shot_ages
     for start, end in pairwise([*starts, len(cost)]):
         view = views[start]
         if view in (-1, current) or current == -1:
             age = age + 1 if view in (-1, current) else 1
         else:
-            blind = bool((cost[start:end, current] >= NO_VIEW_COST).all())
-            if age < least and not blind and np.isfinite(cost[start:end, current]).all():
+            hidden = bool((cost[start:end, current] >= NO_VIEW_COST).all())
+            if age < least and not hidden and np.isfinite(cost[start:end, current]).all():
                 return False
             age = 1
         current = view if view >= 0 else current
@@ -73,13 +74,13 @@ def exhaustive(
     shot_ages: int = 1,
     weight: NDArray[np.float64] | None = None,
 ) -> tuple[float, tuple[int, ...]]:
-    """Try every sequence that the rules allow; ties: stay with the camera, else the lowest index."""
+    """Try all allowed sequences; ties: stay with the camera, else the lowest index."""
     frames, cameras = cost.shape
     bounds = [frame for frame in range(frames) if cuts[frame]] + [frames]
     head: list[int] = []
     for frame in range(bounds[0]):
-        going = previous >= 0 and np.isfinite(cost[frame, previous]) and (frame == 0 or head[-1] >= 0)
-        head.append(previous if going else -1)
+        continues = previous >= 0 and np.isfinite(cost[frame, previous]) and (frame == 0 or head[-1] >= 0)
+        head.append(previous if continues else -1)
     options = []
     for start, end in pairwise(bounds):
         possible = [c for c in range(cameras) if np.isfinite(cost[start:end, c]).all()] or [-1]
@@ -90,11 +91,16 @@ def exhaustive(
         for view in views:
             order.append(-1 if view in (-1, current) else view)
             current = view if view >= 0 else current
-        return price(cost, views, previous, switch_cost, weight), order
+        return total_cost(cost, views, previous, switch_cost, weight), order
 
     every = [tuple(head) + tuple(v for gop in parts for v in gop) for parts in product(*options)]
     best = min(
-        (it for it in every if keeps(cost, it, bounds[:-1], previous, minimum_shot_gops, shot_ages)), key=rank
+        (
+            sequence
+            for sequence in every
+            if keeps_minimum_shot(cost, sequence, bounds[:-1], previous, minimum_shot_gops, shot_ages)
+        ),
+        key=rank,
     )
     return rank(best)[0], best
 
@@ -165,9 +171,9 @@ def test_a_shot_may_be_short_if_its_camera_loses_the_object() -> None:
 def test_the_last_frames_can_be_weighted_to_extrapolate() -> None:
     cost, cuts = np.array([[[0.5, 0.5], [0.5, 0.25]]]), np.ones(2, bool)
     assert select_views(cost, np.array([0]), 1.0, cuts).views.tolist() == [[0, 0]]
-    frame_weights = select_views(cost, np.array([0]), 1.0, cuts, weight=np.array([1.0, 8.0]))
-    assert frame_weights.views.tolist() == [[0, 1]]
-    assert frame_weights.costs.tolist() == [0.5 + 1.0 + 8 * 0.25]
+    extrapolated = select_views(cost, np.array([0]), 1.0, cuts, weight=np.array([1.0, 8.0]))
+    assert extrapolated.views.tolist() == [[0, 1]]
+    assert extrapolated.costs.tolist() == [0.5 + 1.0 + 8 * 0.25]
 
 
 @settings(deadline=None, max_examples=100)
@@ -201,10 +207,10 @@ def test_objects_do_not_influence_each_other(
 
 
 def test_a_short_better_view_is_not_worth_a_cut_and_a_long_one_is() -> None:
-    glimpse = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.5], [0.5, 0.5]]
-    frame_weights = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.1], [0.5, 0.1]]
-    assert choose(glimpse, 0, 1.0, [True] * 4) == [0, 0, 0, 0]
-    assert choose(frame_weights, 0, 1.0, [True] * 4) == [0, 1, 1, 1]
+    short = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.5], [0.5, 0.5]]
+    long = [[0.5, 0.5], [0.5, 0.1], [0.5, 0.1], [0.5, 0.1]]
+    assert choose(short, 0, 1.0, [True] * 4) == [0, 0, 0, 0]
+    assert choose(long, 0, 1.0, [True] * 4) == [0, 1, 1, 1]
 
 
 def test_without_a_switching_cost_every_frame_takes_its_best_view() -> None:
@@ -241,11 +247,11 @@ def test_a_stream_cannot_start_within_a_gop() -> None:
 
 
 def test_without_cameras_there_is_no_view() -> None:
-    nobody = select_views(np.zeros((0, 3, 2)), np.zeros(0, int), 1.0, np.ones(3, bool))
-    blind = select_views(np.zeros((2, 3, 0)), np.full(2, -1), 1.0, np.ones(3, bool))
-    assert nobody.views.shape == (0, 3)
-    assert (blind.views == -1).all()
-    assert blind.costs.tolist() == [3.0, 3.0]
+    no_objects = select_views(np.zeros((0, 3, 2)), np.zeros(0, int), 1.0, np.ones(3, bool))
+    no_cameras = select_views(np.zeros((2, 3, 0)), np.full(2, -1), 1.0, np.ones(3, bool))
+    assert no_objects.views.shape == (0, 3)
+    assert (no_cameras.views == -1).all()
+    assert no_cameras.costs.tolist() == [3.0, 3.0]
 
 
 def test_arguments_are_not_modified() -> None:
