@@ -29,7 +29,7 @@ def paths(request: pytest.FixtureRequest) -> np.ndarray:
     return np.array([[(it.x, it.y) for it in crowd.poses(t / RATE)] for t in range(120 * RATE)])
 
 
-def test_players_sprint_and_turn_and_stand(paths: np.ndarray) -> None:
+def test_players_sprint_turn_and_stand(paths: np.ndarray) -> None:
     step = np.diff(paths, axis=0)
     speed = np.hypot(*step.transpose(2, 0, 1)) * RATE
     assert 4.5 < speed.max() < 7.0
@@ -41,7 +41,7 @@ def test_players_sprint_and_turn_and_stand(paths: np.ndarray) -> None:
     assert np.degrees(turned[fast[1:] & fast[:-1]]).max() > 10  # in a tenth of a second
 
 
-def test_nobody_runs_through_anybody_or_off_the_floor(paths: np.ndarray) -> None:
+def test_players_do_not_collide_or_leave_the_floor(paths: np.ndarray) -> None:
     gaps = np.linalg.norm(paths[:, :, None] - paths[:, None], axis=3)[:, *np.triu_indices(PLAYERS, 1)]
     assert np.mean(gaps < 0.45) < 0.001
     west, south, east, north = COURT.bounds
@@ -53,21 +53,21 @@ def test_nobody_runs_through_anybody_or_off_the_floor(paths: np.ndarray) -> None
             assert not ((paths > low) & (paths < high)).all(axis=2).any()
 
 
-def test_the_game_goes_to_and_fro(paths: np.ndarray) -> None:
+def test_the_game_alternates_between_the_baskets(paths: np.ndarray) -> None:
     """At the end of each round everybody is before the basket that is attacked."""
     for number in range(1, 12):
         east = paths[int(number * ROUND * RATE) - 1, :, 0] > SPORTS_HALL.width / 2
         assert east.mean() == (1.0 if (number - 1) % 2 == 0 else 0.0)
 
 
-def test_defenders_stay_close_to_whom_they_mark(paths: np.ndarray) -> None:
+def test_defenders_stay_close_to_their_opponents(paths: np.ndarray) -> None:
     reds, blues = paths[:, ::2], paths[:, 1::2]
     nearest = np.linalg.norm(reds[:, :, None] - blues[:, None], axis=3).min(axis=2)
     assert np.median(nearest) < 2.0
     assert np.mean(nearest < 1.0) > 0.05
 
 
-def test_a_team_plays_in_one_shirt_and_the_other_in_another() -> None:
+def test_each_team_has_one_outfit() -> None:
     first, second = (
         [choose_team_outfit(player, team) for player in range(team, PLAYERS, 2)] for team in range(2)
     )
@@ -94,7 +94,7 @@ def test_boxes_end_at_the_feet_on_the_floor() -> None:
     assert np.median(errors) < 0.5
 
 
-def test_everybody_is_seen_by_some_camera() -> None:
+def test_every_player_is_visible_in_some_camera() -> None:
     scene = Scene("court", 4, PLAYERS, 2, *SIZE)
     for frame in range(0, 1500, 125):
         best = np.zeros(PLAYERS)
@@ -103,7 +103,7 @@ def test_everybody_is_seen_by_some_camera() -> None:
         assert best.min() > 0.5
 
 
-def test_a_board_hides_who_is_behind_it() -> None:
+def test_a_board_occludes_people_behind_it() -> None:
     world = Scene("court", 1, 1, 1, *SIZE).world
     assert isinstance(world, RoomWorld)
     view = world.view(0)
@@ -118,7 +118,7 @@ def test_a_board_hides_who_is_behind_it() -> None:
     assert truth.visibility[0] < 0.6
 
 
-def test_who_runs_leans_and_bends_their_arms() -> None:
+def test_runners_lean_forward_and_bend_their_arms() -> None:
     walks, runs = (place_joints(Pose(0.0, 0.0, 0.0, 0.4, speed), 1.8) for speed in (1.2, 4.6))
     assert runs[Joint.HEAD, 0] - runs[Joint.BELLY, 0] > walks[Joint.HEAD, 0] - walks[Joint.BELLY, 0]
     hands = (Joint.HAND_L, Joint.HAND_R)

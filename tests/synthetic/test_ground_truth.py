@@ -92,7 +92,7 @@ def test_the_homography_takes_the_feet_to_the_ground_position(crowd: Scene) -> N
     assert np.quantile(errors, 0.95) < 0.8
 
 
-def test_one_person_is_the_same_height_above_the_floor_from_every_side(crowd: Scene) -> None:
+def test_a_person_has_the_same_height_in_every_camera(crowd: Scene) -> None:
     """Project a person's height at their ground position: the box's top is there."""
     where = (4.5, 4.0)
     for camera in range(3):
@@ -103,7 +103,7 @@ def test_one_person_is_the_same_height_above_the_floor_from_every_side(crowd: Sc
         )
 
 
-def test_less_shows_of_someone_the_more_someone_else_stands_in_front(crowd: Scene) -> None:
+def test_visibility_falls_the_more_another_person_stands_in_front(crowd: Scene) -> None:
     camera = np.array(hall(crowd).view(0).center[:2])
     behind = np.array([4.2, 5.2])
     ahead = (camera - behind) / np.linalg.norm(camera - behind)
@@ -120,14 +120,14 @@ def test_less_shows_of_someone_the_more_someone_else_stands_in_front(crowd: Scen
     assert shares[-1] < 0.5
 
 
-def test_the_order_of_the_people_does_not_matter_to_what_shows(crowd: Scene) -> None:
+def test_visibility_does_not_depend_on_the_order_of_people(crowd: Scene) -> None:
     one, other = (4.2, 5.2), (3.85, 4.75)
     forward, swapped = stand(crowd, 0, one, other), stand(crowd, 0, other, one)
     assert forward.visibility[0] < 0.9
     assert swapped.visibility[1] < 0.9
 
 
-def test_furniture_hides_who_stands_behind_it_and_nobody_in_front(crowd: Scene) -> None:
+def test_furniture_occludes_people_behind_it_and_not_in_front(crowd: Scene) -> None:
     camera = hall(crowd).view(0).center[:2]
     (piece,) = (piece for piece in ROOM.furniture if piece.name == "pillar")
     west, south, east, north = piece.footprint
@@ -137,13 +137,13 @@ def test_furniture_hides_who_stands_behind_it_and_nobody_in_front(crowd: Scene) 
     assert stand(crowd, 0, tuple(pillar - 0.9 * sight)).visibility[0] == 1.0
 
 
-def test_the_picture_s_edge_hides_too(crowd: Scene) -> None:
+def test_the_pictures_edge_lowers_visibility(crowd: Scene) -> None:
     near = stand(crowd, 1, (8.2, 1.4))
     assert near.visibility[0] < 0.9
     assert near.boxes[0, 3] == SIZE[1]
 
 
-def test_who_has_left_by_the_door_is_in_no_picture(crowd: Scene) -> None:
+def test_a_person_who_left_by_the_door_is_in_no_picture(crowd: Scene) -> None:
     (door,) = (door for door in ROOM.doors if door.wall == "north")
     hidden = ROOM.beyond(door, 2.3, 0.75)  # in the corridor, beside the door
     assert all(len(stand(crowd, camera, hidden).ids) == 0 for camera in range(3))

@@ -54,7 +54,7 @@ def test_people_meet_and_part_again_several_times_a_minute(people: int, seed: in
 
 @pytest.mark.parametrize("people", [2, 3, 4])
 @pytest.mark.parametrize("seed", range(2))
-def test_nobody_walks_through_anybody_or_leaves(people: int, seed: int) -> None:
+def test_people_do_not_collide_or_leave(people: int, seed: int) -> None:
     those = paths(people, seed)
     assert gaps(those).min() > 0.2  # metres: bodies are about as deep
     assert np.mean(gaps(those) < 0.4) < 0.02
@@ -64,7 +64,7 @@ def test_nobody_walks_through_anybody_or_leaves(people: int, seed: int) -> None:
         assert not ((those > (west, south)) & (those < (east, north))).all(axis=2).any()
 
 
-def test_the_beginning_of_a_round_joins_the_end_of_the_one_before() -> None:
+def test_rounds_join_without_a_jump() -> None:
     those = crowd(4, 2)
     for number in range(1, 6):
         before, after = those.poses(number * ROUND - 1e-6), those.poses(number * ROUND)
@@ -75,20 +75,20 @@ def test_the_beginning_of_a_round_joins_the_end_of_the_one_before() -> None:
             assert abs(steps - round(steps)) < 0.01  # the legs are where they were
 
 
-def test_people_walk_at_people_s_pace() -> None:
+def test_people_walk_at_a_plausible_speed() -> None:
     those = paths(3, 5)
     speed = np.hypot(*np.diff(those, axis=0).transpose(2, 0, 1)) * RATE
     assert speed.max() < 2.0
     assert 0.3 < np.median(speed) < 1.2
 
 
-def test_everybody_is_apart_at_the_beginning() -> None:
+def test_people_are_apart_at_the_beginning() -> None:
     assert min(gaps(paths(4, seed, 1))[0].min() for seed in range(5)) > 1.2
 
 
 @settings(deadline=None, max_examples=30)
 @given(people=st.integers(0, 8), seed=st.integers(0, 1000))
-def test_a_round_leads_everybody_from_start_to_end(people: int, seed: int) -> None:
+def test_a_round_leads_every_person_from_start_to_end(people: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     starts, ends = rng.uniform(OVERHEAD_AREA[:2], OVERHEAD_AREA[2:], (2, people, 2))
     plan = plan_gathering(rng, starts, ends, OVERHEAD_AREA)
@@ -100,7 +100,7 @@ def test_a_round_leads_everybody_from_start_to_end(people: int, seed: int) -> No
 
 @settings(deadline=None, max_examples=40)
 @given(offsets=st.floats(-0.5, 0.5), speed=st.floats(0.4, 1.4))
-def test_two_who_meet_head_on_pass_each_other(offsets: float, speed: float) -> None:
+def test_two_people_who_meet_head_on_pass_each_other(offsets: float, speed: float) -> None:
     clock = np.arange(60) / 5 - 6
     one = np.column_stack([speed * clock, np.zeros(60)])
     other = np.column_stack([-speed * clock, np.full(60, offsets)])
@@ -144,7 +144,7 @@ def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
     assert np.mean(outwards) > 0.1
 
 
-def test_who_stand_together_are_one_blob_and_who_are_apart_are_several() -> None:
+def test_people_who_stand_together_are_one_blob_and_people_apart_are_several() -> None:
     """Two people: the picture's difference from the empty room, as a background model would see it."""
     scene = Scene("overhead", 1, 2, 1)
     empty = scene.background(0).astype(np.int16)

@@ -26,7 +26,7 @@ def room() -> Scene:
     return scene()
 
 
-def test_a_frame_is_the_same_to_the_byte_in_every_instance_and_order(room: Scene) -> None:
+def test_a_frame_is_identical_in_every_instance_and_order(room: Scene) -> None:
     frames = [0, 3000, 17, 1_000_000, 18]
     forward = [room.image(camera, frame) for camera in range(2) for frame in frames]
     again = scene()
@@ -47,7 +47,7 @@ def test_a_frame_is_the_same_in_another_process(room: Scene) -> None:
     assert there.stdout.strip() == hashlib.sha256(room.image(1, 777).tobytes()).hexdigest()
 
 
-def test_what_one_does_with_a_picture_does_not_change_the_next(room: Scene) -> None:
+def test_modifying_a_picture_does_not_change_the_next(room: Scene) -> None:
     before = room.image(0, 40)
     room.image(0, 40)[:] = 0
     room.background(0)[:] = 0
@@ -62,11 +62,11 @@ def test_cameras_frames_and_seeds_differ(room: Scene) -> None:
     assert not np.allclose(room.ground_positions(200), scene(seed=1).ground_positions(200))
 
 
-def test_time_is_in_seconds_whatever_the_frame_rate(room: Scene) -> None:
+def test_time_is_in_seconds_at_every_frame_rate(room: Scene) -> None:
     assert np.allclose(room.ground_positions(250), scene(fps=10.0).ground_positions(100))
 
 
-def test_noise_is_mild_and_new_in_every_frame() -> None:
+def test_noise_is_mild_and_differs_between_frames() -> None:
     nobody = scene(objects=0)
     first, second = (nobody.image(0, frame).astype(float) for frame in (10, 11))
     assert 0.5 < np.abs(first - second).mean() < 4
@@ -93,7 +93,7 @@ def test_arguments_out_of_range_are_refused_in_one_line(arguments: dict[str, obj
     assert "\n" not in str(caught.value)
 
 
-def test_a_camera_or_frame_that_is_not_there_is_refused(room: Scene) -> None:
+def test_a_camera_or_frame_that_does_not_exist_is_refused(room: Scene) -> None:
     with pytest.raises(ValueError, match="no camera 2"):
         room.image(2, 0)
     with pytest.raises(ValueError, match="frame -1"):

@@ -37,7 +37,7 @@ def test_every_file_is_there_and_nothing_else(recording: Path) -> None:
     assert [path.name for path in recording.parent.iterdir()] == ["room"]
 
 
-def test_a_video_shows_the_scene_s_frames_at_its_rate(scene: Scene, recording: Path) -> None:
+def test_a_video_shows_the_scenes_frames_at_its_rate(scene: Scene, recording: Path) -> None:
     for camera in range(2):
         frames = decode(recording / f"c{camera}.mp4")
         assert len(frames) == FRAMES
@@ -68,7 +68,7 @@ def test_the_rows_are_the_truth_of_their_frames(scene: Scene, recording: Path) -
             assert (mine[:, 6:8] == 1).all()
 
 
-def test_the_homographies_are_the_scene_s(scene: Scene, recording: Path) -> None:
+def test_the_homographies_are_those_of_the_scene(scene: Scene, recording: Path) -> None:
     ground = json.loads((recording / "ground.json").read_text())
     assert ground["unit"] == "m"
     assert list(ground["homography"]) == ["c0", "c1"]
@@ -82,14 +82,14 @@ def test_the_same_scene_gives_the_same_bytes(scene: Scene, recording: Path, tmp_
             assert path.read_bytes() == (tmp_path / "again" / path.relative_to(recording)).read_bytes()
 
 
-def test_progress_is_told_frame_by_frame(scene: Scene, tmp_path: Path) -> None:
+def test_progress_is_reported_frame_by_frame(scene: Scene, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     (tmp_path / "empty").mkdir()
     write_recording(scene, tmp_path / "empty", 0.2, lambda done, whole: told.append((done, whole)))
     assert told == [(n, 5) for n in range(1, 6)]
 
 
-def test_a_folder_with_something_in_it_is_refused_and_left_alone(scene: Scene, tmp_path: Path) -> None:
+def test_a_folder_that_is_not_empty_is_refused_and_unchanged(scene: Scene, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
     with pytest.raises(FileExistsError, match="not an empty folder") as caught:
         write_recording(scene, tmp_path, 1)

@@ -43,7 +43,7 @@ def test_fish_never_swim_into_each_other(swum: list[FishState]) -> None:
         assert gaps[np.triu_indices(9, 1)].min() > 0.15  # metres: bodies are 0.14 broad
 
 
-def test_fish_swim_where_their_heads_point_and_turn_as_fish_do(swum: list[FishState]) -> None:
+def test_fish_swim_forward_and_turn_plausibly(swum: list[FishState]) -> None:
     turns, slants = [], []
     for one, other in pairwise(swum):
         step = other.places - one.places
@@ -56,7 +56,7 @@ def test_fish_swim_where_their_heads_point_and_turn_as_fish_do(swum: list[FishSt
     assert np.mean(np.array(slants) > 0.8) > 0.98
 
 
-def test_a_round_begins_where_the_one_before_has_ended() -> None:
+def test_rounds_of_the_shoal_join_without_a_jump() -> None:
     shoal = Shoal(9, 4)
     for number in (1, 2, 3):
         before, after = shoal.at(number * ROUND - 1e-4), shoal.at(number * ROUND)
@@ -66,7 +66,7 @@ def test_a_round_begins_where_the_one_before_has_ended() -> None:
         assert np.abs(tails - np.rint(tails)).max() < 0.01
 
 
-def test_fish_stay_in_the_first_camera_s_picture(swum: list[FishState]) -> None:
+def test_fish_stay_in_the_first_cameras_picture(swum: list[FishState]) -> None:
     view = PinholeCamera.at(VIEWPOINTS[0], *SIZE)
     outside = 0
     for it in swum[::5]:
@@ -87,7 +87,7 @@ def test_all_begin_on_a_circle_and_swim_towards_the_camera() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_fish_hide_each_other_in_every_clip_of_twenty_seconds(seed: int) -> None:
+def test_fish_occlude_each_other_in_every_clip_of_twenty_seconds(seed: int) -> None:
     scene = tank(1, seed=seed)
     shares = []
     for frame in range(0, 500, 10):
@@ -99,7 +99,7 @@ def test_fish_hide_each_other_in_every_clip_of_twenty_seconds(seed: int) -> None
     assert np.mean(np.array(shares) > 0.97) > 0.5
 
 
-def test_a_frame_is_the_same_to_the_byte_in_every_order_and_process() -> None:
+def test_a_frame_is_identical_in_every_order_and_process() -> None:
     scene = tank()
     frames = [0, 3000, 17, 200_000]
     forward = [scene.image(camera, frame) for camera in range(2) for frame in frames]
@@ -131,7 +131,7 @@ def test_a_box_is_where_the_picture_differs_from_the_tank_without_fish() -> None
     assert max(found) < 5  # pixels: a fin's tip through the murk
 
 
-def test_of_two_fish_in_line_the_further_one_is_hidden() -> None:
+def test_of_two_fish_in_line_the_farther_one_is_occluded() -> None:
     view = PinholeCamera.at(VIEWPOINTS[0], *SIZE)
     shares = []
     for offsets in (2.0, 0.25, 0.0):
@@ -149,7 +149,7 @@ def test_of_two_fish_in_line_the_further_one_is_hidden() -> None:
     assert shares[-1] < 0.1
 
 
-def test_what_only_hides_takes_its_share_and_has_no_row() -> None:
+def test_an_occluder_lowers_visibility_and_has_no_truth_row() -> None:
     view = PinholeCamera.at(VIEWPOINTS[0], 100, 60)
     block = np.full((20, 40, 4), 255, dtype=np.uint8)
     seen = measure_visibility(
@@ -160,7 +160,7 @@ def test_what_only_hides_takes_its_share_and_has_no_row() -> None:
     assert seen[3].share == pytest.approx(1 - 30 * 10 / (40 * 20))
 
 
-def test_murk_takes_a_colour_to_the_water_s_and_red_first() -> None:
+def test_murk_shifts_colors_to_that_of_the_water_and_red_first() -> None:
     water = open_water(np.array([[0.0, 1.0, 0.0]]))
     seen = attenuate_by_water(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
     assert np.allclose(seen[0], 1.0)
@@ -170,7 +170,7 @@ def test_murk_takes_a_colour_to_the_water_s_and_red_first() -> None:
     assert (left[1:3, 0] < left[1:3, 1]).all()
 
 
-def test_the_net_of_light_moves_repeats_and_has_bright_lines() -> None:
+def test_caustics_move_tile_and_have_bright_lines() -> None:
     now, soon, later = (caustics(seconds).astype(int) for seconds in (5.0, 5.04, 7.0))
     assert 0 < np.abs(soon - now).mean() < 8  # no flicker
     assert np.abs(later - now).mean() > 15
@@ -181,7 +181,7 @@ def test_the_net_of_light_moves_repeats_and_has_bright_lines() -> None:
     assert seam < 2.5 * inner
 
 
-def test_fish_are_on_no_floor() -> None:
+def test_fish_have_no_floor() -> None:
     scene = tank()
     assert scene.objects == 9
     assert scene.homography(0) is None

@@ -39,14 +39,14 @@ def inside(paths: np.ndarray) -> np.ndarray:
     return (paths[..., 0] < ROOM.width) & (paths[..., 1] < ROOM.depth)
 
 
-def test_nobody_jumps_in_anyones_sight(paths: np.ndarray) -> None:
+def test_people_do_not_jump_while_visible(paths: np.ndarray) -> None:
     speed = np.hypot(*np.diff(paths, axis=0).transpose(2, 0, 1)) * RATE
     seen = inside(paths)[1:] | inside(paths)[:-1]
     assert speed[seen].max() < 2.5
     assert 0.6 < np.median(speed[seen]) < 1.4
 
 
-def test_nobody_walks_through_furniture_or_walls(paths: np.ndarray) -> None:
+def test_people_do_not_walk_through_furniture_or_walls(paths: np.ndarray) -> None:
     for west, south, east, north in ROOM.footprints():
         within = (paths > (west - 0.05, south - 0.05)) & (paths < (east + 0.05, north + 0.05))
         assert not within.all(axis=2).any()
@@ -56,7 +56,7 @@ def test_nobody_walks_through_furniture_or_walls(paths: np.ndarray) -> None:
     assert (np.abs(paths[..., 0] - middle)[wall] < 0.5).all()
 
 
-def test_people_keep_apart_but_do_meet(paths: np.ndarray) -> None:
+def test_people_keep_their_distance_and_still_meet(paths: np.ndarray) -> None:
     apart = np.hypot(*(paths[:, :, None] - paths[:, None]).transpose(3, 0, 1, 2))
     pairs = apart[:, *np.triu_indices(4, 1)]
     both = (inside(paths)[:, :, None] & inside(paths)[:, None])[:, *np.triu_indices(4, 1)]
@@ -71,7 +71,7 @@ def test_people_leave_and_come_back(paths: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_background_can_be_learnt_at_the_beginning(seed: int) -> None:
+def test_a_background_can_be_learned_at_the_beginning(seed: int) -> None:
     """Everybody is there, apart from each other, and nobody stands still for the first four seconds."""
     start = [four(seed).poses(t / 10) for t in range(41)]
     assert all(ROOM.outside(pose.x, pose.y) < -0.5 for poses in start for pose in poses)
@@ -83,13 +83,13 @@ def test_a_background_can_be_learnt_at_the_beginning(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_room_is_never_left_by_all_at_once_for_long(seed: int) -> None:
+def test_the_room_is_hardly_ever_empty(seed: int) -> None:
     poses = [four(seed).poses(float(t)) for t in range(240)]
     there = [sum(ROOM.outside(pose.x, pose.y) < 0 for pose in those) for those in poses]
     assert np.mean(np.array(there) >= 2) > 0.95
 
 
-def test_more_people_do_not_change_the_ways_of_the_first() -> None:
+def test_more_people_do_not_change_the_paths_of_the_first() -> None:
     few, many = VisitingCrowd(ROOM, 2, 3), VisitingCrowd(ROOM, 5, 3)
     for seconds in (0.0, 33.3, 250.0):
         assert many.poses(seconds)[:2] == few.poses(seconds)
@@ -101,7 +101,7 @@ def test_no_two_people_dress_alike() -> None:
 
 
 @pytest.mark.parametrize("part", ["upper", "lower"])
-def test_the_first_eight_differ_clearly_in_every_piece(part: str) -> None:
+def test_the_first_eight_outfits_differ_clearly_in_every_piece(part: str) -> None:
     colors = np.array([[getattr(choose_outfit(walker, 0), part) for walker in range(8)]], dtype=np.float32)
     lab = cv2.cvtColor(colors, cv2.COLOR_RGB2LAB)[0]
     apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)[np.triu_indices(8, 1)]
@@ -126,7 +126,7 @@ def test_a_body_stands_on_the_floor_at_its_height(
     assert np.hypot(*(body[:, :2] - (3.0, 2.0)).T).max() < 0.5 * height
 
 
-def test_feet_that_stand_do_not_slide() -> None:
+def test_standing_feet_do_not_slide() -> None:
     """A steady walk: the lower foot's place on the floor hardly moves."""
     speed, step = 1.1, 0.01
     trail = [
@@ -140,7 +140,7 @@ def test_feet_that_stand_do_not_slide() -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(offsets=st.floats(-0.6, 0.6), speed=st.floats(0.4, 1.5))
-def test_two_who_walk_into_each_other_step_aside(offsets: float, speed: float) -> None:
+def test_two_people_on_a_collision_course_step_aside(offsets: float, speed: float) -> None:
     clock = np.arange(40) / 5 - 4
     one = np.column_stack([4.5 + speed * clock, np.full(40, 3.5)])
     other = np.column_stack([4.5 - speed * clock, np.full(40, 3.5 + offsets)])

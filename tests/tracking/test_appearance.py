@@ -19,7 +19,7 @@ def test_each_box_has_the_histogram_of_its_pixels() -> None:
     np.testing.assert_allclose(found, [[1, 0, 0, 0], [0, 0, 0, 1], [0.5, 0, 0, 0.5]])
 
 
-def test_boxes_are_cut_to_the_image_and_one_outside_looks_like_nothing_in_particular() -> None:
+def test_boxes_are_clipped_to_the_image_and_a_box_outside_has_the_uniform_histogram() -> None:
     grey = np.full((10, 10), 200, dtype=np.uint8)
     found = gray_histograms(grey, np.array([[-5.0, -5, 5, 5], [50.0, 50, 60, 60]]), bins=2)
     np.testing.assert_allclose(found, [[0.0, 1.0], [0.5, 0.5]])
@@ -43,7 +43,7 @@ def test_impossible_bins_are_refused(bins: int) -> None:
 @pytest.mark.parametrize("measure", MEASURES)
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_distances_go_from_alike_to_nothing_in_common(measure: AppearanceMeasure, seed: int) -> None:
+def test_distances_range_from_identical_to_disjoint(measure: AppearanceMeasure, seed: int) -> None:
     looks = np.random.default_rng(seed).dirichlet(np.ones(8), 5)
     table = appearance_distance(looks, looks, measure)
     assert table.shape == (5, 5)
@@ -55,5 +55,5 @@ def test_distances_go_from_alike_to_nothing_in_common(measure: AppearanceMeasure
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_everything_is_alike_where_no_appearance_is_known(measure: AppearanceMeasure) -> None:
+def test_unknown_appearances_have_distance_zero(measure: AppearanceMeasure) -> None:
     assert (appearance_distance(np.empty((2, 0)), np.empty((3, 0)), measure) == np.zeros((2, 3))).all()

@@ -24,7 +24,7 @@ def told(looks: tuple[AppearanceSample, ...]) -> list[tuple[int, int, list[float
     return [(it.first, it.last, it.histogram.tolist()) for it in looks]
 
 
-def test_frames_in_a_row_are_one_glimpse_and_a_crowd_or_a_hiding_ends_it() -> None:
+def test_consecutive_frames_are_one_sample_until_a_crowd_or_an_occlusion() -> None:
     one = track(1, HERE, HERE, HERE, HERE, HERE, HERE)
     two = track(2, THERE, THERE, BESIDE, THERE, None, THERE)
     states = [np.zeros(6, dtype=np.int64), np.array([1, 1, 1, 1, -1, 1])]
@@ -38,7 +38,7 @@ def test_frames_in_a_row_are_one_glimpse_and_a_crowd_or_a_hiding_ends_it() -> No
     ]
 
 
-def test_only_final_frames_tell_and_whoever_is_hidden_may_be_in_the_box() -> None:
+def test_only_final_frames_give_samples_and_hidden_objects_may_be_in_the_box() -> None:
     one, two = track(1, HERE, HERE, HERE), track(2, BESIDE, THERE, THERE)
     states = [np.zeros(3, dtype=np.int64), np.full(3, -1)]  # two is not seen, but known to be there
     frames = [seen(HERE)] * 2

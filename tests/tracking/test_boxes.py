@@ -36,7 +36,7 @@ def test_a_box_without_area_overlaps_nothing() -> None:
     assert overlap(nothing, nothing) == iou(nothing, nothing) == 0.0
 
 
-def test_all_are_compared_with_all_by_broadcasting() -> None:
+def test_broadcasting_compares_all_pairs() -> None:
     some, others = np.zeros((3, 4)), np.ones((5, 4))
     assert corner_distance(some[:, None], others[None]).shape == (3, 5)
 

@@ -20,20 +20,20 @@ def seen(
     return Detections(np.array(boxes, dtype=np.float64).reshape(-1, 4), given_scores, looks)
 
 
-def test_who_walks_is_half_way_in_the_middle() -> None:
+def test_a_walking_person_is_halfway_in_the_middle() -> None:
     there = interpolate_detections(seen((0, 0, 10, 30), scores=(0.5,)), seen((4, 2, 14, 32)), 0.5)
     assert there.boxes.tolist() == [[2, 1, 12, 31]]
     assert there.scores.tolist() == [0.5]
 
 
-def test_two_who_walk_past_each_other_are_not_mixed_up() -> None:
+def test_two_people_who_pass_each_other_are_not_swapped() -> None:
     there = interpolate_detections(
         seen((0, 0, 10, 30), (30, 0, 40, 30)), seen((27, 0, 37, 30), (3, 0, 13, 30)), 1 / 3
     )
     assert there.boxes[:, 0] == pytest.approx([29.0, 1.0])
 
 
-def test_who_comes_or_goes_is_not_guessed() -> None:
+def test_unmatched_detections_are_not_interpolated() -> None:
     assert len(interpolate_detections(seen((0, 0, 10, 30)), seen((50, 0, 60, 30)), 0.5)) == 0
     assert len(interpolate_detections(seen(), seen((50, 0, 60, 30)), 0.5)) == 0
     assert interpolate_detections(seen((0, 0, 10, 30)), seen(bins=2), 0.5).histograms.shape == (0, 2)
@@ -43,7 +43,7 @@ sides = st.tuples(st.integers(0, 60), st.integers(0, 60), st.integers(4, 30), st
 
 
 @given(st.lists(sides, max_size=6), st.lists(sides, max_size=6), st.floats(0, 1))
-def test_nobody_is_guessed_twice_and_all_lie_between(
+def test_each_detection_is_interpolated_once_and_lies_between(
     first: list[tuple[int, int, int, int]], second: list[tuple[int, int, int, int]], share: float
 ) -> None:
     before, after = (seen(*((x, y, x + w, y + h) for x, y, w, h in some)) for some in (first, second))

@@ -26,7 +26,7 @@ rows = st.builds(
 
 
 @given(st.lists(rows, max_size=20))
-def test_what_is_written_is_read_again(written: list[MotRow]) -> None:
+def test_written_rows_are_read_back(written: list[MotRow]) -> None:
     text = format_rows(written)
     read = list(parse_rows(text.splitlines(), "x"))
     assert format_rows(read) == text
@@ -58,7 +58,7 @@ def _refusal(lines: list[str]) -> str:
 
 
 @pytest.mark.parametrize("field", range(7))
-def test_a_field_without_end_is_named_by_its_beginning(field: int) -> None:
+def test_an_overlong_field_is_shortened_in_the_message(field: int) -> None:
     fields = ["1", "1", "0", "0", "5", "5", "1"]
     for text in ("x" * 5000, "9" * 5000, *([".3" + "9" * 500, "9" * 300] if field < 2 else [])):
         fields[field] = text
@@ -118,7 +118,7 @@ def test_numbers_have_two_decimals_and_no_negative_zero() -> None:
     assert format_row(row) == "7,3,0.00,1.00,2.00,3.14,0.50,-1,-1,-1"
 
 
-def test_ground_truth_says_how_visible_a_person_is() -> None:
+def test_ground_truth_has_the_visible_share() -> None:
     truth, result = parse_rows(["1,1,2,3,4,5,1,1,0.25", "1,1,2,3,4,5,1,-1,-1,-1"], "gt")
     assert (truth.visible, result.visible) == (0.25, -1.0)
     assert truth.box == (2.0, 3.0, 6.0, 8.0)
@@ -131,14 +131,14 @@ def test_a_file_is_written_whole(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.txt"]
 
 
-def test_a_packed_file_is_read_like_its_text(tmp_path: Path) -> None:
+def test_a_gzip_file_is_read_like_its_text(tmp_path: Path) -> None:
     path = tmp_path / "c0.txt.gz"
     path.write_bytes(gzip.compress(b"1,2,3,4,5,6,1\n"))
     assert read_rows(path) == [MotRow(1, 2, 3, 4, 5, 6)]
 
 
 @pytest.mark.parametrize("cut", [0, 5, -9])
-def test_a_packed_file_that_is_broken_is_refused_in_one_line(tmp_path: Path, cut: int) -> None:
+def test_a_broken_gzip_file_is_refused_in_one_line(tmp_path: Path, cut: int) -> None:
     path = tmp_path / "c0.txt.gz"
     whole = gzip.compress(b"1,2,3,4,5,6,1\n" * 50)
     path.write_bytes(b"1,2,3,4,5,6,1\n" if cut == 0 else whole[:cut])

@@ -62,7 +62,7 @@ def final(results: list[WindowResult | None]) -> dict[int, dict[int, npt.NDArray
     return rows
 
 
-def test_toys_that_pass_keep_their_numbers() -> None:
+def test_toys_that_cross_keep_their_ids() -> None:
     one = tracker()
     rows = final([*(one.push(picture(frame)) for frame in range(1, FRAMES)), one.flush()])
     assert sorted(rows[1]) == list(range(1, FRAMES)), "the one in front is never hidden"
@@ -74,7 +74,7 @@ def test_toys_that_pass_keep_their_numbers() -> None:
     assert len(rows[2]) >= 20
 
 
-def test_windows_end_where_the_stride_says_and_flush_ends_the_rest() -> None:
+def test_windows_end_at_the_stride_and_flush_ends_the_last_one() -> None:
     one = tracker(stride=10)
     ends = [frame for frame in range(1, 24) if one.push(picture(frame))]
     assert ends == [9, 19]

@@ -86,7 +86,7 @@ def test_a_missed_frame_is_a_frame_without_detections(stream: list[Detections], 
 
 @given(streams())
 @settings(deadline=None, max_examples=10)
-def test_trackers_share_nothing_and_repeat_themselves(stream: list[Detections]) -> None:
+def test_trackers_share_no_state_and_are_deterministic(stream: list[Detections]) -> None:
     alone = follow(stream, tracker())
     one, other = tracker(), tracker()
     noise = [seen_at([Stroll(9.0, 9.0, 1.0, 5)], n) for n in range(len(stream))]
@@ -113,7 +113,7 @@ def test_people_are_found_and_numbered_from_one(first: int) -> None:
             assert max(float(iou(box, np.array(real))) for real in truth) > 0.8
 
 
-def test_a_person_who_enters_later_is_born_and_shown_from_the_window_on() -> None:
+def test_a_person_who_enters_later_is_tracked_from_that_window_on() -> None:
     people = [Stroll(20.0, 30.0, 2.0, 0), Stroll(250.0, 60.0, -1.0, 3, range(30, 200))]
     results = follow([seen_at(people, n, 1.0) for n in range(60)], tracker())
     found = final_boxes(results)
@@ -122,7 +122,7 @@ def test_a_person_who_enters_later_is_born_and_shown_from_the_window_on() -> Non
     assert seen == list(range(min(seen), 60))
 
 
-def test_somebody_new_is_seen_clearly_once_and_what_led_up_to_it_counts() -> None:
+def test_one_confident_detection_initiates_a_track_with_its_earlier_frames() -> None:
     vague = Stroll(100.0, 50.0, 2.0, 1, sure=range(0))
     clear_once = Stroll(100.0, 50.0, 2.0, 1, sure=range(12, 13))
     assert not _ids(follow([seen_at([vague], frame) for frame in range(30)], tracker()))
@@ -130,14 +130,14 @@ def test_somebody_new_is_seen_clearly_once_and_what_led_up_to_it_counts() -> Non
     assert all(shown[frame].keys() == {1} for frame in range(30))
 
 
-def test_short_clutter_is_nobody() -> None:
+def test_short_clutter_initiates_no_track() -> None:
     person = Stroll(20.0, 30.0, 2.0, 0)
     clutter = Stroll(300.0, 60.0, 0.0, 5, range(22, 29))
     results = follow([seen_at([person, clutter], n, 1.0) for n in range(60)], tracker())
     assert _ids(results) == {1}
 
 
-def test_a_person_hidden_behind_another_keeps_the_number() -> None:
+def test_an_occluded_person_keeps_the_id() -> None:
     # They meet at frame 50; the further one is not detected while they overlap.
     front = Stroll(100.0, 40.0, 2.0, 0)
     behind = Stroll(300.0, 36.0, -2.0, 4)
@@ -156,7 +156,7 @@ def test_a_person_hidden_behind_another_keeps_the_number() -> None:
     assert len(found[50]) == 1
 
 
-def test_who_comes_back_soon_gets_the_number_back_and_who_comes_late_gets_a_new_one() -> None:
+def test_a_person_back_soon_keeps_the_id_and_one_back_late_gets_a_new_one() -> None:
     def ids(absence: int) -> set[int]:
         seen = [n for n in range(60 + absence) if n < 30 or n >= 30 + absence]
         stay = Stroll(100.0, 40.0, 0.0, 2)
@@ -167,7 +167,7 @@ def test_who_comes_back_soon_gets_the_number_back_and_who_comes_late_gets_a_new_
     assert ids(80) == {1, 2}
 
 
-def test_somebody_else_at_the_same_place_is_somebody_else() -> None:
+def test_a_person_of_another_appearance_at_the_same_place_gets_a_new_id() -> None:
     first, second = Stroll(100.0, 40.0, 0.0, 2, range(30)), Stroll(100.0, 40.0, 0.0, 6, range(70, 110))
     results = follow([seen_at([first, second], n, 1.0) for n in range(110)], tracker())
     assert _ids(results) == {1, 2}
@@ -179,7 +179,7 @@ def test_two_boxes_on_one_person_are_one_object() -> None:
     assert all(len(boxes) == 1 for boxes in found.values())
 
 
-def test_after_a_long_gap_everything_begins_again_without_a_result_for_the_gap() -> None:
+def test_after_a_long_gap_tracking_restarts_without_a_result_for_the_gap() -> None:
     person = Stroll(50.0, 40.0, 0.0, 2)
     tracked = tracker()
     before = [tracked.push(n, seen_at([person], n)) for n in range(23)]
@@ -201,7 +201,7 @@ def test_memory_is_bounded_by_the_window_and_the_list() -> None:
         assert len(tracked._objects) <= window.max_objects
 
 
-def test_where_the_list_is_full_only_who_is_hidden_makes_room() -> None:
+def test_at_max_objects_only_hidden_tracks_are_replaced() -> None:
     """One who is hidden, and two who come at once: the second of them finds no room."""
     there = [Stroll(100.0 * k, 40.0, 0.0, k) for k in range(4)]
     left = [Stroll(100.0, 40.0, 0.0, 1, seen=range(20))]
@@ -212,7 +212,7 @@ def test_where_the_list_is_full_only_who_is_hidden_makes_room() -> None:
     assert len(final_boxes(results)[99]) == 4
 
 
-def test_who_must_be_seen_in_every_frame_to_be_somebody_is_found_by_that() -> None:
+def test_a_person_detected_in_every_frame_is_initiated_at_full_required_visibility() -> None:
     person = Stroll(20, 40, 2.0, 0)
     window = WindowSettings(birth_min_visible=1.0)
     results = follow([seen_at([person], n) for n in range(40)], tracker(window))
@@ -239,12 +239,12 @@ def test_flush_without_frames_and_twice_gives_nothing() -> None:
     "wrong",
     [{"stride": 0}, {"stride": 16}, {"birth_window": 16}, {"birth_min_visible": 0.0}, {"max_objects": 0}],
 )
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         WindowSettings(**wrong)  # type: ignore[arg-type]
 
 
-def test_two_who_cross_without_known_looks_keep_their_numbers() -> None:
+def test_two_people_who_cross_without_appearance_keep_their_ids() -> None:
     """Nothing but the way they go tells them apart; for three frames one hides the other."""
     tracked = tracker()
     results = []
@@ -262,13 +262,13 @@ def test_two_who_cross_without_known_looks_keep_their_numbers() -> None:
         assert (last[number][0] > box[0]) == went_right
 
 
-def test_somebody_new_does_not_get_the_number_of_who_left_elsewhere() -> None:
+def test_a_new_person_does_not_get_the_id_of_one_who_left_elsewhere() -> None:
     first, second = Stroll(20.0, 40.0, 0.0, 2, range(30)), Stroll(220.0, 40.0, 0.0, 2, range(45, 90))
     results = follow([seen_at([first, second], n, 1.0) for n in range(90)], tracker())
     assert _ids(results) == {1, 2}
 
 
-def test_who_comes_back_elsewhere_long_after_gets_their_number_by_their_looks() -> None:
+def test_a_person_back_elsewhere_after_long_is_reidentified_by_appearance() -> None:
     away = 120
     there = Stroll(20.0, 40.0, 0.0, 2, range(40))
     back = Stroll(260.0, 60.0, 0.0, 2, range(40 + away, 100 + away))

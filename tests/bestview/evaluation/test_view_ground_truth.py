@@ -1,4 +1,4 @@
-"""Ground truth of views, the offline optimum, and the matching of objects, compared with exhaustive search."""
+"""Ground truth of views, the offline optimum, and object matching equal exhaustive search."""
 
 from __future__ import annotations
 

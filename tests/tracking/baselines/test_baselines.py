@@ -67,7 +67,7 @@ def _follow(tracker: Tracker, frames: int, people: int, blind: range = range(0))
 
 
 @pytest.mark.parametrize("name", BY_DETECTIONS)
-def test_two_people_who_pass_each_other_apart_keep_their_numbers(name: str) -> None:
+def test_two_people_who_pass_at_a_distance_keep_their_ids(name: str) -> None:
     results = _follow(_tracker(name), 45, 2)
     boxes = final_boxes(results)
     assert {number for row in boxes.values() for number in row} == {1, 2}
@@ -82,7 +82,7 @@ def test_two_people_who_pass_each_other_apart_keep_their_numbers(name: str) -> N
 
 
 @pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if it != "lp" and needs_images(it)])
-def test_who_looks_at_the_picture_follows_where_nothing_was_detected(name: str) -> None:
+def test_image_based_trackers_continue_without_detections(name: str) -> None:
     blind = range(20, 24)
     boxes = final_boxes(_follow(_tracker(name), 45, 1, blind))
     for frame in blind:
@@ -100,7 +100,7 @@ def test_a_window_without_a_matched_detection_has_the_uniform_histogram(name: st
         assert track.histogram.tolist() == [0.5, 0.5]
 
 
-def test_the_filter_goes_on_as_it_went_and_says_nothing_meanwhile() -> None:
+def test_the_kalman_filter_predicts_through_missed_frames_without_publishing() -> None:
     blind = range(20, 26)
     boxes = final_boxes(_follow(_tracker("kalman"), 45, 1, blind))
     assert not any(boxes.get(frame) for frame in blind)
@@ -108,7 +108,7 @@ def test_the_filter_goes_on_as_it_went_and_says_nothing_meanwhile() -> None:
 
 
 @pytest.mark.parametrize("name", [it for it in BY_DETECTIONS if needs_images(it)])
-def test_a_frame_without_a_picture_begins_nobody_and_ends_nobody(name: str) -> None:
+def test_a_frame_without_a_picture_neither_starts_nor_ends_tracks(name: str) -> None:
     tracker = _tracker(name)
     told = []
     for frame in range(45):
@@ -127,7 +127,7 @@ def test_the_same_pictures_give_the_same_tracks(name: str) -> None:
     assert shown(_follow(_tracker(name), 20, 2)) == shown(_follow(_tracker(name), 20, 2))
 
 
-def test_a_name_that_no_tracker_has_is_told_with_those_that_there_are() -> None:
+def test_an_unknown_tracker_is_refused_with_the_known_names() -> None:
     with pytest.raises(ValueError, match=r"'sort'.*kalman.*lp|'sort'.*lp.*kalman"):
         create_tracker("sort", WINDOW, CostSettings(), lambda: create_solver("columns"))
 
@@ -142,7 +142,7 @@ def test_a_name_that_no_tracker_has_is_told_with_those_that_there_are() -> None:
         {"max_unmatched_frames": -1},
     ],
 )
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be|between 0 and 1"):
         StepwiseSettings(**wrong)  # type: ignore[arg-type]
 
@@ -164,7 +164,7 @@ def streams(draw: st.DrawFn) -> list[tuple[int, Detections]]:
 
 @given(streams())
 @settings(deadline=None, max_examples=40)
-def test_every_frame_is_told_once_and_no_number_is_used_twice(stream: list[tuple[int, Detections]]) -> None:
+def test_every_frame_is_published_once_and_no_id_is_reused(stream: list[tuple[int, Detections]]) -> None:
     tracker = _tracker("kalman")
     results = [tracker.push(frame, seen) for frame, seen in stream]
     told = [it for it in (*results, tracker.flush()) if it is not None]
@@ -187,7 +187,7 @@ def test_every_frame_is_told_once_and_no_number_is_used_twice(stream: list[tuple
 
 
 @pytest.mark.parametrize("name", BY_DETECTIONS)
-def test_no_result_spans_a_long_gap_and_nobody_is_known_after_it(name: str) -> None:
+def test_no_result_spans_a_long_gap_and_ids_are_new_after_it(name: str) -> None:
     tracker, later = _tracker(name), WINDOW.forget_after + 12
     before = _follow(tracker, 8, 1)
     told = [tracker.push(frame, _seen(9, 1), _picture(9, 1)) for frame in range(later, later + 9)]
@@ -208,7 +208,7 @@ def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
 
 @given(st.integers(0, 500), st.lists(st.tuples(*[st.integers(-20, 60)] * 4), min_size=1, max_size=5))
 @settings(deadline=None, max_examples=60)
-def test_colours_of_boxes_are_those_that_are_counted(
+def test_color_histograms_of_boxes_equal_counted_ones(
     seed: int, corners: list[tuple[int, int, int, int]]
 ) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (30, 40, 3)).astype(np.uint8)

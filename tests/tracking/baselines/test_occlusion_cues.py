@@ -32,7 +32,7 @@ from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
 SEEDS = range(4)
 
 
-def test_a_mixture_finds_the_two_colours_that_pixels_were_drawn_from() -> None:
+def test_a_mixture_recovers_the_two_colors_that_pixels_were_drawn_from() -> None:
     rng = np.random.default_rng(3)
     drawn = np.concatenate([rng.normal([200, 40, 60], 6, (900, 3)), rng.normal([30, 90, 180], 12, (300, 3))])
     found = fit_mixture(np.clip(drawn, 0, 255).astype(np.uint8), components=2)
@@ -41,7 +41,7 @@ def test_a_mixture_finds_the_two_colours_that_pixels_were_drawn_from() -> None:
     assert found.means[order] == pytest.approx(np.array([[200, 40, 60], [30, 90, 180]]), abs=2.5)
 
 
-def test_densities_are_the_formula() -> None:
+def test_densities_equal_the_formula() -> None:
     rng = np.random.default_rng(4)
     found = fit_mixture(rng.integers(0, 256, (400, 3)).astype(np.uint8), components=3)
     colours = rng.uniform(0, 255, (20, 3))
@@ -55,14 +55,14 @@ def test_densities_are_the_formula() -> None:
 
 
 @pytest.mark.parametrize("pixels", [1, 5, 40])
-def test_few_pixels_or_one_colour_make_a_mixture_too(pixels: int) -> None:
+def test_few_pixels_or_one_color_give_a_valid_mixture(pixels: int) -> None:
     one = np.full((pixels, 3), 77, dtype=np.uint8)
     densities = fit_mixture(one, components=3).densities(CODE_COLORS)
     assert np.isfinite(densities).all()
     assert color_codes(one[None])[0, 0] == int(np.argmax(densities))
 
 
-def test_a_colour_is_looked_up_where_it_is() -> None:
+def test_the_color_code_is_that_of_the_nearest_color() -> None:
     image = np.random.default_rng(5).integers(0, 256, (6, 7, 3)).astype(np.uint8)
     assert np.abs(CODE_COLORS[color_codes(image)] - image).max() <= 4
     assert CODE_COLORS.shape == (COLOR_CODES, 3)
@@ -80,9 +80,7 @@ def test_the_posterior_is_bayes_rule() -> None:
     st.lists(st.tuples(*[st.integers(-8, 40)] * 2, *[st.integers(1, 25)] * 2), min_size=1),
 )
 @settings(deadline=None, max_examples=60)
-def test_contrasts_are_those_that_are_summed_pixel_by_pixel(
-    seed: int, places: list[tuple[int, int, int, int]]
-) -> None:
+def test_contrasts_equal_sums_over_pixels(seed: int, places: list[tuple[int, int, int, int]]) -> None:
     values = np.random.default_rng(seed).random((24, 32, 2)).astype(np.float32)
     windows = np.array([[x, y, x + w, y + h] for x, y, w, h in places], dtype=float)
     found = CenterSurroundIntegral(values, 3, 2).contrast(windows)
@@ -108,7 +106,7 @@ def test_a_ring_has_its_share_of_the_windows_pixels() -> None:
 
 @given(st.integers(0, 500), st.lists(st.sets(st.integers(1, 6), max_size=4), min_size=1, max_size=12))
 @settings(deadline=None, max_examples=60)
-def test_shares_are_never_less_than_nothing_nor_more_than_all(seed: int, company: list[set[int]]) -> None:
+def test_shares_stay_between_0_and_1(seed: int, company: list[set[int]]) -> None:
     rng, shares = np.random.default_rng(seed), OccluderParticles.unoccluded(30)
     for near in company:
         known = dict(zip(shares.occluder_ids, shares.states.mean(axis=0), strict=True))
@@ -120,21 +118,21 @@ def test_shares_are_never_less_than_nothing_nor_more_than_all(seed: int, company
         assert set(known) - near == set(known) - set(shares.occluder_ids)
 
 
-def test_a_share_stays_with_whom_it_is_of_when_others_come_and_go() -> None:
+def test_a_share_stays_with_its_occluder_when_others_come_and_go() -> None:
     shares = OccluderParticles((4, 7), np.tile([0.1, 0.6], (10, 1)), np.full(10, 0.1))
     shares.propagate(np.random.default_rng(1), [7, 9], 0.0)
     assert np.allclose(shares.states, [0.6, 0.0])
     assert np.allclose(shares.hidden_share, 0.6)
 
 
-def test_who_looks_like_the_wall_is_found_behind_another_where_the_plain_filter_loses_them() -> None:
+def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_filter_fails() -> None:
     scenes = [Crossing((GREY, BLUE), seed=seed) for seed in SEEDS]
     assert times_kept([OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS], scenes) == len(SEEDS)
     plain = [ParticleFilters(ParticleSettings(seed=it)) for it in SEEDS]
     assert times_kept(plain, scenes) <= len(SEEDS) - 2
 
 
-def test_who_walks_hidden_by_another_goes_with_them_past_something_of_their_colours() -> None:
+def test_a_hidden_person_moves_with_the_occluder_past_a_distractor() -> None:
     scenes = [WalkTogether((RED, BLUE), seed=seed) for seed in SEEDS]
     with_cues = times_kept([OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS], scenes)
     alone = [
@@ -144,13 +142,13 @@ def test_who_walks_hidden_by_another_goes_with_them_past_something_of_their_colo
     assert times_kept(alone, scenes) <= 1
 
 
-def test_two_who_pass_each_other_behind_a_third_are_told_apart() -> None:
+def test_two_people_who_pass_behind_a_third_keep_their_ids() -> None:
     scenes = [ThreeMeet((RED, BLUE, GREEN), seed=seed) for seed in SEEDS]
     methods = [OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS]
     assert times_kept(methods, scenes) >= len(SEEDS) - 1
 
 
-def test_an_occlusion_is_there_while_somebody_is_hidden_and_only_then() -> None:
+def test_the_hidden_share_is_large_only_during_the_occlusion() -> None:
     scene, method = Crossing((RED, BLUE)), OcclusionCues()
     people = [method.initialize(scene.picture(0), scene.where(person, 0)) for person in range(2)]
     hidden = []
@@ -162,7 +160,7 @@ def test_an_occlusion_is_there_while_somebody_is_hidden_and_only_then() -> None:
     assert max(behind[:20].max(), behind[36:].max(), before.max()) < 0.1
 
 
-def test_the_same_seed_weighs_the_same() -> None:
+def test_the_same_seed_gives_the_same_predictions() -> None:
     scene = Crossing((RED, BLUE))
     told = []
     for _ in range(2):
@@ -176,6 +174,6 @@ def test_the_same_seed_weighs_the_same() -> None:
     "wrong",
     [{"particles": 0}, {"components": 0}, {"sharpness": 0.0}, {"occlusion_noise": -0.1}, {"jump_share": 0.6}],
 )
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be|between"):
         OcclusionCueSettings(**wrong)  # type: ignore[arg-type]

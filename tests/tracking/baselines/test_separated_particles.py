@@ -27,9 +27,7 @@ SEEDS = range(6)
 
 @given(st.integers(0, 500), st.lists(st.tuples(*[st.integers(-20, 60)] * 4), min_size=1, max_size=5))
 @settings(deadline=None, max_examples=60)
-def test_levels_of_boxes_are_those_that_are_counted(
-    seed: int, corners: list[tuple[int, int, int, int]]
-) -> None:
+def test_part_histograms_equal_counted_ones(seed: int, corners: list[tuple[int, int, int, int]]) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (30, 40, 3)).astype(np.uint8)
     boxes = np.array([[min(a, c), min(b, d), max(a, c), max(b, d)] for a, b, c, d in corners], dtype=float)
     around = np.array([5.0, -3.0, 33.0, 22.0])  # what the field is cut to
@@ -58,7 +56,7 @@ def test_parts_are_cut_row_by_row() -> None:
 
 @given(st.integers(0, 1000), st.integers(1, 4), st.integers(1, 6))
 @settings(deadline=None, max_examples=60)
-def test_the_overlap_factor_is_the_share_that_is_counted(seed: int, objects: int, reduced: int) -> None:
+def test_the_overlap_factor_equals_the_counted_share(seed: int, objects: int, reduced: int) -> None:
     rng = np.random.default_rng(seed)
     middles = [rng.uniform(-10, 20, (int(rng.integers(1, 30)), 2)) for _ in range(objects)]
     for number, factors in enumerate(overlap_factors(middles, reduced)):
@@ -71,20 +69,20 @@ def test_the_overlap_factor_is_the_share_that_is_counted(seed: int, objects: int
 
 @given(st.integers(0, 1000))
 @settings(deadline=None, max_examples=30)
-def test_who_is_alone_is_weighed_as_before(seed: int) -> None:
+def test_isolated_objects_have_overlap_factor_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     apart = [rng.uniform(0, 40, (20, 2)), rng.uniform(60, 90, (20, 2))]
     assert all((factors == 1.0).all() for factors in overlap_factors(apart, 4))
     assert all((factors == 0.5).all() for factors in overlap_factors([apart[0], apart[0]], 4))
 
 
-def test_alike_is_one_and_nothing_in_common_is_none() -> None:
+def test_the_bhattacharyya_coefficient_is_1_for_equal_and_0_for_disjoint_histograms() -> None:
     shares = np.eye(LEVELS)[[0, 3]]
     assert bhattacharyya_coefficient(shares, shares).tolist() == [1.0, 1.0]
     assert float(bhattacharyya_coefficient(shares[0], shares[1])) == 0.0
 
 
-def test_two_who_look_alike_cross_where_independent_filters_are_kidnapped() -> None:
+def test_two_similar_people_who_cross_are_kept_where_independent_filters_fail() -> None:
     scenes = [Crossing((RED, RED), seed=seed) for seed in SEEDS]
     apart = times_kept([SeparatedParticles(SeparatedParticleSettings(seed=it)) for it in SEEDS], scenes)
     together = times_kept([ParticleFilters(ParticleSettings(seed=it)) for it in SEEDS], scenes)
@@ -93,9 +91,7 @@ def test_two_who_look_alike_cross_where_independent_filters_are_kidnapped() -> N
 
 
 @pytest.mark.parametrize(("in_front", "behind"), [(RED, False), (BLUE, True)])
-def test_only_who_is_dressed_otherwise_hides_somebody_without_driving_them_away(
-    in_front: Clothes, behind: bool
-) -> None:
+def test_only_a_person_in_other_clothes_counts_as_an_occluder(in_front: Clothes, behind: bool) -> None:
     method = SeparatedParticles()
     apart = Crossing((RED, in_front))
     people = [method.initialize(apart.picture(0), apart.where(person, 0)) for person in range(2)]
@@ -109,6 +105,6 @@ def test_only_who_is_dressed_otherwise_hides_somebody_without_driving_them_away(
 
 
 @pytest.mark.parametrize("wrong", [{"particles": 0}, {"rows": 0}, {"cell_pixels": 0}, {"sharpness": 0.0}])
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be"):
         SeparatedParticleSettings(**wrong)  # type: ignore[arg-type]

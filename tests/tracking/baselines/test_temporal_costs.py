@@ -35,7 +35,7 @@ def _blob(left: float, top: float, right: float, bottom: float, shape: np.ndarra
     return Blob(np.array([left, top, right, bottom]), shape, int((shape > 0).sum()), np.full(BINS, 1 / BINS))
 
 
-def test_a_blob_within_another_is_no_distance_away() -> None:
+def test_a_blob_within_another_has_distance_zero() -> None:
     outer, inner = _blob(0, 0, 40, 40), _blob(10, 10, 30, 40)
     assert distance_score(outer, inner, METRE, SETTINGS) == 0.0
     assert distance_score(inner, outer, METRE, SETTINGS) == 0.0
@@ -51,14 +51,14 @@ def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimetres() 
     assert distance_score(left, right, METRE, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
 
 
-def test_the_gap_is_between_what_is_filled_and_not_between_boxes() -> None:
+def test_the_gap_is_measured_between_shapes_and_not_between_boxes() -> None:
     disc = np.hypot(*np.mgrid[-19.5:20:1, -19.5:20:1]) <= 20
     round_ = _blob(0, 0, 40, 40, np.where(disc, 255, 0).astype(np.uint8))
     other = _blob(60, 60, 100, 100, np.where(disc, 255, 0).astype(np.uint8))
     assert blob_gap(round_, other) == pytest.approx(math.hypot(60, 60) - 40, abs=2.5)
 
 
-def test_the_penalty_is_the_share_of_the_way_that_is_walked_and_beyond_it_a_sigmoid() -> None:
+def test_the_penalty_is_linear_up_to_the_walkable_distance_and_a_sigmoid_beyond() -> None:
     assert distance_cost(0.0) == 0.0
     assert distance_cost(0.7) == 0.7
     assert distance_cost(1.0) == 1.0
@@ -68,12 +68,12 @@ def test_the_penalty_is_the_share_of_the_way_that_is_walked_and_beyond_it_a_sigm
 
 
 @given(st.floats(0, 6), st.floats(0, 6))
-def test_farther_never_costs_less(one: float, other: float) -> None:
+def test_the_penalty_grows_with_distance(one: float, other: float) -> None:
     near, far = sorted((one, other))
     assert distance_cost(near) <= distance_cost(far)
 
 
-def test_the_penalty_goes_by_the_time_between_the_samples() -> None:
+def test_the_penalty_depends_on_the_time_between_samples() -> None:
     blobs = [_blob(0, 0, 20, 20)], [_blob(70, 0, 100, 20)]
     short, long = (float(distance_costs(*blobs, seconds, METRE, SETTINGS)[0, 0]) for seconds in (0.5, 2.0))
     assert short > 1.0
@@ -81,7 +81,7 @@ def test_the_penalty_goes_by_the_time_between_the_samples() -> None:
 
 
 @given(st.integers(0, 10_000), st.integers(1, 400), st.integers(1, 400))
-def test_the_intersection_of_shares_is_that_of_counts(seed: int, size: int, model_size: int) -> None:
+def test_the_intersection_of_shares_equals_that_of_counts(seed: int, size: int, model_size: int) -> None:
     rng = np.random.default_rng(seed)
     found = np.bincount(rng.integers(0, 6, size), minlength=BINS)
     model = np.bincount(rng.integers(2, 8, model_size), minlength=BINS)
@@ -109,7 +109,7 @@ def test_only_the_pixels_of_the_mask_count() -> None:
     assert not uv_histogram(image, np.zeros_like(mask)).any()
 
 
-def test_somebody_is_compared_with_how_they_looked_nearest_by() -> None:
+def test_appearance_is_compared_with_the_nearest_learned_region() -> None:
     places = RegionalAppearance(3, (300, 300))
     red, blue = np.eye(BINS)[0], np.eye(BINS)[1]
     here, there = np.array([[40.0, 40.0]]), np.array([[250.0, 250.0]])
@@ -130,7 +130,7 @@ def _room(rng: np.random.Generator) -> np.ndarray:
     return np.clip(shade + rng.normal(0, 2, shade.shape), 0, 255).astype(np.uint8)
 
 
-def test_what_is_not_of_the_room_is_foreground_and_noise_is_not() -> None:
+def test_changes_of_the_room_are_foreground_and_noise_is_not() -> None:
     rng = np.random.default_rng(1)
     background = YuvBackground([_room(rng) for _ in range(20)], BlobSettings())
     image = _room(rng)
@@ -141,7 +141,7 @@ def test_what_is_not_of_the_room_is_foreground_and_noise_is_not() -> None:
     assert found.mean() < 0.005
 
 
-def test_the_distance_is_that_of_mahalanobis_in_yuv() -> None:
+def test_the_distance_is_the_mahalanobis_distance_in_yuv() -> None:
     rng = np.random.default_rng(2)
     room = rng.integers(80, 160, (30, 40, 3))
     # Most pixels are as they were, so that no exposure is told from the rest.
@@ -162,7 +162,7 @@ def test_the_distance_is_that_of_mahalanobis_in_yuv() -> None:
     np.testing.assert_allclose(background.distance(image), expected, rtol=1e-3, atol=1e-3)
 
 
-def test_who_walks_through_while_it_is_learned_is_no_part_of_the_room() -> None:
+def test_a_person_walking_through_during_learning_is_not_part_of_the_background() -> None:
     rng = np.random.default_rng(3)
     images = []
     for step in range(20):
@@ -173,7 +173,7 @@ def test_who_walks_through_while_it_is_learned_is_no_part_of_the_room() -> None:
     assert (background.foreground(_room(rng)) > 0).mean() < 0.005
 
 
-def test_a_room_that_changes_slowly_is_learned_where_nobody_is() -> None:
+def test_a_slowly_changing_background_is_learned_outside_of_people() -> None:
     rng = np.random.default_rng(4)
     finder = BlobDetector((120, 90), 6.0, BlobSettings(learn_rate=0.3))
     finder.prepare([_room(rng) for _ in range(20)])
@@ -188,7 +188,7 @@ def test_a_room_that_changes_slowly_is_learned_where_nobody_is() -> None:
     assert np.abs(box - [40, 30, 60, 60]).max() <= 3
 
 
-def test_blobs_are_whole_and_specks_are_none() -> None:
+def test_blobs_are_merged_and_specks_are_dropped() -> None:
     rng = np.random.default_rng(5)
     finder = BlobDetector((120, 90), 6.0, BlobSettings())
     finder.prepare([_room(rng) for _ in range(20)])

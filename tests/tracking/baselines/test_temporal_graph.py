@@ -73,13 +73,13 @@ def test_the_joint_path_is_the_cheapest_of_all(graph: WindowGraph) -> None:
 
 @given(graphs(most_stages=2))
 @settings(deadline=None, max_examples=30)
-def test_so_it_is_for_three_people(graph: WindowGraph) -> None:
+def test_the_joint_path_is_the_cheapest_for_three_people(graph: WindowGraph) -> None:
     assert solve_joint_path(graph, prune_links(graph), _MANY).cost == pytest.approx(_best(graph))
 
 
 @given(graphs(most_people=4, most_stages=6, most_blobs=4), st.sampled_from([0.6, 1.5, np.inf]))
 @settings(deadline=None, max_examples=60)
-def test_person_by_person_is_as_cheap_as_edge_by_edge(graph: WindowGraph, longest: float) -> None:
+def test_solving_person_by_person_equals_solving_edge_by_edge(graph: WindowGraph, longest: float) -> None:
     graph = replace(graph, max_step_cost=longest)
     left = prune_links(graph)
     nobody = [np.zeros(len(it), dtype=np.int64) for it in graph.shared]
@@ -96,7 +96,7 @@ def test_person_by_person_is_as_cheap_as_edge_by_edge(graph: WindowGraph, longes
 
 @given(graphs(most_people=3, most_stages=4, most_blobs=4))
 @settings(deadline=None, max_examples=80)
-def test_pruning_keeps_the_best_path_where_nobody_goes_too_far_on_it(graph: WindowGraph) -> None:
+def test_pruning_keeps_the_best_path_if_all_its_steps_are_short_enough(graph: WindowGraph) -> None:
     whole = solve_joint_path(graph, prune_links(graph), _MANY)
     taken = [
         step[a, b]
@@ -114,7 +114,7 @@ def test_pruning_keeps_the_best_path_where_nobody_goes_too_far_on_it(graph: Wind
     )
 
 
-def test_without_pruning_there_are_as_many_edges_as_pairs_of_nodes() -> None:
+def test_without_pruning_the_edges_are_all_pairs_of_nodes() -> None:
     graph = WindowGraph(
         np.array([0, 1, 2]),
         (np.zeros((3, 3)), np.zeros((3, 2))),
@@ -127,7 +127,7 @@ def test_without_pruning_there_are_as_many_edges_as_pairs_of_nodes() -> None:
     assert count_unpruned_edges(graph) == [27, 27 * 8]
 
 
-def test_pruning_leaves_a_chain_where_everybody_is_far_from_everybody() -> None:
+def test_pruning_leaves_a_chain_where_all_people_are_far_apart() -> None:
     far = np.where(np.eye(3, dtype=bool), 0.0, 30.0)
     graph = WindowGraph(
         np.arange(3),
@@ -141,14 +141,14 @@ def test_pruning_leaves_a_chain_where_everybody_is_far_from_everybody() -> None:
     assert solve_joint_path(graph, prune_links(graph), _MANY).blobs.tolist() == [[0, 1, 2], [0, 1, 2]]
 
 
-def test_who_can_get_to_no_blob_is_somewhere_all_the_same() -> None:
+def test_a_person_out_of_reach_of_all_blobs_is_assigned_the_nearest() -> None:
     graph = WindowGraph(
         np.array([0]), (np.array([[40.0, 30.0]]),), (np.zeros((1, 2)),), (np.ones(2, dtype=bool),), 0.35, 2.0
     )
     assert solve_joint_path(graph, prune_links(graph), _MANY).blobs.tolist() == [[1]]
 
 
-def test_a_merge_costs_for_everybody_in_it_but_one() -> None:
+def test_a_merge_costs_for_each_person_but_one() -> None:
     blobs = [np.array([0, 1]), np.array([0, 1]), np.array([1])]
     shared, nobody = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)
     costs = merge_costs(blobs, shared, nobody, 0.35)
@@ -162,7 +162,7 @@ def test_a_merge_costs_for_everybody_in_it_but_one() -> None:
 
 @given(graphs(most_people=4, most_stages=3, most_blobs=3))
 @settings(deadline=None, max_examples=40)
-def test_too_many_people_for_one_table_are_decided_one_after_the_other(graph: WindowGraph) -> None:
+def test_too_many_people_for_one_table_are_solved_one_after_the_other(graph: WindowGraph) -> None:
     found = solve_joint_path(graph, prune_links(graph), 1)
     whole = solve_joint_path(graph, prune_links(graph), _MANY)
     assert _cost(graph, found.blobs) == pytest.approx(found.cost)
@@ -170,7 +170,7 @@ def test_too_many_people_for_one_table_are_decided_one_after_the_other(graph: Wi
     assert not found.exact or found.cost == pytest.approx(whole.cost)
 
 
-def test_evidence_that_comes_later_corrects_an_earlier_match() -> None:
+def test_later_evidence_corrects_an_earlier_match() -> None:
     # Two people meet in one blob and part; at first each looks like the other, then like themselves.
     near = np.full((1, 2), 0.22)
     apart = np.array([[0.0, 9.0], [9.0, 0.0]])

@@ -57,7 +57,7 @@ def _nearest(boxes: dict[int, Floats], place: tuple[float, float]) -> int:
     return max(boxes, key=lambda number: float(iou(boxes[number], box)))
 
 
-def test_people_who_meet_and_part_are_who_they_were() -> None:
+def test_people_who_meet_and_part_keep_their_ids() -> None:
     results = _follow(_tracker(), {frame: _picture(_meet(frame), frame) for frame in range(130)})
     boxes = final_boxes(results)
     numbers = [tuple(_nearest(boxes[frame], _meet(frame)[person]) for person in (0, 1)) for frame in (5, 125)]
@@ -76,7 +76,7 @@ def test_boxes_follow_the_blobs_between_the_samples() -> None:
         assert float(iou(boxes[frame][_nearest(boxes[frame], (x, y))], expected)) > 0.6, f"frame {frame}"
 
 
-def test_who_comes_in_is_somebody_new_and_who_goes_out_is_gone() -> None:
+def test_a_person_who_enters_gets_an_id_and_one_who_leaves_loses_it() -> None:
     def where(frame: int) -> dict[int, tuple[float, float]]:
         found = {0: (60.0, 40.0)}
         if frame >= 30:
@@ -90,7 +90,7 @@ def test_who_comes_in_is_somebody_new_and_who_goes_out_is_gone() -> None:
     assert set(boxes[225]) == {1}
 
 
-def test_in_a_closed_room_nobody_comes() -> None:
+def test_in_a_closed_world_no_track_is_initiated_later() -> None:
     def where(frame: int) -> dict[int, tuple[float, float]]:
         return {0: (60.0, 40.0)} | ({1: (140.0, 110.0)} if frame >= 30 else {})
 
@@ -99,7 +99,7 @@ def test_in_a_closed_room_nobody_comes() -> None:
     assert {number for row in boxes.values() for number in row} == {1}
 
 
-def test_every_frame_is_told_once_and_is_final_soon_enough() -> None:
+def test_every_frame_is_published_once_within_the_lag() -> None:
     pictures: dict[int, Image | None] = {frame: _picture(_meet(frame), frame) for frame in range(3, 120)}
     for frame in (10, 11, *range(60, 90)):
         pictures[frame] = None
@@ -133,7 +133,7 @@ def test_the_same_pictures_give_the_same_tracks() -> None:
     assert first == second
 
 
-def test_nobody_is_known_after_a_long_gap_and_no_result_spans_it() -> None:
+def test_ids_are_new_after_a_long_gap_and_no_result_spans_it() -> None:
     tracker, later = _tracker(), WINDOW.forget_after + 40
     before = _follow(tracker, {frame: _picture(_meet(0), frame) for frame in range(20)})
     after = _follow(tracker, {later + frame: _picture(_meet(0), frame) for frame in range(20)})
@@ -142,7 +142,7 @@ def test_nobody_is_known_after_a_long_gap_and_no_result_spans_it() -> None:
     assert numbers == [{1, 2}, {3, 4}]
 
 
-def test_without_pictures_to_prepare_by_the_room_is_learned_as_it_goes() -> None:
+def test_without_preparation_the_background_is_learned_online() -> None:
     settings = TemporalSettings(
         window_stages=2, stage_s=0.2, blobs=BlobSettings(bootstrap_frames=20, samples=10)
     )
@@ -153,7 +153,7 @@ def test_without_pictures_to_prepare_by_the_room_is_learned_as_it_goes() -> None
     assert set(boxes[55]) == {1}
 
 
-def test_looks_are_those_of_the_detections_that_show_somebody_alone() -> None:
+def test_appearance_samples_come_from_detections_of_single_people() -> None:
     tracker = _tracker()
     told = []
     for frame in range(40):
@@ -175,7 +175,7 @@ def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
         tracker.push(5, _NOBODY, _picture({}, 0))
 
 
-def test_it_is_a_tracker_by_name_that_needs_pictures() -> None:
+def test_the_registry_creates_it_by_name_with_pictures_required() -> None:
     assert needs_images("temporal")
     made = create_tracker("temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS)
     assert isinstance(made, TemporalTracker)
@@ -197,7 +197,7 @@ def test_it_is_a_tracker_by_name_that_needs_pictures() -> None:
         {"forget_after_s": -1.0},
     ],
 )
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must (not )?be"):
         TemporalSettings(**wrong)  # type: ignore[arg-type]
 
@@ -212,11 +212,11 @@ def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> Non
         {"learn_rate": 1.5},
     ],
 )
-def test_settings_of_blobs_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_blob_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be|is a share"):
         BlobSettings(**wrong)  # type: ignore[arg-type]
 
 
-def test_however_little_floor_is_in_the_picture_foreground_grows_by_a_part_of_it() -> None:
+def test_the_dilation_is_bounded_by_the_picture() -> None:
     blobs = BlobDetector((64, 48), 0.001, BlobSettings(dilation_m=1.0))
     assert blobs._kernel.shape == (13, 13)

@@ -41,7 +41,7 @@ def _unlike(before: TrackEnd, after: TrackEnd) -> float:
 
 @given(st.integers(0, 5000), st.integers(2, 5))
 @settings(deadline=None, max_examples=80)
-def test_who_left_is_the_most_probable_of_all_states(seed: int, count: int) -> None:
+def test_the_departed_member_is_the_most_probable_of_all_states(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     group = [_end(rng, int(rng.integers(0, 40))) for _ in range(count)]
     out, rest = _end(rng, 50), _end(rng, 50)
@@ -55,7 +55,7 @@ def test_who_left_is_the_most_probable_of_all_states(seed: int, count: int) -> N
     assert departed_member(group, out, rest, CLOSE, max_distance=1.0) == best
 
 
-def test_who_is_like_nobody_of_a_group_was_never_in_it() -> None:
+def test_a_person_unlike_all_members_was_not_in_the_group() -> None:
     place, still = np.zeros(2), np.zeros(2)
     group = [TrackEnd(0, place, still, 80.0, look(kind)) for kind in (0, 1)]
     stranger = TrackEnd(90, place, still, 80.0, look(5))
@@ -88,12 +88,12 @@ def _numbers(tracker: Tracker, frames: list[Detections], people: list[Stroll]) -
     return had
 
 
-def test_who_comes_out_of_a_group_has_the_number_they_went_in_with() -> None:
+def test_a_person_who_leaves_a_group_keeps_the_id() -> None:
     frames, people = _crossing()
     assert [len(numbers) for numbers in _numbers(_tracker("track-graph"), frames, people)] == [1, 1]
 
 
-def test_who_is_followed_on_by_mistake_gets_their_number_back_when_the_group_splits() -> None:
+def test_a_hijacked_track_is_corrected_when_the_group_splits() -> None:
     people = [Stroll(200.0, 50.0, 0.0, 2), Stroll(100.0, 50.0, 1.0, 6)]
     # Who alone is detected: the box goes from the one who stands to the one who walks, the filter with it.
     stands, walks = range(82, 112), range(112, 140)
@@ -108,7 +108,7 @@ def test_who_is_followed_on_by_mistake_gets_their_number_back_when_the_group_spl
     assert [plain[0][0] == plain[0][-1], plain[1][0] == plain[1][-1]] != [True, True]
 
 
-def test_a_frame_shows_a_number_at_most_once_and_the_same_comes_of_the_same() -> None:
+def test_a_frame_has_an_id_at_most_once_and_results_are_deterministic() -> None:
     rng = np.random.default_rng(8)
     people = [Stroll(float(rng.integers(0, 300)), 40.0, float(rng.integers(-4, 5)), it) for it in range(5)]
     frames = []
@@ -142,6 +142,6 @@ def test_a_frame_shows_a_number_at_most_once_and_the_same_comes_of_the_same() ->
         {"merge_after_frames": 0},
     ],
 )
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"covered|must be"):
         TrackGraphSettings(**wrong)  # type: ignore[arg-type]

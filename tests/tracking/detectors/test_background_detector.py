@@ -30,7 +30,7 @@ def best_overlap(seen: Detections, figure: Figure, frame: int) -> float:
     return float(iou(sure, figure.box(frame)).max(initial=0.0))
 
 
-def test_a_walker_is_found_in_a_tight_box() -> None:
+def test_a_walker_is_detected_in_a_tight_box() -> None:
     seen = watched(BackgroundDetector(), [WALKER], range(120))
     overlaps = [best_overlap(seen[frame], WALKER, frame) for frame in range(45, 120)]
     assert np.mean(np.array(overlaps) >= 0.5) >= 0.95
@@ -38,7 +38,7 @@ def test_a_walker_is_found_in_a_tight_box() -> None:
     assert np.mean(overlaps) >= 0.65
 
 
-def test_nobody_is_found_where_nobody_is() -> None:
+def test_an_empty_scene_has_no_detections() -> None:
     seen = watched(BackgroundDetector(), [], range(60))
     assert all((frame.scores < SURE).all() for frame in seen)
 
@@ -51,20 +51,20 @@ def test_two_people_side_by_side_are_two() -> None:
         assert np.mean(found) >= 0.8
 
 
-def test_the_camera_s_gain_does_not_turn_the_scene_into_people() -> None:
+def test_a_gain_change_causes_no_detections() -> None:
     detector = BackgroundDetector()
     watched(detector, [], range(50))
     brighter = watched(detector, [], range(50, 70), gain=1.15)
     assert all((frame.scores < SURE).all() for frame in brighter)
 
 
-def test_somebody_who_stands_still_is_not_absorbed() -> None:
+def test_a_standing_person_is_not_absorbed_into_the_background() -> None:
     arrived = [Figure(10, 200, speed=2.0, begin=40, end=100), Figure(210, 200, begin=100)]
     seen = watched(BackgroundDetector(), arrived, range(200))
     assert np.mean([best_overlap(seen[frame], arrived[1], frame) >= 0.5 for frame in range(110, 200)]) > 0.95
 
 
-def test_who_is_in_a_recording_s_first_frame_is_found_there_and_leaves_no_ghost() -> None:
+def test_a_person_in_the_first_frame_of_a_recording_is_detected_and_leaves_no_ghost() -> None:
     walker = Figure(10, 200, speed=2.0, begin=0)
     detector = BackgroundDetector()
     assert detector.warming_up
@@ -76,7 +76,7 @@ def test_who_is_in_a_recording_s_first_frame_is_found_there_and_leaves_no_ghost(
     assert not any(ghosts.any() for ghosts in left)
 
 
-def test_what_a_recording_shows_ahead_is_learned_and_forgotten_when_the_light_changes() -> None:
+def test_a_prepared_background_is_replaced_when_the_picture_changes() -> None:
     detector = BackgroundDetector()
     detector.prepare([picture([], frame) for frame in range(3)], every=1)
     upside_down = [np.ascontiguousarray(picture([], frame)[::-1]) for frame in range(120)]
@@ -84,7 +84,7 @@ def test_what_a_recording_shows_ahead_is_learned_and_forgotten_when_the_light_ch
     assert (seen[-1].scores < SURE).all()
 
 
-def test_the_ghost_of_somebody_who_was_there_from_the_start_vanishes() -> None:
+def test_the_ghost_of_a_person_present_from_the_start_vanishes() -> None:
     leaves = Figure(150, 200, end=60)
     detector = BackgroundDetector()
     watched(detector, [leaves], range(60))
@@ -93,7 +93,7 @@ def test_the_ghost_of_somebody_who_was_there_from_the_start_vanishes() -> None:
     assert all((frame.scores < SURE).all() for frame in after[-20:])
 
 
-def test_what_is_ignored_is_not_found() -> None:
+def test_ignored_regions_have_no_detections() -> None:
     right = ((WIDTH / 2, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (WIDTH / 2, HEIGHT))
     hidden = Figure(260, 200, speed=-0.5, begin=40)
     seen = watched(BackgroundDetector(BackgroundSettings(ignore=(right,))), [hidden], range(100))
@@ -101,7 +101,7 @@ def test_what_is_ignored_is_not_found() -> None:
 
 
 @pytest.mark.parametrize(("colour", "length"), [(True, 96), (False, 64)])
-def test_looks_tell_people_apart_by_colour(colour: bool, length: int) -> None:
+def test_color_histograms_distinguish_people(colour: bool, length: int) -> None:
     red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, colour=(190, 110, 35))
     detector = BackgroundDetector(BackgroundSettings(appearance=AppearanceSettings(color=colour)))
     seen = watched(detector, [red, blue], range(80))[-1]
@@ -112,7 +112,7 @@ def test_looks_tell_people_apart_by_colour(colour: bool, length: int) -> None:
     assert (likeness < 0.85) == colour
 
 
-def test_the_same_frames_give_the_same_detections_to_the_byte() -> None:
+def test_the_same_frames_give_identical_detections() -> None:
     first, second = (watched(BackgroundDetector(), [WALKER], range(80)) for _ in range(2))
     for one, other in zip(first, second, strict=True):
         for part in ("boxes", "scores", "histograms"):
@@ -128,7 +128,7 @@ def test_another_size_or_type_is_refused() -> None:
         detector.detect(picture([], 1)[..., 0])
 
 
-def test_a_third_of_wild_samples_does_not_move_the_height_line() -> None:
+def test_a_third_of_outliers_does_not_change_the_height_model() -> None:
     rng = np.random.default_rng(1)
     foot = rng.uniform(100, 280, 300)
     height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.05, 300)
@@ -140,7 +140,7 @@ def test_a_third_of_wild_samples_does_not_move_the_height_line() -> None:
     )
 
 
-def test_the_height_line_is_in_doubt_where_nobody_was_seen() -> None:
+def test_the_height_model_is_uncertain_where_it_has_no_samples() -> None:
     foot = np.linspace(150, 170, 20)
     line = fit_height_model(np.stack([foot, 0.6 * foot - 20.0], axis=1), HeightModelSettings())
     assert line is not None
@@ -148,7 +148,7 @@ def test_the_height_line_is_in_doubt_where_nobody_was_seen() -> None:
     assert far > 2.0 * near
 
 
-def test_people_all_of_one_height_everywhere_are_no_floor() -> None:
+def test_heights_that_do_not_grow_towards_the_camera_are_refused() -> None:
     foot = np.linspace(60, 280, 400)
     steep = np.stack([foot, 200.0 - 0.5 * foot], axis=1)
     assert fit_height_model(steep, HeightModelSettings()) is None
@@ -156,7 +156,7 @@ def test_people_all_of_one_height_everywhere_are_no_floor() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.floats(0.35, 1.0), st.floats(-80.0, 60.0), st.integers(0, 1000))
-def test_by_metres_pieces_and_pairs_of_people_do_not_lead_the_line_astray(
+def test_with_floor_geometry_fragments_and_pairs_of_people_do_not_change_the_height_model(
     slope: float, row: float, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -171,7 +171,7 @@ def test_by_metres_pieces_and_pairs_of_people_do_not_lead_the_line_astray(
     np.testing.assert_allclose(line.expected_height(rows), slope * (rows - row), rtol=0.08)
 
 
-def test_by_metres_there_is_a_line_before_anybody_was_seen_and_where_nothing_agrees() -> None:
+def test_with_floor_geometry_there_is_a_height_model_without_or_with_inconsistent_samples() -> None:
     floor = FloorGeometry(20.0, 0.65)
     before = HeightModelEstimator(HeightModelSettings(), floor, HEIGHT).model
     assert before is not None
@@ -186,7 +186,7 @@ def test_by_metres_there_is_a_line_before_anybody_was_seen_and_where_nothing_agr
     assert fit_height_model(wild, HeightModelSettings()) is None
 
 
-def test_children_are_learned_to_be_smaller_than_people_of_the_usual_height() -> None:
+def test_many_small_people_lower_the_height_model() -> None:
     rng = np.random.default_rng(5)
     foot = rng.uniform(100, 280, 300)
     height = 0.8 * 0.6 * (foot - 30.0) * rng.normal(1.0, 0.05, 300)
@@ -202,7 +202,7 @@ def test_children_are_learned_to_be_smaller_than_people_of_the_usual_height() ->
     )
 
 
-def test_the_fewer_people_were_seen_the_more_the_height_line_is_in_doubt() -> None:
+def test_the_height_model_is_more_uncertain_with_fewer_people() -> None:
     foot = np.linspace(100, 280, 900)
     samples = np.stack([foot, 0.65 * foot - 20.0], axis=1)
     lines = [fit_height_model(samples, HeightModelSettings(), people=people) for people in (1, 2, 8)]
@@ -212,7 +212,7 @@ def test_the_fewer_people_were_seen_the_more_the_height_line_is_in_doubt() -> No
     assert doubts[0] >= 0.03 * 110.0, "however often somebody is seen, they may be tall"
 
 
-def test_who_stands_still_counts_once_and_who_walks_at_every_tenth_of_their_height() -> None:
+def test_a_standing_person_gives_one_sample_and_a_walking_one_gives_many() -> None:
     anew, counted = SampleNoveltyFilter(), {"stands": 0, "walks": 0}
     for frame in range(400):
         stands = IsolatedPerson(60.0 + frame % 3, 130.0, 50.0)
@@ -224,14 +224,14 @@ def test_who_stands_still_counts_once_and_who_walks_at_every_tenth_of_their_heig
     assert 60 <= counted["walks"] <= 80
 
 
-def test_a_place_is_forgotten_when_nobody_is_there() -> None:
+def test_a_place_is_forgotten_when_it_is_empty() -> None:
     anew, person = SampleNoveltyFilter(), IsolatedPerson(60.0, 130.0, 50.0)
     assert anew.new_samples([person]) == [person]
     assert anew.new_samples([], frames=200) == []
     assert anew.new_samples([person]) == [person]
 
 
-def test_who_stands_long_with_hidden_feet_does_not_lead_the_line_astray() -> None:
+def test_a_standing_person_with_hidden_feet_does_not_change_the_height_model() -> None:
     visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
     learner = HeightModelEstimator(HeightModelSettings())
     for frame in range(600):
@@ -248,7 +248,7 @@ def test_who_stands_long_with_hidden_feet_does_not_lead_the_line_astray() -> Non
     np.testing.assert_allclose(learner.model.expected_height(rows), 0.6 * rows - 25.0, rtol=0.08)
 
 
-def test_of_ground_without_metres_the_horizon_holds_the_line() -> None:
+def test_without_a_unit_the_horizon_constrains_the_height_model() -> None:
     rng = np.random.default_rng(8)
     foot = rng.uniform(120, 150, 60)
     height = 0.8 * (foot - 20.0) * rng.normal(1.0, 0.04, 60)
@@ -264,7 +264,7 @@ def test_of_ground_without_metres_the_horizon_holds_the_line() -> None:
     assert held.standard_deviation(near) < 0.5 * free.standard_deviation(near)
 
 
-def test_more_pieces_than_people_do_not_lead_the_line_astray() -> None:
+def test_more_fragments_than_people_do_not_change_the_height_model() -> None:
     rng = np.random.default_rng(6)
     foot = rng.uniform(110, 260, 200)
     height = (0.6 * foot - 20.0) * rng.normal(1.0, 0.04, 200)
@@ -276,7 +276,7 @@ def test_more_pieces_than_people_do_not_lead_the_line_astray() -> None:
     )
 
 
-def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
+def test_the_height_model_is_reliable_with_floor_geometry_or_many_samples() -> None:
     alone = HeightModelEstimator(HeightModelSettings())
     assert not alone.is_reliable
     assert HeightModelEstimator(HeightModelSettings(), FloorGeometry(57.0, 0.7), HEIGHT).is_reliable
@@ -294,7 +294,7 @@ def test_how_tall_people_are_is_sure_by_metres_or_by_many_people() -> None:
     assert surely[-1]
 
 
-def test_what_was_measured_of_the_floor_says_how_tall_people_are_in_every_size_of_picture() -> None:
+def test_floor_geometry_gives_the_height_model_at_every_picture_size() -> None:
     lines = []
     for factor in (1, 2):
         detector = BackgroundDetector(floor=FloorGeometry(57.0 * factor, 0.7))

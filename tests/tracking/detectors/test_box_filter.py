@@ -46,7 +46,7 @@ def found(body: Body = "person", band: HeightRange | None = None) -> ScanPeaks:
 
 
 @pytest.mark.parametrize("body", ["person", "box"])
-def test_gains_and_sizes_are_what_the_cells_add_up_to(body: Body) -> None:
+def test_gains_and_areas_equal_sums_over_cells(body: Body) -> None:
     foreground, cost, weight = scene()
     peaks = found(body)
     assert len(peaks.boxes) > 3
@@ -57,13 +57,13 @@ def test_gains_and_sizes_are_what_the_cells_add_up_to(body: Body) -> None:
     assert (np.diff(peaks.gains) <= 0.0).all()
 
 
-def test_everybody_is_found() -> None:
+def test_every_person_is_a_peak() -> None:
     best = found().boxes
     for box in PEOPLE:
         assert (np.abs(best - box).max(axis=1) <= 3.0).any(), box
 
 
-def test_moving_a_peak_by_a_cell_brings_next_to_nothing() -> None:
+def test_peaks_are_local_maxima() -> None:
     foreground, cost, _ = scene()
     gain = foreground - cost
     for box, value in zip(found().boxes[:3], found().gains[:3], strict=True):
@@ -71,7 +71,7 @@ def test_moving_a_peak_by_a_cell_brings_next_to_nothing() -> None:
             assert gain[body_of(box + np.array([x, y, x, y]))].sum() <= 1.03 * value
 
 
-def test_heights_off_the_line_are_not_found() -> None:
+def test_heights_outside_the_range_are_not_searched() -> None:
     line = HeightModel(slope=0.55, offset=0.0)
     peaks = found(band=HeightRange(line, tolerance=0.15, tolerance_std=1.0, min_height=0.08))
     heights, feet = peaks.boxes[:, 3] - peaks.boxes[:, 1], peaks.boxes[:, 3]
@@ -80,7 +80,7 @@ def test_heights_off_the_line_are_not_found() -> None:
     assert ((peaks.priors > 0.0) & (peaks.priors <= 1.0)).all()
 
 
-def test_small_people_are_sought_where_as_small_ones_were_seen() -> None:
+def test_small_people_are_searched_down_to_the_least_height_of_the_model() -> None:
     weight = np.ones((ROWS, COLUMNS), dtype=np.float32)
     gain = np.full_like(weight, -0.35)
     child = np.array([60.0, 30.0, 65.0, 42.0])
@@ -93,7 +93,7 @@ def test_small_people_are_sought_where_as_small_ones_were_seen() -> None:
         assert not sought or np.abs(boxes[0] - child).max() <= 2.0
 
 
-def test_a_new_line_replaces_the_one_before() -> None:
+def test_a_new_height_range_replaces_the_previous_one() -> None:
     foreground, cost, weight = scene()
     one = BoxFilter(weight, ROWS, BoxFilterSettings(min_height=0.3, max_height=0.6))
     bands = [HeightRange(HeightModel(slope, 0.0), 0.1, 1.0, 0.08) for slope in (0.5, 0.6)]
@@ -102,7 +102,7 @@ def test_a_new_line_replaces_the_one_before() -> None:
     assert alternating[0].shape != alternating[1].shape or (alternating[0] != alternating[1]).any()
 
 
-def test_gains_beside_the_chosen_are_as_if_summed_anew() -> None:
+def test_incremental_gains_equal_recomputed_ones() -> None:
     foreground, cost, weight = scene()
     peaks = found()
     search = GreedySearch(peaks, foreground, cost, weight, ForegroundFitSettings())
@@ -121,7 +121,7 @@ def test_gains_beside_the_chosen_are_as_if_summed_anew() -> None:
         np.testing.assert_allclose(search.visible, [free[body].sum() for body in bodies], atol=1e-2)
 
 
-def test_a_small_set_explains_the_foreground_and_the_rest_scores_low() -> None:
+def test_a_small_set_explains_the_foreground_and_other_boxes_score_low() -> None:
     foreground, cost, weight = scene()
     explained = fit_foreground(found(), foreground, cost, weight, ForegroundFitSettings())
     assert explained.people == 3
@@ -129,7 +129,7 @@ def test_a_small_set_explains_the_foreground_and_the_rest_scores_low() -> None:
     assert (explained.scores[3:] < 0.4).all()
 
 
-def test_a_crowd_is_explained_by_as_many_as_there_are() -> None:
+def test_a_crowd_is_explained_by_its_number_of_people() -> None:
     weight = np.ones((ROWS, COLUMNS), dtype=np.float32)
     crowd = [
         (4.0 + 12.0 * k, 4.0 + 40.0 * row, 16.0 + 12.0 * k, 36.0 + 40.0 * row)
@@ -150,7 +150,7 @@ def test_a_crowd_is_explained_by_as_many_as_there_are() -> None:
     assert fit_foreground(peaks, foreground, cost, weight, ForegroundFitSettings(max_people=7)).people == 7
 
 
-def test_without_explanation_boxes_score_by_themselves() -> None:
+def test_without_foreground_fit_boxes_score_independently() -> None:
     foreground, cost, weight = scene()
     peaks = found()
     explained = fit_foreground(
@@ -161,7 +161,7 @@ def test_without_explanation_boxes_score_by_themselves() -> None:
     assert explained.scores[0] == pytest.approx(peaks.gains[0] / peaks.areas[0])
 
 
-def test_nothing_is_found_in_nothing() -> None:
+def test_an_empty_foreground_has_no_peaks() -> None:
     _, _, weight = scene()
     nothing, cost = np.zeros_like(weight), 0.35 * weight
     peaks = BoxFilter(weight, ROWS, BoxFilterSettings()).peaks(nothing - cost, None)
@@ -169,7 +169,7 @@ def test_nothing_is_found_in_nothing() -> None:
     assert len(fit_foreground(peaks, nothing, cost, weight, ForegroundFitSettings()).boxes) == 0
 
 
-def test_bodies_are_cut_at_the_borders() -> None:
+def test_bodies_are_clipped_at_the_borders() -> None:
     boxes = np.array([[-10.0, -10.0, 10.0, 40.0], [110.0, 60.0, 130.0, 120.0]])
     corners = part_rectangles(boxes, BODY_PARTS["box"], (ROWS, COLUMNS))
     sums = np.arange(ROWS + 1)[:, None] * np.arange(COLUMNS + 1.0)[None]  # the integral of a plane of ones

@@ -30,12 +30,12 @@ def found(settings: HogSettings = SETTINGS) -> Detections:
     return HogDetector(settings).detect(room()[0])
 
 
-def test_people_are_found_in_boxes_of_their_size() -> None:
+def test_people_are_detected_in_boxes_of_their_size() -> None:
     overlaps = iou(found().boxes[:, None], room()[1][None]).max(axis=0)
     assert np.count_nonzero(overlaps >= 0.6) >= 2, overlaps
 
 
-def test_scores_are_in_order_and_nobody_is_found_twice() -> None:
+def test_scores_are_sorted_and_no_person_is_detected_twice() -> None:
     seen = found()
     assert (np.diff(seen.scores) <= 0.0).all()
     assert ((seen.scores >= 0.5) & (seen.scores <= 1.0)).all()
@@ -43,23 +43,23 @@ def test_scores_are_in_order_and_nobody_is_found_twice() -> None:
     assert (overlaps[~np.eye(len(seen), dtype=np.bool_)] <= SETTINGS.nms_iou).all()
 
 
-def test_looks_are_those_asked_for() -> None:
+def test_histograms_follow_the_settings() -> None:
     detector = HogDetector(SETTINGS, AppearanceExtractor(AppearanceSettings(color=False), 32))
     seen = detector.detect(room()[0])
     assert detector.bins == 32 == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
 
 
-def test_what_is_ignored_is_not_found() -> None:
+def test_ignored_regions_have_no_detections() -> None:
     everything = (((0.0, 0.0), (640.0, 0.0), (640.0, 360.0), (0.0, 360.0)),)
     assert len(HogDetector(SETTINGS, ignore=everything).detect(room()[0])) == 0
 
 
-def test_the_same_picture_gives_the_same_boxes_to_the_byte() -> None:
+def test_the_same_picture_gives_identical_boxes() -> None:
     assert found().boxes.tobytes() == found().boxes.tobytes()
 
 
-def test_of_equal_boxes_the_first_by_place_is_kept_whatever_their_order() -> None:
+def test_of_equal_boxes_the_first_by_position_is_kept_in_any_order() -> None:
     boxes = np.array([[10.0, 0, 20, 30], [11.0, 0, 21, 30], [50.0, 0, 60, 30], [9.0, 0, 19, 30]])
     scores = np.array([0.5, 0.5, 0.9, 0.5])
     for order in ([0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]):
@@ -69,7 +69,7 @@ def test_of_equal_boxes_the_first_by_place_is_kept_whatever_their_order() -> Non
     assert len(non_maximum_suppression(boxes[:0], scores[:0], 0.5, 1)) == 0
 
 
-def test_settings_that_make_no_sense_are_refused() -> None:
+def test_invalid_settings_are_refused() -> None:
     with pytest.raises(ValueError, match="min_height"):
         HogSettings(min_height=0.0)
     with pytest.raises(ValueError, match="step"):

@@ -31,14 +31,14 @@ def test_frames_come_in_order_and_those_without_a_row_are_empty(file: Path) -> N
     assert detector.last_frame == 2
 
 
-def test_a_frame_can_be_asked_for_by_number(file: Path) -> None:
+def test_a_frame_can_be_selected_by_number(file: Path) -> None:
     detector = MotFileDetector(file, MotFileSettings(first_frame=100))
     np.testing.assert_array_equal(detector.detect(NOTHING, 102).boxes, [[12, 20, 42, 80]])
     assert len(detector.detect(NOTHING)) == 0
     assert len(detector.detect(NOTHING, 99)) == 0
 
 
-def test_confidences_are_stretched_to_scores_best_first_and_doubles_go(file: Path) -> None:
+def test_confidences_are_scaled_to_scores_and_duplicates_are_removed(file: Path) -> None:
     seen = MotFileDetector(file).detect(NOTHING)
     np.testing.assert_allclose(seen.scores, [1.0, 0.0])
     np.testing.assert_array_equal(seen.boxes[:, 0], [10, 200])
@@ -47,7 +47,7 @@ def test_confidences_are_stretched_to_scores_best_first_and_doubles_go(file: Pat
     assert len(MotFileDetector(file, MotFileSettings(min_score=0.5)).detect(NOTHING)) == 1
 
 
-def test_one_confidence_far_above_all_others_does_not_make_them_doubtful(tmp_path: Path) -> None:
+def test_one_outlier_confidence_does_not_lower_the_other_scores(tmp_path: Path) -> None:
     path = tmp_path / "det.txt"
     confidences = [10.0, *(20.0 + n / 10 for n in range(18)), 1000.0]
     path.write_text("".join(f"{n + 1},-1,0,0,30,60,{c},-1,-1,-1\n" for n, c in enumerate(confidences)))

@@ -40,18 +40,18 @@ def test_a_person_is_found_once_and_other_classes_are_not(
     assert seen.histograms.shape == (1, 96)
 
 
-def test_the_classes_asked_for_are_found(tmp_path: Path) -> None:
+def test_configured_classes_are_detected(tmp_path: Path) -> None:
     one = detector(save(tmp_path / "tiny.onnx", V8), classes=(0, 1))
     np.testing.assert_allclose(one.detect(WHITE).scores, [0.9, 0.72], rtol=1e-5)
     with pytest.raises(ValueError, match="no class 7"):
         detector(tmp_path / "tiny.onnx", classes=(7,))
 
 
-def test_weak_boxes_are_left_out(tmp_path: Path) -> None:
+def test_boxes_below_min_score_are_dropped(tmp_path: Path) -> None:
     assert len(detector(save(tmp_path / "tiny.onnx", V8), min_score=0.8).detect(WHITE)) == 0
 
 
-def test_boxes_are_moved_back_from_between_the_bars(tmp_path: Path) -> None:
+def test_boxes_are_mapped_back_from_the_letterboxed_input(tmp_path: Path) -> None:
     path = save(tmp_path / "tiny.onnx", V8, size=(96, 96))
     wide = np.full((64, 192, 3), 255, dtype=np.uint8)  # half its size in the input, 32 rows of bar above
     seen = detector(path, min_score=0.1).detect(wide)
@@ -60,19 +60,19 @@ def test_boxes_are_moved_back_from_between_the_bars(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen.boxes, [[48, 0, 72, 40]], atol=1e-4)
 
 
-def test_a_file_that_leaves_its_size_open_gets_the_one_set(tmp_path: Path) -> None:
+def test_a_model_with_dynamic_size_gets_the_configured_size(tmp_path: Path) -> None:
     path = save(tmp_path / "tiny.onnx", V8, size=("height", "width"))
     square = np.full((200, 200, 3), 255, dtype=np.uint8)
     seen = detector(path, input_size=100).detect(square)
     np.testing.assert_allclose(seen.boxes, [BOX], atol=1e-4)
 
 
-def test_half_precision_is_understood(tmp_path: Path) -> None:
+def test_half_precision_models_are_supported(tmp_path: Path) -> None:
     seen = detector(save(tmp_path / "tiny.onnx", V8, kind="FLOAT16")).detect(WHITE)
     np.testing.assert_allclose(seen.boxes, [BOX], atol=0.1)
 
 
-def test_a_file_that_does_not_fit_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_an_unsupported_model_is_refused_in_one_line(tmp_path: Path) -> None:
     noise = tmp_path / "noise.onnx"
     noise.write_bytes(b"no network")
     refused = {
@@ -96,7 +96,7 @@ def test_without_onnxruntime_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
         detector(path)
 
 
-def test_a_layout_that_is_named_goes_before_the_shape() -> None:
+def test_a_configured_layout_overrides_the_shape() -> None:
     one_class = yolov5([(*MIDDLE, 0.9, 0.8)], boxes=300)
     found = decode_output(one_class, "yolov5", (0,))
     np.testing.assert_allclose(found.boxes[0], [24, 12, 36, 52])

@@ -31,7 +31,7 @@ def moved(image: Picture, right: int, down: int) -> Picture:
     return np.roll(image, (down, right), axis=(0, 1))
 
 
-def test_the_best_peak_is_the_object_wherever_it_went() -> None:
+def test_the_best_peak_is_the_object() -> None:
     image = clutter()
     seen = TemplateDetector(cut(image)).detect(moved(image, 31, -12))
     np.testing.assert_array_equal(seen.boxes[0], [151, 78, 183, 118])
@@ -40,7 +40,7 @@ def test_the_best_peak_is_the_object_wherever_it_went() -> None:
     assert seen.scores[1] < 0.9
 
 
-def test_a_change_of_light_does_not_hide_it() -> None:
+def test_a_change_of_brightness_keeps_the_peak() -> None:
     image = clutter()
     darker = cv2.convertScaleAbs(image, alpha=0.7, beta=10).astype(np.uint8)
     seen = TemplateDetector(cut(image)).detect(darker)
@@ -48,7 +48,7 @@ def test_a_change_of_light_does_not_hide_it() -> None:
     np.testing.assert_array_equal(seen.boxes[0, :2], TOY[:2])
 
 
-def test_there_are_as_many_peaks_as_are_asked_for_and_no_two_at_one_place() -> None:
+def test_there_are_max_peaks_peaks_at_different_places() -> None:
     image = clutter()
     seen = TemplateDetector(cut(image), TemplateSettings(max_peaks=80)).detect(image)
     assert len(seen) == 80
@@ -58,7 +58,7 @@ def test_there_are_as_many_peaks_as_are_asked_for_and_no_two_at_one_place() -> N
     assert len(TemplateDetector(cut(image), TemplateSettings(max_peaks=7)).detect(image)) == 7
 
 
-def test_least_score_leaves_out_weak_peaks() -> None:
+def test_peaks_below_min_score_are_dropped() -> None:
     image = clutter()
     seen = TemplateDetector(cut(image), TemplateSettings(min_score=0.5)).detect(image)
     assert 1 <= len(seen) < 80
@@ -86,7 +86,7 @@ def test_the_intersection_of_sub_images_is_their_mean_absolute_difference() -> N
     assert distance == pytest.approx(np.abs(first - second).mean())
 
 
-def test_a_box_outside_the_picture_looks_like_nothing_in_particular() -> None:
+def test_a_box_outside_the_picture_has_the_uniform_histogram() -> None:
     (row,) = subimage_histograms(clutter(), np.array([[400.0, 0, 420, 20]]), SubimageSettings(color=False))
     assert len(row) == SubimageSettings(color=False).length == 288
     assert np.ptp(row) == 0.0
@@ -97,7 +97,7 @@ def test_a_blank_picture_has_no_peaks() -> None:
     assert len(TemplateDetector(cut(clutter())).detect(blank)) == 0
 
 
-def test_the_same_picture_gives_the_same_peaks_to_the_byte() -> None:
+def test_the_same_picture_gives_identical_peaks() -> None:
     image = clutter(3)
     one, other = (TemplateDetector(cut(image)).detect(image) for _ in range(2))
     assert one.boxes.tobytes() == other.boxes.tobytes()
@@ -105,7 +105,7 @@ def test_the_same_picture_gives_the_same_peaks_to_the_byte() -> None:
     assert iou(one.boxes[0], np.array([120.0, 90, 152, 130])) == 1.0
 
 
-def test_what_cannot_be_searched_for_is_refused() -> None:
+def test_an_unusable_template_is_refused() -> None:
     image = clutter()
     with pytest.raises(ValueError, match="4 pixels a side"):
         TemplateDetector(image[:3, :10])

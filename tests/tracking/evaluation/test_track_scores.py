@@ -25,7 +25,7 @@ def stay(number: int, left: float, *frames: int) -> list[MotRow]:
 TWO_PEOPLE = stay(1, NEAR, 1, 2, 3, 4) + stay(2, FAR, 1, 2, 3, 4)
 
 
-def test_a_case_worked_out_by_hand() -> None:
+def test_scores_of_a_small_example() -> None:
     # The first person is followed by track 10, then by 11; the other by 12; 13 is nobody.
     tracks = stay(10, NEAR, 1, 2) + stay(11, NEAR, 3, 4) + stay(12, FAR, 1, 2, 3, 4) + stay(13, 250.0, 1)
     scores = evaluate(TWO_PEOPLE, tracks)
@@ -49,38 +49,38 @@ def test_no_tracks_are_all_misses() -> None:
     assert (scores.hota, scores.mota, scores.idf1, scores.misses, scores.tracks) == (0, 0, 0, 8, 0)
 
 
-def test_tracks_of_nobody_are_all_false() -> None:
+def test_tracks_without_truth_are_all_false_positives() -> None:
     scores = evaluate([], TWO_PEOPLE)
     assert (scores.hota, scores.idf1, scores.false_positives, scores.objects) == (0, 0, 8, 0)
 
 
-def test_a_person_who_does_not_count_need_not_be_found_and_may_be() -> None:
+def test_ignored_people_count_neither_as_misses_nor_as_false_positives() -> None:
     passer_by = [box(frame, 9, 250.0, confidence=0.0) for frame in (1, 2, 3, 4)]
     tracks = [replace(row, confidence=1.0) for row in passer_by]
     assert evaluate(TWO_PEOPLE + passer_by, TWO_PEOPLE) == evaluate(TWO_PEOPLE, TWO_PEOPLE)
     assert evaluate(TWO_PEOPLE + passer_by, TWO_PEOPLE + tracks) == evaluate(TWO_PEOPLE, TWO_PEOPLE)
 
 
-def test_a_track_at_somebody_who_counts_is_right_though_somebody_who_does_not_is_near() -> None:
+def test_a_track_near_an_ignored_person_still_matches_a_counted_one() -> None:
     beside = [box(frame, 9, 10.0, confidence=0.0) for frame in (1, 2, 3, 4)]
     assert evaluate(TWO_PEOPLE + beside, TWO_PEOPLE).precision == 1.0
 
 
 @pytest.mark.parametrize(("shift", "found"), [(13.3, 1.0), (13.4, 0.0)])
-def test_half_an_overlap_is_enough(shift: float, found: float) -> None:
+def test_an_iou_of_one_half_matches(shift: float, found: float) -> None:
     # Boxes of 40 pixels moved by a third of that share 26.7 of 53.3.
     scores = evaluate(stay(1, NEAR, 1, 2), stay(5, shift, 1, 2))
     assert scores.recall == found
     assert evaluate(stay(1, NEAR, 1, 2), stay(5, shift, 1, 2), 0.3).recall == 1.0
 
 
-def test_a_pair_stays_although_another_overlaps_more() -> None:
+def test_a_match_is_kept_although_another_overlaps_more() -> None:
     truth = stay(1, NEAR, 1, 2, 3)
     tracks = [*stay(10, 8.0, 1, 2, 3), *stay(11, 2.0, 2, 3)]
     assert evaluate(truth, tracks).switches == 0
 
 
-def test_who_was_lost_is_matched_anew() -> None:
+def test_a_lost_person_is_matched_again_by_overlap() -> None:
     # Track 10 loses person 1 for a frame, and then overlaps person 2 more than 1: it is 2's, who had 11.
     truth = stay(1, 0.0, 1, 2, 3) + stay(2, 14.0, 1, 2, 3)
     tracks = stay(10, 0.0, 1) + stay(11, 14.0, 1, 2) + [box(3, 10, 11.0)]
@@ -93,12 +93,12 @@ def test_an_id_twice_in_a_frame_is_refused() -> None:
         evaluate(TWO_PEOPLE, stay(5, NEAR, 1, 2) + stay(5, FAR, 2))
 
 
-def test_detections_are_not_taken_for_tracks() -> None:
+def test_detections_are_refused_as_tracks() -> None:
     with pytest.raises(ValueError, match="detections, not tracks"):
         evaluate(TWO_PEOPLE, [replace(row, id=-1) for row in TWO_PEOPLE])
 
 
-def test_other_numbers_in_another_camera_are_wrong_only_jointly() -> None:
+def test_different_ids_in_another_camera_lower_only_the_joint_scores() -> None:
     there = stay(1, NEAR, 1, 2, 3, 4)
     cameras = {
         "c0": TruthAndTracks(there, stay(10, NEAR, 1, 2, 3, 4)),
@@ -110,7 +110,7 @@ def test_other_numbers_in_another_camera_are_wrong_only_jointly() -> None:
     assert (scores.joint.objects, scores.joint.tracks, scores.joint.switches) == (1, 2, 1)
 
 
-def test_the_same_number_in_every_camera_is_right_jointly() -> None:
+def test_the_same_ids_in_every_camera_give_perfect_joint_scores() -> None:
     cameras = {name: TruthAndTracks(TWO_PEOPLE, TWO_PEOPLE) for name in ("c0", "c1", "c2")}
     assert evaluate_cameras(cameras).joint == Scores(1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 2, 2)
 
@@ -126,13 +126,13 @@ def test_a_camera_with_an_id_twice_is_named() -> None:
         evaluate_cameras({"c1": TruthAndTracks(TWO_PEOPLE, stay(5, NEAR, 1) * 2)})
 
 
-def test_perfect_association_has_no_switches_and_nothing_false() -> None:
+def test_oracle_association_has_no_switches_and_no_false_positives() -> None:
     detections = [replace(row, id=-1) for row in TWO_PEOPLE[:-1] + stay(0, 250.0, 1, 2)]
     scores = evaluate(TWO_PEOPLE, oracle_association(detections, TWO_PEOPLE))
     assert (scores.switches, scores.false_positives, scores.misses) == (0, 0, 1)
 
 
-def test_perfect_association_of_public_detections(shared_data: Path) -> None:
+def test_oracle_association_of_public_detections(shared_data: Path) -> None:
     folder = shared_data / "mot15" / "TUD-Campus"
     truth = read_rows(folder / "gt.txt")
     scores = evaluate(truth, oracle_association(read_rows(folder / "det.txt"), truth))

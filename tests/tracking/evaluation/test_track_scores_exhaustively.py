@@ -144,7 +144,7 @@ def _hota_at(
 
 
 @pytest.mark.parametrize("seed", range(CASES))
-def test_the_scores_are_those_of_trying_everything(seed: int) -> None:
+def test_scores_equal_those_of_exhaustive_search(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth, tracks = random_rows(rng, 3), random_rows(rng, int(rng.integers(1, 5)))
     frames = align_frames(truth, tracks, LEAST)

@@ -17,7 +17,7 @@ from tracking.solvers.base import create_solver
 ASSIST = InteractiveSettings(enabled=True)
 
 
-def test_the_middle_of_a_box_is_not_far_and_nothing_is_farther_than_twice_the_reach() -> None:
+def test_the_normalized_offset_is_0_at_the_middle_of_a_box_and_at_most_1() -> None:
     boxes = np.array(
         [[0.0, 0.0, 20.0, 40.0], [20.0, 0.0, 40.0, 40.0], [40.0, 0.0, 60.0, 40.0], [400.0, 0, 420, 40]]
     )
@@ -27,14 +27,16 @@ def test_the_middle_of_a_box_is_not_far_and_nothing_is_farther_than_twice_the_re
 
 
 @pytest.mark.parametrize("wrong", [(np.nan, 0.0, 1.0), (0.0, np.inf, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)])
-def test_a_pointing_without_a_place_or_a_reach_is_refused(wrong: tuple[float, float, float]) -> None:
+def test_a_correction_without_finite_position_or_tolerance_is_refused(
+    wrong: tuple[float, float, float],
+) -> None:
     with pytest.raises(ValueError, match="finite coordinates and a positive tolerance"):
         PositionCorrection(0, 1, *wrong)
 
 
 @given(cases(objects=3, frames=4, places=4), st.integers(0, 3), st.floats(-20, 140), st.floats(-20, 140))
 @settings(deadline=None, max_examples=40)
-def test_only_the_nodes_of_who_is_pointed_at_cost_more_in_that_frame_and_by_the_formula(
+def test_a_correction_raises_only_node_costs_of_its_object_in_its_frame(
     case: Case, frame: int, x: float, y: float
 ) -> None:
     network = network_of(replace(case, shared=True))
@@ -52,7 +54,7 @@ def test_only_the_nodes_of_who_is_pointed_at_cost_more_in_that_frame_and_by_the_
         assert ((before == after) | (np.isinf(before) & (after == 1.5))).all()
 
 
-def test_a_pointing_exchanges_two_who_could_be_either() -> None:
+def test_a_correction_decides_between_two_identical_objects() -> None:
     """Both are alike and at one place before the window: without it the answer is an accident."""
     case = Case(2, 3, 2, shared=True, settings=replace(SETTINGS, layout=0.0, gate=None), seed=5)
     network = network_of(case)

@@ -20,12 +20,12 @@ from tracking.types import Detections
 SIZE = np.array([20.0, 40.0])
 
 
-def test_a_place_has_the_size_of_who_is_pointed_at_around_the_point() -> None:
+def test_an_inserted_box_has_the_objects_size_around_the_point() -> None:
     box = box_around(PositionCorrection(0, 1, 100.0, 50.0, 8.0), SIZE)
     np.testing.assert_allclose(box, [90.0, 30.0, 110.0, 70.0])
 
 
-def test_found_is_who_has_a_box_of_their_size_near_the_point_and_not_who_is_one_with_somebody() -> None:
+def test_only_a_box_of_the_objects_size_near_the_point_counts_as_its_hypothesis() -> None:
     pointing = PositionCorrection(0, 1, 100.0, 50.0, 8.0)
     own, both, far = [92.0, 30.0, 112.0, 70.0], [85.0, 30.0, 125.0, 70.0], [150.0, 30.0, 170.0, 70.0]
     assert has_hypothesis(pointing, SIZE, np.array([far, own]))
@@ -33,7 +33,7 @@ def test_found_is_who_has_a_box_of_their_size_near_the_point_and_not_who_is_one_
     assert not has_hypothesis(pointing, SIZE, np.empty((0, 4)))
 
 
-def test_what_is_added_comes_last_and_nobody_new_can_begin_with_it() -> None:
+def test_an_inserted_detection_comes_last_with_score_0() -> None:
     seen = Detections(np.array([[0.0, 0, 9, 9]]), np.array([0.9]), np.array([[0.5, 0.5]]))
     more = insert_hypothesis(seen, np.array([1.0, 2, 3, 4]), np.array([1.0, 0.0]))
     assert more.boxes.tolist() == [[0.0, 0, 9, 9], [1.0, 2, 3, 4]]
@@ -41,7 +41,7 @@ def test_what_is_added_comes_last_and_nobody_new_can_begin_with_it() -> None:
     assert more.histograms.tolist() == [[0.5, 0.5], [1.0, 0.0]]
 
 
-def test_a_place_that_was_made_for_one_is_none_for_others_and_in_nobodys_way() -> None:
+def test_an_inserted_hypothesis_is_for_its_object_only_and_conflicts_with_none() -> None:
     """In the middle frame both would be at the same observation, and one would have to hide."""
     network = network_of(
         Case(2, 3, 2, shared=True, settings=replace(SETTINGS, layout=0.0, gate=None), seed=5)

@@ -62,7 +62,7 @@ def _shown(results: Sequence[WindowResult]) -> list[object]:
     ]
 
 
-def test_without_a_pointing_its_tracks_are_those_of_the_plain_tracker() -> None:
+def test_without_corrections_the_tracks_equal_those_of_the_online_tracker() -> None:
     stream = _crossing()
     helped = follow(stream, _helped())
     assert _shown(helped) == _shown(follow(stream, _plain()))
@@ -70,7 +70,7 @@ def test_without_a_pointing_its_tracks_are_those_of_the_plain_tracker() -> None:
     assert not any(it.risk_events for it in follow(stream, _plain()))
 
 
-def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() -> None:
+def test_only_a_crossing_of_similar_people_is_a_risk_event() -> None:
     def foreseen(people: Sequence[Stroll]) -> list[tuple[int, int]]:
         results = follow(_crossing(people), _helped())
         return [
@@ -88,7 +88,7 @@ def test_two_alike_who_are_about_to_cross_are_foreseen_and_two_others_are_not() 
     assert not foreseen([ALIKE[0], Stroll(300, 50, -4.0, 4)])
 
 
-def test_who_vanishes_with_nobody_near_is_foreseen_to_be_lost() -> None:
+def test_a_person_who_vanishes_alone_is_a_track_loss_event() -> None:
     gone = Stroll(200, 50, 1.0, 2, seen=range(40))
     results = follow([seen_at([ALIKE[0], gone], n, 0.5) for n in range(60)], _helped())
     fading = [trouble for it in results for trouble in it.risk_events if trouble.reason == "track_loss"]
@@ -100,7 +100,7 @@ def test_who_vanishes_with_nobody_near_is_foreseen_to_be_lost() -> None:
 @pytest.mark.parametrize(
     "frames", [range(42, 60), range(60, 61), range(75, 76)], ids=["following", "late", "last"]
 )
-def test_a_pointing_mends_the_past_back_to_where_the_two_met(frames: range) -> None:
+def test_a_correction_revises_the_past_back_to_the_crossing(frames: range) -> None:
     """They are told to have turned back, which the tracker holds for less likely."""
     tracked = _helped()
     for n, seen in enumerate(_crossing()):
@@ -120,7 +120,7 @@ def test_a_pointing_mends_the_past_back_to_where_the_two_met(frames: range) -> N
     assert {track.id for track in mended.tracks} == {1, 2}
 
 
-def test_what_comes_after_a_mended_past_goes_on_from_it() -> None:
+def test_later_results_continue_from_the_revised_past() -> None:
     tracked, stream = _helped(), _crossing(frames=100)
     for n, seen in enumerate(stream[:60]):
         tracked.push(n, seen)
@@ -130,14 +130,14 @@ def test_what_comes_after_a_mended_past_goes_on_from_it() -> None:
         assert {number: _whom(box, frame) for number, box in tracks.items()} == {1: 1, 2: 0}
 
 
-def test_a_pointing_that_the_tracks_follow_already_changes_nothing() -> None:
+def test_a_correction_that_agrees_with_the_tracks_changes_nothing() -> None:
     tracked = _helped()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
     assert tracked.apply_corrections([_at(ALIKE[0], n, 1) for n in range(45, 79)]) is None
 
 
-def test_who_was_lost_and_got_another_number_gets_the_old_one_back_when_pointed_at() -> None:
+def test_a_correction_gives_a_lost_person_the_old_id_back() -> None:
     """Hidden for two seconds, and elsewhere than they went: the tracker holds them for somebody new."""
     away = [Stroll(0, 50, 2.0, 1, seen=range(30)), Stroll(-100, 50, 5.0, 1, seen=range(80, 140))]
     tracked = _helped()
@@ -149,7 +149,7 @@ def test_who_was_lost_and_got_another_number_gets_the_old_one_back_when_pointed_
     assert mended.revised_from == pytest.approx(80, abs=2)
 
 
-def test_a_pointing_before_the_memory_is_not_taken() -> None:
+def test_a_correction_before_the_memory_is_ignored() -> None:
     tracked = _helped(memory=30)
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
@@ -158,7 +158,7 @@ def test_a_pointing_before_the_memory_is_not_taken() -> None:
     assert tracked.apply_corrections([_at(ALIKE[1], 40, 1)]) is None
 
 
-def test_a_small_doubt_that_is_forgotten_keeps_no_later_pointing_from_mending() -> None:
+def test_a_forgotten_contradiction_does_not_prevent_later_revisions() -> None:
     tracked, stream = _helped(memory=60), _crossing(frames=91)
     for n, seen in enumerate(stream):
         tracked.push(n, seen)
@@ -193,7 +193,7 @@ def test_after_a_long_gap_nothing_before_it_is_remembered() -> None:
     assert tracked.apply_corrections([_at(ALIKE[1], 50, 1)]) is None
 
 
-def test_the_same_pointings_give_the_same_answer() -> None:
+def test_the_same_corrections_give_the_same_results() -> None:
     def mended() -> list[object]:
         tracked = _helped()
         results = [tracked.push(n, seen) for n, seen in enumerate(_crossing())]
@@ -203,7 +203,7 @@ def test_the_same_pointings_give_the_same_answer() -> None:
     assert mended() == mended()
 
 
-def test_after_the_end_of_a_recording_it_is_still_mended() -> None:
+def test_corrections_are_applied_after_the_end_of_a_recording() -> None:
     tracked = _helped()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
@@ -221,7 +221,7 @@ def test_after_the_end_of_a_recording_it_is_still_mended() -> None:
         (InteractiveSettings(enabled=True), InteractiveTracker),
     ],
 )
-def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
+def test_the_interactive_tracker_is_created_only_if_enabled(
     assist: InteractiveSettings | None, kind: Callable[..., object]
 ) -> None:
     found = create_tracker(
@@ -241,12 +241,12 @@ def test_only_who_asks_for_help_gets_a_tracker_that_takes_it(
         {"hidden_share": 1.5},
     ],
 )
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must|at least|share"):
         InteractiveSettings(**wrong)  # type: ignore[arg-type]
 
 
-def test_who_is_pointed_at_has_a_box_of_their_own_where_the_detector_finds_one_for_two() -> None:
+def test_a_correction_inserts_a_box_where_the_detector_merges_two_people() -> None:
     tracked, stream = _helped(), _crossing()
     merged = (33, 34, 35, 40, 41)
     for n in range(33, 42):
@@ -270,7 +270,7 @@ def _own(box: np.ndarray | None, frame: int) -> bool:
     return box is not None and bool(iou(box, np.array(ALIKE[1].box(frame))) > 0.7)
 
 
-def test_who_is_pointed_at_while_hidden_by_somebody_who_was_there_before_is_behind_them() -> None:
+def test_a_correction_during_an_occlusion_is_not_backdated() -> None:
     """That says nothing of the frames before; at a box of the other one's in the open it does."""
     tracked = _helped()
     for n, seen in enumerate(_crossing()):

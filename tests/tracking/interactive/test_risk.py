@@ -14,7 +14,7 @@ from tracking.interactive.risk import WEIGHTS, failure_probability
 
 
 @pytest.mark.parametrize("reason", get_args(RiskReason))
-def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason: RiskReason) -> None:
+def test_a_risk_is_a_probability_and_falls_with_the_margin(reason: RiskReason) -> None:
     for lead in (-20.0, 0.0, 20.0):
         risks = [
             failure_probability(reason, RiskFeatures(margin, lead, 10.0))
@@ -24,14 +24,14 @@ def test_a_risk_is_a_probability_and_no_larger_where_the_tracker_is_surer(reason
         assert all(one >= other for one, other in pairwise(risks))
 
 
-def test_the_longer_somebody_is_hidden_the_likelier_they_are_lost() -> None:
+def test_the_risk_of_track_loss_grows_with_the_hidden_time() -> None:
     risks = [
         failure_probability("track_loss", RiskFeatures(0.0, -hidden, hidden)) for hidden in (5, 10, 20, 40)
     ]
     assert all(one < other for one, other in pairwise(risks))
 
 
-def test_the_weights_that_made_the_examples_are_found_again() -> None:
+def test_fitting_recovers_the_weights_that_generated_the_examples() -> None:
     rng = np.random.default_rng(1)
     truth = np.array([-1.0, 2.0])
     terms = np.stack([np.ones(20_000), rng.normal(size=20_000)], axis=1)

@@ -31,7 +31,7 @@ def _exchanged(states: np.ndarray, a: int, b: int, frame: int) -> np.ndarray:
 
 @given(cases(objects=4, frames=5, places=4))
 @settings(deadline=None, max_examples=60)
-def test_a_margin_is_what_the_cheapest_exchange_costs_of_all_tried(case: Case) -> None:
+def test_a_margin_equals_the_cost_of_the_cheapest_swap(case: Case) -> None:
     network, states, cost = _solved(case)
     found = swap_margins(network, states)
     for a, b in combinations(range(network.objects), 2):
@@ -53,7 +53,7 @@ def test_a_margin_is_what_the_cheapest_exchange_costs_of_all_tried(case: Case) -
 
 @given(cases(objects=3, frames=4, places=3))
 @settings(deadline=None, max_examples=60)
-def test_a_margin_is_no_less_than_what_the_best_answer_costs_in_which_the_two_end_exchanged(
+def test_a_margin_is_at_least_the_cost_of_the_best_solution_with_swapped_ends(
     case: Case,
 ) -> None:
     network, states, cost = _solved(case)
@@ -72,7 +72,7 @@ def test_a_margin_is_no_less_than_what_the_best_answer_costs_in_which_the_two_en
 
 @given(cases(objects=3, frames=4, places=3), st.randoms())
 @settings(deadline=None, max_examples=20)
-def test_in_whatever_order_the_objects_come_their_margins_are_the_same(case: Case, lot: object) -> None:
+def test_margins_do_not_depend_on_the_order_of_objects(case: Case, lot: object) -> None:
     network, states, _ = _solved(case)
     assume(network.objects > 1)
     order = list(range(network.objects))
@@ -81,7 +81,7 @@ def test_in_whatever_order_the_objects_come_their_margins_are_the_same(case: Cas
     np.testing.assert_allclose(turned, swap_margin_matrix(network, states)[np.ix_(order, order)], atol=1e-9)
 
 
-def test_objects_with_observations_of_their_own_have_nothing_to_exchange() -> None:
+def test_margins_need_shared_observations() -> None:
     case = Case(2, 2, 2, shared=False, settings=replace(SETTINGS, layout=0.0), seed=4)
     network = network_of(case)
     with pytest.raises(ValueError, match="share observations"):

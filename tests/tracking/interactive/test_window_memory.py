@@ -23,13 +23,13 @@ def _two_begin_in_one_place() -> WindowMemory:
     return memory
 
 
-def test_unless_windows_are_solved_again_nobody_has_a_number_that_was_used() -> None:
+def test_without_solving_windows_again_no_id_is_reused() -> None:
     memory = _two_begin_in_one_place()
     memory.record_window(_window(29))
     assert memory.assign_id(15, PLACE, new_id=3) == 3
 
 
-def test_when_windows_are_solved_again_each_number_of_theirs_is_given_once() -> None:
+def test_windows_solved_again_assign_each_of_their_ids_once() -> None:
     memory = _two_begin_in_one_place()
     memory.record_window(_window(19))
     assert memory.assign_id(13, ELSEWHERE, new_id=3) == 3, "nobody began there"
@@ -38,7 +38,7 @@ def test_when_windows_are_solved_again_each_number_of_theirs_is_given_once() -> 
     assert memory.assign_id(13, PLACE, new_id=4) == 4
 
 
-def test_who_began_in_a_window_that_stands_keeps_their_number_to_themselves() -> None:
+def test_ids_of_windows_that_are_not_solved_again_stay_assigned() -> None:
     memory = _two_begin_in_one_place()
     memory.record_window(_window(24))
     assert memory.assign_id(13, PLACE, new_id=3) == 2

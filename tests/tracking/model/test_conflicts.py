@@ -37,7 +37,7 @@ def test_boxes_conflict_above_the_overlap() -> None:
     np.testing.assert_array_equal(relation[0], [True, True, False])
 
 
-def test_a_box_between_two_people_parts_them_only_when_stars_are_the_rows() -> None:
+def test_a_box_between_two_people_excludes_them_only_with_star_rows() -> None:
     """A and C are apart, B between them is nobody's: `A--B--C`."""
     network = row_of_people(0.0, 14.0, 28.0)
     assert not network.exclusions()[0, 0, 2]
@@ -47,7 +47,7 @@ def test_a_box_between_two_people_parts_them_only_when_stars_are_the_rows() -> N
     assert not two.exclusions()[0, 0, 2]
 
 
-def test_the_star_of_a_place_is_itself_and_what_conflicts_of_the_others() -> None:
+def test_the_star_of_a_place_contains_itself_and_conflicting_places_of_other_objects() -> None:
     stars = row_of_people(0.0, 14.0, rules=replace(CORNERS, conflict_rows="star"), objects=2)
     rows = {row.tobytes() for row in stars.rows(0)}
     both, first, second = [True, True], [True, False], [False, True]
@@ -58,7 +58,7 @@ def test_the_star_of_a_place_is_itself_and_what_conflicts_of_the_others() -> Non
 
 @random_networks
 @given(case=cases(objects=4, frames=2, places=6))
-def test_rows_forbid_just_what_places_exclude(case: Case) -> None:
+def test_rows_forbid_exactly_the_exclusions(case: Case) -> None:
     network = network_of(case)
     exclusions, sets, places = network.exclusions(), network.sets, network.places
     for m in range(network.frames):
@@ -74,7 +74,7 @@ def test_rows_forbid_just_what_places_exclude(case: Case) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), own=st.booleans())
-def test_cliques_are_cliques_and_the_cover_of_a_part_is_the_part_of_the_cover(seed: int, own: bool) -> None:
+def test_rows_are_cliques_and_components_are_covered_independently(seed: int, own: bool) -> None:
     rng = np.random.default_rng(seed)
     relation = rng.uniform(size=(12, 12)) < 0.15
     relation |= relation.T | np.eye(12, dtype=np.bool_)
@@ -92,7 +92,7 @@ def test_cliques_are_cliques_and_the_cover_of_a_part_is_the_part_of_the_cover(se
 
 @random_networks
 @given(case=cases(objects=5, frames=2, places=6))
-def test_the_finder_gives_every_broken_row_once_and_no_other(case: Case) -> None:
+def test_the_separator_finds_every_violated_row_once(case: Case) -> None:
     network = network_of(case)
     rng = np.random.default_rng(case.seed)
     usage = rng.dirichlet(np.full(network.places + 1, 0.3), (network.objects, network.frames))

@@ -34,7 +34,7 @@ def window(
     return build_network([Template(1, LOOK, None, motion)], frames, settings)
 
 
-def test_somebody_goes_on_as_they_went_and_slower_the_longer_they_are_away() -> None:
+def test_the_predicted_velocity_decays_with_time() -> None:
     motion = walked()
     steps = np.diff(motion.predict(60)[:, 0])
     assert 4.0 < steps[0] < 5.0
@@ -43,7 +43,7 @@ def test_somebody_goes_on_as_they_went_and_slower_the_longer_they_are_away() -> 
     assert np.ptp(motion.predict(60)[:, [1, 3]], axis=0) == pytest.approx([0.0, 0.0])
 
 
-def test_one_sighting_has_no_direction() -> None:
+def test_one_observation_gives_no_velocity() -> None:
     motion = MotionModel.of([7], BOX[None], 9)
     assert motion.velocity == pytest.approx([0.0, 0.0])
     assert motion.elapsed == 2
@@ -51,14 +51,14 @@ def test_one_sighting_has_no_direction() -> None:
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=11), st.integers(1, 50))
-def test_a_velocity_is_never_overestimated_whatever_frames_it_is_seen_in(gaps: list[int], after: int) -> None:
+def test_a_velocity_is_never_overestimated_from_any_frames(gaps: list[int], after: int) -> None:
     frames = [int(n) for n in np.cumsum([0, *gaps])]
     motion = MotionModel.of(frames, np.stack([BOX + n * RIGHT for n in frames]), frames[-1] + after)
     assert 0.0 < motion.velocity[0] <= 5.0
     assert motion.velocity[1] == pytest.approx(0.0)
 
 
-def test_nobody_comes_out_of_hiding_far_from_where_they_should_be_or_as_somebody_else() -> None:
+def test_reappearance_is_gated_by_predicted_position_and_appearance() -> None:
     settings, motion = CostSettings(), walked()
     expected = motion.predict(2)
     near = window(motion, settings, *expected)
@@ -74,7 +74,7 @@ def test_nobody_comes_out_of_hiding_far_from_where_they_should_be_or_as_somebody
     assert np.isfinite(window(motion, paper, *(expected + 500.0)).pair[0, 0, 1, 0])
 
 
-def test_coming_back_costs_more_the_farther_off() -> None:
+def test_reappearance_costs_more_the_farther_from_the_prediction() -> None:
     motion = walked()
     costs = [
         window(motion, CostSettings(), *(motion.predict(2) + np.array([x, 0.0, x, 0.0]))).pair[0, 0, 1, 0]
@@ -83,12 +83,12 @@ def test_coming_back_costs_more_the_farther_off() -> None:
     assert np.all(np.diff(costs) > 0.0)
 
 
-def test_who_never_was_seen_may_come_from_anywhere() -> None:
+def test_an_object_without_motion_model_is_not_gated() -> None:
     assert np.isfinite(window(None, CostSettings(), BOX, BOX + 400.0).pair).any(axis=None)
     assert np.isfinite(window(None, CostSettings(), BOX, BOX + 400.0).pair[0, 0, 1, 0])
 
 
-def test_short_gaps_are_bridged_and_long_ones_are_not() -> None:
+def test_short_gaps_are_interpolated_and_long_ones_are_not() -> None:
     seen = {0: BOX, 3: BOX + 3 * RIGHT, 9: BOX}
     boxes = np.full((12, 4), np.nan)
     for frame, box in seen.items():
@@ -100,7 +100,7 @@ def test_short_gaps_are_bridged_and_long_ones_are_not() -> None:
     assert np.isnan(boxes[1]).all(), "what was given stays"
 
 
-def test_a_gap_that_began_before_the_window_is_bridged_from_there() -> None:
+def test_a_gap_that_began_before_the_window_is_interpolated() -> None:
     boxes = np.full((4, 4), np.nan)
     boxes[2] = BOX + 2 * RIGHT
     filled = interpolate_gaps(boxes, (-2, BOX - 2 * RIGHT), 5)

@@ -27,14 +27,14 @@ def g(first: np.ndarray, second: np.ndarray) -> float:
     return float(appearance_distance(first[None], second[None])[0, 0])
 
 
-def test_an_arc_between_observations_costs_likeness_change_and_displacement() -> None:
+def test_an_arc_between_observations_costs_appearance_change_and_displacement() -> None:
     frames = [seen(LEFT), seen(LEFT, RIGHT, looks=(DARK, LIGHT))]
     network = build_network([Template(1, DARK, LEFT)], frames, SETTINGS)
     arc = network.pair[0, 0, 0, 1] + network.node[0, 1, 1]
     assert arc == pytest.approx(g(DARK, LIGHT) + 0.5 * g(DARK, LIGHT) + 0.01 * 100.0)
 
 
-def test_an_arc_out_of_occlusion_costs_likeness_and_a_constant() -> None:
+def test_an_arc_out_of_occlusion_costs_appearance_and_a_constant() -> None:
     network = build_network([Template(1, DARK, LEFT)], [seen(LEFT), seen(RIGHT, looks=(LIGHT,))], SETTINGS)
     assert network.pair[0, 0, HIDDEN, 0] + network.node[0, 1, 0] == pytest.approx(0.3 + g(DARK, LIGHT))
 
@@ -46,7 +46,7 @@ def test_arcs_into_occlusion_and_sink_cost_both_constants() -> None:
     np.testing.assert_allclose(network.sink, 0.3 + 0.5)
 
 
-def test_the_source_is_an_observation_where_the_object_was_seen_and_an_occlusion_where_not() -> None:
+def test_the_source_is_an_observation_or_an_occlusion() -> None:
     here, away = Template(1, DARK, LEFT), Template(2, DARK, None)
     network = build_network([here, away], [seen(RIGHT, looks=(LIGHT,))], SETTINGS)
     first = network.source + network.node[:, 0]
@@ -55,7 +55,7 @@ def test_the_source_is_an_observation_where_the_object_was_seen_and_an_occlusion
     np.testing.assert_allclose(first[1], [0.3 + likeness, 0.8])
 
 
-def test_gated_arcs_do_not_exist_and_occlusion_is_always_within_reach() -> None:
+def test_gated_arcs_do_not_exist_and_occlusion_is_never_gated() -> None:
     frames = [seen(LEFT), seen(LEFT, RIGHT)]
     network = build_network([Template(1, DARK, RIGHT)], frames, replace(SETTINGS, gate=50.0))
     assert np.isinf(network.pair[0, 0, 0, 1])
@@ -64,7 +64,7 @@ def test_gated_arcs_do_not_exist_and_occlusion_is_always_within_reach() -> None:
     assert np.isfinite(network.pair[0, 0, HIDDEN]).all()
 
 
-def test_displacement_may_count_in_heights_of_the_boxes() -> None:
+def test_displacement_can_be_measured_in_box_heights() -> None:
     settings = replace(SETTINGS, displacement=1.0, displacement_unit="heights")
     small = build_network([Template(1, DARK, LEFT)], [seen(RIGHT)], settings)
     large = build_network([Template(1, DARK, 3 * LEFT)], [seen(3 * RIGHT)], settings)
@@ -72,13 +72,13 @@ def test_displacement_may_count_in_heights_of_the_boxes() -> None:
     assert small.source[0, 0] == pytest.approx(100.0 / 50.0)
 
 
-def test_doubt_costs_where_it_is_switched_on() -> None:
+def test_low_confidence_costs_if_enabled() -> None:
     doubtful = Detections(LEFT[None], np.array([0.25]), DARK[None])
     network = build_network([Template(1, DARK, LEFT)], [doubtful], replace(SETTINGS, confidence=0.4))
     assert network.node[0, 0, 0] == pytest.approx(0.4 * 0.75)
 
 
-def test_padding_is_no_place_to_be() -> None:
+def test_padding_is_not_selectable() -> None:
     network = build_network([Template(1, DARK, LEFT)], [seen(), seen(LEFT, RIGHT)], SETTINGS)
     assert np.isinf(network.node[0, 0, :2]).all()
     assert not network.conflicts[0].any()
@@ -92,14 +92,14 @@ def test_unknown_appearance_costs_nothing() -> None:
     assert network.node[1, 0, 0] == pytest.approx(g(LIGHT, DARK))
 
 
-def test_own_observations_are_those_of_their_object() -> None:
+def test_observations_per_object_belong_to_their_object() -> None:
     templates = [Template(1, DARK, LEFT), Template(2, DARK, RIGHT)]
     network = build_network_per_object(templates, [[seen(LEFT)], [seen(RIGHT)]], SETTINGS)
     np.testing.assert_allclose(network.source[:, 0], 0.0, atol=1e-7)
     assert not network.shared
 
 
-def test_some_objects_of_a_network_are_a_network() -> None:
+def test_selected_objects_form_a_network() -> None:
     templates = [Template(n, DARK, LEFT + n) for n in range(3)]
     own = [[seen(LEFT + n), seen(LEFT + n, RIGHT)] for n in range(3)]
     part = build_network_per_object(templates, own, SETTINGS).select([2, 0])
@@ -116,14 +116,14 @@ def test_some_objects_of_a_network_are_a_network() -> None:
         ([], [seen(LEFT), Detections(LEFT[None], np.ones(1), np.ones((1, 1)))], "same number of bins"),
     ],
 )
-def test_what_does_not_fit_is_refused(
+def test_inconsistent_inputs_are_refused(
     templates: list[Template], frames: list[Detections], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
         build_network(templates, frames, SETTINGS)
 
 
-def test_objects_and_their_observations_are_as_many() -> None:
+def test_the_numbers_of_objects_and_observations_must_agree() -> None:
     with pytest.raises(ValueError, match="1 templates need as many"):
         build_network_per_object([Template(1, DARK, LEFT)], [], SETTINGS)
 

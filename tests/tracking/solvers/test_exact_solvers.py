@@ -35,7 +35,7 @@ def test_the_optimum_is_found(name: str, case: Case) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(case=cases(objects=3, frames=5, places=4, layouts=(0.0, 0.0, 0.0005)))
-def test_both_ways_to_the_optimum_agree(case: Case) -> None:
+def test_both_exact_solvers_agree(case: Case) -> None:
     network = network_of(case)
     joint = create_solver("extended-dp").solve(network).report
     exact = create_solver("exact").solve(network).report
@@ -80,7 +80,7 @@ def test_where_joint_states_are_too_many_branching_finds_the_optimum(monkeypatch
     assert create_solver("exact").solve(network).report.objective == pytest.approx(expected, rel=CLOSE)
 
 
-def test_two_people_in_step_among_others_are_where_all_joint_states_say() -> None:
+def test_the_exact_solver_agrees_with_joint_states_on_two_people_in_step() -> None:
     rng = np.random.default_rng(3)
     frames = []
     for m in range(10):
@@ -93,7 +93,7 @@ def test_two_people_in_step_among_others_are_where_all_joint_states_say() -> Non
     assert exact.objective == pytest.approx(joint.objective, rel=CLOSE)
 
 
-def test_a_program_that_presolve_wrongly_calls_infeasible_is_solved() -> None:
+def test_a_program_wrongly_presolved_as_infeasible_is_solved() -> None:
     costs = replace(PAPER_COSTS, disappearance=1.0, conflict_distance=120.0, conflict_rows="star")
     network = network_of(Case(6, 4, 8, shared=False, settings=costs, seed=304))
     found = solve_relaxation(network)

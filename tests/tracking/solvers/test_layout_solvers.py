@@ -38,7 +38,7 @@ REGULAR_IS_WORSE = Case(3, 2, 2, shared=True, settings=ILL, seed=1537)
 @settings(deadline=None, max_examples=40)
 @given(case=cases(objects=3, frames=2, places=2, layouts=(1e-5, 1e-4)))
 @example(case=REGULAR_IS_WORSE)
-def test_squares_are_bounded_below_the_optimum_and_whole_relaxations_attain_it(case: Case) -> None:
+def test_the_l2_bound_is_below_the_optimum_and_integral_relaxations_attain_it(case: Case) -> None:
     network = network_of(case)
     report = create_solver("l2").solve(network).report
     optimum = best_square_by_trying(network)
@@ -51,7 +51,7 @@ def test_squares_are_bounded_below_the_optimum_and_whole_relaxations_attain_it(c
 
 @settings(deadline=None, max_examples=20)
 @given(case=cases(objects=4, frames=4, places=4))
-def test_without_layout_squares_change_nothing(case: Case) -> None:
+def test_without_layout_l2_equals_columns(case: Case) -> None:
     network = network_of(case)
     columns, squares = create_solver("columns").solve(network), create_solver("l2").solve(network)
     np.testing.assert_array_equal(columns.states, squares.states)

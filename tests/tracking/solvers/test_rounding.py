@@ -24,7 +24,7 @@ def two_at_one_place(*, gate: float | None = None, frames: int = 1) -> Network:
     return build_network(templates, [seen] * frames, replace(PAPER_COSTS, gate=gate))
 
 
-def test_the_largest_share_gets_the_place_and_the_other_its_next() -> None:
+def test_the_largest_share_gets_the_place_and_the_other_object_its_next_best() -> None:
     usage = np.array([[[0.6, 0.3, 0.1]], [[0.5, 0.2, 0.3]]])
     assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [2]]
     usage = np.array([[[0.6, 0.3, 0.1]], [[0.5, 0.4, 0.1]]])
@@ -36,13 +36,13 @@ def test_of_equal_shares_the_first_object_gets_the_place() -> None:
     assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [2]]
 
 
-def test_who_keeps_nothing_is_occluded() -> None:
+def test_an_object_without_remaining_share_is_occluded() -> None:
     usage = np.array([[[0.7, 0.0, 0.3]], [[0.6, 0.4, 0.0]]])
     usage[1, 0, 1] = 0.0
     assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [2]]
 
 
-def test_whole_shares_stay_as_they_are() -> None:
+def test_integral_shares_are_unchanged() -> None:
     usage = np.array([[[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]])
     assert is_integral(usage)
     assert round_relaxation(two_at_one_place(), usage).tolist() == [[0], [1]]
@@ -59,7 +59,7 @@ def test_a_jump_that_gating_forbids_is_repaired() -> None:
 
 @many
 @given(case=cases(objects=4, frames=4, places=4, layouts=(0.0, 0.002)))
-def test_any_shares_round_to_nodes_without_conflict_and_improving_never_costs(case: Case) -> None:
+def test_any_shares_round_without_conflict_and_improving_never_raises_the_cost(case: Case) -> None:
     network = network_of(case)
     rng = np.random.default_rng(case.seed)
     usage = rng.dirichlet(np.full(network.places + 1, 0.5), (network.objects, network.frames))

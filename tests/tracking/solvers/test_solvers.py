@@ -26,7 +26,7 @@ def solved(case: Case, name: str) -> Solution:
     return create_solver(name).solve(network_of(case))
 
 
-def test_an_unknown_solver_is_refused_with_the_names_there_are() -> None:
+def test_an_unknown_solver_is_refused_with_the_known_names() -> None:
     with pytest.raises(ValueError, match=r"'simplex'.*arcs, columns"):
         create_solver("simplex")
 
@@ -49,7 +49,7 @@ def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
 @pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
 @settings(deadline=None, max_examples=30)
 @given(case=cases(objects=2, frames=3, places=2, layouts=(0.0, 0.002)))
-def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: str, case: Case) -> None:
+def test_the_bound_is_below_the_optimum_and_integral_relaxations_are_optimal(name: str, case: Case) -> None:
     network = network_of(case)
     optimum = best_by_trying(network)
     report = create_solver(name).solve(network).report
@@ -64,9 +64,7 @@ def test_the_bound_is_below_the_optimum_and_whole_relaxations_are_optimal(name: 
 @pytest.mark.parametrize("name", ["arcs", "extended-dp", "greedy-dp"])
 @settings(deadline=None, max_examples=40)
 @given(case=cases(objects=3, frames=2, places=2), share=st.sampled_from([0.2, 0.5, 0.8]))
-def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is_in_conflict(
-    name: str, case: Case, share: float
-) -> None:
+def test_forbidden_nodes_are_avoided_or_the_report_has_conflicts(name: str, case: Case, share: float) -> None:
     network = network_of(case)
     barred = np.random.default_rng(case.seed).uniform(size=network.node.shape) < share
     network = replace(network, node=np.where(barred, np.inf, network.node))
@@ -83,7 +81,7 @@ def test_where_objects_must_be_somewhere_they_are_there_or_the_answer_says_it_is
         assert found.report.objective == pytest.approx(optimum, rel=CLOSE)
 
 
-def test_greedy_ends_where_there_is_a_way_for_nobody() -> None:
+def test_greedy_ends_if_no_object_has_a_path() -> None:
     network = network_of(Case(3, 3, 2, shared=True, settings=SETTINGS, seed=1))
     found = create_solver("greedy-dp").solve(replace(network, node=np.full_like(network.node, np.inf)))
     assert np.isinf(found.report.objective)
@@ -91,7 +89,7 @@ def test_greedy_ends_where_there_is_a_way_for_nobody() -> None:
 
 @settings(deadline=None, max_examples=25)
 @given(case=cases(objects=3, frames=2, places=2))
-def test_three_objects_get_the_optimum_where_the_relaxation_is_whole(case: Case) -> None:
+def test_three_objects_get_the_optimum_if_the_relaxation_is_integral(case: Case) -> None:
     network = network_of(case)
     optimum = best_by_trying(network)
     for name in RELAXING:

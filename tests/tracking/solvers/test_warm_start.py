@@ -33,20 +33,20 @@ def same_optimum(network: Network, hint: WarmStart) -> None:
 
 @bounded
 @given(case=cases(objects=6, frames=6, places=6, layouts=(0.0, 0.0, 0.002)))
-def test_an_answer_as_its_own_hint_changes_nothing(case: Case) -> None:
+def test_a_solution_as_its_own_warm_start_changes_nothing(case: Case) -> None:
     network = network_of(case)
     same_optimum(network, create_solver("columns").solve(network).warm_start)
 
 
 @bounded
 @given(case=cases(objects=6, frames=6, places=6), other=cases(objects=6, frames=6, places=6))
-def test_the_hint_of_another_window_changes_nothing(case: Case, other: Case) -> None:
+def test_the_warm_start_of_another_window_changes_nothing(case: Case, other: Case) -> None:
     same_optimum(network_of(case), create_solver("columns").solve(network_of(other)).warm_start)
 
 
 @bounded
 @given(case=cases(objects=5, frames=5, places=6, stars=False), seed=st.integers(0, 2**32 - 1))
-def test_a_made_up_hint_changes_nothing(case: Case, seed: int) -> None:
+def test_an_arbitrary_warm_start_changes_nothing(case: Case, seed: int) -> None:
     rng = np.random.default_rng(seed)
     network = network_of(replace(case, shared=True))
     rows = [
@@ -65,7 +65,7 @@ def test_a_made_up_hint_changes_nothing(case: Case, seed: int) -> None:
 
 @bounded
 @given(case=cases(objects=6, frames=5, places=6))
-def test_the_same_hint_gives_the_same_answer(case: Case) -> None:
+def test_the_same_warm_start_gives_the_same_solution(case: Case) -> None:
     columns, network = create_solver("columns"), network_of(case)
     hint = columns.solve(network).warm_start
     first, second = columns.solve(network, hint), columns.solve(network, hint)
@@ -74,7 +74,7 @@ def test_the_same_hint_gives_the_same_answer(case: Case) -> None:
 
 
 @pytest.mark.parametrize("name", ["arcs", "exact", "extended-dp", "greedy-dp", "separate-dp", "l2"])
-def test_other_solvers_need_no_hint(name: str) -> None:
+def test_other_solvers_ignore_the_warm_start(name: str) -> None:
     network, solver = rivals(0), create_solver(name)
     first, second = (
         solver.solve(network),
@@ -83,7 +83,7 @@ def test_other_solvers_need_no_hint(name: str) -> None:
     np.testing.assert_array_equal(first.states, second.states)
 
 
-def test_a_later_window_knows_its_frames_and_objects_by_their_new_numbers() -> None:
+def test_a_shifted_warm_start_has_the_new_frame_and_object_indices() -> None:
     rows = (ConflictPrice(0, (1, 2), 0.5), ConflictPrice(2, (0, 1), 0.25))
     hint = WarmStart(rows, np.array([[0, 1, 2], [3, 4, -1]])).shift(2, [1, None, 0])
     assert hint.rows == (ConflictPrice(0, (0, 1), 0.25),)
@@ -106,7 +106,7 @@ def costs() -> CostSettings:
     return replace(PAPER_COSTS, displacement=0.003, conflict_distance=60.0)
 
 
-def test_where_the_old_prices_hold_no_program_is_solved() -> None:
+def test_if_the_old_prices_hold_no_program_is_solved() -> None:
     columns = create_solver("columns")
     before = columns.solve(rivals(0))
     assert before.report.rounds > 0, "the two have to want the same boxes for this test"
@@ -115,7 +115,7 @@ def test_where_the_old_prices_hold_no_program_is_solved() -> None:
     assert after.report.objective == pytest.approx(columns.solve(rivals(1)).report.objective, rel=CLOSE)
 
 
-def test_a_report_says_the_time_and_is_equal_whatever_it_was() -> None:
+def test_reports_are_equal_regardless_of_solving_time() -> None:
     first, second = (create_solver("columns").solve(rivals(0)).report for _ in range(2))
     assert first.seconds > 0.0
     assert replace(first, seconds=1.0) == replace(second, seconds=2.0)
