@@ -1,4 +1,4 @@
-"""A game: two teams run about a court, and whoever is in one team looks like the rest of it."""
+"""The court scene: two teams in two outfits play a plausible game, and the ground truth fits the pictures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PLAYERS = 10
 def paths(request: pytest.FixtureRequest) -> np.ndarray:
     """Two minutes of a game: ``(T, PLAYERS, 2)`` metres."""
     crowd = ChoreographedCrowd(Game(COURT, PLAYERS, request.param), [1.85] * PLAYERS)
-    return np.array([[(it.x, it.y) for it in crowd.poses(t / RATE)] for t in range(120 * RATE)])
+    return np.array([[(pose.x, pose.y) for pose in crowd.poses(t / RATE)] for t in range(120 * RATE)])
 
 
 def test_players_sprint_turn_and_stand(paths: np.ndarray) -> None:
@@ -54,7 +54,7 @@ def test_players_do_not_collide_or_leave_the_floor(paths: np.ndarray) -> None:
 
 
 def test_the_game_alternates_between_the_baskets(paths: np.ndarray) -> None:
-    """At the end of each round everybody is before the basket that is attacked."""
+    """At the end of each round all players are in the attacked half."""
     for number in range(1, 12):
         east = paths[int(number * ROUND * RATE) - 1, :, 0] > SPORTS_HALL.width / 2
         assert east.mean() == (1.0 if (number - 1) % 2 == 0 else 0.0)

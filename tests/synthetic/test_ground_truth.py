@@ -1,4 +1,4 @@
-"""The ground truth is what the pictures show."""
+"""The ground truth agrees with the pictures."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def crowd() -> Scene:
     return Scene("room", 3, 4, 0, *SIZE)
 
 
-def hall(scene: Scene) -> RoomWorld:
+def room_world(scene: Scene) -> RoomWorld:
     assert isinstance(scene.world, RoomWorld)
     return scene.world
 
 
 def stand(scene: Scene, camera: int, *places: tuple[float, float]) -> CameraTruth:
-    """Judge people who stand at given places."""
-    camera_view = hall(scene).camera_view(camera)
+    """Return the ground truth of people who stand at given places."""
+    camera_view = room_world(scene).camera_view(camera)
     poses = [Pose(x, y, 0.0, 0.0, 0.0) for x, y in places]
     return measure_truth(
         camera_view,
@@ -52,7 +52,7 @@ def test_a_box_is_where_the_picture_differs_from_the_empty_room() -> None:
         for frame in range(30, 900, 60):
             truth = single.truth(frame)[camera]
             if not single.inside(frame)[0] or len(truth.ids) == 0 or truth.visibility[0] < 0.99:
-                continue  # hidden in part, or in the corridor's dark
+                continue  # partly occluded, or in the dark corridor
             changed = np.abs(single.image(camera, frame).astype(np.int16) - empty).max(axis=2) > 50
             x, y, width, height = cv2.boundingRect(cv2.medianBlur(changed.astype(np.uint8), 3))
             found.append(overlap(truth.boxes[0], np.array([x, y, x + width, y + height], dtype=float)))
@@ -93,18 +93,18 @@ def test_the_homography_takes_the_feet_to_the_ground_position(crowd: Scene) -> N
 
 
 def test_a_person_has_the_same_height_in_every_camera(crowd: Scene) -> None:
-    """Project a person's height at their ground position: the box's top is there."""
+    """The projected height at the ground position is the top of the box."""
     where = (4.5, 4.0)
     for camera in range(3):
         truth = stand(crowd, camera, where)
-        top, _ = hall(crowd).view(camera).project(np.array([[*where, choose_outfit(0, 0).height]]))
+        top, _ = room_world(crowd).view(camera).project(np.array([[*where, choose_outfit(0, 0).height]]))
         assert truth.boxes[0, 1] == pytest.approx(
             top[0, 1], abs=0.06 * (truth.boxes[0, 3] - truth.boxes[0, 1])
         )
 
 
 def test_visibility_falls_the_more_another_person_stands_in_front(crowd: Scene) -> None:
-    camera = np.array(hall(crowd).view(0).center[:2])
+    camera = np.array(room_world(crowd).view(0).center[:2])
     behind = np.array([4.2, 5.2])
     ahead = (camera - behind) / np.linalg.norm(camera - behind)
     offsets = np.array([-ahead[1], ahead[0]])
@@ -128,7 +128,7 @@ def test_visibility_does_not_depend_on_the_order_of_people(crowd: Scene) -> None
 
 
 def test_furniture_occludes_people_behind_it_and_not_in_front(crowd: Scene) -> None:
-    camera = hall(crowd).view(0).center[:2]
+    camera = room_world(crowd).view(0).center[:2]
     (piece,) = (piece for piece in ROOM.furniture if piece.name == "pillar")
     west, south, east, north = piece.footprint
     pillar = np.array([(west + east) / 2, (south + north) / 2])

@@ -1,4 +1,4 @@
-"""From straight above: people meet, stand together so that they look like one, and part."""
+"""The overhead scene: people meet, stand so close that they are one blob, and part."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ def crowd(people: int, seed: int) -> ChoreographedCrowd:
 
 @cache
 def paths(people: int, seed: int, seconds: int = 120) -> np.ndarray:
-    """Sample a company: ``(T, people, 2)`` metres."""
-    those = crowd(people, seed)
-    return np.array([[(it.x, it.y) for it in those.poses(t / RATE)] for t in range(seconds * RATE)])
+    """Return the sampled paths of a crowd: ``(T, people, 2)`` metres."""
+    walkers = crowd(people, seed)
+    return np.array([[(pose.x, pose.y) for pose in walkers.poses(t / RATE)] for t in range(seconds * RATE)])
 
 
-def gaps(those: np.ndarray) -> np.ndarray:
+def gaps(people_paths: np.ndarray) -> np.ndarray:
     """Return the distances of all pairs: ``(T, pairs)`` metres."""
-    apart = np.linalg.norm(those[:, :, None] - those[:, None], axis=3)
-    return apart[:, *np.triu_indices(those.shape[1], 1)]
+    apart = np.linalg.norm(people_paths[:, :, None] - people_paths[:, None], axis=3)
+    return apart[:, *np.triu_indices(people_paths.shape[1], 1)]
 
 
 @pytest.mark.parametrize("people", [2, 3, 4])
@@ -55,29 +55,29 @@ def test_people_meet_and_part_again_several_times_a_minute(people: int, seed: in
 @pytest.mark.parametrize("people", [2, 3, 4])
 @pytest.mark.parametrize("seed", range(2))
 def test_people_do_not_collide_or_leave(people: int, seed: int) -> None:
-    those = paths(people, seed)
-    assert gaps(those).min() > 0.2  # metres: bodies are about as deep
-    assert np.mean(gaps(those) < 0.4) < 0.02
-    assert (those > (OVERHEAD_AREA[0] - 0.4, OVERHEAD_AREA[1] - 0.4)).all()
-    assert (those < (OVERHEAD_AREA[2] + 0.4, OVERHEAD_AREA[3] + 0.4)).all()
+    people_paths = paths(people, seed)
+    assert gaps(people_paths).min() > 0.2  # metres: about the depth of a body
+    assert np.mean(gaps(people_paths) < 0.4) < 0.02
+    assert (people_paths > (OVERHEAD_AREA[0] - 0.4, OVERHEAD_AREA[1] - 0.4)).all()
+    assert (people_paths < (OVERHEAD_AREA[2] + 0.4, OVERHEAD_AREA[3] + 0.4)).all()
     for west, south, east, north in OVERHEAD.footprints():
-        assert not ((those > (west, south)) & (those < (east, north))).all(axis=2).any()
+        assert not ((people_paths > (west, south)) & (people_paths < (east, north))).all(axis=2).any()
 
 
 def test_rounds_join_without_a_jump() -> None:
-    those = crowd(4, 2)
+    walkers = crowd(4, 2)
     for number in range(1, 6):
-        before, after = those.poses(number * ROUND - 1e-6), those.poses(number * ROUND)
+        before, after = walkers.poses(number * ROUND - 1e-6), walkers.poses(number * ROUND)
         for one, other, height in zip(before, after, (1.65, 1.7, 1.75, 1.8), strict=True):
             assert np.hypot(one.x - other.x, one.y - other.y) < 1e-3
             assert abs(np.sin((one.heading - other.heading) / 2)) < 0.02
             steps = (one.walked - other.walked) / (0.69 * height)
-            assert abs(steps - round(steps)) < 0.01  # the legs are where they were
+            assert abs(steps - round(steps)) < 0.01  # the phase of the legs continues
 
 
 def test_people_walk_at_a_plausible_speed() -> None:
-    those = paths(3, 5)
-    speed = np.hypot(*np.diff(those, axis=0).transpose(2, 0, 1)) * RATE
+    people_paths = paths(3, 5)
+    speed = np.hypot(*np.diff(people_paths, axis=0).transpose(2, 0, 1)) * RATE
     assert speed.max() < 2.0
     assert 0.3 < np.median(speed) < 1.2
 
@@ -145,7 +145,7 @@ def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
 
 
 def test_people_who_stand_together_are_one_blob_and_people_apart_are_several() -> None:
-    """Two people: the picture's difference from the empty room, as a background model would see it."""
+    """Compare with the empty room, as a background model does, for two people."""
     scene = Scene("overhead", 1, 2, 1)
     empty = scene.background(0).astype(np.int16)
     near, far = [], []

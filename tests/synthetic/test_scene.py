@@ -43,8 +43,8 @@ def test_a_frame_is_the_same_in_another_process(room: Scene) -> None:
         f"picture = Scene('room', 2, 4, 0, {SIZE[0]}, {SIZE[1]}).image(1, 777);"
         "print(hashlib.sha256(picture.tobytes()).hexdigest())"
     )
-    there = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
-    assert there.stdout.strip() == hashlib.sha256(room.image(1, 777).tobytes()).hexdigest()
+    process = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert process.stdout.strip() == hashlib.sha256(room.image(1, 777).tobytes()).hexdigest()
 
 
 def test_modifying_a_picture_does_not_change_the_next(room: Scene) -> None:
@@ -67,10 +67,10 @@ def test_time_is_in_seconds_at_every_frame_rate(room: Scene) -> None:
 
 
 def test_noise_is_mild_and_differs_between_frames() -> None:
-    nobody = scene(objects=0)
-    first, second = (nobody.image(0, frame).astype(float) for frame in (10, 11))
+    empty = scene(objects=0)
+    first, second = (empty.image(0, frame).astype(float) for frame in (10, 11))
     assert 0.5 < np.abs(first - second).mean() < 4
-    assert np.abs(first - nobody.background(0)).mean() < 5
+    assert np.abs(first - empty.background(0)).mean() < 5
 
 
 @pytest.mark.parametrize(

@@ -49,9 +49,9 @@ def test_a_video_shows_the_scenes_frames_at_its_rate(scene: Scene, recording: Pa
                 for shift in (-1, 0, 1)
                 if index + shift >= 0
             ]
-            own = np.square(shown - scene.image(camera, index)).mean()
-            assert own == min(errors)
-            assert own < 40  # a mean error of about six grey levels: it is compressed
+            own_error = np.square(shown - scene.image(camera, index)).mean()
+            assert own_error == min(errors)
+            assert own_error < 40  # a mean error of about six gray levels, from compression
 
 
 def test_the_rows_are_the_truth_of_their_frames(scene: Scene, recording: Path) -> None:
@@ -61,11 +61,11 @@ def test_the_rows_are_the_truth_of_their_frames(scene: Scene, recording: Path) -
         assert rows[:, 0].min() >= 1
         for frame in range(FRAMES):
             truth = scene.truth(frame)[camera]
-            mine = rows[rows[:, 0] == frame + 1]
-            assert mine[:, 1].tolist() == truth.ids.tolist()
-            assert np.allclose(mine[:, 2:4] + mine[:, 4:6], truth.boxes[:, 2:])
-            assert np.allclose(mine[:, 8], truth.visibility, atol=1e-3)
-            assert (mine[:, 6:8] == 1).all()
+            frame_rows = rows[rows[:, 0] == frame + 1]
+            assert frame_rows[:, 1].tolist() == truth.ids.tolist()
+            assert np.allclose(frame_rows[:, 2:4] + frame_rows[:, 4:6], truth.boxes[:, 2:])
+            assert np.allclose(frame_rows[:, 8], truth.visibility, atol=1e-3)
+            assert (frame_rows[:, 6:8] == 1).all()
 
 
 def test_the_homographies_are_those_of_the_scene(scene: Scene, recording: Path) -> None:
@@ -83,10 +83,10 @@ def test_the_same_scene_gives_the_same_bytes(scene: Scene, recording: Path, tmp_
 
 
 def test_progress_is_reported_frame_by_frame(scene: Scene, tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    progress: list[tuple[int, int]] = []
     (tmp_path / "empty").mkdir()
-    write_recording(scene, tmp_path / "empty", 0.2, lambda done, whole: told.append((done, whole)))
-    assert told == [(n, 5) for n in range(1, 6)]
+    write_recording(scene, tmp_path / "empty", 0.2, lambda done, whole: progress.append((done, whole)))
+    assert progress == [(n, 5) for n in range(1, 6)]
 
 
 def test_a_folder_that_is_not_empty_is_refused_and_unchanged(scene: Scene, tmp_path: Path) -> None:

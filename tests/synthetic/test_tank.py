@@ -1,4 +1,4 @@
-"""Fish that all look the same: they swim freely, hide each other, and the truth says how much."""
+"""The fish scene: identical fish swim freely, occlude each other, and ground truth has the visible shares."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ def tank(cameras: int = 2, objects: int | None = None, seed: int = 1) -> Scene:
 
 
 @pytest.fixture(scope="module", params=range(3))
-def swum(request: pytest.FixtureRequest) -> list[FishState]:
+def states(request: pytest.FixtureRequest) -> list[FishState]:
     """Return seventy seconds of nine fish: two rounds, and the start of a third."""
     shoal = Shoal(9, request.param)
     return [shoal.at(t / RATE) for t in range(70 * RATE)]
 
 
-def test_fish_never_swim_into_each_other(swum: list[FishState]) -> None:
+def test_fish_never_swim_into_each_other(states: list[FishState]) -> None:
     along = np.linspace(-0.45, 0.45, 7) * LENGTH
-    for it in swum:
-        spines = it.places[:, None] + along[:, None] * it.ahead[:, None]
+    for state in states:
+        spines = state.places[:, None] + along[:, None] * state.ahead[:, None]
         gaps = np.linalg.norm(spines[:, None, :, None] - spines[None, :, None], axis=4).min(axis=(2, 3))
         assert gaps[np.triu_indices(9, 1)].min() > 0.15  # metres: bodies are 0.14 broad
 
 
-def test_fish_swim_forward_and_turn_plausibly(swum: list[FishState]) -> None:
+def test_fish_swim_forward_and_turn_plausibly(states: list[FishState]) -> None:
     turns, slants = [], []
-    for one, other in pairwise(swum):
+    for one, other in pairwise(states):
         step = other.places - one.places
         far = np.linalg.norm(step, axis=1)
         assert far.max() * RATE < 1.6
@@ -66,14 +66,14 @@ def test_rounds_of_the_shoal_join_without_a_jump() -> None:
         assert np.abs(tails - np.rint(tails)).max() < 0.01
 
 
-def test_fish_stay_in_the_first_cameras_picture(swum: list[FishState]) -> None:
+def test_fish_stay_in_the_first_cameras_picture(states: list[FishState]) -> None:
     view = PinholeCamera.at(VIEWPOINTS[0], *SIZE)
     outside = 0
-    for it in swum[::5]:
-        pixels, _ = view.project(fish_vertices(it).reshape(-1, 3))
+    for state in states[::5]:
+        pixels, _ = view.project(fish_vertices(state).reshape(-1, 3))
         beyond = ((pixels < 0) | (pixels > SIZE)).any(axis=1).reshape(9, -1).any(axis=1)
         outside += int(beyond.sum())
-    assert outside < 0.01 * 9 * len(swum[::5])
+    assert outside < 0.01 * 9 * len(states[::5])
 
 
 def test_all_begin_on_a_circle_and_swim_towards_the_camera() -> None:
@@ -111,8 +111,8 @@ def test_a_frame_is_identical_in_every_order_and_process() -> None:
         f"picture = Scene('fish', 2, None, 1, {SIZE[0]}, {SIZE[1]}).image(1, 3000);"
         "print(hashlib.sha256(picture.tobytes()).hexdigest())"
     )
-    there = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
-    assert there.stdout.strip() == hashlib.sha256(forward[5].tobytes()).hexdigest()
+    process = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert process.stdout.strip() == hashlib.sha256(forward[5].tobytes()).hexdigest()
 
 
 def test_a_box_is_where_the_picture_differs_from_the_tank_without_fish() -> None:
@@ -141,9 +141,11 @@ def test_of_two_fish_in_line_the_farther_one_is_occluded() -> None:
         further, depth_offset = draw_fish(view, fish_vertices(two), caustics(0.0))
         assert further is not None
         assert depth_offset is not None
-        seen = measure_visibility(view, [FigureLayer(0, further, None), FigureLayer(1, depth_offset, None)])
-        assert seen[1].share == 1.0
-        shares.append(seen[0].share)
+        measured = measure_visibility(
+            view, [FigureLayer(0, further, None), FigureLayer(1, depth_offset, None)]
+        )
+        assert measured[1].share == 1.0
+        shares.append(measured[0].share)
     assert shares[0] == 1.0
     assert shares == sorted(shares, reverse=True)
     assert shares[-1] < 0.1
@@ -152,22 +154,22 @@ def test_of_two_fish_in_line_the_farther_one_is_occluded() -> None:
 def test_an_occluder_lowers_visibility_and_has_no_truth_row() -> None:
     view = PinholeCamera.at(VIEWPOINTS[0], 100, 60)
     block = np.full((20, 40, 4), 255, dtype=np.uint8)
-    seen = measure_visibility(
+    measured = measure_visibility(
         view, [FigureLayer(3, Figure(10, 10, block), None), FigureLayer(None, Figure(20, 0, block), None)]
     )
-    assert list(seen) == [3]
-    assert seen[3].box.tolist() == [10, 10, 50, 30]
-    assert seen[3].share == pytest.approx(1 - 30 * 10 / (40 * 20))
+    assert list(measured) == [3]
+    assert measured[3].box.tolist() == [10, 10, 50, 30]
+    assert measured[3].share == pytest.approx(1 - 30 * 10 / (40 * 20))
 
 
 def test_murk_shifts_colors_to_that_of_the_water_and_red_first() -> None:
     water = open_water(np.array([[0.0, 1.0, 0.0]]))
-    seen = attenuate_by_water(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
-    assert np.allclose(seen[0], 1.0)
-    assert np.allclose(seen[3], water, atol=1e-4)
-    left = (seen - water) / (1 - water)
-    assert (np.diff(left, axis=0) < 0).all()
-    assert (left[1:3, 0] < left[1:3, 1]).all()
+    attenuated = attenuate_by_water(np.ones((4, 3)), np.array([0.0, 4.0, 12.0, 200.0]), water)
+    assert np.allclose(attenuated[0], 1.0)
+    assert np.allclose(attenuated[3], water, atol=1e-4)
+    remaining = (attenuated - water) / (1 - water)
+    assert (np.diff(remaining, axis=0) < 0).all()
+    assert (remaining[1:3, 0] < remaining[1:3, 1]).all()
 
 
 def test_caustics_move_tile_and_have_bright_lines() -> None:

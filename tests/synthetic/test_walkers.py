@@ -1,4 +1,4 @@
-"""People walk as people do: steadily, round furniture and each other, and out by the doors."""
+"""People walk plausibly: steadily, around furniture and each other, and out by the doors."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_people_leave_and_come_back(paths: np.ndarray) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_background_can_be_learned_at_the_beginning(seed: int) -> None:
-    """Everybody is there, apart from each other, and nobody stands still for the first four seconds."""
+    """In the first four seconds all people are in the room, apart from each other, and moving."""
     start = [four(seed).poses(t / 10) for t in range(41)]
     assert all(ROOM.outside(pose.x, pose.y) < -0.5 for poses in start for pose in poses)
     assert min(pose.speed for poses in start for pose in poses) > 0.2
@@ -85,8 +85,8 @@ def test_a_background_can_be_learned_at_the_beginning(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_room_is_hardly_ever_empty(seed: int) -> None:
     poses = [four(seed).poses(float(t)) for t in range(240)]
-    there = [sum(ROOM.outside(pose.x, pose.y) < 0 for pose in those) for those in poses]
-    assert np.mean(np.array(there) >= 2) > 0.95
+    present = [sum(ROOM.outside(pose.x, pose.y) < 0 for pose in people) for people in poses]
+    assert np.mean(np.array(present) >= 2) > 0.95
 
 
 def test_more_people_do_not_change_the_paths_of_the_first() -> None:
@@ -96,8 +96,8 @@ def test_more_people_do_not_change_the_paths_of_the_first() -> None:
 
 
 def test_no_two_people_dress_alike() -> None:
-    looks = [choose_outfit(walker, 0) for walker in range(40)]
-    assert len({(look.upper, look.lower) for look in looks}) == len(looks)
+    outfits = [choose_outfit(walker, 0) for walker in range(40)]
+    assert len({(outfit.upper, outfit.lower) for outfit in outfits}) == len(outfits)
 
 
 @pytest.mark.parametrize("part", ["upper", "lower"])
@@ -127,7 +127,7 @@ def test_a_body_stands_on_the_floor_at_its_height(
 
 
 def test_standing_feet_do_not_slide() -> None:
-    """A steady walk: the lower foot's place on the floor hardly moves."""
+    """During a steady walk the lower foot hardly moves on the floor."""
     speed, step = 1.1, 0.01
     trail = [
         place_joints(Pose(speed * t * step, 0.0, 0.0, speed * t * step, speed), 1.75) for t in range(400)
@@ -144,10 +144,10 @@ def test_two_people_on_a_collision_course_step_aside(offsets: float, speed: floa
     clock = np.arange(40) / 5 - 4
     one = np.column_stack([4.5 + speed * clock, np.full(40, 3.5)])
     other = np.column_stack([4.5 - speed * clock, np.full(40, 3.5 + offsets)])
-    polite = sidestep(ROOM, one, other[None], 5.0)
-    before, after = (np.hypot(*(path - other).T).min() for path in (one, polite))
+    adjusted = sidestep(ROOM, one, other[None], 5.0)
+    before, after = (np.hypot(*(path - other).T).min() for path in (one, adjusted))
     assert after >= min(before, MIN_DISTANCE) - 1e-6
-    assert np.abs(np.diff(polite, axis=0)).max() < 0.5  # metres in a fifth of a second
+    assert np.abs(np.diff(adjusted, axis=0)).max() < 0.5  # metres in a fifth of a second
 
 
 @settings(deadline=None, max_examples=60)

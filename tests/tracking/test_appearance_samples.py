@@ -1,4 +1,4 @@
-"""How objects look is told of the final frames in which nobody else is in their box, run by run."""
+"""Appearance samples: runs of final frames in which no other object is in the box."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from tracking.appearance_samples import add_appearance_samples
 HERE, THERE, BESIDE = (0.0, 0.0, 10.0, 20.0), (200.0, 0.0, 210.0, 20.0), (3.0, 0.0, 13.0, 20.0)
 
 
-def seen(*boxes: tuple[float, ...]) -> Detections:
-    looks = np.eye(4)[: len(boxes)]
-    return Detections(np.array(boxes), np.ones(len(boxes)), looks)
+def detections(*boxes: tuple[float, ...]) -> Detections:
+    samples = np.eye(4)[: len(boxes)]
+    return Detections(np.array(boxes), np.ones(len(boxes)), samples)
 
 
 def track(number: int, *boxes: tuple[float, ...] | None) -> WindowTrack:
@@ -20,18 +20,20 @@ def track(number: int, *boxes: tuple[float, ...] | None) -> WindowTrack:
     return WindowTrack(number, rows, rows, np.full(4, 0.25), 1.0)
 
 
-def told(looks: tuple[AppearanceSample, ...]) -> list[tuple[int, int, list[float]]]:
-    return [(it.first, it.last, it.histogram.tolist()) for it in looks]
+def as_tuples(samples: tuple[AppearanceSample, ...]) -> list[tuple[int, int, list[float]]]:
+    return [(sample.first, sample.last, sample.histogram.tolist()) for sample in samples]
 
 
 def test_consecutive_frames_are_one_sample_until_a_crowd_or_an_occlusion() -> None:
     one = track(1, HERE, HERE, HERE, HERE, HERE, HERE)
     two = track(2, THERE, THERE, BESIDE, THERE, None, THERE)
     states = [np.zeros(6, dtype=np.int64), np.array([1, 1, 1, 1, -1, 1])]
-    frames = [seen(HERE, THERE), seen(HERE, THERE), seen(HERE, BESIDE)] + [seen(HERE, THERE)] * 3
+    frames = [detections(HERE, THERE), detections(HERE, THERE), detections(HERE, BESIDE)] + [
+        detections(HERE, THERE)
+    ] * 3
     first, second = add_appearance_samples([one, two], states, 100, frames)
-    assert told(first.appearance_samples) == [(100, 101, [1, 0, 0, 0]), (103, 105, [1, 0, 0, 0])]
-    assert told(second.appearance_samples) == [
+    assert as_tuples(first.appearance_samples) == [(100, 101, [1, 0, 0, 0]), (103, 105, [1, 0, 0, 0])]
+    assert as_tuples(second.appearance_samples) == [
         (100, 101, [0, 1, 0, 0]),
         (103, 103, [0, 1, 0, 0]),
         (105, 105, [0, 1, 0, 0]),
@@ -40,9 +42,9 @@ def test_consecutive_frames_are_one_sample_until_a_crowd_or_an_occlusion() -> No
 
 def test_only_final_frames_give_samples_and_hidden_objects_may_be_in_the_box() -> None:
     one, two = track(1, HERE, HERE, HERE), track(2, BESIDE, THERE, THERE)
-    states = [np.zeros(3, dtype=np.int64), np.full(3, -1)]  # two is not seen, but known to be there
-    frames = [seen(HERE)] * 2
+    states = [np.zeros(3, dtype=np.int64), np.full(3, -1)]  # the second is hidden, but tracked
+    frames = [detections(HERE)] * 2
     first, second = add_appearance_samples([one, two], states, 7, frames)
-    assert told(first.appearance_samples) == [(8, 8, [1, 0, 0, 0])]
+    assert as_tuples(first.appearance_samples) == [(8, 8, [1, 0, 0, 0])]
     assert second.appearance_samples == ()
     assert add_appearance_samples([], [], 7, frames) == ()

@@ -1,4 +1,4 @@
-"""Two toys that pass in front of each other keep their numbers, and the hidden one is said to be hidden."""
+"""The template tracker: two toys that cross keep their ids, and the occluded one is hidden."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def final(results: list[WindowResult | None]) -> dict[int, dict[int, npt.NDArray
             for frame in range(result.first, result.final_to + 1):  # type: ignore[union-attr]
                 box = track.boxes[frame - result.first]  # type: ignore[union-attr]
                 if not np.isnan(box).any():
-                    assert frame not in rows[track.id], "a final frame was given twice"
+                    assert frame not in rows[track.id], "a frame became final twice"
                     rows[track.id][frame] = box
     return rows
 
@@ -70,7 +70,7 @@ def test_toys_that_cross_keep_their_ids() -> None:
         assert iou(rows[1][frame], places(frame)[0]) > 0.8
         if frame in rows[2]:
             assert iou(rows[2][frame], places(frame)[1]) > 0.6, frame
-    assert 15 not in rows[2] and 16 not in rows[2], "behind the other it is hidden"  # noqa: PT018
+    assert 15 not in rows[2] and 16 not in rows[2], "hidden behind the other"  # noqa: PT018
     assert len(rows[2]) >= 20
 
 
@@ -78,9 +78,9 @@ def test_windows_end_at_the_stride_and_flush_ends_the_last_one() -> None:
     one = tracker(stride=10)
     ends = [frame for frame in range(1, 24) if one.push(picture(frame))]
     assert ends == [9, 19]
-    rest = one.flush()
-    assert rest is not None
-    assert (rest.last, rest.final_to) == (23, 23)
+    last = one.flush()
+    assert last is not None
+    assert (last.last, last.final_to) == (23, 23)
     assert one.flush() is None
 
 

@@ -1,4 +1,4 @@
-"""The online tracker: what is final stays, who is there is found, who comes back keeps the number."""
+"""The online tracker: final frames do not change, people are found, and those who return keep their ids."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _ids(results: list[WindowResult]) -> set[int]:
 
 @st.composite
 def streams(draw: st.DrawFn) -> list[Detections]:
-    """Some people, some of whom are missed now and then, and some clutter."""
+    """Draw detections of some people with misses, and some clutter."""
     people = [
         Stroll(draw(st.integers(0, 300)), draw(st.integers(0, 100)), draw(st.integers(-4, 4)), look)
         for look in range(draw(st.integers(0, 3)))
@@ -39,9 +39,9 @@ def streams(draw: st.DrawFn) -> list[Detections]:
     rng = np.random.default_rng(seed)
     frames = []
     for frame in range(draw(st.integers(1, 45))):
-        there = [person for person in people if rng.random() < 0.85]
+        present = [person for person in people if rng.random() < 0.85]
         clutter = [Stroll(float(rng.integers(0, 300)), 50.0, 0.0, 7) for _ in range(rng.integers(0, 2))]
-        frames.append(seen_at([*there, *clutter], frame, jitter=1.5, seed=seed))
+        frames.append(seen_at([*present, *clutter], frame, jitter=1.5, seed=seed))
     return frames
 
 
@@ -72,7 +72,7 @@ def test_every_frame_becomes_final_once_and_in_order(
 @settings(deadline=None, max_examples=25)
 def test_a_missed_frame_is_a_frame_without_detections(stream: list[Detections], missed: set[int]) -> None:
     emptied = [Detections.empty(8) if n in missed else seen for n, seen in enumerate(stream)]
-    # The first and the last frame must be there for the two to be about the same frames.
+    # The first and the last frame are kept, so that both trackers cover the same frames.
     kept = [n for n in range(len(stream)) if n not in missed or n in {0, len(stream) - 1}]
     pushed, skipping = tracker(), tracker()
     every = final_boxes(follow(emptied, pushed))
@@ -103,7 +103,7 @@ def test_people_are_found_and_numbered_from_one(first: int) -> None:
     people = [Stroll(20.0, 30.0, 2.0, 0), Stroll(300.0, 60.0, -1.5, 3)]
     results = follow([seen_at(people, n, 1.0) for n in range(40)], tracker(), first)
     found = final_boxes(results)
-    # Whoever is there from the start is shown from the first window that is long enough for the test.
+    # People present from the start are published from the first window that is long enough for initiation.
     assert min(found) < first + WindowSettings().stride
     assert sorted(found) == list(range(min(found), first + 40))
     for frame, boxes in found.items():
@@ -202,11 +202,11 @@ def test_memory_is_bounded_by_the_window_and_the_list() -> None:
 
 
 def test_at_max_objects_only_hidden_tracks_are_replaced() -> None:
-    """One who is hidden, and two who come at once: the second of them finds no room."""
-    there = [Stroll(100.0 * k, 40.0, 0.0, k) for k in range(4)]
+    """One track is hidden and two people arrive at once: only one of them gets a track."""
+    present = [Stroll(100.0 * k, 40.0, 0.0, k) for k in range(4)]
     left = [Stroll(100.0, 40.0, 0.0, 1, seen=range(20))]
     new = [Stroll(100.0 * k, 240.0, 0.0, k, seen=range(40, 100)) for k in (5, 6)]
-    people = [there[0], *left, *there[2:], *new]
+    people = [present[0], *left, *present[2:], *new]
     results = follow([seen_at(people, n) for n in range(100)], tracker(WindowSettings(max_objects=4)))
     assert {1, 3, 4} < set(final_boxes(results)[99])
     assert len(final_boxes(results)[99]) == 4
@@ -245,7 +245,7 @@ def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
 
 
 def test_two_people_who_cross_without_appearance_keep_their_ids() -> None:
-    """Nothing but the way they go tells them apart; for three frames one hides the other."""
+    """Only their motion distinguishes them; for a few frames one occludes the other."""
     tracked = tracker()
     results = []
     for frame in range(60):
@@ -270,8 +270,8 @@ def test_a_new_person_does_not_get_the_id_of_one_who_left_elsewhere() -> None:
 
 def test_a_person_back_elsewhere_after_long_is_reidentified_by_appearance() -> None:
     away = 120
-    there = Stroll(20.0, 40.0, 0.0, 2, range(40))
+    present = Stroll(20.0, 40.0, 0.0, 2, range(40))
     back = Stroll(260.0, 60.0, 0.0, 2, range(40 + away, 100 + away))
-    results = follow([seen_at([there, back], n, 1.0) for n in range(100 + away)], tracker())
+    results = follow([seen_at([present, back], n, 1.0) for n in range(100 + away)], tracker())
     assert _ids(results) == {1}
     assert set(final_boxes(results)[90 + away]) == {1}

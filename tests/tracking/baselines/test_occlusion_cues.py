@@ -1,4 +1,4 @@
-"""Positions and occlusions: mixtures, the contrast of windows, the shares, and who passes behind another."""
+"""Occlusion cues: color mixtures, the contrast of windows, occluder shares, and tracking behind others."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def test_a_mixture_recovers_the_two_colors_that_pixels_were_drawn_from() -> None
 def test_densities_equal_the_formula() -> None:
     rng = np.random.default_rng(4)
     found = fit_mixture(rng.integers(0, 256, (400, 3)).astype(np.uint8), components=3)
-    colours = rng.uniform(0, 255, (20, 3))
-    for colour, density in zip(colours, found.densities(colours), strict=True):
+    colors = rng.uniform(0, 255, (20, 3))
+    for color, density in zip(colors, found.densities(colors), strict=True):
         expected = 0.0
         for share, mean, covariance in zip(found.weights, found.means, found.covariances, strict=True):
-            off = colour - mean
-            exponent = -0.5 * off @ np.linalg.inv(covariance) @ off
+            difference = color - mean
+            exponent = -0.5 * difference @ np.linalg.inv(covariance) @ difference
             expected += share * np.exp(exponent) / np.sqrt((2 * np.pi) ** 3 * np.linalg.det(covariance))
         assert density == pytest.approx(expected)
 
@@ -69,9 +69,9 @@ def test_the_color_code_is_that_of_the_nearest_color() -> None:
 
 
 def test_the_posterior_is_bayes_rule() -> None:
-    mine, others = np.array([0.2, 0.0, 1e-5]), np.array([0.1, 0.3, 0.0])
+    likelihood, other_likelihoods = np.array([0.2, 0.0, 1e-5]), np.array([0.1, 0.3, 0.0])
     expected = [0.5 * 0.2 / (0.5 * 0.2 + 0.5 * 0.1), 0.0, 1.0]
-    assert posterior(mine, others, 0.5) == pytest.approx(expected)
+    assert posterior(likelihood, other_likelihoods, 0.5) == pytest.approx(expected)
     assert posterior(np.zeros(1), np.zeros(1), 0.5).tolist() == [0.0]
 
 
@@ -85,7 +85,7 @@ def test_contrasts_equal_sums_over_pixels(seed: int, places: list[tuple[int, int
     windows = np.array([[x, y, x + w, y + h] for x, y, w, h in places], dtype=float)
     found = CenterSurroundIntegral(values, 3, 2).contrast(windows)
     for window, contrasts in zip(windows, found, strict=True):
-        inner, outer = (np.rint(it) for it in (window, add_ring(window)))
+        inner, outer = (np.rint(box) for box in (window, add_ring(window)))
         inside, ring = [], []
         for y in range(24):
             for x in range(32):
@@ -127,16 +127,18 @@ def test_a_share_stays_with_its_occluder_when_others_come_and_go() -> None:
 
 def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_filter_fails() -> None:
     scenes = [Crossing((GREY, BLUE), seed=seed) for seed in SEEDS]
-    assert times_kept([OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS], scenes) == len(SEEDS)
-    plain = [ParticleFilters(ParticleSettings(seed=it)) for it in SEEDS]
+    assert times_kept([OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes) == len(
+        SEEDS
+    )
+    plain = [ParticleFilters(ParticleSettings(seed=seed)) for seed in SEEDS]
     assert times_kept(plain, scenes) <= len(SEEDS) - 2
 
 
 def test_a_hidden_person_moves_with_the_occluder_past_a_distractor() -> None:
     scenes = [WalkTogether((RED, BLUE), seed=seed) for seed in SEEDS]
-    with_cues = times_kept([OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS], scenes)
+    with_cues = times_kept([OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes)
     alone = [
-        OcclusionCues(OcclusionCueSettings(seed=it, occlusion_noise=0.0, jump_share=0.0)) for it in SEEDS
+        OcclusionCues(OcclusionCueSettings(seed=seed, occlusion_noise=0.0, jump_share=0.0)) for seed in SEEDS
     ]
     assert with_cues >= len(SEEDS) - 1
     assert times_kept(alone, scenes) <= 1
@@ -144,7 +146,7 @@ def test_a_hidden_person_moves_with_the_occluder_past_a_distractor() -> None:
 
 def test_two_people_who_pass_behind_a_third_keep_their_ids() -> None:
     scenes = [ThreeMeet((RED, BLUE, GREEN), seed=seed) for seed in SEEDS]
-    methods = [OcclusionCues(OcclusionCueSettings(seed=it)) for it in SEEDS]
+    methods = [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS]
     assert times_kept(methods, scenes) >= len(SEEDS) - 1
 
 
@@ -154,7 +156,7 @@ def test_the_hidden_share_is_large_only_during_the_occlusion() -> None:
     hidden = []
     for frame in range(1, FRAMES):
         method.predict(scene.picture(frame), people)
-        hidden.append([float(it.occluders.weights @ it.occluders.hidden_share) for it in people])
+        hidden.append([float(person.occluders.weights @ person.occluders.hidden_share) for person in people])
     behind, before = np.array(hidden).T
     assert behind[27:29].min() > 0.7
     assert max(behind[:20].max(), behind[36:].max(), before.max()) < 0.1
@@ -162,12 +164,12 @@ def test_the_hidden_share_is_large_only_during_the_occlusion() -> None:
 
 def test_the_same_seed_gives_the_same_predictions() -> None:
     scene = Crossing((RED, BLUE))
-    told = []
+    runs = []
     for _ in range(2):
         method = OcclusionCues()
         people = [method.initialize(scene.picture(0), scene.where(person, 0)) for person in range(2)]
-        told.append([method.predict(scene.picture(frame), people).tobytes() for frame in range(1, 12)])
-    assert told[0] == told[1]
+        runs.append([method.predict(scene.picture(frame), people).tobytes() for frame in range(1, 12)])
+    assert runs[0] == runs[1]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Particle filters kept apart: the parts' histograms, the overlap factor, two people who look alike."""
+"""Separated particle filters: part histograms, the overlap factor, and crossings of similar people."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SEEDS = range(6)
 def test_part_histograms_equal_counted_ones(seed: int, corners: list[tuple[int, int, int, int]]) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (30, 40, 3)).astype(np.uint8)
     boxes = np.array([[min(a, c), min(b, d), max(a, c), max(b, d)] for a, b, c, d in corners], dtype=float)
-    around = np.array([5.0, -3.0, 33.0, 22.0])  # what the field is cut to
+    field_box = np.array([5.0, -3.0, 33.0, 22.0])  # the field is clipped to this box
     expected = np.zeros((len(boxes), CHANNELS, LEVELS))
     for row, box in enumerate(boxes):
         left, top, right, bottom = np.clip(box, [5, 0, 5, 0], [33, 22, 33, 22]).astype(int)
@@ -39,7 +39,7 @@ def test_part_histograms_equal_counted_ones(seed: int, corners: list[tuple[int, 
             for x in range(left, right):
                 for channel in range(CHANNELS):
                     expected[row, channel, image[y, x, channel] // 32] += one
-    assert np.allclose(PartHistograms(image, around).histograms(boxes), expected)
+    assert np.allclose(PartHistograms(image, field_box).histograms(boxes), expected)
 
 
 def test_parts_are_cut_row_by_row() -> None:
@@ -63,8 +63,10 @@ def test_the_overlap_factor_equals_the_counted_share(seed: int, objects: int, re
         assert factors.shape == (len(middles[number]),)
         for (x, y), factor in zip(middles[number], factors, strict=True):
             cell = (x // reduced, y // reduced)
-            there = [sum((a // reduced, b // reduced) == cell for a, b in it) for it in middles]
-            assert factor == pytest.approx(there[number] / sum(there))
+            counts = [
+                sum((a // reduced, b // reduced) == cell for a, b in positions) for positions in middles
+            ]
+            assert factor == pytest.approx(counts[number] / sum(counts))
 
 
 @given(st.integers(0, 1000))
@@ -84,8 +86,8 @@ def test_the_bhattacharyya_coefficient_is_1_for_equal_and_0_for_disjoint_histogr
 
 def test_two_similar_people_who_cross_are_kept_where_independent_filters_fail() -> None:
     scenes = [Crossing((RED, RED), seed=seed) for seed in SEEDS]
-    apart = times_kept([SeparatedParticles(SeparatedParticleSettings(seed=it)) for it in SEEDS], scenes)
-    together = times_kept([ParticleFilters(ParticleSettings(seed=it)) for it in SEEDS], scenes)
+    apart = times_kept([SeparatedParticles(SeparatedParticleSettings(seed=seed)) for seed in SEEDS], scenes)
+    together = times_kept([ParticleFilters(ParticleSettings(seed=seed)) for seed in SEEDS], scenes)
     assert apart >= len(SEEDS) - 1
     assert together <= len(SEEDS) - 2
 

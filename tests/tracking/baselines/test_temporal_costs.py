@@ -1,4 +1,4 @@
-"""What a step between two blobs costs, and how colours are compared: the formulas of the report."""
+"""Costs of steps between blobs and the comparison of colors equal the formulas of the report."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tracking.baselines.temporal_consistency.regional_appearance import (
     uv_histogram,
 )
 
-METRE = 50.0
+PIXELS_PER_METER = 50.0
 SETTINGS = TemporalSettings()
 
 
@@ -37,25 +37,25 @@ def _blob(left: float, top: float, right: float, bottom: float, shape: np.ndarra
 
 def test_a_blob_within_another_has_distance_zero() -> None:
     outer, inner = _blob(0, 0, 40, 40), _blob(10, 10, 30, 40)
-    assert distance_score(outer, inner, METRE, SETTINGS) == 0.0
-    assert distance_score(inner, outer, METRE, SETTINGS) == 0.0
+    assert distance_score(outer, inner, PIXELS_PER_METER, SETTINGS) == 0.0
+    assert distance_score(inner, outer, PIXELS_PER_METER, SETTINGS) == 0.0
 
 
 def test_blobs_that_overlap_in_part_are_six_centimetres_apart() -> None:
-    assert distance_score(_blob(0, 0, 40, 40), _blob(20, 20, 60, 60), METRE, SETTINGS) == 0.06
+    assert distance_score(_blob(0, 0, 40, 40), _blob(20, 20, 60, 60), PIXELS_PER_METER, SETTINGS) == 0.06
 
 
 def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimetres() -> None:
     left, right = _blob(0, 0, 20, 20), _blob(70, 0, 100, 20)
     assert blob_gap(left, right) == pytest.approx(50.0, abs=1.5)
-    assert distance_score(left, right, METRE, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
+    assert distance_score(left, right, PIXELS_PER_METER, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
 
 
 def test_the_gap_is_measured_between_shapes_and_not_between_boxes() -> None:
     disc = np.hypot(*np.mgrid[-19.5:20:1, -19.5:20:1]) <= 20
-    round_ = _blob(0, 0, 40, 40, np.where(disc, 255, 0).astype(np.uint8))
+    disc_blob = _blob(0, 0, 40, 40, np.where(disc, 255, 0).astype(np.uint8))
     other = _blob(60, 60, 100, 100, np.where(disc, 255, 0).astype(np.uint8))
-    assert blob_gap(round_, other) == pytest.approx(math.hypot(60, 60) - 40, abs=2.5)
+    assert blob_gap(disc_blob, other) == pytest.approx(math.hypot(60, 60) - 40, abs=2.5)
 
 
 def test_the_penalty_is_linear_up_to_the_walkable_distance_and_a_sigmoid_beyond() -> None:
@@ -75,7 +75,9 @@ def test_the_penalty_grows_with_distance(one: float, other: float) -> None:
 
 def test_the_penalty_depends_on_the_time_between_samples() -> None:
     blobs = [_blob(0, 0, 20, 20)], [_blob(70, 0, 100, 20)]
-    short, long = (float(distance_costs(*blobs, seconds, METRE, SETTINGS)[0, 0]) for seconds in (0.5, 2.0))
+    short, long = (
+        float(distance_costs(*blobs, seconds, PIXELS_PER_METER, SETTINGS)[0, 0]) for seconds in (0.5, 2.0)
+    )
     assert short > 1.0
     assert long == pytest.approx((0.16 + 1.0) / (1.45 * 2.0), abs=0.02)
 
@@ -93,11 +95,11 @@ def test_the_intersection_of_shares_equals_that_of_counts(seed: int, size: int, 
 def test_colours_count_and_brightness_does_not() -> None:
     mask = np.full((10, 10), 255, dtype=np.uint8)
 
-    def look(*bgr: int) -> np.ndarray:
+    def histogram(*bgr: int) -> np.ndarray:
         return uv_histogram(np.full((10, 10, 3), bgr, dtype=np.uint8), mask)
 
-    assert float(mismatch(look(60, 60, 60), look(200, 200, 200))) == 0.0
-    assert float(mismatch(look(40, 40, 180), look(180, 40, 40))) == 1.0
+    assert float(mismatch(histogram(60, 60, 60), histogram(200, 200, 200))) == 0.0
+    assert float(mismatch(histogram(40, 40, 180), histogram(180, 40, 40))) == 1.0
 
 
 def test_only_the_pixels_of_the_mask_count() -> None:
@@ -110,19 +112,19 @@ def test_only_the_pixels_of_the_mask_count() -> None:
 
 
 def test_appearance_is_compared_with_the_nearest_learned_region() -> None:
-    places = RegionalAppearance(3, (300, 300))
+    regions = RegionalAppearance(3, (300, 300))
     red, blue = np.eye(BINS)[0], np.eye(BINS)[1]
     here, there = np.array([[40.0, 40.0]]), np.array([[250.0, 250.0]])
-    assert places.costs(here, red[None], 0.5) == [0.5]
-    places.learn(here[0], red)
-    places.learn(there[0], blue)
-    assert places.costs(here + 20, red[None], 0.5) == [0.0]
-    assert places.costs(there - 20, red[None], 0.5) == [1.0]
+    assert regions.costs(here, red[None], 0.5) == [0.5]
+    regions.learn(here[0], red)
+    regions.learn(there[0], blue)
+    assert regions.costs(here + 20, red[None], 0.5) == [0.0]
+    assert regions.costs(there - 20, red[None], 0.5) == [1.0]
     for step in range(40):
-        places.learn(np.array([float(step * 7 % 300), float(step * 13 % 300)]), red)
-    assert len(places) <= 9
-    places.learn(here[0], blue)
-    assert places.costs(here, blue[None], 0.5) == [0.0], "what was known of that part of the room is replaced"
+        regions.learn(np.array([float(step * 7 % 300), float(step * 13 % 300)]), red)
+    assert len(regions) <= 9
+    regions.learn(here[0], blue)
+    assert regions.costs(here, blue[None], 0.5) == [0.0], "the appearance of that region is replaced"
 
 
 def _room(rng: np.random.Generator) -> np.ndarray:
@@ -144,7 +146,7 @@ def test_changes_of_the_room_are_foreground_and_noise_is_not() -> None:
 def test_the_distance_is_the_mahalanobis_distance_in_yuv() -> None:
     rng = np.random.default_rng(2)
     room = rng.integers(80, 160, (30, 40, 3))
-    # Most pixels are as they were, so that no exposure is told from the rest.
+    # Most pixels are unchanged, so that no change of exposure is estimated.
     images = [
         (room + rng.choice([-3, 0, 3], room.shape, p=[0.15, 0.7, 0.15])).astype(np.uint8) for _ in range(30)
     ]
@@ -175,14 +177,14 @@ def test_a_person_walking_through_during_learning_is_not_part_of_the_background(
 
 def test_a_slowly_changing_background_is_learned_outside_of_people() -> None:
     rng = np.random.default_rng(4)
-    finder = BlobDetector((120, 90), 6.0, BlobSettings(learn_rate=0.3))
-    finder.prepare([_room(rng) for _ in range(20)])
+    detector = BlobDetector((120, 90), 6.0, BlobSettings(learn_rate=0.3))
+    detector.prepare([_room(rng) for _ in range(20)])
     person = slice(30, 60), slice(40, 60)
     for step in range(40):
         image = _room(rng)
         image[:, 80:] = np.clip(image[:, 80:] + 1.5 * step, 0, 255).astype(np.uint8)
         image[person] = (60, 60, 170)
-        found = finder.detect(image, learn=True)
+        found = detector.detect(image, learn=True)
         assert len(found) == 1, f"step {step}"
     box = found[0].box
     assert np.abs(box - [40, 30, 60, 60]).max() <= 3
@@ -190,13 +192,13 @@ def test_a_slowly_changing_background_is_learned_outside_of_people() -> None:
 
 def test_blobs_are_merged_and_specks_are_dropped() -> None:
     rng = np.random.default_rng(5)
-    finder = BlobDetector((120, 90), 6.0, BlobSettings())
-    finder.prepare([_room(rng) for _ in range(20)])
+    detector = BlobDetector((120, 90), 6.0, BlobSettings())
+    detector.prepare([_room(rng) for _ in range(20)])
     image = _room(rng)
     image[20:40, 20:34] = (60, 60, 170)
     image[41:55, 20:34] = (170, 60, 60)
     image[70:72, 100:102] = 0
-    (only,) = finder.detect(image, learn=False)
+    (only,) = detector.detect(image, learn=False)
     assert only.box[1] <= 20
     assert only.box[3] >= 55
     assert only.colors.sum() == pytest.approx(1.0)

@@ -1,4 +1,4 @@
-"""The best joint path is the best of all of them; pruning leaves out what nobody can have walked."""
+"""The joint path is the best of all paths; pruning removes only links that are too long to walk."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _MANY = 100_000
 
 
 def _cost(graph: WindowGraph, path: np.ndarray) -> float:
-    """Eq. (1) by itself, summed over the stages; infinite along a link that is pruned."""
+    """Compute equation (1) over the stages; infinite along a pruned link."""
     total = 0.0
-    for before, now, step, looks, shared in zip(
+    for before, now, step, appearance, shared in zip(
         [graph.start, *path[:-1]],
         path,
         graph.distance_costs,
@@ -39,14 +39,14 @@ def _cost(graph: WindowGraph, path: np.ndarray) -> float:
     ):
         steps = [step[a, b] for a, b in zip(before, now, strict=True)]
         total += sum(cost if cost <= graph.max_step_cost else np.inf for cost in steps)
-        total += sum(looks[person, blob] for person, blob in enumerate(now))
+        total += sum(appearance[person, blob] for person, blob in enumerate(now))
         here = [blob for blob in now.tolist() if shared[blob]]
         total += graph.merge_cost * (len(here) - len(set(here)))
     return total / graph.people
 
 
 def _best(graph: WindowGraph) -> float:
-    """The cheapest of all joint paths, one after the other."""
+    """Return the cost of the cheapest of all joint paths."""
     nodes = [list(product(range(step.shape[1]), repeat=graph.people)) for step in graph.distance_costs]
     return min(_cost(graph, np.array(path)) for path in product(*nodes))
 
@@ -57,9 +57,9 @@ def graphs(draw: st.DrawFn, most_people: int = 3, most_stages: int = 3, most_blo
     people, stages = draw(st.integers(1, most_people)), draw(st.integers(1, most_stages))
     blobs = [draw(st.integers(1, most_blobs)) for _ in range(stages + 1)]
     steps = tuple(np.round(rng.exponential(0.7, pair), 2) for pair in pairwise(blobs))
-    looks = tuple(np.round(rng.random((people, count)), 2) for count in blobs[1:])
+    appearance = tuple(np.round(rng.random((people, count)), 2) for count in blobs[1:])
     shared = tuple(rng.random(count) < 0.8 for count in blobs[1:])
-    return WindowGraph(rng.integers(0, blobs[0], people), steps, looks, shared, 0.35, np.inf)
+    return WindowGraph(rng.integers(0, blobs[0], people), steps, appearance, shared, 0.35, np.inf)
 
 
 @given(graphs(most_people=2))
@@ -81,13 +81,13 @@ def test_the_joint_path_is_the_cheapest_for_three_people(graph: WindowGraph) -> 
 @settings(deadline=None, max_examples=60)
 def test_solving_person_by_person_equals_solving_edge_by_edge(graph: WindowGraph, longest: float) -> None:
     graph = replace(graph, max_step_cost=longest)
-    left = prune_links(graph)
-    nobody = [np.zeros(len(it), dtype=np.int64) for it in graph.shared]
-    path, cost = cheapest_joint_path(left, graph.shared, nobody, graph.merge_cost)
-    by_edges, same = cheapest_path_by_edges(left, graph.shared, graph.merge_cost)
+    links = prune_links(graph)
+    no_others = [np.zeros(len(shared), dtype=np.int64) for shared in graph.shared]
+    path, cost = cheapest_joint_path(links, graph.shared, no_others, graph.merge_cost)
+    by_edges, same = cheapest_path_by_edges(links, graph.shared, graph.merge_cost)
     assert cost == pytest.approx(same)
-    # People who cannot meet are decided apart, and nothing is lost by it.
-    apart = solve_joint_path(graph, left, _MANY)
+    # People who cannot meet are solved separately without loss.
+    apart = solve_joint_path(graph, links, _MANY)
     assert apart.cost == pytest.approx(cost / graph.people)
     for found in (path, by_edges, apart.blobs):
         unpruned = replace(graph, max_step_cost=np.inf)
@@ -98,19 +98,19 @@ def test_solving_person_by_person_equals_solving_edge_by_edge(graph: WindowGraph
 @settings(deadline=None, max_examples=80)
 def test_pruning_keeps_the_best_path_if_all_its_steps_are_short_enough(graph: WindowGraph) -> None:
     whole = solve_joint_path(graph, prune_links(graph), _MANY)
-    taken = [
+    step_costs = [
         step[a, b]
         for before, now, step in zip(
             [graph.start, *whole.blobs[:-1]], whole.blobs, graph.distance_costs, strict=True
         )
         for a, b in zip(before, now, strict=True)
     ]
-    pruned = replace(graph, max_step_cost=max(taken))
-    left = prune_links(pruned)
-    assert solve_joint_path(pruned, left, _MANY).cost == pytest.approx(whole.cost)
+    pruned = replace(graph, max_step_cost=max(step_costs))
+    links = prune_links(pruned)
+    assert solve_joint_path(pruned, links, _MANY).cost == pytest.approx(whole.cost)
     assert all(
         some <= every
-        for some, every in zip(count_joint_edges(left), count_unpruned_edges(graph), strict=True)
+        for some, every in zip(count_joint_edges(links), count_unpruned_edges(graph), strict=True)
     )
 
 
@@ -123,7 +123,7 @@ def test_without_pruning_the_edges_are_all_pairs_of_nodes() -> None:
         0.35,
         np.inf,
     )
-    # 27 nodes, then 8, as in the report's own example; the first stage is met from one node.
+    # 27 nodes, then 8, as in the example of the report; the first stage has one predecessor.
     assert count_unpruned_edges(graph) == [27, 27 * 8]
 
 
@@ -150,14 +150,14 @@ def test_a_person_out_of_reach_of_all_blobs_is_assigned_the_nearest() -> None:
 
 def test_a_merge_costs_for_each_person_but_one() -> None:
     blobs = [np.array([0, 1]), np.array([0, 1]), np.array([1])]
-    shared, nobody = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)
-    costs = merge_costs(blobs, shared, nobody, 0.35)
+    shared, no_others = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)
+    costs = merge_costs(blobs, shared, no_others, 0.35)
     for a, b in product(range(2), repeat=2):
         here = [a, b, 1]
         assert costs[a, b, 0] == pytest.approx(0.35 * (3 - len(set(here))))
-    # Where somebody else is already, everybody is one too many; where being several is free, nobody is.
+    # With another person in the blob each one costs; in blobs where sharing is free none does.
     assert merge_costs(blobs, shared, np.array([1, 0]), 0.35)[0, 0, 0] == pytest.approx(0.7)
-    assert not merge_costs(blobs, np.zeros(2, dtype=bool), nobody, 0.35).any()
+    assert not merge_costs(blobs, np.zeros(2, dtype=bool), no_others, 0.35).any()
 
 
 @given(graphs(most_people=4, most_stages=3, most_blobs=3))
@@ -171,7 +171,7 @@ def test_too_many_people_for_one_table_are_solved_one_after_the_other(graph: Win
 
 
 def test_later_evidence_corrects_an_earlier_match() -> None:
-    # Two people meet in one blob and part; at first each looks like the other, then like themselves.
+    # Two people meet in one blob and part; first their appearances are swapped, then right.
     near = np.full((1, 2), 0.22)
     apart = np.array([[0.0, 9.0], [9.0, 0.0]])
     alone = (np.ones(2, dtype=bool),)

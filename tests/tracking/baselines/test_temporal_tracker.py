@@ -1,4 +1,4 @@
-"""Temporal consistency as a tracker: numbers survive merges, people come and go, frames are told once."""
+"""The temporal-consistency tracker: ids survive merges, people enter and leave, frames are published once."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tracking.registry import create_tracker, needs_images
 SIZE = (150, 200)
 WINDOW = WindowSettings(window=10, stride=5, birth_window=10)
 _HALF = 11
-_COLOURS = ((40, 40, 200), (200, 70, 30), (50, 160, 50))
+_COLORS = ((40, 40, 200), (200, 70, 30), (50, 160, 50))
 SETTINGS = TemporalSettings(window_stages=4, stage_s=0.2, forget_after_s=2.0)
 FPS = 25.0
-_NOBODY: Detections = Detections.empty(0)
+_NO_DETECTIONS: Detections = Detections.empty(0)
 
 
 def _picture(middles: dict[int, tuple[float, float]], seed: int) -> Image:
@@ -31,12 +31,12 @@ def _picture(middles: dict[int, tuple[float, float]], seed: int) -> Image:
     for person, (x, y) in middles.items():
         left, top = round(x) - _HALF, round(y) - _HALF
         if left < SIZE[1] and left + 2 * _HALF > 0:
-            image[max(top, 0) : top + 2 * _HALF, max(left, 0) : left + 2 * _HALF] = _COLOURS[person]
+            image[max(top, 0) : top + 2 * _HALF, max(left, 0) : left + 2 * _HALF] = _COLORS[person]
     return image
 
 
 def _meet(frame: int) -> dict[int, tuple[float, float]]:
-    """Two people come together, stand for a while, and go back to where each came from."""
+    """Return the positions of two people who meet, stand together, and walk back."""
     away = 60.0 - 1.2 * min(frame, 40) if frame < 70 else 12.0 + 1.2 * min(frame - 70, 40)
     return {0: (100.0 - away, 75.0), 1: (100.0 + away, 75.0)}
 
@@ -48,8 +48,8 @@ def _tracker(settings: TemporalSettings = SETTINGS) -> TemporalTracker:
 
 
 def _follow(tracker: TemporalTracker, pictures: dict[int, Image | None]) -> list[WindowResult]:
-    told = [tracker.push(frame, _NOBODY, image) for frame, image in pictures.items()]
-    return [it for it in (*told, tracker.flush()) if it is not None]
+    results = [tracker.push(frame, _NO_DETECTIONS, image) for frame, image in pictures.items()]
+    return [result for result in (*results, tracker.flush()) if result is not None]
 
 
 def _nearest(boxes: dict[int, Floats], place: tuple[float, float]) -> int:
@@ -64,7 +64,7 @@ def test_people_who_meet_and_part_keep_their_ids() -> None:
     assert numbers[0] == numbers[1]
     assert set(numbers[0]) == {1, 2}
     middle = boxes[55]
-    assert np.array_equal(middle[1], middle[2]), "both are in the one blob meanwhile"
+    assert np.array_equal(middle[1], middle[2]), "both have the box of the merged blob"
 
 
 def test_boxes_follow_the_blobs_between_the_samples() -> None:
@@ -121,7 +121,7 @@ def test_every_frame_is_published_once_within_the_lag() -> None:
 
 def test_results_come_when_windows_end() -> None:
     results = _follow(_tracker(), {frame: _picture(_meet(frame), frame) for frame in range(52)})
-    assert [it.last for it in results] == [*range(4, 50, 5), 51]
+    assert [result.last for result in results] == [*range(4, 50, 5), 51]
 
 
 def test_the_same_pictures_give_the_same_tracks() -> None:
@@ -138,7 +138,7 @@ def test_ids_are_new_after_a_long_gap_and_no_result_spans_it() -> None:
     before = _follow(tracker, {frame: _picture(_meet(0), frame) for frame in range(20)})
     after = _follow(tracker, {later + frame: _picture(_meet(0), frame) for frame in range(20)})
     assert after[0].first == later
-    numbers = [{it.id for result in results for it in result.tracks} for results in (before, after)]
+    numbers = [{track.id for result in results for track in result.tracks} for results in (before, after)]
     assert numbers == [{1, 2}, {3, 4}]
 
 
@@ -155,30 +155,35 @@ def test_without_preparation_the_background_is_learned_online() -> None:
 
 def test_appearance_samples_come_from_detections_of_single_people() -> None:
     tracker = _tracker()
-    told = []
+    pushed = []
     for frame in range(40):
         middles = _meet(frame)
         boxes = np.array([[x - _HALF, y - _HALF, x + _HALF, y + _HALF] for x, y in middles.values()])
-        seen = Detections(boxes, np.full(2, 0.9), np.eye(2))
-        told.append(tracker.push(frame, seen, _picture(middles, frame)))
-    results = [it for it in (*told, tracker.flush()) if it is not None]
-    looks = [
-        (track.id, look) for result in results for track in result.tracks for look in track.appearance_samples
+        detections = Detections(boxes, np.full(2, 0.9), np.eye(2))
+        pushed.append(tracker.push(frame, detections, _picture(middles, frame)))
+    results = [result for result in (*pushed, tracker.flush()) if result is not None]
+    samples = [
+        (track.id, sample)
+        for result in results
+        for track in result.tracks
+        for sample in track.appearance_samples
     ]
-    assert {(number, int(look.histogram.argmax())) for number, look in looks} == {(1, 0), (2, 1)}
+    assert {(number, int(sample.histogram.argmax())) for number, sample in samples} == {(1, 0), (2, 1)}
 
 
 def test_a_frame_that_does_not_come_after_the_last_one_is_refused() -> None:
     tracker = _tracker()
-    tracker.push(5, _NOBODY, _picture({}, 0))
+    tracker.push(5, _NO_DETECTIONS, _picture({}, 0))
     with pytest.raises(ValueError, match="frame 5 came after frame 5"):
-        tracker.push(5, _NOBODY, _picture({}, 0))
+        tracker.push(5, _NO_DETECTIONS, _picture({}, 0))
 
 
 def test_the_registry_creates_it_by_name_with_pictures_required() -> None:
     assert needs_images("temporal")
-    made = create_tracker("temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS)
-    assert isinstance(made, TemporalTracker)
+    created = create_tracker(
+        "temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS
+    )
+    assert isinstance(created, TemporalTracker)
 
 
 @pytest.mark.parametrize(

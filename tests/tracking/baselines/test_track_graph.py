@@ -1,4 +1,4 @@
-"""The track graph: who leaves a group, and two who cross while one of them is not detected."""
+"""The track graph: members that leave a group, and crossings in which one person is not detected."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ def _unlike(before: TrackEnd, after: TrackEnd) -> float:
 def test_the_departed_member_is_the_most_probable_of_all_states(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     group = [_end(rng, int(rng.integers(0, 40))) for _ in range(count)]
-    out, rest = _end(rng, 50), _end(rng, 50)
+    leaving_track, remaining_track = _end(rng, 50), _end(rng, 50)
     probabilities = {}
     for leaving, *staying in permutations(range(count)):
-        probability = exp(-_unlike(group[leaving], out))
+        probability = exp(-_unlike(group[leaving], leaving_track))
         if len(staying) == 1:
-            probability *= exp(-_unlike(group[staying[0]], rest))
+            probability *= exp(-_unlike(group[staying[0]], remaining_track))
         probabilities[leaving] = probability
-    best = max(probabilities, key=lambda it: probabilities[it])
-    assert departed_member(group, out, rest, CLOSE, max_distance=1.0) == best
+    best = max(probabilities, key=lambda member: probabilities[member])
+    assert departed_member(group, leaving_track, remaining_track, CLOSE, max_distance=1.0) == best
 
 
 def test_a_person_unlike_all_members_was_not_in_the_group() -> None:
@@ -63,9 +63,9 @@ def test_a_person_unlike_all_members_was_not_in_the_group() -> None:
 
 
 def _crossing() -> tuple[list[Detections], list[Stroll]]:
-    """One walks by another, who is not detected while they are nearly one behind the other."""
+    """Return detections of a person walking past a standing one, who is missed while near the other."""
     standing = Stroll(200.0, 50.0, 0.0, 2, seen=range(1000))
-    hidden = {it for it in range(200) if abs(50.0 + 3.0 * it - 200.0) < 30.0}
+    hidden = {frame for frame in range(200) if abs(50.0 + 3.0 * frame - 200.0) < 30.0}
     walking = Stroll(50.0, 45.0, 3.0, 6)
     frames = [
         seen_at([standing] if frame in hidden else [standing, walking], frame, jitter=0.5, seed=3)
@@ -76,16 +76,16 @@ def _crossing() -> tuple[list[Detections], list[Stroll]]:
 
 def _numbers(tracker: Tracker, frames: list[Detections], people: list[Stroll]) -> list[list[int]]:
     """Return each person's track numbers in order."""
-    told = [tracker.push(number, seen) for number, seen in enumerate(frames)]
-    results = [it for it in (*told, tracker.flush()) if it is not None]
-    had: list[list[int]] = [[] for _ in people]
+    pushed = [tracker.push(number, seen) for number, seen in enumerate(frames)]
+    results = [result for result in (*pushed, tracker.flush()) if result is not None]
+    ids_of_person: list[list[int]] = [[] for _ in people]
     for frame, boxes in sorted(final_boxes(results).items()):
         for number, box in boxes.items():
             near = [float(iou(box, np.array(person.box(frame)))) for person in people]
-            mine = had[int(np.argmax(near))]
-            if max(near) > 0.6 and (not mine or mine[-1] != number):
-                mine.append(number)
-    return had
+            ids = ids_of_person[int(np.argmax(near))]
+            if max(near) > 0.6 and (not ids or ids[-1] != number):
+                ids.append(number)
+    return ids_of_person
 
 
 def test_a_person_who_leaves_a_group_keeps_the_id() -> None:
@@ -95,12 +95,12 @@ def test_a_person_who_leaves_a_group_keeps_the_id() -> None:
 
 def test_a_hijacked_track_is_corrected_when_the_group_splits() -> None:
     people = [Stroll(200.0, 50.0, 0.0, 2), Stroll(100.0, 50.0, 1.0, 6)]
-    # Who alone is detected: the box goes from the one who stands to the one who walks, the filter with it.
+    # One person alone is detected: the box moves from the standing to the walking one, with the filter.
     stands, walks = range(82, 112), range(112, 140)
     frames = []
     for frame in range(180):
-        there = [people[0]] if frame in stands else [people[1]] if frame in walks else people
-        frames.append(seen_at(there, frame, jitter=0.5, seed=4))
+        present = [people[0]] if frame in stands else [people[1]] if frame in walks else people
+        frames.append(seen_at(present, frame, jitter=0.5, seed=4))
     graph, plain = (_numbers(_tracker(name), frames, people) for name in ("track-graph", "kalman"))
     assert graph[0][-1] == graph[0][0]
     assert graph[1][-1] == graph[1][0]
@@ -110,25 +110,27 @@ def test_a_hijacked_track_is_corrected_when_the_group_splits() -> None:
 
 def test_a_frame_has_an_id_at_most_once_and_results_are_deterministic() -> None:
     rng = np.random.default_rng(8)
-    people = [Stroll(float(rng.integers(0, 300)), 40.0, float(rng.integers(-4, 5)), it) for it in range(5)]
+    people = [
+        Stroll(float(rng.integers(0, 300)), 40.0, float(rng.integers(-4, 5)), kind) for kind in range(5)
+    ]
     frames = []
     for frame in range(200):
-        there = [
+        present = [
             person
             for place, person in enumerate(people)
             if not any(abs(person.box(frame)[0] - other.box(frame)[0]) < 14 for other in people[:place])
         ]
-        frames.append(seen_at(there, frame % 90, jitter=1.0, seed=frame))
-    told = []
+        frames.append(seen_at(present, frame % 90, jitter=1.0, seed=frame))
+    runs = []
     for _ in range(2):
         tracker = _tracker("track-graph")
         results = [tracker.push(n, seen) for n, seen in enumerate(frames)]
-        told.append([it for it in (*results, tracker.flush()) if it is not None])
-    for result in told[0]:
+        runs.append([result for result in (*results, tracker.flush()) if result is not None])
+    for result in runs[0]:
         numbers = [track.id for track in result.tracks]
         assert len(numbers) == len(set(numbers))
-    assert [[it.boxes.tobytes() for it in result.tracks] for result in told[0]] == [
-        [it.boxes.tobytes() for it in result.tracks] for result in told[1]
+    assert [[track.boxes.tobytes() for track in result.tracks] for result in runs[0]] == [
+        [track.boxes.tobytes() for track in result.tracks] for result in runs[1]
     ]
 
 

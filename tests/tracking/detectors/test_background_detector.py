@@ -1,4 +1,4 @@
-"""The standard detector on drawn pictures: who is there is found, and what is not there is not."""
+"""The background detector on drawn pictures: people are detected, and nothing else is."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_walker_is_detected_in_a_tight_box() -> None:
     seen = watched(BackgroundDetector(), [WALKER], range(120))
     overlaps = [best_overlap(seen[frame], WALKER, frame) for frame in range(45, 120)]
     assert np.mean(np.array(overlaps) >= 0.5) >= 0.95
-    # One alone may be tall, so that their height is in doubt, and a rectangle is no person.
+    # The height model is uncertain with one person, and a rectangle is not shaped like a person.
     assert np.mean(overlaps) >= 0.65
 
 
@@ -89,7 +89,7 @@ def test_the_ghost_of_a_person_present_from_the_start_vanishes() -> None:
     detector = BackgroundDetector()
     watched(detector, [leaves], range(60))
     after = watched(detector, [], range(60, 130))
-    assert best_overlap(after[0], leaves, 0) >= 0.5, "there is no ghost to begin with"
+    assert best_overlap(after[0], leaves, 0) >= 0.5, "without a ghost the test proves nothing"
     assert all((frame.scores < SURE).all() for frame in after[-20:])
 
 
@@ -198,7 +198,7 @@ def test_many_small_people_lower_the_height_model() -> None:
     one = fit_height_model(samples, HeightModelSettings(), prior, people=1)
     assert one is not None
     assert line.expected_height(np.array([200.0])) < one.expected_height(np.array([200.0])) < 102.0, (
-        "one child is no school"
+        "one small person may be a child"
     )
 
 
@@ -206,29 +206,29 @@ def test_the_height_model_is_more_uncertain_with_fewer_people() -> None:
     foot = np.linspace(100, 280, 900)
     samples = np.stack([foot, 0.65 * foot - 20.0], axis=1)
     lines = [fit_height_model(samples, HeightModelSettings(), people=people) for people in (1, 2, 8)]
-    doubts = [float(line.standard_deviation(np.array([200.0]))[0]) for line in lines if line is not None]
-    assert len(doubts) == 3
-    assert doubts[0] > 1.3 * doubts[1] > 1.6 * doubts[2]
-    assert doubts[0] >= 0.03 * 110.0, "however often somebody is seen, they may be tall"
+    deviations = [float(line.standard_deviation(np.array([200.0]))[0]) for line in lines if line is not None]
+    assert len(deviations) == 3
+    assert deviations[0] > 1.3 * deviations[1] > 1.6 * deviations[2]
+    assert deviations[0] >= 0.03 * 110.0, "many samples of one tall person do not help"
 
 
 def test_a_standing_person_gives_one_sample_and_a_walking_one_gives_many() -> None:
-    anew, counted = SampleNoveltyFilter(), {"stands": 0, "walks": 0}
+    novelty, counted = SampleNoveltyFilter(), {"stands": 0, "walks": 0}
     for frame in range(400):
         stands = IsolatedPerson(60.0 + frame % 3, 130.0, 50.0)
         walks = IsolatedPerson(80.0 + 2.0 * frame, 200.0, 100.0)
         flickers = [] if 100 <= frame < 140 else [stands]
-        for person in anew.new_samples([*flickers, walks]):
+        for person in novelty.new_samples([*flickers, walks]):
             counted["walks" if person is walks else "stands"] += 1
     assert counted["stands"] == 1
     assert 60 <= counted["walks"] <= 80
 
 
 def test_a_place_is_forgotten_when_it_is_empty() -> None:
-    anew, person = SampleNoveltyFilter(), IsolatedPerson(60.0, 130.0, 50.0)
-    assert anew.new_samples([person]) == [person]
-    assert anew.new_samples([], frames=200) == []
-    assert anew.new_samples([person]) == [person]
+    novelty, person = SampleNoveltyFilter(), IsolatedPerson(60.0, 130.0, 50.0)
+    assert novelty.new_samples([person]) == [person]
+    assert novelty.new_samples([], frames=200) == []
+    assert novelty.new_samples([person]) == [person]
 
 
 def test_a_standing_person_with_hidden_feet_does_not_change_the_height_model() -> None:
@@ -236,7 +236,7 @@ def test_a_standing_person_with_hidden_feet_does_not_change_the_height_model() -
     learner = HeightModelEstimator(HeightModelSettings())
     for frame in range(600):
         foreground = np.zeros_like(visible)
-        foreground[85:125, 280:296] = 255  # three quarters of somebody
+        foreground[85:125, 280:296] = 255  # three quarters of a person
         if frame < 200:
             foot = 140 + frame // 2
             tall = round(0.6 * foot - 25)
@@ -256,7 +256,10 @@ def test_without_a_unit_the_horizon_constrains_the_height_model() -> None:
     prior = height_prior(HeightModelSettings(), FloorGeometry(20.0, None), HEIGHT)
     assert prior.model is None
     samples = np.stack([foot, height], axis=1)
-    held, free = (fit_height_model(samples, HeightModelSettings(), it, people=4) for it in (prior, None))
+    held, free = (
+        fit_height_model(samples, HeightModelSettings(), model_prior, people=4)
+        for model_prior in (prior, None)
+    )
     assert held is not None
     assert free is not None
     near = np.array([260.0])
@@ -281,7 +284,7 @@ def test_the_height_model_is_reliable_with_floor_geometry_or_many_samples() -> N
     assert not alone.is_reliable
     assert HeightModelEstimator(HeightModelSettings(), FloorGeometry(57.0, 0.7), HEIGHT).is_reliable
     visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
-    surely = []
+    reliable = []
     for step in range(120):
         foreground = np.zeros_like(visible)
         foot = 120 + step
@@ -289,9 +292,9 @@ def test_the_height_model_is_reliable_with_floor_geometry_or_many_samples() -> N
         left = 20 + 2 * step
         foreground[foot - tall : foot, left : left + int(0.36 * tall)] = 255
         alone.observe(foreground, visible)
-        surely.append(alone.is_reliable)
-    assert not surely[5]
-    assert surely[-1]
+        reliable.append(alone.is_reliable)
+    assert not reliable[5]
+    assert reliable[-1]
 
 
 def test_floor_geometry_gives_the_height_model_at_every_picture_size() -> None:

@@ -1,4 +1,4 @@
-"""The box filter and the explanation against the same worked out cell by cell."""
+"""The box filter and the foreground fit equal references that sum cell by cell."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def scene(seed: int = 0) -> tuple[Plane, Plane, Plane]:
     return foreground * weight, cost, weight
 
 
-def found(body: Body = "person", band: HeightRange | None = None) -> ScanPeaks:
+def find_peaks(body: Body = "person", band: HeightRange | None = None) -> ScanPeaks:
     foreground, cost, weight = scene()
     settings = BoxFilterSettings(body=body, min_height=0.3, max_height=0.6)
     return BoxFilter(weight, ROWS, settings).peaks(foreground - cost, band)
@@ -48,7 +48,7 @@ def found(body: Body = "person", band: HeightRange | None = None) -> ScanPeaks:
 @pytest.mark.parametrize("body", ["person", "box"])
 def test_gains_and_areas_equal_sums_over_cells(body: Body) -> None:
     foreground, cost, weight = scene()
-    peaks = found(body)
+    peaks = find_peaks(body)
     assert len(peaks.boxes) > 3
     for box, gain, size in zip(peaks.boxes, peaks.gains, peaks.areas, strict=True):
         inside = body_of(box, body)
@@ -58,7 +58,7 @@ def test_gains_and_areas_equal_sums_over_cells(body: Body) -> None:
 
 
 def test_every_person_is_a_peak() -> None:
-    best = found().boxes
+    best = find_peaks().boxes
     for box in PEOPLE:
         assert (np.abs(best - box).max(axis=1) <= 3.0).any(), box
 
@@ -66,14 +66,14 @@ def test_every_person_is_a_peak() -> None:
 def test_peaks_are_local_maxima() -> None:
     foreground, cost, _ = scene()
     gain = foreground - cost
-    for box, value in zip(found().boxes[:3], found().gains[:3], strict=True):
+    for box, value in zip(find_peaks().boxes[:3], find_peaks().gains[:3], strict=True):
         for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             assert gain[body_of(box + np.array([x, y, x, y]))].sum() <= 1.03 * value
 
 
 def test_heights_outside_the_range_are_not_searched() -> None:
     line = HeightModel(slope=0.55, offset=0.0)
-    peaks = found(band=HeightRange(line, tolerance=0.15, tolerance_std=1.0, min_height=0.08))
+    peaks = find_peaks(band=HeightRange(line, tolerance=0.15, tolerance_std=1.0, min_height=0.08))
     heights, feet = peaks.boxes[:, 3] - peaks.boxes[:, 1], peaks.boxes[:, 3]
     assert len(heights) > 3
     assert (np.abs(heights - 0.55 * feet) <= np.maximum(0.15 * 0.55 * feet, 1.0)).all()
@@ -85,12 +85,12 @@ def test_small_people_are_searched_down_to_the_least_height_of_the_model() -> No
     gain = np.full_like(weight, -0.35)
     child = np.array([60.0, 30.0, 65.0, 42.0])
     gain[body_of(child)] = 1.0
-    for smallest, sought in ((40.0, False), (11.0, True)):
+    for smallest, expected in ((40.0, False), (11.0, True)):
         line = HeightModel(0.3, 0.0, min_height=smallest)
         one = BoxFilter(weight, ROWS, BoxFilterSettings(min_height=0.3))
         boxes = one.peaks(gain, HeightRange(line, 0.15, 1.0, min_height=0.08)).boxes
-        assert (len(boxes) > 0) == sought
-        assert not sought or np.abs(boxes[0] - child).max() <= 2.0
+        assert (len(boxes) > 0) == expected
+        assert not expected or np.abs(boxes[0] - child).max() <= 2.0
 
 
 def test_a_new_height_range_replaces_the_previous_one() -> None:
@@ -104,7 +104,7 @@ def test_a_new_height_range_replaces_the_previous_one() -> None:
 
 def test_incremental_gains_equal_recomputed_ones() -> None:
     foreground, cost, weight = scene()
-    peaks = found()
+    peaks = find_peaks()
     search = GreedySearch(peaks, foreground, cost, weight, ForegroundFitSettings())
     chosen: set[int] = set()
     rng = np.random.default_rng(1)
@@ -114,16 +114,16 @@ def test_incremental_gains_equal_recomputed_ones() -> None:
         hidden = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
         for one in chosen:
             hidden |= body_of(peaks.boxes[one])
-        left = np.where(hidden, np.minimum(foreground - cost, 0.0), foreground - cost)
+        remaining = np.where(hidden, np.minimum(foreground - cost, 0.0), foreground - cost)
         free = np.where(hidden, 0.0, weight)
         bodies = [body_of(box) for box in peaks.boxes]
-        np.testing.assert_allclose(search.gains, [left[body].sum() for body in bodies], atol=1e-2)
+        np.testing.assert_allclose(search.gains, [remaining[body].sum() for body in bodies], atol=1e-2)
         np.testing.assert_allclose(search.visible, [free[body].sum() for body in bodies], atol=1e-2)
 
 
 def test_a_small_set_explains_the_foreground_and_other_boxes_score_low() -> None:
     foreground, cost, weight = scene()
-    explained = fit_foreground(found(), foreground, cost, weight, ForegroundFitSettings())
+    explained = fit_foreground(find_peaks(), foreground, cost, weight, ForegroundFitSettings())
     assert explained.people == 3
     assert (explained.scores[:3] > 0.6).all()
     assert (explained.scores[3:] < 0.4).all()
@@ -152,7 +152,7 @@ def test_a_crowd_is_explained_by_its_number_of_people() -> None:
 
 def test_without_foreground_fit_boxes_score_independently() -> None:
     foreground, cost, weight = scene()
-    peaks = found()
+    peaks = find_peaks()
     explained = fit_foreground(
         peaks, foreground, cost, weight, ForegroundFitSettings(enabled=False, max_hypotheses=5)
     )

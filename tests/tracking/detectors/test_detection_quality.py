@@ -1,4 +1,4 @@
-"""What detection and tracking must reach: on the synthetic room, and on a real recording where it is."""
+"""Minimum quality of detection and tracking, on the synthetic room and on a real recording."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Quality:
     precision: float
 
 
-def tracked(
+def track_boxes(
     images: Iterable[npt.NDArray[np.uint8]], ignore: tuple[tuple[tuple[float, float], ...], ...] = ()
 ) -> dict[int, Boxes]:
     """Return the final boxes of every frame, counted from 0."""
@@ -52,21 +52,21 @@ def tracked(
 
 
 def quality(truth: Mapping[int, tuple[Boxes, npt.NDArray[np.bool_]]], found: Mapping[int, Boxes]) -> Quality:
-    """Compare; the truth gives boxes and who of them counts for the recall."""
-    there = hit = given = right = 0
+    """Compute recall and precision; the truth has boxes and which of them count for the recall."""
+    people = detected = boxes_found = correct = 0
     for frame, (boxes, counts) in truth.items():
         overlaps = iou(boxes[:, None], found[frame][None])
         rows, columns = linear_sum_assignment(np.where(overlaps >= 0.5, overlaps, 0.0), maximize=True)
         same = overlaps[rows, columns] >= 0.5
-        there, given = there + int(counts.sum()), given + len(found[frame])
-        hit, right = hit + int(counts[rows[same]].sum()), right + int(same.sum())
-    return Quality(hit / there, right / given)
+        people, boxes_found = people + int(counts.sum()), boxes_found + len(found[frame])
+        detected, correct = detected + int(counts[rows[same]].sum()), correct + int(same.sum())
+    return Quality(detected / people, correct / boxes_found)
 
 
 @pytest.mark.slow
 def test_people_of_the_room_are_tracked_two_seconds_after_the_start() -> None:
     scene = Scene("room", 3, 4, 1, 640, 360, 25)
-    found = tracked(scene.image(0, frame) for frame in range(FRAMES_OF_SCENE))
+    found = track_boxes(scene.image(0, frame) for frame in range(FRAMES_OF_SCENE))
     truth = {}
     for frame in range(WARM_UP, FRAMES_OF_SCENE):
         seen = scene.truth(frame)[0]
@@ -80,7 +80,7 @@ def test_people_of_a_real_terrace_are_tracked(shared_data: Path) -> None:
     with av.open(str(shared_data / "terrace" / "c0.mp4")) as film:
         frames = islice(film.decode(video=0), FRAMES_OF_RECORDING)
         images = [frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False) for frame in frames]
-    found = tracked(images, (WATERMARK,))
+    found = track_boxes(images, (WATERMARK,))
     boxes: dict[int, list[tuple[float, ...]]] = {}
     for row in read_rows(shared_data / "terrace" / "gt" / "c0.txt"):
         if WARM_UP <= row.frame - 1 < FRAMES_OF_RECORDING:

@@ -1,4 +1,4 @@
-"""OpenCV's people detector behind the interface: boxes on people, best first, none twice."""
+"""The HOG detector: boxes on people, best first, without duplicates."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from tracking.detectors.non_maximum_suppression import non_maximum_suppression
 from tracking.types import Detections
 
 SETTINGS = HogSettings(min_height=0.25)
-WHERE_SOMEBODY_IS = 110
+FRAME = 110
 
 
 @cache
 def room() -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float64]]:
     """Return a picture of the synthetic room and the boxes of fully visible people."""
     scene = Scene("room", 3, 4, 1, 640, 360, 25)
-    seen = scene.truth(WHERE_SOMEBODY_IS)[0]
-    return scene.image(0, WHERE_SOMEBODY_IS), seen.boxes[seen.visibility >= 0.8]
+    seen = scene.truth(FRAME)[0]
+    return scene.image(0, FRAME), seen.boxes[seen.visibility >= 0.8]
 
 
 def found(settings: HogSettings = SETTINGS) -> Detections:

@@ -1,4 +1,4 @@
-"""Public detections as a detector: the right frame, scores in [0, 1], no doubles."""
+"""The MOT file detector: the right frame, scores in [0, 1], no duplicates."""
 
 from __future__ import annotations
 

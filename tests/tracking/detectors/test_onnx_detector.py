@@ -1,4 +1,4 @@
-"""Networks of the user's: every layout of YOLO's is read, and what does not fit is said in one line."""
+"""The ONNX detector: all YOLO layouts are read, and unsupported models are refused in one line."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_boxes_are_mapped_back_from_the_letterboxed_input(tmp_path: Path) -> Non
     path = save(tmp_path / "tiny.onnx", V8, size=(96, 96))
     wide = np.full((64, 192, 3), 255, dtype=np.uint8)  # half its size in the input, 32 rows of bar above
     seen = detector(path, min_score=0.1).detect(wide)
-    # The bars are 114 of 255 bright, and so sure is this network.
+    # The bars have brightness 114 of 255, which scales the score of this network.
     np.testing.assert_allclose(seen.scores, [0.72 * 114 / 255], rtol=1e-3)
     np.testing.assert_allclose(seen.boxes, [[48, 0, 72, 40]], atol=1e-4)
 
@@ -80,8 +80,8 @@ def test_an_unsupported_model_is_refused_in_one_line(tmp_path: Path) -> None:
         save(tmp_path / "flat.onnx", V8[0]): r"output has the shape \(6, 20\)",
         save(tmp_path / "thin.onnx", yolov5([(1.0, 2.0, 3.0, 4.0)])): r"shape \(1, 20, 4\)",
     }
-    for path, said in refused.items():
-        with pytest.raises(ValueError, match=said) as caught:
+    for path, message in refused.items():
+        with pytest.raises(ValueError, match=message) as caught:
             detector(path)
         assert path.name in str(caught.value)
         assert "\n" not in str(caught.value)
@@ -102,4 +102,4 @@ def test_a_configured_layout_overrides_the_shape() -> None:
     np.testing.assert_allclose(found.boxes[0], [24, 12, 36, 52])
     np.testing.assert_allclose(found.scores[0], 0.72)
     by_shape = decode_output(one_class, "auto", (0,))
-    np.testing.assert_allclose(by_shape.boxes[0], MIDDLE, err_msg="by its shape it is end to end")
+    np.testing.assert_allclose(by_shape.boxes[0], MIDDLE, err_msg="the shape alone means end to end")

@@ -1,4 +1,4 @@
-"""Template matching: the object is its own best peak, and sub-images are told apart."""
+"""The template detector: the object is the best peak, and sub-images are compared by appearance."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_there_are_max_peaks_peaks_at_different_places() -> None:
     assert len(seen) == 80
     apart = np.abs(seen.boxes[:, None, :2] - seen.boxes[None, :, :2])
     near = (apart[..., 0] <= 2) & (apart[..., 1] <= 2)
-    assert near.sum() == 80, "only every peak with itself"
+    assert near.sum() == 80, "no peak is near another"
     assert len(TemplateDetector(cut(image), TemplateSettings(max_peaks=7)).detect(image)) == 7
 
 

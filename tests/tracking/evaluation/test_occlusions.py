@@ -1,4 +1,4 @@
-"""Occlusions in ground truth, and whether a number survives them."""
+"""Occlusions in ground truth, and whether ids survive them."""
 
 from __future__ import annotations
 

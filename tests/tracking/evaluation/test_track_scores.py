@@ -1,4 +1,4 @@
-"""Scores of tracks: a case worked out by hand, what does not count, and the ceiling."""
+"""Track scores: a small example, ignored people, and the oracle association."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TWO_PEOPLE = stay(1, NEAR, 1, 2, 3, 4) + stay(2, FAR, 1, 2, 3, 4)
 
 
 def test_scores_of_a_small_example() -> None:
-    # The first person is followed by track 10, then by 11; the other by 12; 13 is nobody.
+    # Track 10 and then 11 follow the first person, 12 the other; 13 is a false positive.
     tracks = stay(10, NEAR, 1, 2) + stay(11, NEAR, 3, 4) + stay(12, FAR, 1, 2, 3, 4) + stay(13, 250.0, 1)
     scores = evaluate(TWO_PEOPLE, tracks)
     assert (scores.switches, scores.misses, scores.false_positives) == (1, 0, 1)
@@ -99,13 +99,13 @@ def test_detections_are_refused_as_tracks() -> None:
 
 
 def test_different_ids_in_another_camera_lower_only_the_joint_scores() -> None:
-    there = stay(1, NEAR, 1, 2, 3, 4)
+    truth = stay(1, NEAR, 1, 2, 3, 4)
     cameras = {
-        "c0": TruthAndTracks(there, stay(10, NEAR, 1, 2, 3, 4)),
-        "c1": TruthAndTracks(there, stay(20, NEAR, 1, 2, 3, 4)),
+        "c0": TruthAndTracks(truth, stay(10, NEAR, 1, 2, 3, 4)),
+        "c1": TruthAndTracks(truth, stay(20, NEAR, 1, 2, 3, 4)),
     }
     scores = evaluate_cameras(cameras)
-    assert [it.idf1 for it in scores.cameras.values()] == [1.0, 1.0]
+    assert [camera_scores.idf1 for camera_scores in scores.cameras.values()] == [1.0, 1.0]
     assert scores.joint.idf1 == 0.5
     assert (scores.joint.objects, scores.joint.tracks, scores.joint.switches) == (1, 2, 1)
 

@@ -1,4 +1,4 @@
-"""Scores of tiny random cases against all ways to match people with tracks, tried one by one."""
+"""Scores of small random cases equal those of all possible matchings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tracking.evaluation.frame_matching import FrameSimilarity, align_frames
 from tracking.motchallenge import MotRow
 
 CASES = 60
-LEAST = 0.5
+MIN_IOU = 0.5
 ALPHAS = np.arange(1, 20) / 20.0
 Pairs = list[tuple[int, int]]
 
 
 def random_rows(rng: np.random.Generator, objects: int) -> list[MotRow]:
-    """Draw up to `objects` people who crowd into a place two boxes wide, for five frames."""
+    """Draw up to `objects` people in a space two boxes wide, for five frames."""
     return [
         MotRow(frame, number, rng.uniform(0, 60), rng.uniform(0, 60), 80.0, 160.0)
         for frame in range(1, 6)
@@ -66,11 +66,11 @@ def clear(frames: list[FrameSimilarity]) -> tuple[int, int]:
         best: tuple[float, ...] = (-1.0, 0.0)
         chosen: Pairs = []
         for pairs in matchings(frame):
-            kept = [pair for pair in pairs if frame.similarity[pair] >= LEAST]
+            kept = [pair for pair in pairs if frame.similarity[pair] >= MIN_IOU]
             stays = sum(before.get(person) == track for person, track in ids(frame, kept))
-            worth = (float(stays), float(sum(frame.similarity[pair] for pair in kept)))
-            if worth > best:
-                best, chosen = worth, kept
+            rank = (float(stays), float(sum(frame.similarity[pair] for pair in kept)))
+            if rank > best:
+                best, chosen = rank, kept
         before = dict(ids(frame, chosen))
         matches += len(chosen)
         switches += sum(last.get(person, track) != track for person, track in before.items())
@@ -83,7 +83,7 @@ def identity_f1(frames: list[FrameSimilarity]) -> float:
     people, tracks = boxes_of(frames)
     together = {
         (person, track): sum(
-            frame.similarity[row, column] >= LEAST
+            frame.similarity[row, column] >= MIN_IOU
             for frame in frames
             for row in np.flatnonzero(frame.truth == person)
             for column in np.flatnonzero(frame.tracks == track)
@@ -147,7 +147,7 @@ def _hota_at(
 def test_scores_equal_those_of_exhaustive_search(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth, tracks = random_rows(rng, 3), random_rows(rng, int(rng.integers(1, 5)))
-    frames = align_frames(truth, tracks, LEAST)
+    frames = align_frames(truth, tracks, MIN_IOU)
     scores = evaluate(truth, tracks)
     matches, switches = clear(frames)
     assert (scores.misses, scores.false_positives) == (len(truth) - matches, len(tracks) - matches)

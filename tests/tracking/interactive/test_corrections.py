@@ -1,4 +1,4 @@
-"""What it costs to be elsewhere than where somebody points."""
+"""Costs of positions that contradict an operator's correction."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def test_a_correction_raises_only_node_costs_of_its_object_in_its_frame(
     case: Case, frame: int, x: float, y: float
 ) -> None:
     network = network_of(replace(case, shared=True))
-    pointing = PositionCorrection(100 + frame, 7, x, y, 25.0)
+    correction = PositionCorrection(100 + frame, 7, x, y, 25.0)
     ids = [7, *range(10, 9 + network.objects)]
-    changed = apply_corrections(network, 100, ids, {pointing.frame: {7: pointing}}, ASSIST, 1.5)
+    changed = apply_corrections(network, 100, ids, {correction.frame: {7: correction}}, ASSIST, 1.5)
     if frame >= network.frames:
         assert changed is network
         return
     more = network.node.copy()
-    more[0, frame, :-1] += ASSIST.correction_weight * normalized_offset(pointing, network.boxes[0, frame])
+    more[0, frame, :-1] += ASSIST.correction_weight * normalized_offset(correction, network.boxes[0, frame])
     more[0, frame, -1] += ASSIST.correction_weight * ASSIST.hidden_share
     np.testing.assert_array_equal(changed.node, more)
     for before, after in ((network.source, changed.source), (network.pair, changed.pair)):
@@ -55,15 +55,15 @@ def test_a_correction_raises_only_node_costs_of_its_object_in_its_frame(
 
 
 def test_a_correction_decides_between_two_identical_objects() -> None:
-    """Both are alike and at one place before the window: without it the answer is an accident."""
+    """Both objects are identical before the window: without the correction the assignment is arbitrary."""
     case = Case(2, 3, 2, shared=True, settings=replace(SETTINGS, layout=0.0, gate=None), seed=5)
     network = network_of(case)
     even = replace(network, node=np.zeros_like(network.node), source=np.zeros_like(network.source))
     places = [np.flatnonzero(network.present[0, m]) for m in range(3)]
-    assert all(len(it) == 2 for it in places)
+    assert all(len(frame_places) == 2 for frame_places in places)
     for owner in (0, 1):
         left, top, right, bottom = network.boxes[0, 2, 0].tolist()
-        said = PositionCorrection(2, owner, (left + right) / 2.0, (top + bottom) / 2.0, 1.0)
-        pointed = apply_corrections(even, 0, [0, 1], {2: {owner: said}}, ASSIST, 1.0)
-        states = create_solver("exact").solve(pointed).states
+        correction = PositionCorrection(2, owner, (left + right) / 2.0, (top + bottom) / 2.0, 1.0)
+        corrected = apply_corrections(even, 0, [0, 1], {2: {owner: correction}}, ASSIST, 1.0)
+        states = create_solver("exact").solve(corrected).states
         assert states[owner, 2] == 0

@@ -1,4 +1,4 @@
-"""The tracker that is helped: nothing changes unasked, and the past is mended when told."""
+"""The interactive tracker: equal to the online tracker without corrections; corrections revise the past."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from tracking.interactive import InteractiveSettings, InteractiveTracker, Positi
 from tracking.interactive.late_correction import backdate_correction
 from tracking.registry import create_tracker
 
-ALIKE = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
-"""Two who look alike and cross in frame 37; nothing tells who is who after it but how they went."""
+SIMILAR = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
+"""Two similar people who cross in frame 37; only their motion distinguishes them."""
 
 
-def _helped(memory: int = 250) -> InteractiveTracker:
+def _interactive_tracker(memory: int = 250) -> InteractiveTracker:
     assist = InteractiveSettings(enabled=True, memory_frames=memory)
     return InteractiveTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
 
 
-def _plain() -> OnlineTracker:
+def _online_tracker() -> OnlineTracker:
     return OnlineTracker(WindowSettings(), TEST_COSTS, create_solver("columns"))
 
 
-def _crossing(people: Sequence[Stroll] = ALIKE, frames: int = 80) -> list[Detections]:
-    """One piece of foreground while they are behind each other."""
+def _crossing(people: Sequence[Stroll] = SIMILAR, frames: int = 80) -> list[Detections]:
+    """Return the detections of a crossing: one box while one person is behind the other."""
     stream = [seen_at(people, n, 0.5, 1) for n in range(frames)]
     for n in range(33, 42):
         found = stream[n]
@@ -46,136 +46,138 @@ def _boxes(result: WindowResult, number: int) -> np.ndarray:
     return next(track.boxes for track in result.tracks if track.id == number)
 
 
-def _whom(box: np.ndarray, frame: int) -> int:
-    return int(np.argmax([iou(box, np.array(person.box(frame))) for person in ALIKE]))
+def _person_at(box: np.ndarray, frame: int) -> int:
+    return int(np.argmax([iou(box, np.array(person.box(frame))) for person in SIMILAR]))
 
 
 def _shown(results: Sequence[WindowResult]) -> list[object]:
     return [
         (
-            it.first,
-            it.last,
-            it.final_to,
-            [(t.id, t.boxes.tobytes(), t.interpolated.tobytes()) for t in it.tracks],
+            result.first,
+            result.last,
+            result.final_to,
+            [(t.id, t.boxes.tobytes(), t.interpolated.tobytes()) for t in result.tracks],
         )
-        for it in results
+        for result in results
     ]
 
 
 def test_without_corrections_the_tracks_equal_those_of_the_online_tracker() -> None:
     stream = _crossing()
-    helped = follow(stream, _helped())
-    assert _shown(helped) == _shown(follow(stream, _plain()))
-    assert all(it.revised_from is None for it in helped)
-    assert not any(it.risk_events for it in follow(stream, _plain()))
+    results = follow(stream, _interactive_tracker())
+    assert _shown(results) == _shown(follow(stream, _online_tracker()))
+    assert all(result.revised_from is None for result in results)
+    assert not any(result.risk_events for result in follow(stream, _online_tracker()))
 
 
 def test_only_a_crossing_of_similar_people_is_a_risk_event() -> None:
-    def foreseen(people: Sequence[Stroll]) -> list[tuple[int, int]]:
-        results = follow(_crossing(people), _helped())
+    def crossing_events(people: Sequence[Stroll]) -> list[tuple[int, int]]:
+        results = follow(_crossing(people), _interactive_tracker())
         return [
-            (it.last, trouble.frame)
-            for it in results
-            for trouble in it.risk_events
-            if trouble.reason == "crossing"
+            (result.last, event.frame)
+            for result in results
+            for event in result.risk_events
+            if event.reason == "crossing"
         ]
 
-    warned = foreseen(ALIKE)
-    assert warned
-    first, expected = warned[0]
+    events = crossing_events(SIMILAR)
+    assert events
+    first, expected = events[0]
     assert first < 33
     assert expected == pytest.approx(37, abs=5)
-    assert not foreseen([ALIKE[0], Stroll(300, 50, -4.0, 4)])
+    assert not crossing_events([SIMILAR[0], Stroll(300, 50, -4.0, 4)])
 
 
 def test_a_person_who_vanishes_alone_is_a_track_loss_event() -> None:
     gone = Stroll(200, 50, 1.0, 2, seen=range(40))
-    results = follow([seen_at([ALIKE[0], gone], n, 0.5) for n in range(60)], _helped())
-    fading = [trouble for it in results for trouble in it.risk_events if trouble.reason == "track_loss"]
-    assert fading
-    assert {trouble.objects for trouble in fading} == {(2,)}
-    assert all(40 <= trouble.frame < 60 for trouble in fading)
+    results = follow([seen_at([SIMILAR[0], gone], n, 0.5) for n in range(60)], _interactive_tracker())
+    losses = [event for result in results for event in result.risk_events if event.reason == "track_loss"]
+    assert losses
+    assert {event.objects for event in losses} == {(2,)}
+    assert all(40 <= event.frame < 60 for event in losses)
 
 
 @pytest.mark.parametrize(
     "frames", [range(42, 60), range(60, 61), range(75, 76)], ids=["following", "late", "last"]
 )
 def test_a_correction_revises_the_past_back_to_the_crossing(frames: range) -> None:
-    """They are told to have turned back, which the tracker holds for less likely."""
-    tracked = _helped()
+    """The corrections say that both turned back, which the tracker considers less likely."""
+    tracked = _interactive_tracker()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
-    mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in frames])
-    assert mended is not None
-    assert mended.last == 79
-    assert mended.first <= 33
-    assert mended.revised_from is not None
-    assert 33 <= mended.revised_from <= 45
+    revised = tracked.apply_corrections([_at(SIMILAR[1], n, 1) for n in frames])
+    assert revised is not None
+    assert revised.last == 79
+    assert revised.first <= 33
+    assert revised.revised_from is not None
+    assert 33 <= revised.revised_from <= 45
     for number, before, after in ((1, 0, 1), (2, 1, 0)):
-        boxes = _boxes(mended, number)
-        for frame in range(mended.first, 80):
-            box = boxes[frame - mended.first]
+        boxes = _boxes(revised, number)
+        for frame in range(revised.first, 80):
+            box = boxes[frame - revised.first]
             if not np.isnan(box[0]) and not 33 <= frame < 45:
-                assert _whom(box, frame) == (before if frame < 33 else after), (number, frame)
-    assert {track.id for track in mended.tracks} == {1, 2}
+                assert _person_at(box, frame) == (before if frame < 33 else after), (number, frame)
+    assert {track.id for track in revised.tracks} == {1, 2}
 
 
 def test_later_results_continue_from_the_revised_past() -> None:
-    tracked, stream = _helped(), _crossing(frames=100)
+    tracked, stream = _interactive_tracker(), _crossing(frames=100)
     for n, seen in enumerate(stream[:60]):
         tracked.push(n, seen)
-    tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(42, 58)])
-    later = [it for n, seen in enumerate(stream[60:], 60) if (it := tracked.push(n, seen)) is not None]
+    tracked.apply_corrections([_at(SIMILAR[1], n, 1) for n in range(42, 58)])
+    later = [
+        result for n, seen in enumerate(stream[60:], 60) if (result := tracked.push(n, seen)) is not None
+    ]
     for frame, tracks in final_boxes(later).items():
-        assert {number: _whom(box, frame) for number, box in tracks.items()} == {1: 1, 2: 0}
+        assert {number: _person_at(box, frame) for number, box in tracks.items()} == {1: 1, 2: 0}
 
 
 def test_a_correction_that_agrees_with_the_tracks_changes_nothing() -> None:
-    tracked = _helped()
+    tracked = _interactive_tracker()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
-    assert tracked.apply_corrections([_at(ALIKE[0], n, 1) for n in range(45, 79)]) is None
+    assert tracked.apply_corrections([_at(SIMILAR[0], n, 1) for n in range(45, 79)]) is None
 
 
 def test_a_correction_gives_a_lost_person_the_old_id_back() -> None:
-    """Hidden for two seconds, and elsewhere than they went: the tracker holds them for somebody new."""
-    away = [Stroll(0, 50, 2.0, 1, seen=range(30)), Stroll(-100, 50, 5.0, 1, seen=range(80, 140))]
-    tracked = _helped()
+    """Hidden for two seconds and back at an unexpected place: the tracker assigns a new id."""
+    strolls = [Stroll(0, 50, 2.0, 1, seen=range(30)), Stroll(-100, 50, 5.0, 1, seen=range(80, 140))]
+    tracked = _interactive_tracker()
     for n in range(140):
-        tracked.push(n, seen_at(away, n, 0.5))
-    mended = tracked.apply_corrections([_at(away[1], 120, 1)])
-    assert mended is not None
-    assert {track.id for track in mended.tracks if not np.isnan(track.boxes[-1, 0])} == {1}
-    assert mended.revised_from == pytest.approx(80, abs=2)
+        tracked.push(n, seen_at(strolls, n, 0.5))
+    revised = tracked.apply_corrections([_at(strolls[1], 120, 1)])
+    assert revised is not None
+    assert {track.id for track in revised.tracks if not np.isnan(track.boxes[-1, 0])} == {1}
+    assert revised.revised_from == pytest.approx(80, abs=2)
 
 
 def test_a_correction_before_the_memory_is_ignored() -> None:
-    tracked = _helped(memory=30)
+    tracked = _interactive_tracker(memory=30)
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
     assert not tracked.remembers(40)
     assert tracked.remembers(49)
-    assert tracked.apply_corrections([_at(ALIKE[1], 40, 1)]) is None
+    assert tracked.apply_corrections([_at(SIMILAR[1], 40, 1)]) is None
 
 
 def test_a_forgotten_contradiction_does_not_prevent_later_revisions() -> None:
-    tracked, stream = _helped(memory=60), _crossing(frames=91)
+    tracked, stream = _interactive_tracker(memory=60), _crossing(frames=91)
     for n, seen in enumerate(stream):
         tracked.push(n, seen)
         if n == 20:
-            beside = _at(ALIKE[0], 15, 1)
-            assert tracked.apply_corrections([replace(beside, x=beside.x + 0.3**0.5 * WIDTH)]) is None
+            correction = _at(SIMILAR[0], 15, 1)
+            assert tracked.apply_corrections([replace(correction, x=correction.x + 0.3**0.5 * WIDTH)]) is None
             assert tracked._contradicted_frames == [15]
-    mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(60, 70)])
-    assert mended is not None
-    assert mended.revised_from is not None
+    revised = tracked.apply_corrections([_at(SIMILAR[1], n, 1) for n in range(60, 70)])
+    assert revised is not None
+    assert revised.revised_from is not None
 
 
 def test_the_memory_is_bounded() -> None:
-    tracked = _helped(memory=40)
+    tracked = _interactive_tracker(memory=40)
     for n in range(300):
-        tracked.push(n, seen_at(ALIKE, n % 60, 0.5))
-        tracked.apply_corrections([_at(ALIKE[0], n % 60, 1)])
+        tracked.push(n, seen_at(SIMILAR, n % 60, 0.5))
+        tracked.apply_corrections([_at(SIMILAR[0], n % 60, 1)])
     memory = tracked._memory
     assert len(memory.detections) <= 40 + WindowSettings().window + 1
     assert len(memory.assignments) <= len(memory.detections)
@@ -184,33 +186,36 @@ def test_the_memory_is_bounded() -> None:
 
 
 def test_after_a_long_gap_nothing_before_it_is_remembered() -> None:
-    tracked, stream = _helped(), _crossing()
+    tracked, stream = _interactive_tracker(), _crossing()
     for n, seen in enumerate(stream[:60]):
         tracked.push(n, seen)
     tracked.push(5000, stream[0])
     assert not tracked.remembers(50)
     assert tracked.remembers(5000)
-    assert tracked.apply_corrections([_at(ALIKE[1], 50, 1)]) is None
+    assert tracked.apply_corrections([_at(SIMILAR[1], 50, 1)]) is None
 
 
 def test_the_same_corrections_give_the_same_results() -> None:
-    def mended() -> list[object]:
-        tracked = _helped()
+    def revised() -> list[object]:
+        tracked = _interactive_tracker()
         results = [tracked.push(n, seen) for n, seen in enumerate(_crossing())]
-        results += [tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(42, 60)]), tracked.flush()]
-        return _shown([it for it in results if it is not None])
+        results += [
+            tracked.apply_corrections([_at(SIMILAR[1], n, 1) for n in range(42, 60)]),
+            tracked.flush(),
+        ]
+        return _shown([result for result in results if result is not None])
 
-    assert mended() == mended()
+    assert revised() == revised()
 
 
 def test_corrections_are_applied_after_the_end_of_a_recording() -> None:
-    tracked = _helped()
+    tracked = _interactive_tracker()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
     tracked.flush()
-    mended = tracked.apply_corrections([_at(ALIKE[1], n, 1) for n in range(42, 60)])
-    assert mended is not None
-    assert mended.final_to == 79
+    revised = tracked.apply_corrections([_at(SIMILAR[1], n, 1) for n in range(42, 60)])
+    assert revised is not None
+    assert revised.final_to == 79
 
 
 @pytest.mark.parametrize(
@@ -247,35 +252,39 @@ def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
 
 
 def test_a_correction_inserts_a_box_where_the_detector_merges_two_people() -> None:
-    tracked, stream = _helped(), _crossing()
+    tracked, stream = _interactive_tracker(), _crossing()
     merged = (33, 34, 35, 40, 41)
     for n in range(33, 42):
-        both = np.array([person.box(n) for person in ALIKE])
+        both = np.array([person.box(n) for person in SIMILAR])
         box = np.concatenate([both[:, :2].min(axis=0), both[:, 2:].max(axis=0)])
         stream[n] = Detections(box[None], stream[n].scores, stream[n].histograms)
-    shown = final_boxes(follow(stream, _plain()))
-    assert not any(_own(shown[n].get(2), n) for n in merged), "one box is nobody's own"
+    shown = final_boxes(follow(stream, _online_tracker()))
+    assert not any(_is_own_box(shown[n].get(2), n) for n in merged), "the merged box is not the person's own"
     for n, seen in enumerate(stream):
         tracked.push(n, seen)
-    mended = tracked.apply_corrections([_at(ALIKE[1], n, 2) for n in range(30, 46)])
-    assert mended is not None
-    boxes = _boxes(mended, 2)
-    assert all(_own(boxes[n - mended.first], n) for n in merged)
-    assert {track.id for track in mended.tracks} == {1, 2}
-    later = [tracked.push(n, seen_at(ALIKE, n, 0.5)) for n in range(80, 100)]
-    assert {track.id for it in later if it for track in it.tracks} == {1, 2}, "nobody begins with such a box"
+    revised = tracked.apply_corrections([_at(SIMILAR[1], n, 2) for n in range(30, 46)])
+    assert revised is not None
+    boxes = _boxes(revised, 2)
+    assert all(_is_own_box(boxes[n - revised.first], n) for n in merged)
+    assert {track.id for track in revised.tracks} == {1, 2}
+    later = [tracked.push(n, seen_at(SIMILAR, n, 0.5)) for n in range(80, 100)]
+    assert {track.id for result in later if result for track in result.tracks} == {1, 2}, (
+        "inserted boxes initiate no track"
+    )
 
 
-def _own(box: np.ndarray | None, frame: int) -> bool:
-    return box is not None and bool(iou(box, np.array(ALIKE[1].box(frame))) > 0.7)
+def _is_own_box(box: np.ndarray | None, frame: int) -> bool:
+    return box is not None and bool(iou(box, np.array(SIMILAR[1].box(frame))) > 0.7)
 
 
 def test_a_correction_during_an_occlusion_is_not_backdated() -> None:
-    """That says nothing of the frames before; at a box of the other one's in the open it does."""
-    tracked = _helped()
+    """It says nothing about earlier frames; a correction at the other person's visible box does."""
+    tracked = _interactive_tracker()
     for n, seen in enumerate(_crossing()):
         tracked.push(n, seen)
-    behind, open_ = _at(ALIKE[1], 38, 2), _at(ALIKE[0], 60, 2)
+    behind, open_ = _at(SIMILAR[1], 38, 2), _at(SIMILAR[0], 60, 2)
     assert 2 not in tracked._memory.assignments[38]
     assert backdate_correction(behind, tracked._memory, TEST_COSTS, since=0) == []
-    assert {it.object for it in backdate_correction(open_, tracked._memory, TEST_COSTS, since=0)} == {1, 2}
+    assert {
+        correction.object for correction in backdate_correction(open_, tracked._memory, TEST_COSTS, since=0)
+    } == {1, 2}

@@ -1,4 +1,4 @@
-"""How likely a failure is: by signs that mean what they say."""
+"""Failure probabilities from risk features."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_a_risk_is_a_probability_and_falls_with_the_margin(reason: RiskReason) -
             failure_probability(reason, RiskFeatures(margin, lead, 10.0))
             for margin in (0.0, 0.5, 2.0, 100.0, np.inf)
         ]
-        assert all(0.0 < it < 1.0 for it in risks)
+        assert all(0.0 < risk < 1.0 for risk in risks)
         assert all(one >= other for one, other in pairwise(risks))
 
 

@@ -1,4 +1,4 @@
-"""What it costs two objects to have each other's identity from some frame on."""
+"""Swap margins: the cost of swapping two identities from some frame on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _solved(case: Case) -> tuple[Network, np.ndarray, float]:
     return network, solution.states, solution.report.objective
 
 
-def _exchanged(states: np.ndarray, a: int, b: int, frame: int) -> np.ndarray:
+def _swap_from(states: np.ndarray, a: int, b: int, frame: int) -> np.ndarray:
     other = states.copy()
     other[[a, b], frame:] = states[[b, a], frame:]
     return other
@@ -35,20 +35,20 @@ def test_a_margin_equals_the_cost_of_the_cheapest_swap(case: Case) -> None:
     network, states, cost = _solved(case)
     found = swap_margins(network, states)
     for a, b in combinations(range(network.objects), 2):
-        tried = [
-            total_cost(network, nodes_from_states(network, _exchanged(states, a, b, frame))) - cost
+        swap_costs = [
+            total_cost(network, nodes_from_states(network, _swap_from(states, a, b, frame))) - cost
             for frame in range(network.frames)
             if (states[[a, b], frame:] != OCCLUDED).any()
         ]
-        least = min(tried, default=np.inf)
+        least = min(swap_costs, default=np.inf)
         assert found.margins[a, b] == found.margins[b, a]
         assert found.margins[a, b] == pytest.approx(least, abs=1e-9)
         if np.isfinite(least):
-            there = _exchanged(states, a, b, int(found.frames[a, b]))
-            assert total_cost(network, nodes_from_states(network, there)) - cost == pytest.approx(
+            swapped = _swap_from(states, a, b, int(found.frames[a, b]))
+            assert total_cost(network, nodes_from_states(network, swapped)) - cost == pytest.approx(
                 least, abs=1e-9
             )
-            assert conflict_count(network, nodes_from_states(network, there)) == 0
+            assert conflict_count(network, nodes_from_states(network, swapped)) == 0
 
 
 @given(cases(objects=3, frames=4, places=3))
@@ -64,21 +64,23 @@ def test_a_margin_is_at_least_the_cost_of_the_best_solution_with_swapped_ends(
             continue
         node = network.node.copy()
         for one, other in ((a, b), (b, a)):
-            barred = np.arange(network.places + 1) != states[other, -1] % (network.places + 1)
-            node[one, -1, barred] = np.inf
+            forbidden = np.arange(network.places + 1) != states[other, -1] % (network.places + 1)
+            node[one, -1, forbidden] = np.inf
         best = create_solver("exact").solve(replace(network, node=node))
         assert best.report.objective - cost <= margins[a, b] + 1e-9
 
 
 @given(cases(objects=3, frames=4, places=3), st.randoms())
 @settings(deadline=None, max_examples=20)
-def test_margins_do_not_depend_on_the_order_of_objects(case: Case, lot: object) -> None:
+def test_margins_do_not_depend_on_the_order_of_objects(case: Case, random: object) -> None:
     network, states, _ = _solved(case)
     assume(network.objects > 1)
     order = list(range(network.objects))
-    lot.shuffle(order)  # type: ignore[attr-defined]
-    turned = swap_margin_matrix(network.select(order), states[order])
-    np.testing.assert_allclose(turned, swap_margin_matrix(network, states)[np.ix_(order, order)], atol=1e-9)
+    random.shuffle(order)  # type: ignore[attr-defined]
+    reordered = swap_margin_matrix(network.select(order), states[order])
+    np.testing.assert_allclose(
+        reordered, swap_margin_matrix(network, states)[np.ix_(order, order)], atol=1e-9
+    )
 
 
 def test_margins_need_shared_observations() -> None:

@@ -1,4 +1,4 @@
-"""The tracker's memory: who has whose number when windows are solved again."""
+"""The window memory: ids when windows are solved again."""
 
 from __future__ import annotations
 
@@ -13,33 +13,35 @@ def _window(end: int) -> WindowSnapshot:
     return WindowSnapshot(first=end - 14, end=end, final_to=end - 10, objects=(), warm_start=None)
 
 
-def _two_begin_in_one_place() -> WindowMemory:
-    """One in each of two windows, as where the first one's track ended at once."""
+def _two_tracks_at_one_place() -> WindowMemory:
+    """Start one track in each of two windows, as if the first had ended at once."""
     memory = WindowMemory(100)
     memory.record_window(_window(19))
     assert memory.assign_id(12, PLACE, new_id=1) == 1
     memory.record_window(_window(24))
-    assert memory.assign_id(14, PLACE, new_id=2) == 2, "who begins where somebody else did is somebody else"
+    assert memory.assign_id(14, PLACE, new_id=2) == 2, (
+        "a track that starts at the same place is another object"
+    )
     return memory
 
 
 def test_without_solving_windows_again_no_id_is_reused() -> None:
-    memory = _two_begin_in_one_place()
+    memory = _two_tracks_at_one_place()
     memory.record_window(_window(29))
     assert memory.assign_id(15, PLACE, new_id=3) == 3
 
 
 def test_windows_solved_again_assign_each_of_their_ids_once() -> None:
-    memory = _two_begin_in_one_place()
+    memory = _two_tracks_at_one_place()
     memory.record_window(_window(19))
-    assert memory.assign_id(13, ELSEWHERE, new_id=3) == 3, "nobody began there"
+    assert memory.assign_id(13, ELSEWHERE, new_id=3) == 3, "no track started there"
     assert memory.assign_id(13, PLACE, new_id=4) == 1
     assert memory.assign_id(13, PLACE, new_id=4) == 2
     assert memory.assign_id(13, PLACE, new_id=4) == 4
 
 
 def test_ids_of_windows_that_are_not_solved_again_stay_assigned() -> None:
-    memory = _two_begin_in_one_place()
+    memory = _two_tracks_at_one_place()
     memory.record_window(_window(24))
     assert memory.assign_id(13, PLACE, new_id=3) == 2
     assert memory.assign_id(13, PLACE, new_id=3) == 3

@@ -1,4 +1,4 @@
-"""Which places exclude each other, and the rows that say so."""
+"""Exclusions between places, and the constraint rows that express them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_boxes_conflict_above_the_overlap() -> None:
 
 
 def test_a_box_between_two_people_excludes_them_only_with_star_rows() -> None:
-    """A and C are apart, B between them is nobody's: `A--B--C`."""
+    """A and C do not conflict; B between them conflicts with both and is unused: `A--B--C`."""
     network = row_of_people(0.0, 14.0, 28.0)
     assert not network.exclusions()[0, 0, 2]
     stars = row_of_people(0.0, 14.0, 28.0, rules=replace(CORNERS, conflict_rows="star"))

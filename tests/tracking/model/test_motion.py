@@ -1,4 +1,4 @@
-"""Motion: where somebody should be by now, and what being elsewhere costs."""
+"""The motion model: predicted positions, and the cost of deviating from them."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_reappearance_is_gated_by_predicted_position_and_appearance() -> None:
     far = window(motion, settings, *(expected + np.array([90.0, 0.0, 90.0, 0.0])))
     assert np.isinf(far.source[0, 0])
     assert np.isinf(far.pair[0, 0, 1, 0])
-    assert np.isfinite(far.pair[0, 0, 0, 0]), "who is seen may go anywhere within a step"
+    assert np.isfinite(far.pair[0, 0, 0, 0]), "a visible object is not gated by motion"
     unlike = window(motion, settings, *expected, look=OTHER)
     assert np.isinf(unlike.pair[0, 0, 1, 0])
     paper = replace(settings, reappearance=0.0, motion=0.0)
@@ -96,8 +96,8 @@ def test_short_gaps_are_interpolated_and_long_ones_are_not() -> None:
     filled = interpolate_gaps(boxes, None, 3)
     assert filled[:4] == pytest.approx(np.stack([BOX + n * RIGHT for n in range(4)]))
     assert np.isnan(filled[4:9]).all()
-    assert np.isnan(filled[10:]).all(), "nobody knows where they go next"
-    assert np.isnan(boxes[1]).all(), "what was given stays"
+    assert np.isnan(filled[10:]).all(), "nothing is extrapolated"
+    assert np.isnan(boxes[1]).all(), "the input is unchanged"
 
 
 def test_a_gap_that_began_before_the_window_is_interpolated() -> None:

@@ -1,4 +1,4 @@
-"""The network of a window: the cost table of paper II.B, cell by cell, and what is refused."""
+"""The network of a window: the cost table of paper section II.B, cell by cell, and refused inputs."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ DARK, LIGHT = np.array([0.9, 0.1]), np.array([0.2, 0.8])
 HIDDEN = -1
 
 
-def seen(*boxes: np.ndarray, looks: tuple[np.ndarray, ...] = ()) -> Detections:
-    histograms = np.array(looks) if looks else np.tile(DARK, (len(boxes), 1))
+def seen(*boxes: np.ndarray, appearance: tuple[np.ndarray, ...] = ()) -> Detections:
+    histograms = np.array(appearance) if appearance else np.tile(DARK, (len(boxes), 1))
     return Detections(np.array(boxes).reshape(-1, 4), np.ones(len(boxes)), histograms.reshape(len(boxes), 2))
 
 
@@ -28,14 +28,16 @@ def g(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def test_an_arc_between_observations_costs_appearance_change_and_displacement() -> None:
-    frames = [seen(LEFT), seen(LEFT, RIGHT, looks=(DARK, LIGHT))]
+    frames = [seen(LEFT), seen(LEFT, RIGHT, appearance=(DARK, LIGHT))]
     network = build_network([Template(1, DARK, LEFT)], frames, SETTINGS)
     arc = network.pair[0, 0, 0, 1] + network.node[0, 1, 1]
     assert arc == pytest.approx(g(DARK, LIGHT) + 0.5 * g(DARK, LIGHT) + 0.01 * 100.0)
 
 
 def test_an_arc_out_of_occlusion_costs_appearance_and_a_constant() -> None:
-    network = build_network([Template(1, DARK, LEFT)], [seen(LEFT), seen(RIGHT, looks=(LIGHT,))], SETTINGS)
+    network = build_network(
+        [Template(1, DARK, LEFT)], [seen(LEFT), seen(RIGHT, appearance=(LIGHT,))], SETTINGS
+    )
     assert network.pair[0, 0, HIDDEN, 0] + network.node[0, 1, 0] == pytest.approx(0.3 + g(DARK, LIGHT))
 
 
@@ -48,7 +50,7 @@ def test_arcs_into_occlusion_and_sink_cost_both_constants() -> None:
 
 def test_the_source_is_an_observation_or_an_occlusion() -> None:
     here, away = Template(1, DARK, LEFT), Template(2, DARK, None)
-    network = build_network([here, away], [seen(RIGHT, looks=(LIGHT,))], SETTINGS)
+    network = build_network([here, away], [seen(RIGHT, appearance=(LIGHT,))], SETTINGS)
     first = network.source + network.node[:, 0]
     likeness = g(DARK, LIGHT)
     np.testing.assert_allclose(first[0], [likeness + 0.5 * likeness + 1.0, 0.8])

@@ -1,4 +1,4 @@
-"""The integer optimum: `exact` and `extended-dp` against each other and against trying everything."""
+"""The integer optimum: `exact` and `extended-dp` equal each other and exhaustive search."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tracking.solvers.objective import conflict_count, total_cost
 from tracking.solvers.solution_builder import integer_nodes
 from tracking.types import Detections
 
-CLOSE = 1e-9
+TOLERANCE = 1e-9
 PERSON = np.array([20.0, 50.0])
 LAYOUTS = (0.0, 0.0, 0.0005, 0.002)
 
@@ -29,7 +29,7 @@ LAYOUTS = (0.0, 0.0, 0.0005, 0.002)
 def test_the_optimum_is_found(name: str, case: Case) -> None:
     network = network_of(case)
     report = create_solver(name).solve(network).report
-    assert report.objective == pytest.approx(best_by_trying(network), rel=CLOSE)
+    assert report.objective == pytest.approx(best_by_trying(network), rel=TOLERANCE)
     assert (report.gap, report.conflicts, report.integral) == (0.0, 0, True)
 
 
@@ -39,7 +39,7 @@ def test_both_exact_solvers_agree(case: Case) -> None:
     network = network_of(case)
     joint = create_solver("extended-dp").solve(network).report
     exact = create_solver("exact").solve(network).report
-    assert exact.objective == pytest.approx(joint.objective, rel=CLOSE)
+    assert exact.objective == pytest.approx(joint.objective, rel=TOLERANCE)
 
 
 @settings(deadline=None, max_examples=40)
@@ -48,7 +48,7 @@ def test_the_optimum_lies_between_the_bound_and_the_rounded_states(case: Case) -
     network = network_of(case)
     relaxed = create_solver("columns").solve(network).report
     exact = create_solver("exact").solve(network).report
-    assert relaxed.bound - CLOSE <= exact.objective <= relaxed.objective + CLOSE
+    assert relaxed.bound - TOLERANCE <= exact.objective <= relaxed.objective + TOLERANCE
 
 
 def test_too_many_joint_states_are_refused() -> None:
@@ -68,7 +68,7 @@ def test_joint_states_and_branching_find_the_same_optimum(case: Case) -> None:
     branched = branch_and_bound(network, found, start)
     best = start if joint is None else joint
     assert conflict_count(network, best) == 0
-    assert total_cost(network, best) == pytest.approx(total_cost(network, branched), rel=CLOSE)
+    assert total_cost(network, best) == pytest.approx(total_cost(network, branched), rel=TOLERANCE)
 
 
 def test_where_joint_states_are_too_many_branching_finds_the_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,7 +77,7 @@ def test_where_joint_states_are_too_many_branching_finds_the_optimum(monkeypatch
     expected = create_solver("extended-dp").solve(network).report.objective
     monkeypatch.setattr(exact, "_MAX_JOINT_STATES", 1)
     monkeypatch.setattr(exact, "_MAX_TRANSITIONS", 1)
-    assert create_solver("exact").solve(network).report.objective == pytest.approx(expected, rel=CLOSE)
+    assert create_solver("exact").solve(network).report.objective == pytest.approx(expected, rel=TOLERANCE)
 
 
 def test_the_exact_solver_agrees_with_joint_states_on_two_people_in_step() -> None:
@@ -90,7 +90,7 @@ def test_the_exact_solver_agrees_with_joint_states_on_two_people_in_step() -> No
     templates = [Template(n, frames[0].histograms[n], frames[0].boxes[n]) for n in range(2)]
     network = build_network(templates, frames, replace(PAPER_COSTS, layout=0.002))
     exact, joint = (create_solver(name).solve(network).report for name in ("exact", "extended-dp"))
-    assert exact.objective == pytest.approx(joint.objective, rel=CLOSE)
+    assert exact.objective == pytest.approx(joint.objective, rel=TOLERANCE)
 
 
 def test_a_program_wrongly_presolved_as_infeasible_is_solved() -> None:

@@ -30,14 +30,14 @@ def best_square_by_trying(network: Network) -> float:
     return best
 
 
-ILL = replace(SETTINGS, gate=40.0, layout=1e-4, conflict_distance=120.0)
-REGULAR_IS_WORSE = Case(3, 2, 2, shared=True, settings=ILL, seed=1537)
-"""A window whose quadratic program HiGHS ends in an error, unless nothing is added to make it regular."""
+ILL_CONDITIONED = replace(SETTINGS, gate=40.0, layout=1e-4, conflict_distance=120.0)
+REGULARIZATION_FAILS = Case(3, 2, 2, shared=True, settings=ILL_CONDITIONED, seed=1537)
+"""A window whose quadratic program fails in HiGHS if it is regularized."""
 
 
 @settings(deadline=None, max_examples=40)
 @given(case=cases(objects=3, frames=2, places=2, layouts=(1e-5, 1e-4)))
-@example(case=REGULAR_IS_WORSE)
+@example(case=REGULARIZATION_FAILS)
 def test_the_l2_bound_is_below_the_optimum_and_integral_relaxations_attain_it(case: Case) -> None:
     network = network_of(case)
     report = create_solver("l2").solve(network).report
@@ -58,7 +58,7 @@ def test_without_layout_l2_equals_columns(case: Case) -> None:
 
 
 def side_by_side(layout: float) -> Network:
-    """Two people walk right in step; in the last frame the second may also stay, which looks better."""
+    """Two people walk in step; in the last frame the second may stay, where its appearance fits better."""
     dark, grey = np.array([1.0, 0.0]), np.array([0.97, 0.03])
 
     def at(*lefts: float, looks: tuple[np.ndarray, ...]) -> Detections:

@@ -1,4 +1,4 @@
-"""From shares of paths to whole ones."""
+"""Rounding of fractional paths to integral ones."""
 
 from __future__ import annotations
 

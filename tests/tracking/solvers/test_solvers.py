@@ -1,4 +1,4 @@
-"""What every solver promises, on random windows against trying everything."""
+"""Properties of all solvers, on random windows and compared with exhaustive search."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tracking.solvers import OCCLUDED, Solution, create_solver
 from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost
 from tracking.types import Detections
 
-CLOSE = 1e-9
-RELAXING = ("arcs", "columns")
-WITHOUT_CONFLICTS = (*RELAXING, "greedy-dp")
+TOLERANCE = 1e-9
+RELAXATIONS = ("arcs", "columns")
+CONFLICT_FREE = (*RELAXATIONS, "greedy-dp")
 bounded = settings(deadline=None, max_examples=60)
 
 
@@ -31,7 +31,7 @@ def test_an_unknown_solver_is_refused_with_the_known_names() -> None:
         create_solver("simplex")
 
 
-@pytest.mark.parametrize("name", WITHOUT_CONFLICTS)
+@pytest.mark.parametrize("name", CONFLICT_FREE)
 @bounded
 @given(case=cases(layouts=(0.0, 0.002)))
 def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
@@ -41,24 +41,24 @@ def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
     assert solution.states.shape == (network.objects, network.frames)
     assert solution.states.dtype == np.int64
     assert solution.states.min(initial=OCCLUDED) >= OCCLUDED
-    assert solution.report.objective == pytest.approx(total_cost(network, nodes), rel=CLOSE)
+    assert solution.report.objective == pytest.approx(total_cost(network, nodes), rel=TOLERANCE)
     assert np.isfinite(solution.report.objective)
     assert conflict_count(network, nodes) == solution.report.conflicts == 0
 
 
-@pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
+@pytest.mark.parametrize("name", [*CONFLICT_FREE, "separate-dp"])
 @settings(deadline=None, max_examples=30)
 @given(case=cases(objects=2, frames=3, places=2, layouts=(0.0, 0.002)))
 def test_the_bound_is_below_the_optimum_and_integral_relaxations_are_optimal(name: str, case: Case) -> None:
     network = network_of(case)
     optimum = best_by_trying(network)
     report = create_solver(name).solve(network).report
-    assert report.bound <= optimum + CLOSE
+    assert report.bound <= optimum + TOLERANCE
     if report.conflicts == 0:
-        assert report.objective >= optimum - CLOSE
+        assert report.objective >= optimum - TOLERANCE
     if report.integral:
-        assert report.objective == pytest.approx(optimum, rel=CLOSE)
-        assert report.gap < CLOSE
+        assert report.objective == pytest.approx(optimum, rel=TOLERANCE)
+        assert report.gap < TOLERANCE
 
 
 @pytest.mark.parametrize("name", ["arcs", "extended-dp", "greedy-dp"])
@@ -66,19 +66,19 @@ def test_the_bound_is_below_the_optimum_and_integral_relaxations_are_optimal(nam
 @given(case=cases(objects=3, frames=2, places=2), share=st.sampled_from([0.2, 0.5, 0.8]))
 def test_forbidden_nodes_are_avoided_or_the_report_has_conflicts(name: str, case: Case, share: float) -> None:
     network = network_of(case)
-    barred = np.random.default_rng(case.seed).uniform(size=network.node.shape) < share
-    network = replace(network, node=np.where(barred, np.inf, network.node))
+    forbidden = np.random.default_rng(case.seed).uniform(size=network.node.shape) < share
+    network = replace(network, node=np.where(forbidden, np.inf, network.node))
     optimum = best_by_trying(network)
     assume(np.isfinite(optimum))
     found = create_solver(name).solve(network)
     assert found.report.conflicts == conflict_count(network, nodes_from_states(network, found.states))
     if not found.report.conflicts:
-        assert found.report.objective >= optimum - CLOSE
+        assert found.report.objective >= optimum - TOLERANCE
     if name != "greedy-dp":
         assert not found.report.conflicts
         assert np.isfinite(found.report.objective)
     if name == "extended-dp" or found.report.integral:
-        assert found.report.objective == pytest.approx(optimum, rel=CLOSE)
+        assert found.report.objective == pytest.approx(optimum, rel=TOLERANCE)
 
 
 def test_greedy_ends_if_no_object_has_a_path() -> None:
@@ -92,22 +92,22 @@ def test_greedy_ends_if_no_object_has_a_path() -> None:
 def test_three_objects_get_the_optimum_if_the_relaxation_is_integral(case: Case) -> None:
     network = network_of(case)
     optimum = best_by_trying(network)
-    for name in RELAXING:
+    for name in RELAXATIONS:
         report = create_solver(name).solve(network).report
-        assert report.bound <= optimum + CLOSE
-        assert not report.integral or report.objective == pytest.approx(optimum, rel=CLOSE)
+        assert report.bound <= optimum + TOLERANCE
+        assert not report.integral or report.objective == pytest.approx(optimum, rel=TOLERANCE)
 
 
 @settings(deadline=None, max_examples=150)
 @given(case=cases(objects=6, frames=6, places=6, layouts=(0.0, 0.0, 0.002)))
 def test_columns_finds_the_optimum_of_all_arcs(case: Case) -> None:
     columns, arcs = solved(case, "columns").report, solved(case, "arcs").report
-    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE, abs=CLOSE)
+    assert columns.bound == pytest.approx(arcs.bound, rel=TOLERANCE, abs=TOLERANCE)
     if columns.integral and arcs.integral:
-        assert columns.objective == pytest.approx(arcs.objective, rel=CLOSE, abs=CLOSE)
+        assert columns.objective == pytest.approx(arcs.objective, rel=TOLERANCE, abs=TOLERANCE)
 
 
-@pytest.mark.parametrize("name", [*WITHOUT_CONFLICTS, "separate-dp"])
+@pytest.mark.parametrize("name", [*CONFLICT_FREE, "separate-dp"])
 @settings(deadline=None, max_examples=10)
 @given(case=cases(objects=4, frames=4, places=4))
 def test_the_same_window_gives_the_same_states(name: str, case: Case) -> None:
@@ -121,7 +121,7 @@ def test_the_same_window_gives_the_same_states(name: str, case: Case) -> None:
 def test_columns_finds_the_optimum_of_crowds(case: Case, crowd: int) -> None:
     crowded = replace(case, objects=crowd, places=12, shared=True)
     columns, arcs = solved(crowded, "columns").report, solved(crowded, "arcs").report
-    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE, abs=CLOSE)
+    assert columns.bound == pytest.approx(arcs.bound, rel=TOLERANCE, abs=TOLERANCE)
 
 
 def test_columns_finds_the_optimum_of_many_small_groups() -> None:
@@ -130,12 +130,12 @@ def test_columns_finds_the_optimum_of_many_small_groups() -> None:
     boxes = np.column_stack([lefts, np.zeros(20), lefts + 20.0, np.full(20, 50.0)])
 
     def seen(frame: int) -> Detections:
-        there = boxes[::2] if frame == 2 else boxes
-        return Detections(there, np.ones(len(there)), np.ones((len(there), 1)))
+        visible = boxes[::2] if frame == 2 else boxes
+        return Detections(visible, np.ones(len(visible)), np.ones((len(visible), 1)))
 
     templates = [Template(n, np.ones(1), boxes[n]) for n in range(20)]
     network = build_network(templates, [seen(m) for m in range(5)], replace(PAPER_COSTS, displacement=0.003))
-    columns, arcs = (create_solver(name).solve(network).report for name in RELAXING)
+    columns, arcs = (create_solver(name).solve(network).report for name in RELAXATIONS)
     assert columns.rounds > 0
-    assert columns.bound == pytest.approx(arcs.bound, rel=CLOSE)
+    assert columns.bound == pytest.approx(arcs.bound, rel=TOLERANCE)
     assert columns.integral

@@ -1,4 +1,4 @@
-"""What one window tells the next: right or wrong, the optimum stays the same."""
+"""Warm starts: the optimum is the same with right and wrong ones."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from tracking.solvers import UNKNOWN_STATE, ConflictPrice, WarmStart, create_sol
 from tracking.solvers.objective import conflict_count, nodes_from_states
 from tracking.types import Detections
 
-CLOSE = 1e-9
+TOLERANCE = 1e-9
 PERSON = np.array([0.0, 0.0, 20.0, 50.0])
 bounded = settings(deadline=None, max_examples=60)
 
 
-def same_optimum(network: Network, hint: WarmStart) -> None:
+def same_optimum(network: Network, warm_start: WarmStart) -> None:
     columns = create_solver("columns")
-    cold, warm = columns.solve(network), columns.solve(network, hint)
-    assert warm.report.bound == pytest.approx(cold.report.bound, rel=CLOSE, abs=CLOSE)
+    cold, warm = columns.solve(network), columns.solve(network, warm_start)
+    assert warm.report.bound == pytest.approx(cold.report.bound, rel=TOLERANCE, abs=TOLERANCE)
     assert conflict_count(network, nodes_from_states(network, warm.states)) == 0
     assert warm.report.objective >= warm.report.bound
     if warm.report.integral and cold.report.integral:
-        assert warm.report.objective == pytest.approx(cold.report.objective, rel=CLOSE, abs=CLOSE)
+        assert warm.report.objective == pytest.approx(cold.report.objective, rel=TOLERANCE, abs=TOLERANCE)
 
 
 @bounded
@@ -67,15 +67,15 @@ def test_an_arbitrary_warm_start_changes_nothing(case: Case, seed: int) -> None:
 @given(case=cases(objects=6, frames=5, places=6))
 def test_the_same_warm_start_gives_the_same_solution(case: Case) -> None:
     columns, network = create_solver("columns"), network_of(case)
-    hint = columns.solve(network).warm_start
-    first, second = columns.solve(network, hint), columns.solve(network, hint)
+    warm_start = columns.solve(network).warm_start
+    first, second = columns.solve(network, warm_start), columns.solve(network, warm_start)
     np.testing.assert_array_equal(first.states, second.states)
     assert first.report == second.report
 
 
 @pytest.mark.parametrize("name", ["arcs", "exact", "extended-dp", "greedy-dp", "separate-dp", "l2"])
 def test_other_solvers_ignore_the_warm_start(name: str) -> None:
-    network, solver = rivals(0), create_solver(name)
+    network, solver = rival_network(0), create_solver(name)
     first, second = (
         solver.solve(network),
         solver.solve(network, create_solver("columns").solve(network).warm_start),
@@ -85,13 +85,13 @@ def test_other_solvers_ignore_the_warm_start(name: str) -> None:
 
 def test_a_shifted_warm_start_has_the_new_frame_and_object_indices() -> None:
     rows = (ConflictPrice(0, (1, 2), 0.5), ConflictPrice(2, (0, 1), 0.25))
-    hint = WarmStart(rows, np.array([[0, 1, 2], [3, 4, -1]])).shift(2, [1, None, 0])
-    assert hint.rows == (ConflictPrice(0, (0, 1), 0.25),)
-    assert hint.states.tolist() == [[-1], [UNKNOWN_STATE], [2]]
+    warm_start = WarmStart(rows, np.array([[0, 1, 2], [3, 4, -1]])).shift(2, [1, None, 0])
+    assert warm_start.rows == (ConflictPrice(0, (0, 1), 0.25),)
+    assert warm_start.states.tolist() == [[-1], [UNKNOWN_STATE], [2]]
 
 
-def rivals(first: int, frames: int = 6) -> Network:
-    """Two people who look alike stand apart; in frame 3 only one of them is seen, and both want the box."""
+def rival_network(first: int, frames: int = 6) -> Network:
+    """Two similar people stand apart; in frame 3 only one is detected, and both compete for the box."""
     boxes = np.array([PERSON, PERSON + np.array([60.0, 0.0, 60.0, 0.0])])
 
     def seen(frame: int) -> Detections:
@@ -108,14 +108,16 @@ def costs() -> CostSettings:
 
 def test_if_the_old_prices_hold_no_program_is_solved() -> None:
     columns = create_solver("columns")
-    before = columns.solve(rivals(0))
-    assert before.report.rounds > 0, "the two have to want the same boxes for this test"
-    after = columns.solve(rivals(1), before.warm_start.shift(1, [0, 1]))
+    before = columns.solve(rival_network(0))
+    assert before.report.rounds > 0, "both objects must compete for the same boxes"
+    after = columns.solve(rival_network(1), before.warm_start.shift(1, [0, 1]))
     assert after.report.rounds == 0
-    assert after.report.objective == pytest.approx(columns.solve(rivals(1)).report.objective, rel=CLOSE)
+    assert after.report.objective == pytest.approx(
+        columns.solve(rival_network(1)).report.objective, rel=TOLERANCE
+    )
 
 
 def test_reports_are_equal_regardless_of_solving_time() -> None:
-    first, second = (create_solver("columns").solve(rivals(0)).report for _ in range(2))
+    first, second = (create_solver("columns").solve(rival_network(0)).report for _ in range(2))
     assert first.seconds > 0.0
     assert replace(first, seconds=1.0) == replace(second, seconds=2.0)
