@@ -24,7 +24,7 @@ PLAYERS = 10
 
 @pytest.fixture(scope="module", params=range(3))
 def paths(request: pytest.FixtureRequest) -> np.ndarray:
-    """Two minutes of a game: ``(T, PLAYERS, 2)`` metres."""
+    """Two minutes of a game: ``(T, PLAYERS, 2)`` meters."""
     crowd = ChoreographedCrowd(Game(COURT, PLAYERS, request.param), [1.85] * PLAYERS)
     return np.array([[(pose.x, pose.y) for pose in crowd.poses(t / RATE)] for t in range(120 * RATE)])
 
@@ -71,8 +71,8 @@ def test_each_team_has_one_outfit() -> None:
     first, second = (
         [choose_team_outfit(player, team) for player in range(team, PLAYERS, 2)] for team in range(2)
     )
-    assert len({(look.upper, look.lower) for look in first}) == 1
-    assert len({(look.upper, look.lower) for look in second}) == 1
+    assert len({(outfit.upper, outfit.lower) for outfit in first}) == 1
+    assert len({(outfit.upper, outfit.lower) for outfit in second}) == 1
     colors = np.array([[first[0].upper, second[0].upper]], dtype=np.float32)
     red, blue = cv2.cvtColor(colors, cv2.COLOR_RGB2LAB)[0]
     assert np.linalg.norm(red - blue) > 60

@@ -30,13 +30,13 @@ def crowd(people: int, seed: int) -> ChoreographedCrowd:
 
 @cache
 def paths(people: int, seed: int, seconds: int = 120) -> np.ndarray:
-    """Return the sampled paths of a crowd: ``(T, people, 2)`` metres."""
+    """Return the sampled paths of a crowd: ``(T, people, 2)`` meters."""
     walkers = crowd(people, seed)
     return np.array([[(pose.x, pose.y) for pose in walkers.poses(t / RATE)] for t in range(seconds * RATE)])
 
 
 def gaps(people_paths: np.ndarray) -> np.ndarray:
-    """Return the distances of all pairs: ``(T, pairs)`` metres."""
+    """Return the distances of all pairs: ``(T, pairs)`` meters."""
     apart = np.linalg.norm(people_paths[:, :, None] - people_paths[:, None], axis=3)
     return apart[:, *np.triu_indices(people_paths.shape[1], 1)]
 
@@ -56,7 +56,7 @@ def test_people_meet_and_part_again_several_times_a_minute(people: int, seed: in
 @pytest.mark.parametrize("seed", range(2))
 def test_people_do_not_collide_or_leave(people: int, seed: int) -> None:
     people_paths = paths(people, seed)
-    assert gaps(people_paths).min() > 0.2  # metres: about the depth of a body
+    assert gaps(people_paths).min() > 0.2  # meters: about the depth of a body
     assert np.mean(gaps(people_paths) < 0.4) < 0.02
     assert (people_paths > (OVERHEAD_AREA[0] - 0.4, OVERHEAD_AREA[1] - 0.4)).all()
     assert (people_paths < (OVERHEAD_AREA[2] + 0.4, OVERHEAD_AREA[3] + 0.4)).all()

@@ -40,7 +40,7 @@ def test_fish_never_swim_into_each_other(states: list[FishState]) -> None:
     for state in states:
         spines = state.places[:, None] + along[:, None] * state.ahead[:, None]
         gaps = np.linalg.norm(spines[:, None, :, None] - spines[None, :, None], axis=4).min(axis=(2, 3))
-        assert gaps[np.triu_indices(9, 1)].min() > 0.15  # metres: bodies are 0.14 broad
+        assert gaps[np.triu_indices(9, 1)].min() > 0.15  # meters: bodies are 0.14 broad
 
 
 def test_fish_swim_forward_and_turn_plausibly(states: list[FishState]) -> None:

@@ -24,7 +24,7 @@ RATE = 10  # samples a second
 
 @pytest.fixture(scope="module")
 def paths() -> np.ndarray:
-    """Three minutes of four people: ``(T, 4, 2)`` metres."""
+    """Three minutes of four people: ``(T, 4, 2)`` meters."""
     walkers = VisitingCrowd(ROOM, 4, 7)
     return np.array([[(pose.x, pose.y) for pose in walkers.poses(t / RATE)] for t in range(180 * RATE)])
 
@@ -147,7 +147,7 @@ def test_two_people_on_a_collision_course_step_aside(offsets: float, speed: floa
     adjusted = sidestep(ROOM, one, other[None], 5.0)
     before, after = (np.hypot(*(path - other).T).min() for path in (one, adjusted))
     assert after >= min(before, MIN_DISTANCE) - 1e-6
-    assert np.abs(np.diff(adjusted, axis=0)).max() < 0.5  # metres in a fifth of a second
+    assert np.abs(np.diff(adjusted, axis=0)).max() < 0.5  # meters in a fifth of a second
 
 
 @settings(deadline=None, max_examples=60)

@@ -15,9 +15,9 @@ def detections(
 ) -> Detections:
     count = len(boxes)
     given_scores = np.array(scores or (0.9,) * count)
-    looks = np.zeros((count, bins))
-    looks[:, :1] = 1.0
-    return Detections(np.array(boxes, dtype=np.float64).reshape(-1, 4), given_scores, looks)
+    histograms = np.zeros((count, bins))
+    histograms[:, :1] = 1.0
+    return Detections(np.array(boxes, dtype=np.float64).reshape(-1, 4), given_scores, histograms)
 
 
 def test_a_walking_person_is_halfway_in_the_middle() -> None:

@@ -32,8 +32,8 @@ def _ids(results: list[WindowResult]) -> set[int]:
 def streams(draw: st.DrawFn) -> list[Detections]:
     """Draw detections of some people with misses, and some clutter."""
     people = [
-        Stroll(draw(st.integers(0, 300)), draw(st.integers(0, 100)), draw(st.integers(-4, 4)), look)
-        for look in range(draw(st.integers(0, 3)))
+        Stroll(draw(st.integers(0, 300)), draw(st.integers(0, 100)), draw(st.integers(-4, 4)), kind)
+        for kind in range(draw(st.integers(0, 3)))
     ]
     seed = draw(st.integers(0, 1000))
     rng = np.random.default_rng(seed)

@@ -10,9 +10,9 @@ from bestview import AppearanceSample, IdentityRegistry, IdentitySettings, Track
 
 STRIDE, UPDATES, PEOPLE = 5, 40, 8
 PIXEL = 0.01
-"""Metres on the floor, seen from above."""
+"""Meters on the floor, seen from above."""
 SIDE = 12.0
-"""Metres of a hall's walls; 100 m lie between two halls."""
+"""Meters of a hall's walls; 100 m lie between two halls."""
 
 
 def ground(hall: int) -> NDArray[np.float64]:
@@ -21,7 +21,7 @@ def ground(hall: int) -> NDArray[np.float64]:
 
 
 def walks() -> NDArray[np.float64]:
-    """Return positions in a hall, (people, frames, 2) metres: straight lines, reflected at the walls."""
+    """Return positions in a hall, (people, frames, 2) meters: straight lines, reflected at the walls."""
     rng = np.random.default_rng(4)
     heading = rng.uniform(0, 2 * np.pi, PEOPLE)
     velocity = 0.05 * np.stack([np.cos(heading), np.sin(heading)], axis=1)

@@ -21,7 +21,7 @@ from bestview.calibration import (
 
 
 def camera_over_floor(random: np.random.Generator) -> Floats:
-    """Return the homography of a camera that looks down on the floor: 640x360 pixels to metres."""
+    """Return the homography of a camera that looks down on the floor: 640x360 pixels to meters."""
     focal, tilt, turn = random.uniform(350, 900), random.uniform(0.2, 1.2), random.uniform(0, 6.28)
     forward = np.array([np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), -np.sin(tilt)])
     right = np.cross(forward, (0, 0, 1.0))

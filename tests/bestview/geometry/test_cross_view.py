@@ -26,7 +26,7 @@ DEFAULT = CrossViewSettings()
 
 
 def camera_at(x: float, y: float, yaw: float) -> CameraGeometry:
-    """Return a level camera above (x, y), looking along +Y, turned left by some degrees; metres."""
+    """Return a level camera above (x, y), looking along +Y, turned left by some degrees; meters."""
     turn = math.radians(yaw)
     across, along = (math.cos(turn), math.sin(turn)), (-math.sin(turn), math.cos(turn))
     depth = [along[0], along[1], -(along[0] * x + along[1] * y)]

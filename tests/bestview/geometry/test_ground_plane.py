@@ -26,7 +26,7 @@ from bestview.geometry.ground_plane import feet_cut_off, from_ground, upright_fr
 
 
 def looking_along(height: float = 3.0, focal: float = 400.0) -> NDArray[np.float64]:
-    """Return the homography of a level camera over (0, 0), looking along +Y: 640x480, metres."""
+    """Return the homography of a level camera over (0, 0), looking along +Y: 640x480, meters."""
     ground_to_image = np.array([[focal, 320.0, 0.0], [0.0, 240.0, focal * height], [0.0, 1.0, 0.0]])
     return np.linalg.inv(ground_to_image)
 
@@ -166,7 +166,7 @@ def test_a_box_from_overhead_has_its_foot_point_in_the_middle() -> None:
     from_above = np.array([[100.0, 200.0, 140.0, 240.0], [np.nan] * 4])
     upright = upright_from_overhead(from_above)
     assert foot_points(upright)[0].tolist() == [120.0, 220.0]
-    plan = np.diag([0.02, 0.02, 1.0])  # metres a pixel
+    plan = np.diag([0.02, 0.02, 1.0])  # meters a pixel
     assert 1.5 < person_heights(plan, upright)[0] < 2.0
     assert np.isnan(upright[1]).all()
     assert not feet_cut_off(upright_from_overhead(np.array([[10.0, 440.0, 50.0, 480.0]])), 480.0).any()

@@ -22,7 +22,7 @@ Clothes = tuple[tuple[int, int, int], tuple[int, int, int]]
 RED: Clothes = ((40, 40, 220), (90, 40, 30))
 BLUE: Clothes = ((220, 60, 30), (40, 40, 160))
 GREEN: Clothes = ((50, 190, 60), (40, 90, 40))
-GREY: Clothes = ((120, 110, 90), (100, 90, 70))
+GRAY: Clothes = ((120, 110, 90), (100, 90, 70))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class Figure:
     speed: float = 0.0
     begin: int = 0
     end: int = 10_000
-    colour: tuple[int, int, int] = (40, 60, 190)
+    color: tuple[int, int, int] = (40, 60, 190)
 
     def box(self, frame: int) -> npt.NDArray[np.float64]:
         """Return left, top, right, bottom."""
@@ -70,7 +70,7 @@ def _draw(canvas: Picture, figure: Figure, frame: int) -> None:
         first = (round(left + begin * width), round(top + start * tall))
         return first, (round(left + end * width) - 1, round(top + stop * tall) - 1)
 
-    cv2.rectangle(canvas, *part(0.0, 0.14, 1.0, 0.55), figure.colour, -1)
+    cv2.rectangle(canvas, *part(0.0, 0.14, 1.0, 0.55), figure.color, -1)
     cv2.rectangle(canvas, *part(0.15, 0.55, 0.45, 1.0), (60, 40, 30), -1)
     cv2.rectangle(canvas, *part(0.55, 0.55, 0.85, 1.0), (60, 40, 30), -1)
     cv2.rectangle(canvas, *part(0.33, 0.0, 0.67, 0.14), (90, 120, 200), -1)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from fakes.tracking.crossings import (
     BLUE,
     FRAMES,
+    GRAY,
     GREEN,
-    GREY,
     RED,
     Crossing,
     ThreeMeet,
@@ -106,9 +106,9 @@ def test_a_ring_has_its_share_of_the_windows_pixels() -> None:
 
 @given(st.integers(0, 500), st.lists(st.sets(st.integers(1, 6), max_size=4), min_size=1, max_size=12))
 @settings(deadline=None, max_examples=60)
-def test_shares_stay_between_0_and_1(seed: int, company: list[set[int]]) -> None:
+def test_shares_stay_between_0_and_1(seed: int, neighbors: list[set[int]]) -> None:
     rng, shares = np.random.default_rng(seed), OccluderParticles.unoccluded(30)
-    for near in company:
+    for near in neighbors:
         known = dict(zip(shares.occluder_ids, shares.states.mean(axis=0), strict=True))
         shares.propagate(rng, sorted(near), 0.3, 0.1)
         assert shares.occluder_ids == tuple(sorted(near))
@@ -126,7 +126,7 @@ def test_a_share_stays_with_its_occluder_when_others_come_and_go() -> None:
 
 
 def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_filter_fails() -> None:
-    scenes = [Crossing((GREY, BLUE), seed=seed) for seed in SEEDS]
+    scenes = [Crossing((GRAY, BLUE), seed=seed) for seed in SEEDS]
     assert times_kept([OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes) == len(
         SEEDS
     )

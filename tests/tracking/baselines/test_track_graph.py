@@ -31,12 +31,12 @@ def _end(rng: np.random.Generator, frame: int) -> TrackEnd:
 
 
 def _unlike(before: TrackEnd, after: TrackEnd) -> float:
-    looks = float(appearance_distance(before.histogram[None], after.histogram[None])[0, 0])
+    distance = float(appearance_distance(before.histogram[None], after.histogram[None])[0, 0])
     frames = after.frame - before.frame
     if frames > CLOSE:
-        return looks
+        return distance
     x, y = after.position - before.position - frames * before.velocity
-    return 0.7 * looks + 0.3 * min(hypot(x, y) / before.height, 1.0)
+    return 0.7 * distance + 0.3 * min(hypot(x, y) / before.height, 1.0)
 
 
 @given(st.integers(0, 5000), st.integers(2, 5))

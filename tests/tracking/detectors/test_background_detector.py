@@ -100,16 +100,16 @@ def test_ignored_regions_have_no_detections() -> None:
     assert all((frame.scores < SURE).all() for frame in seen)
 
 
-@pytest.mark.parametrize(("colour", "length"), [(True, 96), (False, 64)])
-def test_color_histograms_distinguish_people(colour: bool, length: int) -> None:
-    red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, colour=(190, 110, 35))
-    detector = BackgroundDetector(BackgroundSettings(appearance=AppearanceSettings(color=colour)))
+@pytest.mark.parametrize(("color", "length"), [(True, 96), (False, 64)])
+def test_color_histograms_distinguish_people(color: bool, length: int) -> None:
+    red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, color=(190, 110, 35))
+    detector = BackgroundDetector(BackgroundSettings(appearance=AppearanceSettings(color=color)))
     seen = watched(detector, [red, blue], range(80))[-1]
     assert detector.bins == length == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
-    looks = [seen.histograms[np.argmax(iou(seen.boxes, figure.box(79)))] for figure in (red, blue)]
-    likeness = np.sqrt(looks[0] * looks[1]).sum()
-    assert (likeness < 0.85) == colour
+    histograms = [seen.histograms[np.argmax(iou(seen.boxes, figure.box(79)))] for figure in (red, blue)]
+    similarity = np.sqrt(histograms[0] * histograms[1]).sum()
+    assert (similarity < 0.85) == color
 
 
 def test_the_same_frames_give_identical_detections() -> None:

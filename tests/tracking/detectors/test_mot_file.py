@@ -61,9 +61,9 @@ def test_one_outlier_confidence_does_not_lower_the_other_scores(tmp_path: Path) 
 def test_appearance_comes_from_the_picture_where_there_is_one(file: Path) -> None:
     assert MotFileDetector(file).detect(NOTHING).histograms.shape == (2, 0)
     picture = np.full((100, 300, 3), 128, dtype=np.uint8)
-    looks = MotFileDetector(file).detect(picture).histograms
-    assert looks.shape == (2, 64)
-    np.testing.assert_allclose(looks[:, 32], 1.0)
+    histograms = MotFileDetector(file).detect(picture).histograms
+    assert histograms.shape == (2, 64)
+    np.testing.assert_allclose(histograms[:, 32], 1.0)
 
 
 def test_a_missing_file_is_an_error(tmp_path: Path) -> None:

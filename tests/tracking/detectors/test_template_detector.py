@@ -65,10 +65,10 @@ def test_peaks_below_min_score_are_dropped() -> None:
     assert (seen.scores >= 0.5).all()
 
 
-@pytest.mark.parametrize("looks", ["subimage", "gray", "color"])
-def test_the_object_looks_most_like_its_template(looks: str) -> None:
+@pytest.mark.parametrize("measure", ["subimage", "gray", "color"])
+def test_the_object_looks_most_like_its_template(measure: str) -> None:
     image = clutter()
-    detector = TemplateDetector(cut(image), TemplateSettings(appearance=looks))  # type: ignore[arg-type]
+    detector = TemplateDetector(cut(image), TemplateSettings(appearance=measure))  # type: ignore[arg-type]
     seen = detector.detect(moved(image, 5, 5))
     assert seen.histograms.shape[1] == detector.bins
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)

@@ -18,7 +18,7 @@ from tracking.types import Detections
 
 BOX = np.array([100.0, 100.0, 140.0, 200.0])
 RIGHT = np.array([5.0, 0.0, 5.0, 0.0])
-LOOK, OTHER = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+APPEARANCE, OTHER_APPEARANCE = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 
 
 def walked(frames: int = 12) -> MotionModel:
@@ -27,11 +27,14 @@ def walked(frames: int = 12) -> MotionModel:
 
 
 def window(
-    motion: MotionModel | None, settings: CostSettings, *boxes: np.ndarray, look: np.ndarray = LOOK
+    motion: MotionModel | None,
+    settings: CostSettings,
+    *boxes: np.ndarray,
+    appearance: np.ndarray = APPEARANCE,
 ) -> Network:
     """Return a window of one hidden object and one box a frame."""
-    frames = [Detections(box[None], np.ones(1), look[None]) for box in boxes]
-    return build_network([Template(1, LOOK, None, motion)], frames, settings)
+    frames = [Detections(box[None], np.ones(1), appearance[None]) for box in boxes]
+    return build_network([Template(1, APPEARANCE, None, motion)], frames, settings)
 
 
 def test_the_predicted_velocity_decays_with_time() -> None:
@@ -68,7 +71,7 @@ def test_reappearance_is_gated_by_predicted_position_and_appearance() -> None:
     assert np.isinf(far.source[0, 0])
     assert np.isinf(far.pair[0, 0, 1, 0])
     assert np.isfinite(far.pair[0, 0, 0, 0]), "a visible object is not gated by motion"
-    unlike = window(motion, settings, *expected, look=OTHER)
+    unlike = window(motion, settings, *expected, appearance=OTHER_APPEARANCE)
     assert np.isinf(unlike.pair[0, 0, 1, 0])
     paper = replace(settings, reappearance=0.0, motion=0.0)
     assert np.isfinite(window(motion, paper, *(expected + 500.0)).pair[0, 0, 1, 0])

@@ -85,8 +85,8 @@ def test_the_exact_solver_agrees_with_joint_states_on_two_people_in_step() -> No
     frames = []
     for m in range(10):
         corner = np.vstack([[20.0 * m, 30.0], [20.0 * m + 40, 35.0], rng.uniform(0.0, 200.0, (6, 2))])
-        looks = rng.dirichlet(np.full(4, 20.0), 8)
-        frames.append(Detections(np.hstack([corner, corner + PERSON]), np.ones(8), looks))
+        histograms = rng.dirichlet(np.full(4, 20.0), 8)
+        frames.append(Detections(np.hstack([corner, corner + PERSON]), np.ones(8), histograms))
     templates = [Template(n, frames[0].histograms[n], frames[0].boxes[n]) for n in range(2)]
     network = build_network(templates, frames, replace(PAPER_COSTS, layout=0.002))
     exact, joint = (create_solver(name).solve(network).report for name in ("exact", "extended-dp"))

@@ -59,16 +59,16 @@ def test_without_layout_l2_equals_columns(case: Case) -> None:
 
 def side_by_side(layout: float) -> Network:
     """Two people walk in step; in the last frame the second may stay, where its appearance fits better."""
-    dark, grey = np.array([1.0, 0.0]), np.array([0.97, 0.03])
+    dark, gray = np.array([1.0, 0.0]), np.array([0.97, 0.03])
 
-    def at(*lefts: float, looks: tuple[np.ndarray, ...]) -> Detections:
+    def at(*lefts: float, histograms: tuple[np.ndarray, ...]) -> Detections:
         boxes = np.array([PERSON + np.array([left, 0.0, left, 0.0]) for left in lefts])
-        return Detections(boxes, np.ones(len(boxes)), np.array(looks))
+        return Detections(boxes, np.ones(len(boxes)), np.array(histograms))
 
     frames = [
-        at(0.0, 100.0, looks=(dark, dark)),
-        at(30.0, 130.0, looks=(dark, dark)),
-        at(60.0, 160.0, 130.0, looks=(dark, grey, dark)),
+        at(0.0, 100.0, histograms=(dark, dark)),
+        at(30.0, 130.0, histograms=(dark, dark)),
+        at(60.0, 160.0, 130.0, histograms=(dark, gray, dark)),
     ]
     first = frames[0].boxes
     templates = [Template(n, dark, first[n]) for n in range(2)]
