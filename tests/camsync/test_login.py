@@ -134,7 +134,7 @@ async def test_a_login_where_none_is_needed_is_an_error_and_changes_nothing(conn
         assert isinstance(messages[3], Pong)
 
 
-async def test_very_many_connections_without_a_login_lock_no_client_out(connect: Connect) -> None:
+async def test_many_connections_without_a_login_lock_no_client_out(connect: Connect) -> None:
     limits = ServerLimits(pending_logins=4, clients=2, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         crowd = [await connect(server.port) for _ in range(50)]
@@ -148,7 +148,7 @@ async def test_very_many_connections_without_a_login_lock_no_client_out(connect:
         assert all(later == earlier + 1 for earlier, later in pairwise(numbers))
 
 
-async def test_very_many_refused_logins_are_one_line_of_the_log(
+async def test_many_refused_logins_are_one_log_line(
     connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS, users=USERS) as server:

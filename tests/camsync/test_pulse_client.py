@@ -164,7 +164,7 @@ async def test_the_newer_client_of_a_name_stays_and_the_older_ends() -> None:
             await take(newer, 5)
 
 
-async def test_without_a_server_it_waits() -> None:
+async def test_without_a_server_the_client_waits() -> None:
     with socket.socket() as bound:  # bound and not listening
         bound.bind(("127.0.0.1", 0))
         port = bound.getsockname()[1]
@@ -175,7 +175,7 @@ async def test_without_a_server_it_waits() -> None:
             assert not client.status().connected
 
 
-async def test_without_a_server_it_free_runs_if_configured_and_a_server_continues_the_count() -> None:
+async def test_without_a_server_the_client_free_runs_if_configured_and_a_server_continues_the_count() -> None:
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, free_run_after=0.05)
     with socket.socket() as bound:
         bound.bind(("127.0.0.1", 0))

@@ -194,7 +194,7 @@ async def test_a_vanished_client_is_removed_and_others_get_all_pulses(connect: C
         assert numbers == list(range(numbers[0], numbers[-1] + 1))
 
 
-async def test_after_a_long_stall_it_skips_to_the_current_pulse(
+async def test_after_a_long_stall_the_server_skips_to_the_current_pulse(
     connect: Connect, jumping_clock: JumpingClock
 ) -> None:
     async with PulseServer(FPS, clock=jumping_clock) as server:
@@ -209,7 +209,7 @@ async def test_after_a_long_stall_it_skips_to_the_current_pulse(
         assert (await listener.pulse()).number == numbers[-1] + 1
 
 
-async def test_after_a_short_stall_it_sends_every_pulse(
+async def test_after_a_short_stall_the_server_sends_every_pulse(
     connect: Connect, jumping_clock: JumpingClock
 ) -> None:
     async with PulseServer(FPS, clock=jumping_clock, limits=ServerLimits(catch_up=PATIENCE)) as server:

@@ -15,7 +15,7 @@ from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, fake_
 from fakes.timeouts import PATIENCE
 
 
-async def test_repeated_absences_of_the_server_are_few_lines_of_the_log(
+async def test_repeated_absences_of_the_server_are_few_log_lines(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -32,15 +32,13 @@ async def test_repeated_absences_of_the_server_are_few_lines_of_the_log(
     ):
         while client.status().connections < 6:
             await take(client, 1)
-    there, away, back = caplog.messages
-    assert there.endswith(f": {FPS:g} pulses per second")
+    connected, away, reconnected = caplog.messages
+    assert connected.endswith(f": {FPS:g} pulses per second")
     assert away.endswith(" is away: nothing received for 0.3 seconds")
-    assert f": {FPS:g} pulses per second, after " in back
+    assert f": {FPS:g} pulses per second, after " in reconnected
 
 
-async def test_repeated_hellos_are_one_line_of_the_log(
-    connect: Connect, caplog: pytest.LogCaptureFixture
-) -> None:
+async def test_repeated_hellos_are_one_log_line(connect: Connect, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "camsync")
     async with PulseServer(FPS) as server:
         client = await connect(server.port)
@@ -50,7 +48,7 @@ async def test_repeated_hellos_are_one_line_of_the_log(
     assert caplog.messages == ["c0 connected"]
 
 
-async def test_repeated_implausible_claims_are_one_line_of_the_log(
+async def test_repeated_implausible_claims_are_one_log_line(
     connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS) as server:
@@ -62,7 +60,7 @@ async def test_repeated_implausible_claims_are_one_line_of_the_log(
     assert caplog.messages[0].endswith(": claim ignored")
 
 
-async def test_repeated_stalls_are_one_line_of_the_log(
+async def test_repeated_stalls_are_one_log_line(
     connect: Connect, jumping_clock: JumpingClock, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with PulseServer(FPS, clock=jumping_clock) as server:

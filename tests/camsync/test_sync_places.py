@@ -1,4 +1,4 @@
-"""Limits on connections: a client with very many connections takes no place of another."""
+"""Limits on connections: a client with many connections takes no place of another."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def names(server: PulseServer) -> list[str | None]:
     return [client.name for client in server.clients()]
 
 
-async def test_repeated_logins_of_one_user_lock_no_other_out(connect: Connect) -> None:
+async def test_repeated_logins_of_one_user_lock_no_other_user_out(connect: Connect) -> None:
     limits = ServerLimits(clients=16, login_places=3, catch_up=PATIENCE)
     async with PulseServer(FPS, users=USERS, limits=limits) as server:
         for _ in range(40):
@@ -57,7 +57,7 @@ async def test_repeated_logins_of_one_user_lock_no_other_out(connect: Connect) -
             await receive_pulses(server.port, user, Credentials(user, password))
 
 
-async def test_a_user_with_more_connections_than_places_locks_no_other_out(
+async def test_a_user_with_more_connections_than_places_locks_no_other_user_out(
     connect: Connect,
 ) -> None:
     """With the default limits."""
@@ -153,7 +153,7 @@ async def test_many_connections_take_no_place_of_another_address(
         await alone.pulse()
 
 
-async def test_very_many_pending_logins_evict_none_of_another_address(
+async def test_many_pending_logins_evict_none_of_another_address(
     connect: Connect, other_address: str
 ) -> None:
     limits = ServerLimits(pending_logins=3, login_within=1000.0)
@@ -180,7 +180,7 @@ def test_the_oldest_of_the_busiest_origin_is_evicted() -> None:
     assert select_evicted(connections[3:4]) is connections[3]
 
 
-async def test_clients_that_replace_each_other_are_few_lines_of_the_log(
+async def test_clients_that_replace_each_other_are_few_log_lines(
     connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -194,7 +194,7 @@ async def test_clients_that_replace_each_other_are_few_lines_of_the_log(
     assert caplog.messages[1].startswith("another c0 connected from 127.0.0.1:")
 
 
-async def test_every_arrival_of_an_expected_name_is_a_line_of_the_log(
+async def test_every_arrival_of_an_expected_name_is_a_log_line(
     connect: Connect, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "camsync")
@@ -206,9 +206,7 @@ async def test_every_arrival_of_an_expected_name_is_a_line_of_the_log(
     assert sorted(caplog.messages) == sorted(f"{name} connected" for name in names)
 
 
-async def test_unexpected_names_are_few_lines_of_the_log(
-    connect: Connect, caplog: pytest.LogCaptureFixture
-) -> None:
+async def test_unexpected_names_are_few_log_lines(connect: Connect, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "camsync")
     async with PulseServer(FPS, expect=["c0"], start_timeout=0.0) as server:
         for number in range(40):
