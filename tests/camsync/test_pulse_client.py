@@ -26,7 +26,14 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_schedule import PulseSchedule
-from fakes.camsync.pulse_clients import BUSY, FPS, QUICK, JumpingClock, fake_server, take
+from fakes.camsync.pulse_clients import (
+    CLOCK_TOLERANCE,
+    FPS,
+    QUICK_SETTINGS,
+    JumpingClock,
+    fake_server,
+    next_pulses,
+)
 from fakes.timeouts import PATIENCE
 
 
@@ -42,13 +49,13 @@ async def test_clients_that_are_expected_all_get_every_pulse_from_the_first_on()
     patient = ClientSettings(local_after=PATIENCE, queue=200)
     async with PulseServer(FPS, expect=names, limits=ServerLimits(catch_up=PATIENCE)) as server:
         clients = [PulseClient("127.0.0.1", server.port, name, settings=patient) for name in names]
-        received = await asyncio.gather(*(take(client, 100) for client in clients))
+        received = await asyncio.gather(*(next_pulses(client, 100) for client in clients))
         for pulses in received:
             assert [pulse.number for pulse in pulses] == list(range(100))
             assert not any(pulse.missed or pulse.local for pulse in pulses)
         for same_number in zip(*received, strict=True):
             dues = [pulse.due for pulse in same_number]
-            assert max(dues) - min(dues) < BUSY
+            assert max(dues) - min(dues) < CLOCK_TOLERANCE
         assert {info.name for info in server.clients()} == set(names)
         for client in clients:
             assert client.status().fps == FPS
@@ -57,11 +64,13 @@ async def test_clients_that_are_expected_all_get_every_pulse_from_the_first_on()
 
 async def test_due_times_are_one_frame_apart_and_before_arrival() -> None:
     async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as client:
-        pulses = await take(client, 200)
+        pulses = await next_pulses(client, 200)
         first = pulses[0]
         for pulse in pulses:
-            assert pulse.due == pytest.approx(first.due + (pulse.number - first.number) / FPS, abs=BUSY)
-            assert pulse.received > pulse.due - BUSY
+            assert pulse.due == pytest.approx(
+                first.due + (pulse.number - first.number) / FPS, abs=CLOCK_TOLERANCE
+            )
+            assert pulse.received > pulse.due - CLOCK_TOLERANCE
         epochs = [pulse.due - pulse.number / FPS for pulse in pulses]
         assert np.median(np.abs(np.diff(epochs))) < 0.1 / FPS, "the offset to the server's clock is stable"
 
@@ -70,17 +79,17 @@ async def test_the_offset_of_the_servers_clock_is_measured(jumping_clock: Jumpin
     jumping_clock.jumped = 1234.5
     async with (
         PulseServer(FPS, clock=jumping_clock) as server,
-        PulseClient("127.0.0.1", server.port, "c0", settings=QUICK) as client,
+        PulseClient("127.0.0.1", server.port, "c0", settings=QUICK_SETTINGS) as client,
     ):
         async with asyncio.timeout(PATIENCE):
             while (await anext(client)).number >= 0 and client.status().round_trip is None:
                 pass
         status = client.status()
-        assert status.offset == pytest.approx(1234.5, abs=BUSY)
+        assert status.offset == pytest.approx(1234.5, abs=CLOCK_TOLERANCE)
         assert status.round_trip is not None
         assert 0.0 <= status.round_trip < PATIENCE
-        (pulse,) = await take(client, 1)
-        assert pulse.due == pytest.approx(client.now(), abs=20 * BUSY)
+        (pulse,) = await next_pulses(client, 1)
+        assert pulse.due == pytest.approx(client.now(), abs=20 * CLOCK_TOLERANCE)
 
 
 async def test_a_slow_consumer_gets_the_number_of_missed_pulses() -> None:
@@ -89,10 +98,10 @@ async def test_a_slow_consumer_gets_the_number_of_missed_pulses() -> None:
         PulseServer(FPS) as server,
         PulseClient("127.0.0.1", server.port, "c0", settings=settings) as client,
     ):
-        (first,) = await take(client, 1)
+        (first,) = await next_pulses(client, 1)
         await wait_counted(client, first.number + 30)
         newest = client.status().pulse
-        (late,) = await take(client, 1)
+        (late,) = await next_pulses(client, 1)
         assert late.number == newest
         assert late.missed == late.number - first.number - 1
         assert client.missed == late.missed
@@ -104,9 +113,9 @@ async def test_a_short_stall_of_the_consumer_costs_nothing() -> None:
         PulseServer(FPS, limits=ServerLimits(catch_up=PATIENCE)) as server,
         PulseClient("127.0.0.1", server.port, "c0", settings=settings) as client,
     ):
-        (first,) = await take(client, 1)
+        (first,) = await next_pulses(client, 1)
         await wait_counted(client, first.number + 40)
-        numbers = [pulse.number for pulse in await take(client, 60)]
+        numbers = [pulse.number for pulse in await next_pulses(client, 60)]
         assert numbers == list(range(first.number + 1, first.number + 61))
         assert client.missed == 0
 
@@ -120,9 +129,9 @@ async def test_a_stalled_process_reads_the_waiting_pulses_first() -> None:
     settings = ClientSettings(catch_up=0.1)  # pulses that are not read first are lost
     try:
         async with PulseClient("127.0.0.1", port, "c0", settings=settings) as client:
-            (first,) = await take(client, 1)
+            (first,) = await next_pulses(client, 1)
             time.sleep(0.7)  # noqa: ASYNC251 — the stall under test
-            numbers = [pulse.number for pulse in await take(client, 40)]
+            numbers = [pulse.number for pulse in await next_pulses(client, 40)]
             assert numbers == list(range(first.number + 1, first.number + 41))
     finally:
         server.kill()
@@ -144,7 +153,7 @@ async def test_skipped_numbers_are_counted_as_missed(jumping_clock: JumpingClock
         PulseServer(FPS, clock=jumping_clock) as server,
         PulseClient("127.0.0.1", server.port, "c0") as client,
     ):
-        await take(client, 5)
+        await next_pulses(client, 5)
         jumping_clock.jumped += 10.0
         async with asyncio.timeout(PATIENCE):
             async for pulse in client:
@@ -156,19 +165,19 @@ async def test_skipped_numbers_are_counted_as_missed(jumping_clock: JumpingClock
 
 async def test_the_newer_client_of_a_name_stays_and_the_older_ends() -> None:
     async with PulseServer(FPS) as server, PulseClient("127.0.0.1", server.port, "c0") as older:
-        await take(older, 1)
+        await next_pulses(older, 1)
         async with PulseClient("127.0.0.1", server.port, "c0") as newer:
-            await take(newer, 5)
+            await next_pulses(newer, 5)
             with pytest.raises(ReplacedError, match="c0"):
-                await take(older, 10_000)
-            await take(newer, 5)
+                await next_pulses(older, 10_000)
+            await next_pulses(newer, 5)
 
 
 async def test_without_a_server_the_client_waits() -> None:
     with socket.socket() as bound:  # bound and not listening
         bound.bind(("127.0.0.1", 0))
         port = bound.getsockname()[1]
-        async with PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=QUICK) as client:
+        async with PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=QUICK_SETTINGS) as client:
             with pytest.raises(TimeoutError):
                 async with asyncio.timeout(0.2):
                     await anext(client)
@@ -181,7 +190,7 @@ async def test_without_a_server_the_client_free_runs_if_configured_and_a_server_
         bound.bind(("127.0.0.1", 0))
         port = bound.getsockname()[1]
         client = PulseClient("127.0.0.1", port, "c0", fps_hint=FPS, settings=settings)
-        pulses = await take(client, 50)
+        pulses = await next_pulses(client, 50)
     assert [pulse.number for pulse in pulses] == list(range(50))
     assert all(pulse.local for pulse in pulses)
     async with PulseServer(FPS, expect={"c0"}, port=port), asyncio.timeout(PATIENCE):
@@ -222,11 +231,11 @@ async def test_a_silent_server_is_disconnected_and_reconnected() -> None:
 
     async with (
         fake_server(one_pulse) as (port, _),
-        PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
+        PulseClient("127.0.0.1", port, "c0", settings=QUICK_SETTINGS) as client,
     ):
         numbers = []
         while client.status().connections < 3:
-            numbers += [pulse.number for pulse in await take(client, 1)]
+            numbers += [pulse.number for pulse in await next_pulses(client, 1)]
         assert numbers == sorted(set(numbers))
         assert client.status().local_pulses > 0
 
@@ -235,7 +244,7 @@ async def test_a_silent_server_is_disconnected_and_reconnected() -> None:
 async def test_another_service_on_the_port_is_not_a_server(noise: bytes) -> None:
     async with (
         fake_server(lambda: noise) as (port, calls),
-        PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
+        PulseClient("127.0.0.1", port, "c0", settings=QUICK_SETTINGS) as client,
     ):
         async with asyncio.timeout(PATIENCE):
             await calls.acquire()
@@ -249,13 +258,13 @@ async def test_a_server_of_another_version_is_an_error() -> None:
         PulseClient("127.0.0.1", port, "c0") as client,
     ):
         with pytest.raises(VersionError, match="version 3"):
-            await take(client, 1)
+            await next_pulses(client, 1)
 
 
 async def test_a_malformed_host_name_is_an_error() -> None:
-    async with PulseClient("two..dots", 1, "c0", settings=QUICK) as client:
+    async with PulseClient("two..dots", 1, "c0", settings=QUICK_SETTINGS) as client:
         with pytest.raises(SyncError, match=r"two\.\.dots"):
-            await take(client, 1)
+            await next_pulses(client, 1)
 
 
 def test_an_impossible_name_or_rate_is_refused() -> None:

@@ -11,7 +11,7 @@ from camsync.clock import steady_unix_clock
 from camsync.messages import Greeting, Pong, PulseMessage
 from camsync.protocol import encode
 from camsync.pulse_schedule import PulseSchedule
-from fakes.camsync.pulse_clients import FPS, QUICK, Connect, JumpingClock, fake_server, take
+from fakes.camsync.pulse_clients import FPS, QUICK_SETTINGS, Connect, JumpingClock, fake_server, next_pulses
 from fakes.timeouts import PATIENCE
 
 
@@ -28,10 +28,10 @@ async def test_repeated_absences_of_the_server_are_few_log_lines(
 
     async with (
         fake_server(one_pulse) as (port, _),
-        PulseClient("127.0.0.1", port, "c0", settings=QUICK) as client,
+        PulseClient("127.0.0.1", port, "c0", settings=QUICK_SETTINGS) as client,
     ):
         while client.status().connections < 6:
-            await take(client, 1)
+            await next_pulses(client, 1)
     connected, away, reconnected = caplog.messages
     assert connected.endswith(f": {FPS:g} pulses per second")
     assert away.endswith(" is away: nothing received for 0.3 seconds")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.tracking.strolls import Stroll, final_boxes, follow, seen_at, tracker
+from fakes.tracking.strolls import WalkingPerson, detections_at, final_boxes, track_all, tracker
 from tracking.boxes import iou
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
@@ -32,7 +32,7 @@ def _ids(results: list[WindowResult]) -> set[int]:
 def streams(draw: st.DrawFn) -> list[Detections]:
     """Draw detections of some people with misses, and some clutter."""
     people = [
-        Stroll(draw(st.integers(0, 300)), draw(st.integers(0, 100)), draw(st.integers(-4, 4)), kind)
+        WalkingPerson(draw(st.integers(0, 300)), draw(st.integers(0, 100)), draw(st.integers(-4, 4)), kind)
         for kind in range(draw(st.integers(0, 3)))
     ]
     seed = draw(st.integers(0, 1000))
@@ -40,8 +40,10 @@ def streams(draw: st.DrawFn) -> list[Detections]:
     frames = []
     for frame in range(draw(st.integers(1, 45))):
         present = [person for person in people if rng.random() < 0.85]
-        clutter = [Stroll(float(rng.integers(0, 300)), 50.0, 0.0, 7) for _ in range(rng.integers(0, 2))]
-        frames.append(seen_at([*present, *clutter], frame, jitter=1.5, seed=seed))
+        clutter = [
+            WalkingPerson(float(rng.integers(0, 300)), 50.0, 0.0, 7) for _ in range(rng.integers(0, 2))
+        ]
+        frames.append(detections_at([*present, *clutter], frame, jitter=1.5, seed=seed))
     return frames
 
 
@@ -51,7 +53,7 @@ def test_every_frame_becomes_final_once_and_in_order(
     stream: list[Detections], start: int, size: tuple[int, int]
 ) -> None:
     window = WindowSettings(window=size[0], stride=size[1], birth_window=min(size[0], 15))
-    results = follow(stream, tracker(window), start)
+    results = track_all(stream, tracker(window), start)
     assert results[0].first == start
     assert results[-1].final_to == start + len(stream) - 1
     for earlier, later in pairwise(results):
@@ -75,7 +77,7 @@ def test_a_missed_frame_is_a_frame_without_detections(stream: list[Detections], 
     # The first and the last frame are kept, so that both trackers cover the same frames.
     kept = [n for n in range(len(stream)) if n not in missed or n in {0, len(stream) - 1}]
     pushed, skipping = tracker(), tracker()
-    every = final_boxes(follow(emptied, pushed))
+    every = final_boxes(track_all(emptied, pushed))
     results = [skipping.push(n, emptied[n]) for n in kept] + [skipping.flush()]
     some = final_boxes([result for result in results if result is not None])
     assert every.keys() == some.keys()
@@ -87,9 +89,9 @@ def test_a_missed_frame_is_a_frame_without_detections(stream: list[Detections], 
 @given(streams())
 @settings(deadline=None, max_examples=10)
 def test_trackers_share_no_state_and_are_deterministic(stream: list[Detections]) -> None:
-    alone = follow(stream, tracker())
+    alone = track_all(stream, tracker())
     one, other = tracker(), tracker()
-    noise = [seen_at([Stroll(9.0, 9.0, 1.0, 5)], n) for n in range(len(stream))]
+    noise = [detections_at([WalkingPerson(9.0, 9.0, 1.0, 5)], n) for n in range(len(stream))]
     results = []
     for n, seen in enumerate(stream):
         results.append(one.push(n, seen))
@@ -100,8 +102,8 @@ def test_trackers_share_no_state_and_are_deterministic(stream: list[Detections])
 
 @pytest.mark.parametrize("first", [0, 3, 1000])
 def test_people_are_found_and_numbered_from_one(first: int) -> None:
-    people = [Stroll(20.0, 30.0, 2.0, 0), Stroll(300.0, 60.0, -1.5, 3)]
-    results = follow([seen_at(people, n, 1.0) for n in range(40)], tracker(), first)
+    people = [WalkingPerson(20.0, 30.0, 2.0, 0), WalkingPerson(300.0, 60.0, -1.5, 3)]
+    results = track_all([detections_at(people, n, 1.0) for n in range(40)], tracker(), first)
     found = final_boxes(results)
     # People present from the start are published from the first window that is long enough for initiation.
     assert min(found) < first + WindowSettings().stride
@@ -114,8 +116,8 @@ def test_people_are_found_and_numbered_from_one(first: int) -> None:
 
 
 def test_a_person_who_enters_later_is_tracked_from_that_window_on() -> None:
-    people = [Stroll(20.0, 30.0, 2.0, 0), Stroll(250.0, 60.0, -1.0, 3, range(30, 200))]
-    results = follow([seen_at(people, n, 1.0) for n in range(60)], tracker())
+    people = [WalkingPerson(20.0, 30.0, 2.0, 0), WalkingPerson(250.0, 60.0, -1.0, 3, range(30, 200))]
+    results = track_all([detections_at(people, n, 1.0) for n in range(60)], tracker())
     found = final_boxes(results)
     seen = [frame for frame, boxes in found.items() if 2 in boxes]
     assert min(seen) <= 32
@@ -123,29 +125,29 @@ def test_a_person_who_enters_later_is_tracked_from_that_window_on() -> None:
 
 
 def test_one_confident_detection_initiates_a_track_with_its_earlier_frames() -> None:
-    vague = Stroll(100.0, 50.0, 2.0, 1, sure=range(0))
-    clear_once = Stroll(100.0, 50.0, 2.0, 1, sure=range(12, 13))
-    assert not _ids(follow([seen_at([vague], frame) for frame in range(30)], tracker()))
-    shown = final_boxes(follow([seen_at([clear_once], frame) for frame in range(30)], tracker()))
+    vague = WalkingPerson(100.0, 50.0, 2.0, 1, sure=range(0))
+    clear_once = WalkingPerson(100.0, 50.0, 2.0, 1, sure=range(12, 13))
+    assert not _ids(track_all([detections_at([vague], frame) for frame in range(30)], tracker()))
+    shown = final_boxes(track_all([detections_at([clear_once], frame) for frame in range(30)], tracker()))
     assert all(shown[frame].keys() == {1} for frame in range(30))
 
 
 def test_short_clutter_initiates_no_track() -> None:
-    person = Stroll(20.0, 30.0, 2.0, 0)
-    clutter = Stroll(300.0, 60.0, 0.0, 5, range(22, 29))
-    results = follow([seen_at([person, clutter], n, 1.0) for n in range(60)], tracker())
+    person = WalkingPerson(20.0, 30.0, 2.0, 0)
+    clutter = WalkingPerson(300.0, 60.0, 0.0, 5, range(22, 29))
+    results = track_all([detections_at([person, clutter], n, 1.0) for n in range(60)], tracker())
     assert _ids(results) == {1}
 
 
 def test_an_occluded_person_keeps_the_id() -> None:
     # They meet at frame 50; the further one is not detected while they overlap.
-    front = Stroll(100.0, 40.0, 2.0, 0)
-    behind = Stroll(300.0, 36.0, -2.0, 4)
+    front = WalkingPerson(100.0, 40.0, 2.0, 0)
+    behind = WalkingPerson(300.0, 36.0, -2.0, 4)
     stream = []
     for frame in range(100):
         apart = abs(front.box(frame)[0] - behind.box(frame)[0]) > 25.0
-        stream.append(seen_at([front, behind] if apart else [front], frame, 1.0))
-    found = final_boxes(follow(stream, tracker()))
+        stream.append(detections_at([front, behind] if apart else [front], frame, 1.0))
+    found = final_boxes(track_all(stream, tracker()))
     assert {number for boxes in found.values() for number in boxes} == {1, 2}
     before, after = found[30], found[90]
     of_front = {
@@ -159,34 +161,37 @@ def test_an_occluded_person_keeps_the_id() -> None:
 def test_a_person_back_soon_keeps_the_id_and_one_back_late_gets_a_new_one() -> None:
     def ids(absence: int) -> set[int]:
         seen = [n for n in range(60 + absence) if n < 30 or n >= 30 + absence]
-        stay = Stroll(100.0, 40.0, 0.0, 2)
-        stream = [seen_at([stay] if n in seen else [], n, 1.0) for n in range(60 + absence)]
-        return _ids(follow(stream, tracker(WindowSettings(forget_after=60))))
+        stay = WalkingPerson(100.0, 40.0, 0.0, 2)
+        stream = [detections_at([stay] if n in seen else [], n, 1.0) for n in range(60 + absence)]
+        return _ids(track_all(stream, tracker(WindowSettings(forget_after=60))))
 
     assert ids(40) == {1}
     assert ids(80) == {1, 2}
 
 
 def test_a_person_of_another_appearance_at_the_same_place_gets_a_new_id() -> None:
-    first, second = Stroll(100.0, 40.0, 0.0, 2, range(30)), Stroll(100.0, 40.0, 0.0, 6, range(70, 110))
-    results = follow([seen_at([first, second], n, 1.0) for n in range(110)], tracker())
+    first, second = (
+        WalkingPerson(100.0, 40.0, 0.0, 2, range(30)),
+        WalkingPerson(100.0, 40.0, 0.0, 6, range(70, 110)),
+    )
+    results = track_all([detections_at([first, second], n, 1.0) for n in range(110)], tracker())
     assert _ids(results) == {1, 2}
 
 
 def test_two_boxes_on_one_person_are_one_object() -> None:
-    twins = [Stroll(50.0, 40.0, 1.0, 2), Stroll(53.0, 42.0, 1.0, 2)]
-    found = final_boxes(follow([seen_at(twins, n, 1.0) for n in range(60)], tracker()))
+    twins = [WalkingPerson(50.0, 40.0, 1.0, 2), WalkingPerson(53.0, 42.0, 1.0, 2)]
+    found = final_boxes(track_all([detections_at(twins, n, 1.0) for n in range(60)], tracker()))
     assert all(len(boxes) == 1 for boxes in found.values())
 
 
 def test_after_a_long_gap_tracking_restarts_without_a_result_for_the_gap() -> None:
-    person = Stroll(50.0, 40.0, 0.0, 2)
+    person = WalkingPerson(50.0, 40.0, 0.0, 2)
     tracked = tracker()
-    before = [tracked.push(n, seen_at([person], n)) for n in range(23)]
-    ended = tracked.push(1_000_000_004, seen_at([person], 0))
+    before = [tracked.push(n, detections_at([person], n)) for n in range(23)]
+    ended = tracked.push(1_000_000_004, detections_at([person], 0))
     assert ended is not None
     assert ended.final_to == ended.last == 22
-    after = [tracked.push(1_000_000_005 + n, seen_at([person], 0)) for n in range(30)]
+    after = [tracked.push(1_000_000_005 + n, detections_at([person], 0)) for n in range(30)]
     assert _ids([r for r in [*before, ended] if r is not None]) == {1}
     assert _ids([r for r in [*after, tracked.flush()] if r is not None]) == {2}
 
@@ -195,27 +200,29 @@ def test_memory_is_bounded_by_the_window_and_the_list() -> None:
     window = WindowSettings(forget_after=30, max_objects=3)
     tracked = tracker(window)
     for n in range(600):
-        people = [Stroll(60.0 * k, 40.0, 0.0, (n // 40 + k) % 8) for k in range(5)]
-        tracked.push(n, seen_at(people if n % 40 < 25 else [], n))
+        people = [WalkingPerson(60.0 * k, 40.0, 0.0, (n // 40 + k) % 8) for k in range(5)]
+        tracked.push(n, detections_at(people if n % 40 < 25 else [], n))
         assert len(tracked._detections) <= window.window + window.stride
         assert len(tracked._objects) <= window.max_objects
 
 
 def test_at_max_objects_only_hidden_tracks_are_replaced() -> None:
     """One track is hidden and two people arrive at once: only one of them gets a track."""
-    present = [Stroll(100.0 * k, 40.0, 0.0, k) for k in range(4)]
-    left = [Stroll(100.0, 40.0, 0.0, 1, seen=range(20))]
-    new = [Stroll(100.0 * k, 240.0, 0.0, k, seen=range(40, 100)) for k in (5, 6)]
+    present = [WalkingPerson(100.0 * k, 40.0, 0.0, k) for k in range(4)]
+    left = [WalkingPerson(100.0, 40.0, 0.0, 1, seen=range(20))]
+    new = [WalkingPerson(100.0 * k, 240.0, 0.0, k, seen=range(40, 100)) for k in (5, 6)]
     people = [present[0], *left, *present[2:], *new]
-    results = follow([seen_at(people, n) for n in range(100)], tracker(WindowSettings(max_objects=4)))
+    results = track_all(
+        [detections_at(people, n) for n in range(100)], tracker(WindowSettings(max_objects=4))
+    )
     assert {1, 3, 4} < set(final_boxes(results)[99])
     assert len(final_boxes(results)[99]) == 4
 
 
 def test_a_person_detected_in_every_frame_is_initiated_at_full_required_visibility() -> None:
-    person = Stroll(20, 40, 2.0, 0)
+    person = WalkingPerson(20, 40, 2.0, 0)
     window = WindowSettings(birth_min_visible=1.0)
-    results = follow([seen_at([person], n) for n in range(40)], tracker(window))
+    results = track_all([detections_at([person], n) for n in range(40)], tracker(window))
     assert _ids(results) == {1}
 
 
@@ -263,15 +270,18 @@ def test_two_people_who_cross_without_appearance_keep_their_ids() -> None:
 
 
 def test_a_new_person_does_not_get_the_id_of_one_who_left_elsewhere() -> None:
-    first, second = Stroll(20.0, 40.0, 0.0, 2, range(30)), Stroll(220.0, 40.0, 0.0, 2, range(45, 90))
-    results = follow([seen_at([first, second], n, 1.0) for n in range(90)], tracker())
+    first, second = (
+        WalkingPerson(20.0, 40.0, 0.0, 2, range(30)),
+        WalkingPerson(220.0, 40.0, 0.0, 2, range(45, 90)),
+    )
+    results = track_all([detections_at([first, second], n, 1.0) for n in range(90)], tracker())
     assert _ids(results) == {1, 2}
 
 
 def test_a_person_back_elsewhere_after_long_is_reidentified_by_appearance() -> None:
     away = 120
-    present = Stroll(20.0, 40.0, 0.0, 2, range(40))
-    back = Stroll(260.0, 60.0, 0.0, 2, range(40 + away, 100 + away))
-    results = follow([seen_at([present, back], n, 1.0) for n in range(100 + away)], tracker())
+    present = WalkingPerson(20.0, 40.0, 0.0, 2, range(40))
+    back = WalkingPerson(260.0, 60.0, 0.0, 2, range(40 + away, 100 + away))
+    results = track_all([detections_at([present, back], n, 1.0) for n in range(100 + away)], tracker())
     assert _ids(results) == {1}
     assert set(final_boxes(results)[90 + away]) == {1}

@@ -12,22 +12,31 @@ from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings
 from bestview.association.ghost_check import fully_in_view
-from fakes.bestview.identity_scenes import CALIBRATED, STRIDE, VIEWS, Stay, both, play
+from fakes.bestview.identity_scenes import (
+    CALIBRATED,
+    STRIDE,
+    VIEWS,
+    StraightTrack,
+    collect_updates,
+    in_two_cameras,
+)
 
 WIDE, HIGH, TALL = 640, 440, 1.75
 PICTURES = dict.fromkeys(VIEWS, (WIDE, HIGH))
 SETTINGS = IdentitySettings(confirmation_frames=25, ghost_penalty=4.0, clustering_interval=5)
 
 
-def created_at(stays: list[Stay], pictures: dict[str, tuple[int, int]], *uncalibrated: str) -> list[int]:
+def created_at(
+    stays: list[StraightTrack], pictures: dict[str, tuple[int, int]], *uncalibrated: str
+) -> list[int]:
     """Return the frames at which ids are created."""
     ground = {**CALIBRATED, **dict.fromkeys(uncalibrated)}
-    seen = play(IdentityRegistry(SETTINGS, ground), stays, 300, pictures=pictures)
+    seen = collect_updates(IdentityRegistry(SETTINGS, ground), stays, 300, pictures=pictures)
     return [(place + 1) * STRIDE for place, update in enumerate(seen) for _ in update.created]
 
 
 def test_each_camera_that_misses_a_person_requires_more_frames() -> None:
-    alone = [Stay("south", 1, 0, 999, (0, 0))]
+    alone = [StraightTrack("south", 1, 0, 999, (0, 0))]
     two = {"south": (WIDE, HIGH), "west": (WIDE, HIGH)}
     assert created_at(alone, PICTURES) == [(1 + 2 * 4) * 25]
     assert created_at(alone, two) == [(1 + 4) * 25]
@@ -38,20 +47,20 @@ def test_each_camera_that_misses_a_person_requires_more_frames() -> None:
 
 
 def test_a_second_camera_that_sees_the_person_compensates_one_that_does_not() -> None:
-    assert created_at(both(1, (0, 0)), PICTURES) == [15], "two cameras compensate the third"
+    assert created_at(in_two_cameras(1, (0, 0)), PICTURES) == [15], "two cameras compensate the third"
 
 
 def test_cameras_whose_view_does_not_cover_the_place_are_not_missing() -> None:
     # Right below the western camera, and too far from the northern one.
-    assert created_at([Stay("south", 1, 0, 999, (-9.5, -4))], PICTURES) == [25]
+    assert created_at([StraightTrack("south", 1, 0, 999, (-9.5, -4))], PICTURES) == [25]
 
 
 def test_a_person_gone_before_confirmation_gets_no_id() -> None:
-    assert created_at([Stay("south", 1, 0, 80, (0, 0))], PICTURES) == []
+    assert created_at([StraightTrack("south", 1, 0, 80, (0, 0))], PICTURES) == []
     # The other cameras stop reporting once the person has left: nothing is missing, and nobody is there.
     seen = IdentityRegistry(SETTINGS, CALIBRATED)
-    early = play(seen, [Stay("south", 1, 0, 80, (0, 0))], 120, pictures=PICTURES)
-    late = play(seen, [], 300, start=120)
+    early = collect_updates(seen, [StraightTrack("south", 1, 0, 80, (0, 0))], 120, pictures=PICTURES)
+    late = collect_updates(seen, [], 300, start=120)
     assert not [update for update in early + late if update.created]
 
 
@@ -63,7 +72,7 @@ def test_full_view_means_inside_the_picture_and_large_enough(x: float, y: float)
     for name, seen in zip(names, visible, strict=True):
         far = float((VIEWS[name] @ (x, y, 1.0))[2])
         assume(abs(far) > 0.01)
-        person = Stay(name, 1, 0, 0, (x, y)).box(0)
+        person = StraightTrack(name, 1, 0, 0, (x, y)).box(0)
         assume(min(abs(margin) for margin in margins(person)) > 1e-6)
         assert seen == (far > 0 and min(margins(person)) > 0)
 
@@ -90,5 +99,5 @@ def test_a_plan_view_without_horizon_counts_too() -> None:
 @pytest.mark.parametrize("penalty", [0.0, 1e-9])
 def test_without_ghost_penalty_everyone_needs_the_same_frames(penalty: float) -> None:
     registry = IdentityRegistry(replace(SETTINGS, ghost_penalty=penalty), CALIBRATED)
-    seen = play(registry, [Stay("south", 1, 0, 999, (0, 0))], 60, pictures=PICTURES)
+    seen = collect_updates(registry, [StraightTrack("south", 1, 0, 999, (0, 0))], 60, pictures=PICTURES)
     assert sum(len(update.created) for update in seen) == 1

@@ -26,11 +26,11 @@ from fakes.bestview.identity_scenes import (
     OPEN_TRACKLET_LIMITS,
     STRIDE,
     VIEWS,
-    Stay,
-    both,
-    known,
+    StraightTrack,
+    collect_updates,
+    in_two_cameras,
     numbers,
-    play,
+    persons_by_track,
     registry,
     updates,
 )
@@ -39,19 +39,21 @@ from fakes.bestview.identity_scenes import (
 @OPEN_TRACKLET_LIMITS
 def test_a_person_has_one_id_in_every_camera(maximum_open: int) -> None:
     stays = [
-        Stay("south", 4, 0, 999, (0, 0)),
-        Stay("west", 9, 0, 999, (0, 0)),
-        Stay("south", 5, 0, 999, (3, 1)),
-        Stay("west", 8, 0, 999, (3, 1)),
+        StraightTrack("south", 4, 0, 999, (0, 0)),
+        StraightTrack("west", 9, 0, 999, (0, 0)),
+        StraightTrack("south", 5, 0, 999, (3, 1)),
+        StraightTrack("west", 8, 0, 999, (3, 1)),
     ]
-    last = known(play(registry(maximum_open_tracklets=maximum_open), stays, 60))
+    last = persons_by_track(collect_updates(registry(maximum_open_tracklets=maximum_open), stays, 60))
     assert last["south", 4] == last["west", 9]
     assert last["south", 5] == last["west", 8]
     assert sorted(last.values()) == [1, 1, 2, 2]
 
 
 def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
-    seen = play(registry(confirmation_frames=25, clustering_interval=5), both(1, (0, 0)), 60)
+    seen = collect_updates(
+        registry(confirmation_frames=25, clustering_interval=5), in_two_cameras(1, (0, 0)), 60
+    )
     # Two cameras see 10 frames together in every update.
     assert [update.created for update in seen] == [(), (), (1,)] + [()] * 9
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
@@ -59,8 +61,8 @@ def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
 
 @OPEN_TRACKLET_LIMITS
 def test_simultaneous_tracks_of_a_camera_are_two_people_however_close(maximum_open: int) -> None:
-    stays = [*both(1, (0, 0)), *both(2, (0.3, 0.3))]
-    last = known(play(registry(maximum_open_tracklets=maximum_open), stays, 100))
+    stays = [*in_two_cameras(1, (0, 0)), *in_two_cameras(2, (0.3, 0.3))]
+    last = persons_by_track(collect_updates(registry(maximum_open_tracklets=maximum_open), stays, 100))
     assert last["south", 1] != last["south", 2]
     assert last["west", 1] != last["west", 2]
     assert last["south", 1] == last["west", 1]
@@ -69,63 +71,66 @@ def test_simultaneous_tracks_of_a_camera_are_two_people_however_close(maximum_op
 @OPEN_TRACKLET_LIMITS
 def test_people_keep_their_ids_when_a_camera_restarts(maximum_open: int) -> None:
     people = [(-2.0, -2.0), (2.0, -1.0), (0.0, 3.0)]
-    stays = [Stay("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
-    stays += [Stay("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
-    stays += [Stay("west", 101 + i, 150, 999, at) for i, at in enumerate(people)]
-    seen = play(registry(maximum_open_tracklets=maximum_open), stays, 200)
-    again = known(seen[: (150 // STRIDE) + 5])  # five updates after it came back
+    stays = [StraightTrack("south", 1 + i, 0, 999, at) for i, at in enumerate(people)]
+    stays += [StraightTrack("west", 1 + i, 0, 99, at) for i, at in enumerate(people)]
+    stays += [StraightTrack("west", 101 + i, 150, 999, at) for i, at in enumerate(people)]
+    seen = collect_updates(registry(maximum_open_tracklets=maximum_open), stays, 200)
+    again = persons_by_track(seen[: (150 // STRIDE) + 5])  # five updates after it came back
     assert [again["west", 101 + i] for i in range(3)] == [again["south", 1 + i] for i in range(3)]
     assert max(max(update.person_ids.values(), default=0) for update in seen) == 3
 
 
 def test_a_person_who_reappears_at_the_same_place_keeps_the_id() -> None:
-    stays = [Stay("south", 1, 0, 100, (0, 0)), Stay("south", 2, 110, 999, (0, 0))]
+    stays = [StraightTrack("south", 1, 0, 100, (0, 0)), StraightTrack("south", 2, 110, 999, (0, 0))]
     for homographies in (CALIBRATED, BLIND):
-        seen = play(registry(homographies), stays, 200)
+        seen = collect_updates(registry(homographies), stays, 200)
         assert numbers(seen[-1])["south", 2] == 1
         assert all(update.created in {(), (1,)} for update in seen)
 
 
 def test_an_impossible_distance_means_another_person() -> None:
-    stays = [Stay("south", 1, 0, 100, (-4, 0)), Stay("south", 2, 104, 999, (4, 0))]
-    assert numbers(play(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
+    stays = [StraightTrack("south", 1, 0, 100, (-4, 0)), StraightTrack("south", 2, 104, 999, (4, 0))]
+    assert numbers(collect_updates(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
 
 
 @pytest.mark.parametrize("settings", [{}, {"comparable_frames": 250}], ids=["clustered", "reidentified"])
 def test_a_returning_person_with_the_same_appearance_gets_the_id_back(settings: dict[str, int]) -> None:
-    stays = [Stay("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
-    stays += [Stay("south", 10, 450, 999, (4, 2), coat=3), Stay("south", 11, 450, 999, (-4, 2), coat=7)]
-    seen = play(registry(**settings), stays, 600)
+    stays = [StraightTrack("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
+    stays += [
+        StraightTrack("south", 10, 450, 999, (4, 2), coat=3),
+        StraightTrack("south", 11, 450, 999, (-4, 2), coat=7),
+    ]
+    seen = collect_updates(registry(**settings), stays, 600)
     assert [update.departed for update in seen if update.departed] == [(1, 2, 3)]
     assert [update.returned for update in seen if update.returned] == [(2,)]
     assert numbers(seen[-1]) == {("south", 10): 2, ("south", 11): 4}
 
 
 def test_similar_people_do_not_get_each_others_ids_back() -> None:
-    stays = [Stay("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
-    stays += [Stay("south", 10, 400, 999, (4, 2), coat=3)]
-    assert numbers(play(registry(), stays, 600)[-1]) == {("south", 10): 4}
-    assert numbers(play(registry(comparable_frames=250), stays, 600)[-1]) == {("south", 10): 4}
+    stays = [StraightTrack("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
+    stays += [StraightTrack("south", 10, 400, 999, (4, 2), coat=3)]
+    assert numbers(collect_updates(registry(), stays, 600)[-1]) == {("south", 10): 4}
+    assert numbers(collect_updates(registry(comparable_frames=250), stays, 600)[-1]) == {("south", 10): 4}
 
 
 @pytest.mark.parametrize(("fps", "people"), [(5.0, 1), (25.0, 2)])
 def test_reappearance_reach_depends_on_time_not_on_frames(fps: float, people: int) -> None:
-    here = Stay("south", 1, 0, 30, (-4, 0), coat=3)
-    there = Stay("south", 2, 46, 999, (1.7, 0), coat=3)
+    here = StraightTrack("south", 1, 0, 30, (-4, 0), coat=3)
+    there = StraightTrack("south", 2, 46, 999, (1.7, 0), coat=3)
     identities = IdentityRegistry(
         replace(IdentitySettings(), confirmation_frames=5, clustering_interval=5), CALIBRATED, fps=fps
     )
-    assert len({*known(play(identities, [here, there], 200)).values()}) == people
+    assert len({*persons_by_track(collect_updates(identities, [here, there], 200)).values()}) == people
 
 
 def test_without_calibration_only_distinctive_appearance_links_cameras() -> None:
     def dressed(coats: Sequence[int]) -> dict[tuple[str, int], int]:
         stays = [
-            Stay(camera, 1 + i, 0, 999, (2.0 * i - 3, 2.0 * i - 3), coat=worn)
+            StraightTrack(camera, 1 + i, 0, 999, (2.0 * i - 3, 2.0 * i - 3), coat=worn)
             for camera in ("south", "west")
             for i, worn in enumerate(coats)
         ]
-        return numbers(play(registry(BLIND), stays, 600)[-1])
+        return numbers(collect_updates(registry(BLIND), stays, 600)[-1])
 
     differing = dressed([1, 3, 5, 7])
     assert all(differing["south", i] == differing["west", i] for i in (1, 2, 3, 4))
@@ -135,9 +140,9 @@ def test_without_calibration_only_distinctive_appearance_links_cameras() -> None
 
 def test_later_evidence_corrects_an_id_and_reports_it() -> None:
     # Two tracks are too far apart to be one person at first, and at the same place later.
-    apart = [Stay("south", 1, 0, 99, (0, 0)), Stay("west", 1, 0, 99, (0, 6))]
-    joined = [Stay("south", 1, 100, 999, (0, 0)), Stay("west", 1, 100, 999, (0, 0))]
-    seen = play(registry(), [*apart, *joined], 400)
+    apart = [StraightTrack("south", 1, 0, 99, (0, 0)), StraightTrack("west", 1, 0, 99, (0, 6))]
+    joined = [StraightTrack("south", 1, 100, 999, (0, 0)), StraightTrack("west", 1, 100, 999, (0, 0))]
+    seen = collect_updates(registry(), [*apart, *joined], 400)
     assert numbers(seen[15]) == {("south", 1): 1, ("west", 1): 2}
     assert [update.merged for update in seen if update.merged] == [(Merge(1, 2),)]
     assert numbers(seen[-1]) == {("south", 1): 1, ("west", 1): 1}
@@ -149,17 +154,21 @@ def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(
     maximum_open: int, *, dressed: bool
 ) -> None:
     # Two people meet and part in one camera, whose tracker swaps them; another camera tracks both correctly.
-    def meeting(camera: str, local: int, place: float, speed: float, start: int = 0, end: int = 999) -> Stay:
-        return Stay(camera, local, start, end, (place, 0), (speed, 0), dressed * (1 + 2 * (place > 0)))
+    def meeting(
+        camera: str, local: int, place: float, speed: float, start: int = 0, end: int = 999
+    ) -> StraightTrack:
+        return StraightTrack(
+            camera, local, start, end, (place, 0), (speed, 0), dressed * (1 + 2 * (place > 0))
+        )
 
     stays = [
-        Stay("west", 1, 0, 999, (-3, 0), (0.03, 0), dressed * 1),
-        Stay("west", 2, 0, 999, (3, 0.8), (-0.03, 0), dressed * 3),
+        StraightTrack("west", 1, 0, 999, (-3, 0), (0.03, 0), dressed * 1),
+        StraightTrack("west", 2, 0, 999, (3, 0.8), (-0.03, 0), dressed * 3),
     ]
     stays += [meeting("south", 1, -3, 0.03, end=100), meeting("south", 2, 3, -0.03, end=100)]
     stays += [meeting("south", 2, -3, 0.03, start=101), meeting("south", 1, 3, -0.03, start=101)]
-    seen = play(registry(maximum_open_tracklets=maximum_open), stays, 200)
-    before, after = known(seen[: 80 // STRIDE]), known(seen)
+    seen = collect_updates(registry(maximum_open_tracklets=maximum_open), stays, 200)
+    before, after = persons_by_track(seen[: 80 // STRIDE]), persons_by_track(seen)
     assert len({before["south", 1], before["south", 2]}) == 2
     assert after["south", 1] == before["south", 2]
     assert after["south", 2] == before["south", 1]
@@ -168,18 +177,22 @@ def test_a_track_that_switches_people_in_a_crowd_becomes_two_tracklets(
 
 def test_a_person_who_shared_an_id_gets_a_new_one_and_the_split_is_reported() -> None:
     # One camera tracks two people as one until they part; the others see only the one who stays.
-    together = [Stay(camera, 1, 0, 150, (0, 0)) for camera in VIEWS]
-    apart = [Stay(camera, 1, 151, 999, (4, 3) if camera == "west" else (0, 0)) for camera in VIEWS]
-    updated = play(registry(), [*together, *apart], 500)
+    together = [StraightTrack(camera, 1, 0, 150, (0, 0)) for camera in VIEWS]
+    apart = [StraightTrack(camera, 1, 151, 999, (4, 3) if camera == "west" else (0, 0)) for camera in VIEWS]
+    updated = collect_updates(registry(), [*together, *apart], 500)
     assert numbers(updated[150 // STRIDE - 1]) == {("south", 1): 1, ("west", 1): 1, ("north", 1): 1}
     assert [split for update in updated for split in update.split] == [Split(1, 2, "west")]
     assert numbers(updated[-1]) == {("south", 1): 1, ("west", 1): 2, ("north", 1): 1}
 
 
 def test_truncated_feet_have_no_ground_point() -> None:
-    near = Stay("south", 1, 0, 999, (0, -7))  # 3 m from the camera: the feet are far below the picture
+    near = StraightTrack(
+        "south", 1, 0, 999, (0, -7)
+    )  # 3 m from the camera: the feet are far below the picture
     cut = 480.0
-    other = Stay("west", 1, 0, 999, (0, -5))  # stands where a foot at the edge of the south picture would
+    other = StraightTrack(
+        "west", 1, 0, 999, (0, -5)
+    )  # stands where a foot at the edge of the south picture would
 
     def seen(height: float) -> IdentityUpdate:
         identities = registry()
@@ -204,7 +217,9 @@ def test_ids_do_not_depend_on_the_order_of_tracks(data: st.DataObject) -> None:
         for local in range(1, data.draw(st.integers(1, 3)) + 1):
             begin = data.draw(st.integers(0, 60))
             end = begin + data.draw(st.integers(5, 80))
-            stays.append(Stay(camera, local, begin, end, data.draw(spot), coat=data.draw(st.integers(0, 4))))
+            stays.append(
+                StraightTrack(camera, local, begin, end, data.draw(spot), coat=data.draw(st.integers(0, 4)))
+            )
     shuffled = data.draw(st.permutations(stays))
     one, two = registry(), registry()
     for first, second in zip(updates(one, stays, 140), updates(two, shuffled, 140), strict=True):
@@ -219,7 +234,7 @@ def test_ids_do_not_depend_on_the_order_of_tracks(data: st.DataObject) -> None:
 def test_simultaneous_tracks_of_a_camera_never_share_an_id(data: st.DataObject) -> None:
     spot = st.tuples(st.integers(-3, 3), st.integers(-3, 3))
     stays = [
-        Stay(camera, local, 0, 200, data.draw(spot), coat=data.draw(st.integers(0, 3)))
+        StraightTrack(camera, local, 0, 200, data.draw(spot), coat=data.draw(st.integers(0, 3)))
         for camera in VIEWS
         for local in range(1, data.draw(st.integers(1, 4)) + 1)
     ]
@@ -231,9 +246,9 @@ def test_simultaneous_tracks_of_a_camera_never_share_an_id(data: st.DataObject) 
 
 @OPEN_TRACKLET_LIMITS
 def test_a_person_settled_while_visible_does_not_depart(maximum_open: int) -> None:
-    seen = play(
+    seen = collect_updates(
         registry(maximum_open_tracklets=maximum_open, departed_after=60, settle_after=100),
-        both(1, (0, 0), end=400),
+        in_two_cameras(1, (0, 0), end=400),
         600,
     )
     assert [update.departed for update in seen if update.departed] == [(1,)]
@@ -250,7 +265,7 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
         settle_after=100,
         departed_after=50,
     )
-    stays = [Stay("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
+    stays = [StraightTrack("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
     sizes = []
     for _ in updates(identities, stays, 3000):
         open_ = identities._splitter
@@ -297,11 +312,11 @@ def test_minimal_settings_work_while_cameras_come_and_go(zero_settings: Mapping[
                 tracks.append(TrackUpdate(camera, run, last - STRIDE + 1, boxes, (sample,)))
         updates.append(identities.update(tracks, last))
         assert all(number >= 1 for number in numbers(updates[-1]).values())
-    assert known(updates)
+    assert persons_by_track(updates)
 
 
 def test_invalid_arguments_are_refused_in_one_line() -> None:
-    track = Stay("south", 1, 0, 99, (0, 0)).track(0, 14)
+    track = StraightTrack("south", 1, 0, 99, (0, 0)).track(0, 14)
 
     def refused(match: str, *tracks: TrackUpdate, last: int = 14) -> None:
         with pytest.raises(ValueError, match=match) as refusal:
@@ -334,27 +349,31 @@ def test_no_tracks_are_no_people() -> None:
 def test_a_person_is_reidentified_by_appearance_in_a_camera_without_common_ground() -> None:
     # Also on a common ground, since the two cameras never see a person at the same time.
     for homographies in (CALIBRATED, BLIND):
-        stays = [Stay("south", coat, 0, 100, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
-        stays += [Stay("west", 9 - coat, 300, 999, (-2, coat - 3.0), coat=coat) for coat in (1, 3, 5)]
-        ids = known(play(registry(homographies), stays, 400))
+        stays = [StraightTrack("south", coat, 0, 100, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
+        stays += [
+            StraightTrack("west", 9 - coat, 300, 999, (-2, coat - 3.0), coat=coat) for coat in (1, 3, 5)
+        ]
+        ids = persons_by_track(collect_updates(registry(homographies), stays, 400))
         assert [ids["west", 9 - coat] for coat in (1, 3, 5)] == [ids["south", coat] for coat in (1, 3, 5)]
 
 
 def test_travel_times_separate_people_who_look_alike() -> None:
-    def stays() -> Iterator[Stay]:
+    def stays() -> Iterator[StraightTrack]:
         # People with different coats go from south to west in 200 frames, one after the other ...
         for i in range(8):
             begin = 350 * i
-            yield Stay("south", 1 + i, begin, begin + 60, (0, 0), coat=1 + i % 6)
-            yield Stay("west", 1 + i, begin + 260, begin + 320, (0, 0), coat=1 + i % 6)
+            yield StraightTrack("south", 1 + i, begin, begin + 60, (0, 0), coat=1 + i % 6)
+            yield StraightTrack("west", 1 + i, begin + 260, begin + 320, (0, 0), coat=1 + i % 6)
         # ... then two with similar coats leave at different times, and after the usual travel time of the
         # second a person arrives whose coat is as similar to either.
-        yield Stay("south", 21, 2800, 2860, (0, 0), coat=6.7)
-        yield Stay("south", 22, 2800, 3300, (3, 0), coat=7.3)
-        yield Stay("west", 21, 3500, 3600, (0, 0), coat=6.4)
+        yield StraightTrack("south", 21, 2800, 2860, (0, 0), coat=6.7)
+        yield StraightTrack("south", 22, 2800, 3300, (3, 0), coat=7.3)
+        yield StraightTrack("west", 21, 3500, 3600, (0, 0), coat=6.4)
 
     def ids_with(**changes: float) -> dict[tuple[str, int], int]:
-        return known(play(registry(BLIND, comparable_frames=20, **changes), list(stays()), 3600))
+        return persons_by_track(
+            collect_updates(registry(BLIND, comparable_frames=20, **changes), list(stays()), 3600)
+        )
 
     times, alone = ids_with(), ids_with(maximum_travel_evidence=0.0)
     assert times["south", 21] != times["south", 22]

@@ -13,10 +13,10 @@ from fakes.bestview.identity_scenes import (
     BLIND,
     CALIBRATED,
     OPEN_TRACKLET_LIMITS,
-    Stay,
-    known,
+    StraightTrack,
+    collect_updates,
     numbers,
-    play,
+    persons_by_track,
     registry,
 )
 
@@ -25,14 +25,14 @@ SWAP_FRAME = 100
 """The first frame in which each of two tracks follows the other's person."""
 
 
-def meeting(apart: float, coats: tuple[int, int] = (3, 3)) -> list[Stay]:
+def meeting(apart: float, coats: tuple[int, int] = (3, 3)) -> list[StraightTrack]:
     """Return the tracks of two people who pass each other in one camera, whose tracker swaps them."""
     ways = [((-3.0, 0.0), (0.03, 0.0)), ((3.0, apart), (-0.03, 0.0))]
     stays = []
     for person, (start, speed) in enumerate(ways):
         before, after = 1 + person, 2 - person
-        stays.append(Stay("south", before, 0, SWAP_FRAME - 1, start, speed, coats[person]))
-        stays.append(Stay("south", after, SWAP_FRAME, 999, start, speed, coats[person]))
+        stays.append(StraightTrack("south", before, 0, SWAP_FRAME - 1, start, speed, coats[person]))
+        stays.append(StraightTrack("south", after, SWAP_FRAME, 999, start, speed, coats[person]))
     return stays
 
 
@@ -41,33 +41,33 @@ def meeting(apart: float, coats: tuple[int, int] = (3, 3)) -> list[Stay]:
 @pytest.mark.parametrize("corrected_at", [115, 170], ids=["soon", "later"])
 def test_swapped_tracks_exchange_their_ids(maximum_open: int, apart: float, corrected_at: int) -> None:
     identities, stays = registry(BLIND, maximum_open_tracklets=maximum_open), meeting(apart)
-    before = known(play(identities, stays, corrected_at))
+    before = persons_by_track(collect_updates(identities, stays, corrected_at))
     assert before == {ONE: 1, TWO: 2}
-    more = known(play(identities, stays, corrected_at + 5, start=corrected_at))
+    more = persons_by_track(collect_updates(identities, stays, corrected_at + 5, start=corrected_at))
     assert {**before, **more} == before, "the evidence does not correct the swap"
     splits = identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2))
     assert splits == (Split(1, 2, "south"), Split(2, 1, "south"))
-    after = play(identities, stays, 500, start=corrected_at + 5)
+    after = collect_updates(identities, stays, 500, start=corrected_at + 5)
     for update in after:
         assert numbers(update).get(ONE, 2) == 2
         assert numbers(update).get(TWO, 1) == 1
         assert (update.created, update.merged, update.split) == ((), (), ())
-    assert known(after)[ONE] == 2
+    assert persons_by_track(after)[ONE] == 2
 
 
 def test_tracklets_of_other_cameras_since_the_swap_are_swapped_too() -> None:
     # The other camera loses both as they pass, and gets their ids from the first one.
     identities, stays = registry({**CALIBRATED, "west": CALIBRATED["west"]}), meeting(0.8)
     stays += [
-        Stay("west", 5, 0, 90, (-3.0, 0.0), (0.03, 0.0), 3),
-        Stay("west", 6, 0, 90, (3.0, 0.8), (-0.03, 0.0), 3),
-        Stay("west", 7, 120, 999, (-3.0, 0.0), (0.03, 0.0), 3),
-        Stay("west", 8, 120, 999, (3.0, 0.8), (-0.03, 0.0), 3),
+        StraightTrack("west", 5, 0, 90, (-3.0, 0.0), (0.03, 0.0), 3),
+        StraightTrack("west", 6, 0, 90, (3.0, 0.8), (-0.03, 0.0), 3),
+        StraightTrack("west", 7, 120, 999, (-3.0, 0.0), (0.03, 0.0), 3),
+        StraightTrack("west", 8, 120, 999, (3.0, 0.8), (-0.03, 0.0), 3),
     ]
-    seen = known(play(identities, stays, 180))
+    seen = persons_by_track(collect_updates(identities, stays, 180))
     assert len(set(seen.values())) == 2
     identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2))
-    after = known(play(identities, stays, 400, start=180))
+    after = persons_by_track(collect_updates(identities, stays, 400, start=180))
     assert after["south", 1] == after["west", 8] == seen["west", 6]
     assert after["south", 2] == after["west", 7] == seen["west", 5]
 
@@ -75,21 +75,21 @@ def test_tracklets_of_other_cameras_since_the_swap_are_swapped_too() -> None:
 def test_a_swap_that_the_evidence_already_corrected_reports_no_split() -> None:
     identities, stays = registry(), meeting(0.8)
     stays += [
-        Stay("west", 5, 0, 999, (-3.0, 0.0), (0.03, 0.0), 3),
-        Stay("west", 6, 0, 999, (3.0, 0.8), (-0.03, 0.0), 3),
+        StraightTrack("west", 5, 0, 999, (-3.0, 0.0), (0.03, 0.0), 3),
+        StraightTrack("west", 6, 0, 999, (3.0, 0.8), (-0.03, 0.0), 3),
     ]
-    play(identities, stays, 80)
-    seen = known(play(identities, stays, 180, start=80))
+    collect_updates(identities, stays, 80)
+    seen = persons_by_track(collect_updates(identities, stays, 180, start=80))
     assert seen[TWO] == seen["west", 5]
     assert seen[ONE] == seen["west", 6]
     assert identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2)) == ()
-    assert known(play(identities, stays, 300, start=180)) == seen
+    assert persons_by_track(collect_updates(identities, stays, 300, start=180)) == seen
 
 
 def test_tracks_without_an_id_are_not_swapped() -> None:
     identities, stays = registry(BLIND), meeting(0.8)
     assert identities.swap_tracks(ONE, TWO, SWAP_FRAME, (1, 2)) == ()
-    play(identities, stays, 115)
+    collect_updates(identities, stays, 115)
     assert identities.swap_tracks(ONE, TrackKey("south", 9), SWAP_FRAME, (1, 9)) == ()
     assert identities.swap_tracks(ONE, ONE, SWAP_FRAME, (1, 1)) == ()
     assert identities.swap_tracks(ONE, TWO, 0, (0, 0)) == (), "no track existed before that frame"
@@ -110,12 +110,12 @@ def test_after_any_corrections_simultaneous_tracks_of_a_camera_have_different_id
 ) -> None:
     identities = registry()
     stays = [
-        Stay(camera, local, 0, 999, at)
+        StraightTrack(camera, local, 0, 999, at)
         for local, at in ((1, (0.0, 0.0)), (2, (2.0, 1.0)), (3, (-2.0, 2.0)))
         for camera in ("south", "west")
     ]
     for step in range(16):
-        for update in play(identities, stays, 10 * step + 10, start=10 * step):
+        for update in collect_updates(identities, stays, 10 * step + 10, start=10 * step):
             for camera in ("south", "west"):
                 shown = [number for (of, _), number in numbers(update).items() if of == camera]
                 assert len(shown) == len(set(shown))
@@ -127,11 +127,11 @@ def test_after_any_corrections_simultaneous_tracks_of_a_camera_have_different_id
 def test_nothing_is_stored_for_tracks_that_never_reappear() -> None:
     identities = registry(BLIND)
     stays = [replace(stay, end=min(stay.end, 199)) for stay in meeting(3.0)]
-    stays.append(Stay("south", 9, 0, 999, (0.0, 5.0)))
-    play(identities, stays, 200)
+    stays.append(StraightTrack("south", 9, 0, 999, (0.0, 5.0)))
+    collect_updates(identities, stays, 200)
     assert identities.swap_tracks(ONE, TWO, 190, (1, 2))
     assert set(identities._splitter._pending_splits) == {ONE, TWO}, (
         "their next observations start new tracklets"
     )
-    play(identities, stays, 900, start=200)
+    collect_updates(identities, stays, 900, start=200)
     assert not identities._splitter._pending_splits

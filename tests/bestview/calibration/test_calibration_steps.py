@@ -23,7 +23,7 @@ from bestview.calibration.pinhole import Pinhole
 from bestview.calibration.samples import candidate_matches, sample_walk
 from bestview.calibration.walk_tracks import halves_swapped, time_reversed
 from bestview.geometry.ground_plane import foot_points
-from fakes.bestview.walkers import SIZE, Noise, camera_at, seen, stroll
+from fakes.bestview.walkers import SIZE, Noise, camera_at, random_path, recorded_walk
 
 seeds = st.integers(0, 10_000).map(np.random.default_rng)
 SETTINGS = WalkSettings()
@@ -129,7 +129,7 @@ def test_boxes_are_interpolated_between_frames(random: np.random.Generator) -> N
 def test_two_curves_of_one_person_give_the_relative_pose(
     random: np.random.Generator, turn: float, east: float
 ) -> None:
-    camera, path = camera_at(-4, -1), stroll(random, 300)
+    camera, path = camera_at(-4, -1), random_path(random, 300)
     image, tall = camera.picture(path), camera.heights(camera.picture(path))
     track = WalkTrack(0, np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]]))
     samples = sample_walk(Walk("a", SIZE, (track,)), np.arange(0.0, 300.0, 5.0), 0.0, 5, 0.15)
@@ -214,8 +214,8 @@ def test_the_offset_error_grows_with_the_noise() -> None:
     errors = []
     for noise in (0.005, 0.05):
         random = np.random.default_rng(3)
-        cameras, path = (camera_at(-4, -1), camera_at(1, -4.5)), stroll(np.random.default_rng(3), 500)
-        views = [seen("c", camera, [path], random, noise=Noise(noise, noise)) for camera in cameras]
+        cameras, path = (camera_at(-4, -1), camera_at(1, -4.5)), random_path(np.random.default_rng(3), 500)
+        views = [recorded_walk("c", camera, [path], random, noise=Noise(noise, noise)) for camera in cameras]
         samples = [sample_walk(view, np.arange(0.0, 500.0, 5.0), 0.0, 5, 0.15) for view in views]
         candidates = candidate_matches(*samples)
         matches = Correspondences(0, 1, candidates.here, candidates.there, candidates.weight)

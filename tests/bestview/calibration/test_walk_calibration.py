@@ -9,7 +9,7 @@ import pytest
 
 from bestview.calibration import CalibrationError, Floats, Walk, WalkSettings, WalkTrack, calibrate_from_walks
 from bestview.calibration.pinhole import Pinhole
-from fakes.bestview.walkers import SIZE, camera_at, error_on_floor, seen, stroll
+from fakes.bestview.walkers import SIZE, camera_at, error_on_floor, random_path, recorded_walk
 
 WEST, SOUTH = camera_at(-4, -1), camera_at(1, -4.5, focal=0.7)
 PERSON = 1.75
@@ -20,7 +20,7 @@ def walks(
     random: np.random.Generator, cameras: tuple[Pinhole, ...], paths: list[Floats], offsets: tuple[int, ...]
 ) -> list[Walk]:
     return [
-        seen(f"c{number}", camera, paths, random, offset)
+        recorded_walk(f"c{number}", camera, paths, random, offset)
         for number, (camera, offset) in enumerate(zip(cameras, offsets, strict=True))
     ]
 
@@ -28,7 +28,7 @@ def walks(
 @pytest.mark.parametrize(("seed", "offset"), [(2, -19)])
 def test_one_walking_person_calibrates_two_cameras_and_their_offset(seed: int, offset: int) -> None:
     random = np.random.default_rng(seed)
-    given = walks(random, (WEST, SOUTH), [stroll(random, 450)], (0, offset))
+    given = walks(random, (WEST, SOUTH), [random_path(random, 450)], (0, offset))
     found = calibrate_from_walks(given, WalkSettings(maximum_offset=30), PERSON)
     assert found.uncalibrated == ()
     errors = error_on_floor(
@@ -43,7 +43,7 @@ def test_one_walking_person_calibrates_two_cameras_and_their_offset(seed: int, o
 
 def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
     random = np.random.default_rng(4)
-    given = walks(random, (WEST, SOUTH), [stroll(random, 400) for _ in range(3)], (0, 0))
+    given = walks(random, (WEST, SOUTH), [random_path(random, 400) for _ in range(3)], (0, 0))
     box = np.array([300.0, 150.0, 330.0, 230.0])
     sway = 15 * np.sin(np.arange(400) / 9.0)[:, None] * np.array([1, 0.3, 1, 0.3])
     ghost = WalkTrack(0, box + sway)
@@ -58,7 +58,7 @@ def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
 
 def test_calibration_is_deterministic() -> None:
     random = np.random.default_rng(9)
-    given = walks(random, (WEST, SOUTH), [stroll(random, 120)], (0, 0))
+    given = walks(random, (WEST, SOUTH), [random_path(random, 120)], (0, 0))
     brief = WalkSettings(maximum_offset=0, minimum_places=5.0, minimum_breadth=0.02)
     first, second = (calibrate_from_walks(given, brief, PERSON) for _ in range(2))
     for one, other in zip(first.cameras, second.cameras, strict=True):
@@ -67,8 +67,8 @@ def test_calibration_is_deterministic() -> None:
 
 def test_a_camera_that_sees_other_people_is_not_calibrated() -> None:
     random = np.random.default_rng(8)
-    given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, 0))
-    elsewhere = seen("c2", WEST, [stroll(random, 300)], random)
+    given = walks(random, (WEST, SOUTH), [random_path(random, 300)], (0, 0))
+    elsewhere = recorded_walk("c2", WEST, [random_path(random, 300)], random)
     found = calibrate_from_walks([given[0], elsewhere, given[1]], WalkSettings(maximum_offset=0), PERSON)
     assert [calibration.camera for calibration in found.cameras] == ["c0", "c1"]
     (left_out,) = found.uncalibrated
@@ -98,7 +98,7 @@ def test_standing_still_is_refused() -> None:
 
 def test_people_seen_by_one_camera_after_the_other_are_refused() -> None:
     random = np.random.default_rng(1)
-    given = walks(random, (WEST, SOUTH), [stroll(random, 300)], (0, -1000))
+    given = walks(random, (WEST, SOUTH), [random_path(random, 300)], (0, -1000))
     with pytest.raises(CalibrationError, match="no person was tracked by both cameras at the same time"):
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
@@ -106,7 +106,8 @@ def test_people_seen_by_one_camera_after_the_other_are_refused() -> None:
 def test_different_people_are_refused() -> None:
     random = np.random.default_rng(3)
     given = [
-        seen(name, camera, [stroll(random, 400)], random) for name, camera in (("c0", WEST), ("c1", SOUTH))
+        recorded_walk(name, camera, [random_path(random, 400)], random)
+        for name, camera in (("c0", WEST), ("c1", SOUTH))
     ]
     with pytest.raises(CalibrationError, match="c0 and c1"):
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))

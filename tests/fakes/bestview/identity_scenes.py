@@ -42,7 +42,7 @@ OPEN_TRACKLET_LIMITS = pytest.mark.parametrize("maximum_open", [400, 0], ids=["f
 
 
 @dataclass(frozen=True)
-class Stay:
+class StraightTrack:
     """A person's track in one camera, for some frames, along a line on the ground."""
 
     camera: str
@@ -76,9 +76,9 @@ def coat(which: float) -> NDArray[np.float64]:
     return np.asarray(peak / peak.sum())
 
 
-def play(
+def collect_updates(
     registry: IdentityRegistry,
-    stays: Sequence[Stay],
+    stays: Sequence[StraightTrack],
     frames: int,
     start: int = 0,
     pictures: Mapping[str, tuple[int, int]] | None = None,
@@ -88,7 +88,7 @@ def play(
 
 def updates(
     registry: IdentityRegistry,
-    stays: Sequence[Stay],
+    stays: Sequence[StraightTrack],
     frames: int,
     start: int = 0,
     pictures: Mapping[str, tuple[int, int]] | None = None,
@@ -113,11 +113,13 @@ def registry(
     return IdentityRegistry(replace(IdentitySettings(), **changes), homographies)  # type: ignore[arg-type]
 
 
-def both(local: int, place: tuple[float, float], start: int = 0, end: int = 999) -> list[Stay]:
-    return [Stay("south", local, start, end, place), Stay("west", local, start, end, place)]
+def in_two_cameras(
+    local: int, place: tuple[float, float], start: int = 0, end: int = 999
+) -> list[StraightTrack]:
+    return [StraightTrack("south", local, start, end, place), StraightTrack("west", local, start, end, place)]
 
 
-def known(identity_updates: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
+def persons_by_track(identity_updates: Sequence[IdentityUpdate]) -> dict[tuple[str, int], int]:
     """Return the person of each track after these updates, by camera and local id."""
     every = {key: number for update in identity_updates for key, number in update.person_ids.items()}
     newest = {key.track: number for key, number in sorted(every.items())}

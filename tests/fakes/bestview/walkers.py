@@ -38,7 +38,7 @@ def camera_at(
     return Pinhole(parameters, SIZE)
 
 
-def stroll(random: np.random.Generator, frames: int, wide: float = 2.0) -> Floats:
+def random_path(random: np.random.Generator, frames: int, wide: float = 2.0) -> Floats:
     """Return the path of a person who walks from point to point, `(frames, 2)` person heights."""
     places = [random.uniform(-wide, wide, 2)]
     goal = random.uniform(-wide, wide, 2)
@@ -52,7 +52,7 @@ def stroll(random: np.random.Generator, frames: int, wide: float = 2.0) -> Float
     return np.array(places)
 
 
-def seen(
+def recorded_walk(
     name: str,
     camera: Pinhole,
     paths: Sequence[Floats],

@@ -18,7 +18,7 @@ from camsync.messages import PulseMessage, ServerLine
 from camsync.protocol import parse_server_line
 from fakes.timeouts import PATIENCE
 
-BUSY = 0.5
+CLOCK_TOLERANCE = 0.5
 """Error of clock measurements on a busy machine, in seconds."""
 
 
@@ -78,10 +78,10 @@ Connect = Callable[..., Awaitable[RawConnection]]
 
 
 FPS = 400.0
-QUICK = ClientSettings(backoff_first=0.01, backoff_most=0.05, ping_interval=0.05, silence=0.3)
+QUICK_SETTINGS = ClientSettings(backoff_first=0.01, backoff_most=0.05, ping_interval=0.05, silence=0.3)
 
 
-async def take(client: PulseClient, count: int) -> list[Pulse]:
+async def next_pulses(client: PulseClient, count: int) -> list[Pulse]:
     async with asyncio.timeout(PATIENCE):
         return [await anext(client) for _ in range(count)]
 

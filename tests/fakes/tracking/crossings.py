@@ -85,7 +85,7 @@ def _dress(image: Image, left: int, top: int, clothes: Floats, texture: Floats) 
     image[top : top + _TALL, left : left + _WIDE] = np.clip(colors + texture, 0, 255)
 
 
-def followed(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
+def track_people(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
     """Track all people from the first picture to the last; return whether each is found at the end."""
     image = scene.picture(0)
     people = [method.initialize(image, scene.where(person, 0)) for person in range(len(scene.clothes))]
@@ -97,6 +97,6 @@ def followed(method: PredictionMethod[Any], scene: Crossing) -> list[bool]:
     ]
 
 
-def times_kept(methods: Sequence[PredictionMethod[Any]], scenes: Sequence[Crossing]) -> int:
+def count_tracked_scenes(methods: Sequence[PredictionMethod[Any]], scenes: Sequence[Crossing]) -> int:
     """Count the scenes in which all people are found at the end, each with a new method."""
-    return sum(all(followed(method, scene)) for method, scene in zip(methods, scenes, strict=True))
+    return sum(all(track_people(method, scene)) for method, scene in zip(methods, scenes, strict=True))

@@ -55,7 +55,7 @@ def picture(figures: Sequence[Figure], frame: int, gain: float = 1.0) -> Picture
     return np.asarray(cv2.add(cv2.convertScaleAbs(canvas, alpha=gain), noise, dtype=cv2.CV_8U))
 
 
-def watched(
+def detect_all(
     detector: BackgroundDetector, figures: Sequence[Figure], frames: range, gain: float = 1.0
 ) -> list[Detections]:
     """Run the detector on the frames."""

@@ -89,7 +89,7 @@ def network_of(case: Case) -> Network:
     return build_network_per_object(templates, own, case.settings)
 
 
-def best_by_trying(network: Network) -> float:
+def exhaustive_optimum(network: Network) -> float:
     """Return the cost of the optimum by exhaustive search over all states."""
     states = range(network.places + 1)
     best = np.inf

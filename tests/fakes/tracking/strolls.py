@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 30.0, 90.0
 
 
 @dataclass(frozen=True)
-class Stroll:
+class WalkingPerson:
     """A person walking at `speed` pixels per frame; detected in `seen`, with a high score in `sure`."""
 
     x: float
@@ -34,20 +34,22 @@ class Stroll:
         return left, self.y, left + WIDTH, self.y + HEIGHT
 
 
-def look(kind: int) -> np.ndarray:
+def peaked_histogram(kind: int) -> np.ndarray:
     histogram = np.full(BINS, 0.02)
     histogram[kind % BINS] += 1.0
     return histogram / histogram.sum()
 
 
-def seen_at(people: Iterable[Stroll], frame: int, jitter: float = 0.0, seed: int = 0) -> Detections:
+def detections_at(
+    people: Iterable[WalkingPerson], frame: int, jitter: float = 0.0, seed: int = 0
+) -> Detections:
     """Return the detections of a frame: all boxes, with noise of `jitter` pixels."""
     present = [person for person in people if frame in person.seen]
     if not present:
         return Detections.empty(BINS)
     rng = np.random.default_rng((seed, frame))
     boxes = np.array([person.box(frame) for person in present]) + rng.normal(0.0, jitter, (len(present), 4))
-    looks = np.stack([look(person.look) for person in present])
+    looks = np.stack([peaked_histogram(person.look) for person in present])
     scores = np.array([0.9 if frame in person.sure else 0.5 for person in present])
     return Detections(boxes, scores, looks)
 
@@ -56,7 +58,7 @@ def tracker(settings: WindowSettings | None = None) -> OnlineTracker:
     return OnlineTracker(settings or WindowSettings(), TEST_COSTS, create_solver("greedy-dp"))
 
 
-def follow(stream: Sequence[Detections], tracked: OnlineTracker, start: int = 0) -> list[WindowResult]:
+def track_all(stream: Sequence[Detections], tracked: OnlineTracker, start: int = 0) -> list[WindowResult]:
     """Push all frames and flush; return all results."""
     results = [tracked.push(start + n, seen) for n, seen in enumerate(stream)]
     return [result for result in [*results, tracked.flush()] if result is not None]

@@ -15,7 +15,9 @@ pytest.importorskip("onnxruntime", reason="needs onnxruntime: pip install 'myvie
 Table = npt.NDArray[np.float32]
 
 
-def save(path: Path, table: Table, size: tuple[int | str, int | str] = (64, 96), kind: str = "FLOAT") -> Path:
+def save_network(
+    path: Path, table: Table, size: tuple[int | str, int | str] = (64, 96), kind: str = "FLOAT"
+) -> Path:
     """Write a network that returns the table, with scores multiplied by the brightness of the first pixel.
 
     The input is `(1, 3, h, w)`; the first pixel is at the letterbox's corner, so a network that gets the gray

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.tracking.strolls import Stroll, final_boxes, seen_at
+from fakes.tracking.strolls import WalkingPerson, detections_at, final_boxes
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
 from tracking.baselines import StepwiseSettings
 from tracking.baselines.integral_histograms import BINS, ColorIntegralImage
@@ -158,12 +158,13 @@ def streams(draw: st.DrawFn) -> list[tuple[int, Detections]]:
     """Draw detections of people with misses, in frames some of which are skipped."""
     rng = np.random.default_rng(draw(st.integers(0, 1000)))
     people = [
-        Stroll(float(rng.integers(0, 300)), 20.0, float(rng.integers(-4, 5)), look) for look in range(3)
+        WalkingPerson(float(rng.integers(0, 300)), 20.0, float(rng.integers(-4, 5)), look)
+        for look in range(3)
     ]
     frame, found = draw(st.integers(0, 10)), []
     for _ in range(draw(st.integers(1, 40))):
         present = [person for person in people if rng.random() < 0.8]
-        found.append((frame, seen_at(present, frame, jitter=1.5, seed=1)))
+        found.append((frame, detections_at(present, frame, jitter=1.5, seed=1)))
         frame += 1 if rng.random() < 0.9 else int(rng.integers(2, 40))
     return found
 

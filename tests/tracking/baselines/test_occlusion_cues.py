@@ -16,7 +16,7 @@ from fakes.tracking.crossings import (
     Crossing,
     ThreeMeet,
     WalkTogether,
-    times_kept,
+    count_tracked_scenes,
 )
 from tracking.baselines.color_mixture import CODE_COLORS, COLOR_CODES, color_codes, fit_mixture, posterior
 from tracking.baselines.occluder_particles import OccluderParticles
@@ -127,27 +127,29 @@ def test_a_share_stays_with_its_occluder_when_others_come_and_go() -> None:
 
 def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_filter_fails() -> None:
     scenes = [Crossing((GRAY, BLUE), seed=seed) for seed in SEEDS]
-    assert times_kept([OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes) == len(
-        SEEDS
-    )
+    assert count_tracked_scenes(
+        [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes
+    ) == len(SEEDS)
     plain = [ParticleFilters(ParticleSettings(seed=seed)) for seed in SEEDS]
-    assert times_kept(plain, scenes) <= len(SEEDS) - 2
+    assert count_tracked_scenes(plain, scenes) <= len(SEEDS) - 2
 
 
 def test_a_hidden_person_moves_with_the_occluder_past_a_distractor() -> None:
     scenes = [WalkTogether((RED, BLUE), seed=seed) for seed in SEEDS]
-    with_cues = times_kept([OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes)
+    with_cues = count_tracked_scenes(
+        [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes
+    )
     alone = [
         OcclusionCues(OcclusionCueSettings(seed=seed, occlusion_noise=0.0, jump_share=0.0)) for seed in SEEDS
     ]
     assert with_cues >= len(SEEDS) - 1
-    assert times_kept(alone, scenes) <= 1
+    assert count_tracked_scenes(alone, scenes) <= 1
 
 
 def test_two_people_who_pass_behind_a_third_keep_their_ids() -> None:
     scenes = [ThreeMeet((RED, BLUE, GREEN), seed=seed) for seed in SEEDS]
     methods = [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS]
-    assert times_kept(methods, scenes) >= len(SEEDS) - 1
+    assert count_tracked_scenes(methods, scenes) >= len(SEEDS) - 1
 
 
 def test_the_hidden_share_is_large_only_during_the_occlusion() -> None:

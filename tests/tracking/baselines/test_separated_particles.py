@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.tracking.crossings import BLUE, RED, Clothes, Crossing, times_kept
+from fakes.tracking.crossings import BLUE, RED, Clothes, Crossing, count_tracked_scenes
 from tracking.baselines.integral_histograms import (
     CHANNELS,
     LEVELS,
@@ -86,8 +86,10 @@ def test_the_bhattacharyya_coefficient_is_1_for_equal_and_0_for_disjoint_histogr
 
 def test_two_similar_people_who_cross_are_kept_where_independent_filters_fail() -> None:
     scenes = [Crossing((RED, RED), seed=seed) for seed in SEEDS]
-    apart = times_kept([SeparatedParticles(SeparatedParticleSettings(seed=seed)) for seed in SEEDS], scenes)
-    together = times_kept([ParticleFilters(ParticleSettings(seed=seed)) for seed in SEEDS], scenes)
+    apart = count_tracked_scenes(
+        [SeparatedParticles(SeparatedParticleSettings(seed=seed)) for seed in SEEDS], scenes
+    )
+    together = count_tracked_scenes([ParticleFilters(ParticleSettings(seed=seed)) for seed in SEEDS], scenes)
     assert apart >= len(SEEDS) - 1
     assert together <= len(SEEDS) - 2
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.tracking.strolls import BINS, Stroll, final_boxes, look, seen_at
+from fakes.tracking.strolls import BINS, WalkingPerson, detections_at, final_boxes, peaked_histogram
 from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.appearance import appearance_distance
 from tracking.baselines.track_groups import TrackEnd, TrackGraphSettings, departed_member
@@ -57,24 +57,24 @@ def test_the_departed_member_is_the_most_probable_of_all_states(seed: int, count
 
 def test_a_person_unlike_all_members_was_not_in_the_group() -> None:
     place, still = np.zeros(2), np.zeros(2)
-    group = [TrackEnd(0, place, still, 80.0, look(kind)) for kind in (0, 1)]
-    stranger = TrackEnd(90, place, still, 80.0, look(5))
+    group = [TrackEnd(0, place, still, 80.0, peaked_histogram(kind)) for kind in (0, 1)]
+    stranger = TrackEnd(90, place, still, 80.0, peaked_histogram(5))
     assert departed_member(group, stranger, group[0], CLOSE, max_distance=0.5) is None
 
 
-def _crossing() -> tuple[list[Detections], list[Stroll]]:
+def _crossing() -> tuple[list[Detections], list[WalkingPerson]]:
     """Return detections of a person walking past a standing one, who is missed while near the other."""
-    standing = Stroll(200.0, 50.0, 0.0, 2, seen=range(1000))
+    standing = WalkingPerson(200.0, 50.0, 0.0, 2, seen=range(1000))
     hidden = {frame for frame in range(200) if abs(50.0 + 3.0 * frame - 200.0) < 30.0}
-    walking = Stroll(50.0, 45.0, 3.0, 6)
+    walking = WalkingPerson(50.0, 45.0, 3.0, 6)
     frames = [
-        seen_at([standing] if frame in hidden else [standing, walking], frame, jitter=0.5, seed=3)
+        detections_at([standing] if frame in hidden else [standing, walking], frame, jitter=0.5, seed=3)
         for frame in range(100)
     ]
     return frames, [standing, walking]
 
 
-def _numbers(tracker: Tracker, frames: list[Detections], people: list[Stroll]) -> list[list[int]]:
+def _numbers(tracker: Tracker, frames: list[Detections], people: list[WalkingPerson]) -> list[list[int]]:
     """Return each person's track numbers in order."""
     pushed = [tracker.push(number, seen) for number, seen in enumerate(frames)]
     results = [result for result in (*pushed, tracker.flush()) if result is not None]
@@ -94,13 +94,13 @@ def test_a_person_who_leaves_a_group_keeps_the_id() -> None:
 
 
 def test_a_hijacked_track_is_corrected_when_the_group_splits() -> None:
-    people = [Stroll(200.0, 50.0, 0.0, 2), Stroll(100.0, 50.0, 1.0, 6)]
+    people = [WalkingPerson(200.0, 50.0, 0.0, 2), WalkingPerson(100.0, 50.0, 1.0, 6)]
     # One person alone is detected: the box moves from the standing to the walking one, with the filter.
     stands, walks = range(82, 112), range(112, 140)
     frames = []
     for frame in range(180):
         present = [people[0]] if frame in stands else [people[1]] if frame in walks else people
-        frames.append(seen_at(present, frame, jitter=0.5, seed=4))
+        frames.append(detections_at(present, frame, jitter=0.5, seed=4))
     graph, plain = (_numbers(_tracker(name), frames, people) for name in ("track-graph", "kalman"))
     assert graph[0][-1] == graph[0][0]
     assert graph[1][-1] == graph[1][0]
@@ -111,7 +111,8 @@ def test_a_hijacked_track_is_corrected_when_the_group_splits() -> None:
 def test_a_frame_has_an_id_at_most_once_and_results_are_deterministic() -> None:
     rng = np.random.default_rng(8)
     people = [
-        Stroll(float(rng.integers(0, 300)), 40.0, float(rng.integers(-4, 5)), kind) for kind in range(5)
+        WalkingPerson(float(rng.integers(0, 300)), 40.0, float(rng.integers(-4, 5)), kind)
+        for kind in range(5)
     ]
     frames = []
     for frame in range(200):
@@ -120,7 +121,7 @@ def test_a_frame_has_an_id_at_most_once_and_results_are_deterministic() -> None:
             for place, person in enumerate(people)
             if not any(abs(person.box(frame)[0] - other.box(frame)[0]) < 14 for other in people[:place])
         ]
-        frames.append(seen_at(present, frame % 90, jitter=1.0, seed=frame))
+        frames.append(detections_at(present, frame % 90, jitter=1.0, seed=frame))
     runs = []
     for _ in range(2):
         tracker = _tracker("track-graph")

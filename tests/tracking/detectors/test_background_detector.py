@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fakes.tracking.drawn_people import HEIGHT, WIDTH, Figure, picture, watched
+from fakes.tracking.drawn_people import HEIGHT, WIDTH, Figure, detect_all, picture
 from tracking.boxes import iou
 from tracking.detectors import AppearanceSettings, BackgroundDetector, BackgroundSettings
 from tracking.detectors.background.height_model import (
@@ -31,7 +31,7 @@ def best_overlap(seen: Detections, figure: Figure, frame: int) -> float:
 
 
 def test_a_walker_is_detected_in_a_tight_box() -> None:
-    seen = watched(BackgroundDetector(), [WALKER], range(120))
+    seen = detect_all(BackgroundDetector(), [WALKER], range(120))
     overlaps = [best_overlap(seen[frame], WALKER, frame) for frame in range(45, 120)]
     assert np.mean(np.array(overlaps) >= 0.5) >= 0.95
     # The height model is uncertain with one person, and a rectangle is not shaped like a person.
@@ -39,13 +39,13 @@ def test_a_walker_is_detected_in_a_tight_box() -> None:
 
 
 def test_an_empty_scene_has_no_detections() -> None:
-    seen = watched(BackgroundDetector(), [], range(60))
+    seen = detect_all(BackgroundDetector(), [], range(60))
     assert all((frame.scores < SURE).all() for frame in seen)
 
 
 def test_two_people_side_by_side_are_two() -> None:
     pair = [Figure(60, 200, speed=1.5, begin=40), Figure(95, 215, speed=1.5, begin=40)]
-    seen = watched(BackgroundDetector(), [*pair, Figure(300, 180, speed=-2.0, begin=40)], range(130))
+    seen = detect_all(BackgroundDetector(), [*pair, Figure(300, 180, speed=-2.0, begin=40)], range(130))
     for figure in pair:
         found = [best_overlap(seen[frame], figure, frame) >= 0.5 for frame in range(90, 130)]
         assert np.mean(found) >= 0.8
@@ -53,14 +53,14 @@ def test_two_people_side_by_side_are_two() -> None:
 
 def test_a_gain_change_causes_no_detections() -> None:
     detector = BackgroundDetector()
-    watched(detector, [], range(50))
-    brighter = watched(detector, [], range(50, 70), gain=1.15)
+    detect_all(detector, [], range(50))
+    brighter = detect_all(detector, [], range(50, 70), gain=1.15)
     assert all((frame.scores < SURE).all() for frame in brighter)
 
 
 def test_a_standing_person_is_not_absorbed_into_the_background() -> None:
     arrived = [Figure(10, 200, speed=2.0, begin=40, end=100), Figure(210, 200, begin=100)]
-    seen = watched(BackgroundDetector(), arrived, range(200))
+    seen = detect_all(BackgroundDetector(), arrived, range(200))
     assert np.mean([best_overlap(seen[frame], arrived[1], frame) >= 0.5 for frame in range(110, 200)]) > 0.95
 
 
@@ -69,7 +69,7 @@ def test_a_person_in_the_first_frame_of_a_recording_is_detected_and_leaves_no_gh
     detector = BackgroundDetector()
     assert detector.warming_up
     detector.prepare([picture([walker], frame) for frame in range(0, 160, 20)], every=20)
-    seen = watched(detector, [walker], range(100))
+    seen = detect_all(detector, [walker], range(100))
     assert not detector.warming_up
     assert np.mean([best_overlap(seen[frame], walker, frame) >= 0.5 for frame in range(100)]) >= 0.95
     left = [(seen[frame].scores >= SURE) & (seen[frame].boxes[:, 2] < 40.0) for frame in range(60, 100)]
@@ -87,8 +87,8 @@ def test_a_prepared_background_is_replaced_when_the_picture_changes() -> None:
 def test_the_ghost_of_a_person_present_from_the_start_vanishes() -> None:
     leaves = Figure(150, 200, end=60)
     detector = BackgroundDetector()
-    watched(detector, [leaves], range(60))
-    after = watched(detector, [], range(60, 130))
+    detect_all(detector, [leaves], range(60))
+    after = detect_all(detector, [], range(60, 130))
     assert best_overlap(after[0], leaves, 0) >= 0.5, "without a ghost the test proves nothing"
     assert all((frame.scores < SURE).all() for frame in after[-20:])
 
@@ -96,7 +96,7 @@ def test_the_ghost_of_a_person_present_from_the_start_vanishes() -> None:
 def test_ignored_regions_have_no_detections() -> None:
     right = ((WIDTH / 2, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (WIDTH / 2, HEIGHT))
     hidden = Figure(260, 200, speed=-0.5, begin=40)
-    seen = watched(BackgroundDetector(BackgroundSettings(ignore=(right,))), [hidden], range(100))
+    seen = detect_all(BackgroundDetector(BackgroundSettings(ignore=(right,))), [hidden], range(100))
     assert all((frame.scores < SURE).all() for frame in seen)
 
 
@@ -104,7 +104,7 @@ def test_ignored_regions_have_no_detections() -> None:
 def test_color_histograms_distinguish_people(color: bool, length: int) -> None:
     red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, color=(190, 110, 35))
     detector = BackgroundDetector(BackgroundSettings(appearance=AppearanceSettings(color=color)))
-    seen = watched(detector, [red, blue], range(80))[-1]
+    seen = detect_all(detector, [red, blue], range(80))[-1]
     assert detector.bins == length == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
     histograms = [seen.histograms[np.argmax(iou(seen.boxes, figure.box(79)))] for figure in (red, blue)]
@@ -113,7 +113,7 @@ def test_color_histograms_distinguish_people(color: bool, length: int) -> None:
 
 
 def test_the_same_frames_give_identical_detections() -> None:
-    first, second = (watched(BackgroundDetector(), [WALKER], range(80)) for _ in range(2))
+    first, second = (detect_all(BackgroundDetector(), [WALKER], range(80)) for _ in range(2))
     for one, other in zip(first, second, strict=True):
         for part in ("boxes", "scores", "histograms"):
             assert getattr(one, part).tobytes() == getattr(other, part).tobytes()

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from fakes.tracking.tiny_networks import save, yolov5, yolov8
+from fakes.tracking.tiny_networks import save_network, yolov5, yolov8
 from tracking.detectors import OnnxDetector, OnnxSettings
 from tracking.detectors.neural.yolo_output import decode_output
 
@@ -34,25 +34,25 @@ END = yolov5([(24, 12, 36, 52, 0.72, 0), (64, 12, 76, 52, 0.9, 1)], boxes=5)
 def test_a_person_is_found_once_and_other_classes_are_not(
     tmp_path: Path, table: npt.NDArray[np.float32]
 ) -> None:
-    seen = detector(save(tmp_path / "tiny.onnx", table)).detect(WHITE)
+    seen = detector(save_network(tmp_path / "tiny.onnx", table)).detect(WHITE)
     np.testing.assert_allclose(seen.boxes, [BOX], atol=1e-4)
     np.testing.assert_allclose(seen.scores, [0.72], rtol=1e-5)
     assert seen.histograms.shape == (1, 96)
 
 
 def test_configured_classes_are_detected(tmp_path: Path) -> None:
-    one = detector(save(tmp_path / "tiny.onnx", V8), classes=(0, 1))
+    one = detector(save_network(tmp_path / "tiny.onnx", V8), classes=(0, 1))
     np.testing.assert_allclose(one.detect(WHITE).scores, [0.9, 0.72], rtol=1e-5)
     with pytest.raises(ValueError, match="no class 7"):
         detector(tmp_path / "tiny.onnx", classes=(7,))
 
 
 def test_boxes_below_min_score_are_dropped(tmp_path: Path) -> None:
-    assert len(detector(save(tmp_path / "tiny.onnx", V8), min_score=0.8).detect(WHITE)) == 0
+    assert len(detector(save_network(tmp_path / "tiny.onnx", V8), min_score=0.8).detect(WHITE)) == 0
 
 
 def test_boxes_are_mapped_back_from_the_letterboxed_input(tmp_path: Path) -> None:
-    path = save(tmp_path / "tiny.onnx", V8, size=(96, 96))
+    path = save_network(tmp_path / "tiny.onnx", V8, size=(96, 96))
     wide = np.full((64, 192, 3), 255, dtype=np.uint8)  # half its size in the input, 32 rows of bar above
     seen = detector(path, min_score=0.1).detect(wide)
     # The bars have brightness 114 of 255, which scales the score of this network.
@@ -61,14 +61,14 @@ def test_boxes_are_mapped_back_from_the_letterboxed_input(tmp_path: Path) -> Non
 
 
 def test_a_model_with_dynamic_size_gets_the_configured_size(tmp_path: Path) -> None:
-    path = save(tmp_path / "tiny.onnx", V8, size=("height", "width"))
+    path = save_network(tmp_path / "tiny.onnx", V8, size=("height", "width"))
     square = np.full((200, 200, 3), 255, dtype=np.uint8)
     seen = detector(path, input_size=100).detect(square)
     np.testing.assert_allclose(seen.boxes, [BOX], atol=1e-4)
 
 
 def test_half_precision_models_are_supported(tmp_path: Path) -> None:
-    seen = detector(save(tmp_path / "tiny.onnx", V8, kind="FLOAT16")).detect(WHITE)
+    seen = detector(save_network(tmp_path / "tiny.onnx", V8, kind="FLOAT16")).detect(WHITE)
     np.testing.assert_allclose(seen.boxes, [BOX], atol=0.1)
 
 
@@ -77,8 +77,8 @@ def test_an_unsupported_model_is_refused_in_one_line(tmp_path: Path) -> None:
     noise.write_bytes(b"no network")
     refused = {
         noise: "not a usable ONNX file",
-        save(tmp_path / "flat.onnx", V8[0]): r"output has the shape \(6, 20\)",
-        save(tmp_path / "thin.onnx", yolov5([(1.0, 2.0, 3.0, 4.0)])): r"shape \(1, 20, 4\)",
+        save_network(tmp_path / "flat.onnx", V8[0]): r"output has the shape \(6, 20\)",
+        save_network(tmp_path / "thin.onnx", yolov5([(1.0, 2.0, 3.0, 4.0)])): r"shape \(1, 20, 4\)",
     }
     for path, message in refused.items():
         with pytest.raises(ValueError, match=message) as caught:
@@ -90,7 +90,7 @@ def test_an_unsupported_model_is_refused_in_one_line(tmp_path: Path) -> None:
 
 
 def test_without_onnxruntime_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = save(tmp_path / "tiny.onnx", V8)
+    path = save_network(tmp_path / "tiny.onnx", V8)
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
     with pytest.raises(ImportError, match=r"pip install 'myview\[onnx\]'"):
         detector(path)

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fakes.tracking.strolls import TEST_COSTS, WIDTH, Stroll, final_boxes, follow, seen_at
+from fakes.tracking.strolls import TEST_COSTS, WIDTH, WalkingPerson, detections_at, final_boxes, track_all
 from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.boxes import iou
 from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
 from tracking.interactive.late_correction import backdate_correction
 from tracking.registry import create_tracker
 
-SIMILAR = [Stroll(0, 50, 4.0, 1), Stroll(300, 50, -4.0, 1)]
+SIMILAR = [WalkingPerson(0, 50, 4.0, 1), WalkingPerson(300, 50, -4.0, 1)]
 """Two similar people who cross in frame 37; only their motion distinguishes them."""
 
 
@@ -28,16 +28,16 @@ def _online_tracker() -> OnlineTracker:
     return OnlineTracker(WindowSettings(), TEST_COSTS, create_solver("columns"))
 
 
-def _crossing(people: Sequence[Stroll] = SIMILAR, frames: int = 80) -> list[Detections]:
+def _crossing(people: Sequence[WalkingPerson] = SIMILAR, frames: int = 80) -> list[Detections]:
     """Return the detections of a crossing: one box while one person is behind the other."""
-    stream = [seen_at(people, n, 0.5, 1) for n in range(frames)]
+    stream = [detections_at(people, n, 0.5, 1) for n in range(frames)]
     for n in range(33, 42):
         found = stream[n]
         stream[n] = Detections(found.boxes[:1], found.scores[:1], found.histograms[:1])
     return stream
 
 
-def _at(person: Stroll, frame: int, number: int) -> PositionCorrection:
+def _at(person: WalkingPerson, frame: int, number: int) -> PositionCorrection:
     left, top, right, bottom = person.box(frame)
     return PositionCorrection(frame, number, (left + right) / 2, (top + bottom) / 2, WIDTH / 2)
 
@@ -64,15 +64,15 @@ def _shown(results: Sequence[WindowResult]) -> list[object]:
 
 def test_without_corrections_the_tracks_equal_those_of_the_online_tracker() -> None:
     stream = _crossing()
-    results = follow(stream, _interactive_tracker())
-    assert _shown(results) == _shown(follow(stream, _online_tracker()))
+    results = track_all(stream, _interactive_tracker())
+    assert _shown(results) == _shown(track_all(stream, _online_tracker()))
     assert all(result.revised_from is None for result in results)
-    assert not any(result.risk_events for result in follow(stream, _online_tracker()))
+    assert not any(result.risk_events for result in track_all(stream, _online_tracker()))
 
 
 def test_only_a_crossing_of_similar_people_is_a_risk_event() -> None:
-    def crossing_events(people: Sequence[Stroll]) -> list[tuple[int, int]]:
-        results = follow(_crossing(people), _interactive_tracker())
+    def crossing_events(people: Sequence[WalkingPerson]) -> list[tuple[int, int]]:
+        results = track_all(_crossing(people), _interactive_tracker())
         return [
             (result.last, event.frame)
             for result in results
@@ -85,12 +85,14 @@ def test_only_a_crossing_of_similar_people_is_a_risk_event() -> None:
     first, expected = events[0]
     assert first < 33
     assert expected == pytest.approx(37, abs=5)
-    assert not crossing_events([SIMILAR[0], Stroll(300, 50, -4.0, 4)])
+    assert not crossing_events([SIMILAR[0], WalkingPerson(300, 50, -4.0, 4)])
 
 
 def test_a_person_who_vanishes_alone_is_a_track_loss_event() -> None:
-    gone = Stroll(200, 50, 1.0, 2, seen=range(40))
-    results = follow([seen_at([SIMILAR[0], gone], n, 0.5) for n in range(60)], _interactive_tracker())
+    gone = WalkingPerson(200, 50, 1.0, 2, seen=range(40))
+    results = track_all(
+        [detections_at([SIMILAR[0], gone], n, 0.5) for n in range(60)], _interactive_tracker()
+    )
     losses = [event for result in results for event in result.risk_events if event.reason == "track_loss"]
     assert losses
     assert {event.objects for event in losses} == {(2,)}
@@ -141,10 +143,13 @@ def test_a_correction_that_agrees_with_the_tracks_changes_nothing() -> None:
 
 def test_a_correction_gives_a_lost_person_the_old_id_back() -> None:
     """Hidden for two seconds and back at an unexpected place: the tracker assigns a new id."""
-    strolls = [Stroll(0, 50, 2.0, 1, seen=range(30)), Stroll(-100, 50, 5.0, 1, seen=range(80, 140))]
+    strolls = [
+        WalkingPerson(0, 50, 2.0, 1, seen=range(30)),
+        WalkingPerson(-100, 50, 5.0, 1, seen=range(80, 140)),
+    ]
     tracked = _interactive_tracker()
     for n in range(140):
-        tracked.push(n, seen_at(strolls, n, 0.5))
+        tracked.push(n, detections_at(strolls, n, 0.5))
     revised = tracked.apply_corrections([_at(strolls[1], 120, 1)])
     assert revised is not None
     assert {track.id for track in revised.tracks if not np.isnan(track.boxes[-1, 0])} == {1}
@@ -176,7 +181,7 @@ def test_a_forgotten_contradiction_does_not_prevent_later_revisions() -> None:
 def test_the_memory_is_bounded() -> None:
     tracked = _interactive_tracker(memory=40)
     for n in range(300):
-        tracked.push(n, seen_at(SIMILAR, n % 60, 0.5))
+        tracked.push(n, detections_at(SIMILAR, n % 60, 0.5))
         tracked.apply_corrections([_at(SIMILAR[0], n % 60, 1)])
     memory = tracked._memory
     assert len(memory.detections) <= 40 + WindowSettings().window + 1
@@ -258,7 +263,7 @@ def test_a_correction_inserts_a_box_where_the_detector_merges_two_people() -> No
         both = np.array([person.box(n) for person in SIMILAR])
         box = np.concatenate([both[:, :2].min(axis=0), both[:, 2:].max(axis=0)])
         stream[n] = Detections(box[None], stream[n].scores, stream[n].histograms)
-    shown = final_boxes(follow(stream, _online_tracker()))
+    shown = final_boxes(track_all(stream, _online_tracker()))
     assert not any(_is_own_box(shown[n].get(2), n) for n in merged), "the merged box is not the person's own"
     for n, seen in enumerate(stream):
         tracked.push(n, seen)
@@ -267,7 +272,7 @@ def test_a_correction_inserts_a_box_where_the_detector_merges_two_people() -> No
     boxes = _boxes(revised, 2)
     assert all(_is_own_box(boxes[n - revised.first], n) for n in merged)
     assert {track.id for track in revised.tracks} == {1, 2}
-    later = [tracked.push(n, seen_at(SIMILAR, n, 0.5)) for n in range(80, 100)]
+    later = [tracked.push(n, detections_at(SIMILAR, n, 0.5)) for n in range(80, 100)]
     assert {track.id for result in later if result for track in result.tracks} == {1, 2}, (
         "inserted boxes initiate no track"
     )

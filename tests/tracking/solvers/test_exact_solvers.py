@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from fakes.tracking.random_networks import Case, best_by_trying, cases, network_of
+from fakes.tracking.random_networks import Case, cases, exhaustive_optimum, network_of
 from tracking.model.network import Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import create_solver, exact
@@ -29,7 +29,7 @@ LAYOUTS = (0.0, 0.0, 0.0005, 0.002)
 def test_the_optimum_is_found(name: str, case: Case) -> None:
     network = network_of(case)
     report = create_solver(name).solve(network).report
-    assert report.objective == pytest.approx(best_by_trying(network), rel=TOLERANCE)
+    assert report.objective == pytest.approx(exhaustive_optimum(network), rel=TOLERANCE)
     assert (report.gap, report.conflicts, report.integral) == (0.0, 0, True)
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from fakes.tracking.random_networks import SETTINGS, Case, best_by_trying, cases, network_of
+from fakes.tracking.random_networks import SETTINGS, Case, cases, exhaustive_optimum, network_of
 from tracking.model.network import Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import OCCLUDED, Solution, create_solver
@@ -51,7 +51,7 @@ def test_states_exist_and_keep_all_conflicts(name: str, case: Case) -> None:
 @given(case=cases(objects=2, frames=3, places=2, layouts=(0.0, 0.002)))
 def test_the_bound_is_below_the_optimum_and_integral_relaxations_are_optimal(name: str, case: Case) -> None:
     network = network_of(case)
-    optimum = best_by_trying(network)
+    optimum = exhaustive_optimum(network)
     report = create_solver(name).solve(network).report
     assert report.bound <= optimum + TOLERANCE
     if report.conflicts == 0:
@@ -68,7 +68,7 @@ def test_forbidden_nodes_are_avoided_or_the_report_has_conflicts(name: str, case
     network = network_of(case)
     forbidden = np.random.default_rng(case.seed).uniform(size=network.node.shape) < share
     network = replace(network, node=np.where(forbidden, np.inf, network.node))
-    optimum = best_by_trying(network)
+    optimum = exhaustive_optimum(network)
     assume(np.isfinite(optimum))
     found = create_solver(name).solve(network)
     assert found.report.conflicts == conflict_count(network, nodes_from_states(network, found.states))
@@ -91,7 +91,7 @@ def test_greedy_ends_if_no_object_has_a_path() -> None:
 @given(case=cases(objects=3, frames=2, places=2))
 def test_three_objects_get_the_optimum_if_the_relaxation_is_integral(case: Case) -> None:
     network = network_of(case)
-    optimum = best_by_trying(network)
+    optimum = exhaustive_optimum(network)
     for name in RELAXATIONS:
         report = create_solver(name).solve(network).report
         assert report.bound <= optimum + TOLERANCE
