@@ -111,7 +111,7 @@ async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCos
     """Let a worker render GOPs, each published when the previous one is rendered."""
     stream = Broadcaster()
     source = RenderedStream("the room", stream, room.overlay, room.settings, live=True, queue_gops=8)
-    source.use()
+    source.acquire()
     source.video.users = load.video_viewers
     viewers = [source.video.broadcaster.subscribe() for _ in range(load.video_viewers)]
     viewers += [source.mjpeg.subscribe(mjpeg_variants) for mjpeg_variants in load.mjpeg_variants]

@@ -40,9 +40,9 @@ class Pinhole:
     parameters: Floats
     size: tuple[int, int]
 
-    def homography(self, person: float = 1.0) -> Floats:
-        """Return the homography from pixels to the floor, (3, 3); people are `person` units tall."""
-        back = np.diag([person, person, 1.0]) @ self._inverse()
+    def floor_homography(self, person_height: float = 1.0) -> Floats:
+        """Return the homography from pixels to the floor, (3, 3); people are `person_height` units tall."""
+        back = np.diag([person_height, person_height, 1.0]) @ self._inverse()
         return np.asarray(back / np.abs(back).max())
 
     def floor(self, feet: Floats) -> Floats:

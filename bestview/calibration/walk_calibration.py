@@ -170,7 +170,7 @@ def _camera(
     shift = np.array([floor * _FLOOR_DISTANCE, 0.0])
     moved = np.eye(3)
     moved[:2, 2] = shift * person
-    homography = moved @ group.rig.cameras[own].homography(person)
+    homography = moved @ group.rig.cameras[own].floor_homography(person)
     return CameraCalibration(
         camera=name,
         floor=floor,

@@ -58,7 +58,7 @@ class DetectedFrame:
     skipped: bool = False
 
     @property
-    def needs_peers(self) -> bool:
+    def depends_on_peers(self) -> bool:
         """Whether the peers' detections of this frame can change a score."""
         return self.message is not None and len(self.detections) > 0
 
@@ -196,7 +196,7 @@ class CameraPipeline:
             self._messages.without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
             self._messages.shed([pulse])
-        if self.cross_view is not None and frame.needs_peers:
+        if self.cross_view is not None and frame.depends_on_peers:
             detections = self.cross_view.rescore(detections, peers.messages)
             if peers.is_incomplete:
                 self._messages.without_peers(pulse)

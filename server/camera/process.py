@@ -20,7 +20,7 @@ from server.camera.load.load_monitor import LoadMonitor
 from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.camera.pipeline import CameraPipeline
-from server.camera.retained_state import RetainedState
+from server.camera.retained_state import RetainedServiceState
 from server.camera.sources import Image, SourceEndedError
 from server.camera.status_meter import StatusMeter
 from server.camera.thumbnails import encode_thumbnails
@@ -113,7 +113,7 @@ class CameraProcess:
         try:
             if self._config.track.assist.enabled:
                 bus.subscribe(self._keys.camera(self._id, "position_corrections"), self._corrections.put)
-            retained = RetainedState(partial(self._publish, "retained_identities"))
+            retained = RetainedServiceState(partial(self._publish, "retained_identities"))
             bus.subscribe(self._keys.camera(self._id, "identities"), retained.put)
             bus.watch_alive(self._keys.bestview("**"), lambda _, is_present: retained.on_service(is_present))
             await self._wait_for_bestview(bus)
@@ -259,7 +259,7 @@ class CameraProcess:
             now = asyncio.get_running_loop().time()
             self._load.measure_lag(now - item.due, now)
             peers = await self._exchange.exchange(
-                pulse, frame.message, item.captured, needed=frame.needs_peers
+                pulse, frame.message, item.captured, needed=frame.depends_on_peers
             )
             began = time.perf_counter()
             track = partial(self._pipeline.track_detections, frame, peers, self._corrections.take())

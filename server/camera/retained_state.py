@@ -8,7 +8,7 @@ from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX
 from server.messaging.inbox import Message
 
 
-class RetainedState:
+class RetainedServiceState:
     """Holds the service's newest state, undecoded; sends it to every service that starts."""
 
     def __init__(self, send: Callable[[bytes], None]) -> None:

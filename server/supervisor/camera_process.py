@@ -16,7 +16,7 @@ from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
 from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
-from server.supervisor.startup_checks import check_recording
+from server.supervisor.startup_checks import check_source_opens
 from server.supervisor.startup_signal import signal_started
 from server.system.errors import UnavailableError, UserError
 
@@ -101,7 +101,7 @@ async def _run(camera: CameraProcess, restart: asyncio.Event) -> bool:
 async def _follow(running: ActiveConfig, camera_id: str, restart: asyncio.Event) -> None:
     def check(_: Config, reload: ReloadPlan) -> None:
         if camera_id in reload.cameras:
-            check_recording(reload.now, camera_id)
+            check_source_opens(reload.now, camera_id)
 
     async for reload in reloads(running, check):
         running.now = reload.now

@@ -57,7 +57,7 @@ def check_service() -> None:
     _get("/healthz")
 
 
-def check_camera(camera: str) -> None:
+def check_camera_frames(camera: str) -> None:
     """Check whether a camera's frames arrive at the best view.
 
     Raises:
@@ -116,7 +116,7 @@ def check(words: Sequence[str]) -> None:
         case ["bestview"]:
             check_service()
         case ["camera", camera]:
-            check_camera(camera)
+            check_camera_frames(camera)
         case _:
             raise UnhealthyError("name what to check: sync, bestview or camera ID")
 

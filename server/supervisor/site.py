@@ -20,7 +20,7 @@ from server.config.site_config import Config
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
 from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
-from server.supervisor.startup_checks import check_recording
+from server.supervisor.startup_checks import check_source_opens
 from server.supervisor.supervisor import Supervisor
 from server.system.errors import UserError
 
@@ -96,7 +96,7 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
 def _check(wanted: Config, reload: ReloadPlan) -> None:
     check_exposure(wanted)
     for camera in reload.cameras:
-        check_recording(reload.now, camera)
+        check_source_opens(reload.now, camera)
 
 
 def _write_active_config(running: ActiveConfig, path: Path, failures: LogThrottle) -> None:

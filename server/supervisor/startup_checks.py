@@ -48,10 +48,10 @@ def check_recordings(config: Config) -> None:
     if config.audio_camera is not None:
         open_audio(config, config.audio_camera)
     for camera in config.camera_ids:
-        check_recording(config, camera)
+        check_source_opens(config, camera)
 
 
-def check_recording(config: Config, camera: str) -> None:
+def check_source_opens(config: Config, camera: str) -> None:
     """Check that a camera's recording or scene, and its detections, can be opened.
 
     Raises:

@@ -59,10 +59,10 @@ class Gatherings:
     def _places(self, number: int) -> Floats:
         """Return all positions at the beginning of a round: ``(P, 2)``."""
         rng = np.random.default_rng([self._seed, 0x91A5, number + BEFORE])
-        return draw_separated_places(rng, self._people, self._area)
+        return draw_spread_places(rng, self._people, self._area)
 
 
-def draw_separated_places(rng: np.random.Generator, count: int, area: Area) -> Floats:
+def draw_spread_places(rng: np.random.Generator, count: int, area: Area) -> Floats:
     """Draw random positions ``(count, 2)`` far apart: the best of several draws."""
     west, south, east, north = area
     drawn = rng.uniform((west, south), (east, north), (_CANDIDATES, count, 2))

@@ -60,7 +60,7 @@ class PersonStore:
             {number: frames for number, frames in cluster.published_frames.items() if number in self._by_id}
             for cluster in clusters
         ]
-        for cluster, person_id in zip(clusters, assign_ids(published), strict=True):
+        for cluster, person_id in zip(clusters, assign_published_ids(published), strict=True):
             cluster.person_id = person_id
         created = self._assign_new_ids(clusters, affinity, cross_camera, frame, count_missing_cameras)
         for cluster in clusters:
@@ -225,7 +225,7 @@ def _successors(clusters: Sequence[TrackletCluster]) -> dict[int, int]:
     return {person_id: successor for person_id, (_, successor) in best.items() if person_id not in assigned}
 
 
-def assign_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
+def assign_published_ids(published: Sequence[Mapping[int, int]]) -> list[int]:
     """Assign one of the published ids to each of G clusters; 0: none.
 
     The assignment maximizes the total number of frames that keep their published id.

@@ -92,7 +92,7 @@ async def time_shift_segment(request: web.Request, stream: HlsStream, number: in
     time_shift = recorded.time_shift(has_ended=stream.is_over)
     with suppress(OSError):  # an unreadable segment counts as not recorded
         await recorded.check_ends(number * frames, (number + 1) * frames)
-    return await time_shift.segment(number)
+    return await time_shift.build_segment(number)
 
 
 def trim_growing_playlist(listing: SegmentList) -> SegmentList:

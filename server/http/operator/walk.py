@@ -52,13 +52,13 @@ async def delete_walk(request: web.Request) -> web.Response:
 
 
 @routes.get(f"{OPERATOR_PATH}/walk/ground.json")
-async def get_ground(request: web.Request) -> web.Response:
+async def get_ground_file(request: web.Request) -> web.Response:
     """Return the ground file computed from the calibration walk."""
     return _file(request.app[SERVICE].calibration.ground_file(), "application/octet-stream", "ground.json")
 
 
 @routes.get(f"{OPERATOR_PATH}/walk/plan.png")
-async def get_plan(request: web.Request) -> web.Response:
+async def get_plan_file(request: web.Request) -> web.Response:
     """Return the floor plan computed from the calibration walk."""
     return _file(request.app[SERVICE].calibration.floor_plan(), "image/png", "ground.png")
 

@@ -59,10 +59,10 @@ class ManualOverrides:
                 if self._departed.issuperset(self.automatic_numbers(number))
             ),
             merged=merged,
-            split=self.apply_splits(update.split),
+            split=self.map_splits(update.split),
         )
 
-    def apply_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
+    def map_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
         """Return splits with mapped numbers; a split within one manually merged person is dropped."""
         mapped = {
             Split(self.current(split.kept), self.current(split.split_off), split.camera) for split in splits

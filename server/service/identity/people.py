@@ -248,7 +248,7 @@ class PersonTracker:
         if window.message.revised_from is not None:
             before = history.over(window.first, window.fresh - 1)
             window, splits = self._id_switch_repair.read(window, before, self._parts, self._needed_from)
-            self._corrections += self._overrides.apply_splits(splits)
+            self._corrections += self._overrides.map_splits(splits)
         history.put(window, window.first, window.message.last)
         return window
 

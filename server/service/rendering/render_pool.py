@@ -120,7 +120,7 @@ class RenderPool:
             running = self._start(subject)
         if running.expiry is not None:
             running.expiry.cancel()
-        running.stream.use()
+        running.stream.acquire()
         try:
             yield running.stream
         finally:

@@ -128,7 +128,7 @@ class RenderedStream:
         """The number of GOPs for which the worker was too slow."""
         return self._lost + (0 if self._subscriber is None else self._subscriber.lost_gops)
 
-    def use(self) -> None:
+    def acquire(self) -> None:
         """Add a user."""
         self.users += 1
         self._has_users.set()

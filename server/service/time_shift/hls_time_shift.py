@@ -84,7 +84,7 @@ class TimeShift:
         numbers = range(begin // frames, last)
         return SegmentList(numbers, frames, earliest, self.end) if numbers else None
 
-    async def segment(self, number: int) -> HlsSegment | None:
+    async def build_segment(self, number: int) -> HlsSegment | None:
         """Return a segment; None if it is not complete yet, or there is no picture in or before it."""
         first, until = number * self._layout.segment_frames, (number + 1) * self._layout.segment_frames
         until = min(until, self.end) if self.has_ended else until

@@ -18,7 +18,7 @@ from bestview.association.appearance.likelihood import (
     bhattacharyya_distances,
 )
 from bestview.association.clustering import cluster
-from bestview.association.registry.people import assign_ids
+from bestview.association.registry.people import assign_published_ids
 
 WEIGHTS = AppearanceWeights(typical=3.0, maximum=4.0, full_weight_frames=8)
 THRESHOLD = 0.5
@@ -161,7 +161,7 @@ def test_with_mostly_right_evidence_the_clusters_are_the_best_partition(count: i
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.dictionaries(st.integers(1, 4), st.integers(1, 9), max_size=3), max_size=4))
 def test_assigned_ids_keep_the_most_published_frames(published: list[dict[int, int]]) -> None:
-    numbers = assign_ids(published)
+    numbers = assign_published_ids(published)
     assigned = [number for number in numbers if number]
     assert len(assigned) == len(set(assigned))
     kept = sum(frames.get(number, 0) for frames, number in zip(published, numbers, strict=True))

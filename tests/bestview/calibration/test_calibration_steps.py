@@ -41,7 +41,7 @@ def test_the_pinhole_floor_agrees_with_its_homography(random: np.random.Generato
     camera, place = any_camera(random), random.uniform(-1, 1, (20, 2))
     image = camera.picture(place)
     assert np.allclose(camera.floor(image), place)
-    assert np.allclose(to_ground(camera.homography(2.0), image), 2.0 * place)
+    assert np.allclose(to_ground(camera.floor_homography(2.0), image), 2.0 * place)
 
 
 @settings(deadline=None, max_examples=30)
@@ -62,7 +62,7 @@ def test_foot_covariance_agrees_with_the_ground_planes(random: np.random.Generat
     boxes = np.column_stack([image[:, 0] - 5, image[:, 1] - tall, image[:, 0] + 5, image[:, 1]])
     assert np.allclose(foot_points(boxes), image)
     spread = project_to_floor(camera, image, tall, SETTINGS).covariance
-    same = foot_covariance(camera.homography(), boxes, SETTINGS.foot_sideways, SETTINGS.foot_upwards)
+    same = foot_covariance(camera.floor_homography(), boxes, SETTINGS.foot_sideways, SETTINGS.foot_upwards)
     assert np.allclose(spread, np.stack([same[:, 0, 0], same[:, 0, 1], same[:, 1, 1]], axis=1))
 
 

@@ -313,7 +313,7 @@ def test_frames_without_peer_detections_are_reported(recording: Path) -> None:
     needing_peers, reported = [], []
     for pulse in range(FRAMES):
         searched = pipeline.detect(pulse, pipeline.take(pulse))
-        if searched.needs_peers:
+        if searched.depends_on_peers:
             needing_peers.append(pulse)
         tracks = pipeline.track_detections(searched, PeerDetections(is_incomplete=True))
         reported += tracks.without_peers if tracks else []

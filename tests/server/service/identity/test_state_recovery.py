@@ -23,7 +23,7 @@ from fakes.service.scripted_cameras import (
     small_config,
     tracks,
 )
-from server.camera.retained_state import RetainedState
+from server.camera.retained_state import RetainedServiceState
 from server.http.app import make_app
 from server.messaging.epochs import end_of_epoch
 from server.messaging.identity_snapshot import (
@@ -56,7 +56,7 @@ class Site:
     def __init__(self, **changes: object) -> None:
         self._changes = changes
         self.cameras = {
-            camera: RetainedState(lambda snapshot, name=camera: self._receive(name, snapshot))
+            camera: RetainedServiceState(lambda snapshot, name=camera: self._receive(name, snapshot))
             for camera in CAMERAS
         }
         self.service = FedService(small_config())
@@ -186,7 +186,7 @@ def test_numbering_begins_with_the_first_number_however_late_a_camera_connects()
 def test_without_a_cameras_snapshot_only_its_tracks_get_new_numbers() -> None:
     site = tracked_site()
     ann, other = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
-    site.cameras[B] = RetainedState(lambda snapshot: site._receive(B, snapshot))  # restarted as well
+    site.cameras[B] = RetainedServiceState(lambda snapshot: site._receive(B, snapshot))  # restarted as well
     site.start()
     site.track_epochs(range(7, 9))
     assert site.person_of(A, 2, 8) == ann
@@ -218,7 +218,7 @@ def test_no_number_or_name_is_assigned_that_may_be_another_persons(epochs: range
 def test_a_late_snapshot_prevents_numbers_from_being_used_twice() -> None:
     site = tracked_site()
     used = max(site.service.decider.people.registry.all_numbers)
-    site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
+    site.cameras[A] = RetainedServiceState(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {}, B: {}})
     site.cameras[B].on_service(is_present=True)
@@ -240,7 +240,7 @@ def test_a_late_snapshot_is_used() -> None:
 def test_numbers_of_a_late_snapshot_that_may_be_reassigned_are_ignored() -> None:
     site = tracked_site()
     before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
-    site.cameras[A] = RetainedState(lambda snapshot: site._receive(A, snapshot))
+    site.cameras[A] = RetainedServiceState(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
     assert site.person_of(A, 1, 7) in before, "no snapshot listed it as used"
@@ -358,7 +358,7 @@ def test_an_invalid_snapshot_is_counted(damage: bytes, caplog: pytest.LogCapture
 
 def test_a_snapshot_is_limited_in_size() -> None:
     snapshot: list[bytes] = []
-    retained = RetainedState(snapshot.append)
+    retained = RetainedServiceState(snapshot.append)
     retained.put(Message("", b"one", b""))
     retained.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
     retained.on_service(is_present=False)
