@@ -13,7 +13,7 @@ from fakes.bestview.walkers import SIZE, camera_at
 
 EAST, SOUTH = camera_at(4.0, 0.0), camera_at(0.0, -3.0)
 CAMERAS = (EAST, SOUTH)
-GROUNDS = np.array([camera.homography() for camera in CAMERAS])
+GROUNDS = np.array([camera.floor_homography() for camera in CAMERAS])
 BOTTOM = np.array([SIZE[1], SIZE[1]], dtype=float)
 
 
@@ -50,7 +50,7 @@ def test_a_body_is_projected_into_its_own_and_the_other_camera(
 
 def test_the_nearer_camera_has_more_weight() -> None:
     near, far = camera_at(2.5, 0.0), camera_at(-9.0, 0.0)
-    grounds = np.array([camera.homography() for camera in (near, far)])
+    grounds = np.array([camera.floor_homography() for camera in (near, far)])
     boxes = np.array([box_in(near, np.array([0.0, 0.0])), box_in(far, np.array([0.5, 0.0]))])
     body = estimate_bodies(boxes, np.array([0, 1]), np.array([0, 0]), 1, grounds, BOTTOM)
     assert 0.0 < body.ground_point[0, 0] < 0.1
@@ -71,7 +71,7 @@ def test_truncated_feet_and_empty_boxes_have_no_position() -> None:
 def test_points_behind_a_camera_are_not_projected() -> None:
     place = np.array([0.0, 0.0])
     away = camera_at(1.0, 0.0, towards=(5.0, 0.0))
-    grounds = np.array([SOUTH.homography(), away.homography()])
+    grounds = np.array([SOUTH.floor_homography(), away.homography()])
     body = estimate_bodies(box_in(SOUTH, place)[None], np.array([0]), np.array([0]), 1, grounds, BOTTOM)
     boxes = boxes_in_all_cameras(body, grounds)
     assert np.isfinite(boxes[0]).all()
