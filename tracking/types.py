@@ -60,9 +60,8 @@ class RiskEvent:
         reason: the kind of failure.
         objects: the ids of the one or two tracks concerned; the first is the one to correct.
         frame: the expected frame of the failure: the newest frame or later if it is predicted, within the
-        window
-            if it is possible already (`id_switch`: where the identities would separate). Images are displayed
-            later than they are tracked, so it may still be ahead of the viewer.
+            window if it is possible already (`id_switch`: where the identities would separate). Images are
+            displayed later than they are tracked, so it may still be ahead of the viewer.
         margin: the tracker's certainty, as a cost: 0 is undecided.
         length: frames for which the two overlap, or an object is occluded.
         risk: probability of the failure without a correction, in [0, 1]; comparable between reasons.

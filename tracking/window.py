@@ -105,8 +105,7 @@ class WindowResult:
         first: the first frame that was not final before.
         last: the newest frame.
         final_to: every frame up to this one is final and does not change any more; the others are
-        provisional.
-            An object without a final frame may still be dropped.
+            provisional. An object without a final frame may still be dropped.
         tracks: the objects detected in any of the frames, by ascending id.
         report: the solver's report on the last window.
         risk_events: predicted identity failures, the riskiest first; only of an `InteractiveTracker`.

@@ -42,10 +42,10 @@ class CameraOverlap:
     """The people that two cameras show at the same time, by the ground truth.
 
     Attributes:
-        people: number of people that both show in the same frame. boxes: number of their untruncated boxes.
+        people: number of people that both show in the same frame.
+        boxes: number of their untruncated boxes.
         residual: median distance of their foot points from a plane fitted to the nearer half of them, in
-        heights
-            of the other camera's boxes; NaN if there are too few, or all are on a line.
+            heights of the other camera's boxes; NaN if there are too few, or all are on a line.
     """
 
     people: int

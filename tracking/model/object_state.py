@@ -19,8 +19,7 @@ class Template:
         id: the object's id.
         histogram: (B,) float64, summing to 1; B = 0: unknown appearance.
         box: (4,) pixels; None: occluded or absent in that frame, so that arcs from the source cost the same
-        as
-            arcs from an occlusion node.
+            as arcs from an occlusion node.
         motion: its motion up to its last detection; None: unknown.
 
     Raises:

@@ -25,8 +25,7 @@ class RelaxedSolution:
         usage: y (n, M, S), the flow of each object through each node.
         bound: its cost, as proven by the prices.
         priced: (n, M, S) node costs with the prices of conflicts and of the layout, at which the cheapest
-        paths
-            prove the bound.
+            paths prove the bound.
         rounds: how often paths or arcs were priced.
         prices: the binding conflict rows, if all objects share the observations.
         layout_prices: (n, M - 1, 4) the gain per pixel of movement; empty without layout term.

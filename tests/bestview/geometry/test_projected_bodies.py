@@ -71,7 +71,7 @@ def test_truncated_feet_and_empty_boxes_have_no_position() -> None:
 def test_points_behind_a_camera_are_not_projected() -> None:
     place = np.array([0.0, 0.0])
     away = camera_at(1.0, 0.0, towards=(5.0, 0.0))
-    grounds = np.array([SOUTH.floor_homography(), away.homography()])
+    grounds = np.array([SOUTH.floor_homography(), away.floor_homography()])
     body = estimate_bodies(box_in(SOUTH, place)[None], np.array([0]), np.array([0]), 1, grounds, BOTTOM)
     boxes = boxes_in_all_cameras(body, grounds)
     assert np.isfinite(boxes[0]).all()
