@@ -151,7 +151,7 @@ async def second_service(request: pytest.FixtureRequest) -> AsyncIterator[str]:
 async def test_people_of_another_service_are_listed_and_redirected(
     second_service: str, request: pytest.FixtureRequest
 ) -> None:
-    has_address = bool(request.node.callspec.params["second"])
+    has_address = bool(request.node.callspec.params["second_service"])
     async with aiohttp.ClientSession() as session:
 
         async def get(path: str) -> tuple[int, str | None, Any]:
