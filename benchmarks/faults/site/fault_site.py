@@ -68,7 +68,7 @@ class FaultSite:
     page_resumed_at: float | None = None
     """When the page showed new video again."""
     views: StampedViews | None = None
-    """Its views, where they find_differences from those of other sites."""
+    """Its views, where they differ from those of other sites."""
 
     def pids(self, name: str) -> list[int]:
         """Return the pids of a process: sync, bestview, rendering, or a camera's id; empty if it is down."""

@@ -45,7 +45,7 @@ class LiveFrameOrder:
 
 
 def find_differences(shown: Mapping[int, int], recorded: Mapping[int, int]) -> list[str]:
-    """Describe the pulses whose shown and recorded frames find_differences."""
+    """Describe the pulses whose shown and recorded frames differ."""
     return [
         f"pulse {pulse}: frame {frame} was shown, {recorded[pulse]} recorded"
         for pulse, frame in shown.items()

@@ -88,14 +88,14 @@ def describe_bug(error: Exception) -> str:
     return f"a bug in MyView: {type(error).__name__}: {redact_addresses(str(error))}"
 
 
-_COLOURS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}
+_COLORS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}
 
 
 def show(finding: Finding, width: int, console: Console) -> None:
     """Print a finding in one line, with the remedy behind an arrow; ``width`` is that of the first column."""
-    colour = _COLOURS[finding.level]
+    color = _COLORS[finding.level]
     remedy = f" → {finding.remedy}" if finding.remedy else ""
-    head = f"[{colour}]{finding.level.value:7}[/{colour}] {escape(f'{finding.check:{width}}')}"
+    head = f"[{color}]{finding.level.value:7}[/{color}] {escape(f'{finding.check:{width}}')}"
     text = escape(printable(f"{finding.text}{remedy}"))
     console.print(f"{head}  {text}", soft_wrap=True, highlight=False)
 

@@ -47,7 +47,7 @@ def plot_views(
         axis.set_ylabel(f"person {person}\nobject {evaluation.objects.get(person, '-')}")
     axes[-1].set_xlabel("seconds")
     axes[-1].set_xlim(0.0, evaluation.views.shape[1] / site_info.fps)
-    lines = [Line2D([], [], color=colour, linewidth=4) for colour in (_CHOSEN, _BEST, _SEEN)]
+    lines = [Line2D([], [], color=color, linewidth=4) for color in (_CHOSEN, _BEST, _SEEN)]
     figure.legend(lines, ["chosen", "optimum", "visible"], loc="upper right", ncols=3)
     figure.suptitle("Camera chosen for each person", x=0.3)
     save_figure(figure, folder / "choices.png")
@@ -69,8 +69,8 @@ def _plot_person(
         _bars(axis, views == camera, camera + _BAR_OFFSET - 0.1, 0.2, _CHOSEN, fps)
 
 
-def _bars(axis: Axes, on: NDArray[np.bool_], bottom: float, height: float, colour: str, fps: float) -> None:
+def _bars(axis: Axes, on: NDArray[np.bool_], bottom: float, height: float, color: str, fps: float) -> None:
     """Draw a bar over each run of frames for which ``on`` is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
     spans = [(float(begin) / fps, float(end - begin) / fps) for begin, end in edges.reshape(-1, 2)]
-    axis.broken_barh(spans, (bottom, height), color=colour, linewidth=0)
+    axis.broken_barh(spans, (bottom, height), color=color, linewidth=0)

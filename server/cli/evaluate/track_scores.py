@@ -44,7 +44,7 @@ def evaluate_recordings(recordings: Mapping[str, TruthAndTracks], least_iou: flo
 
 def print_table(scores: MultiCameraScores) -> None:
     """Print a row for each camera and, for several cameras, their mean and the joint scores."""
-    # Without frame and colour, to fit into 80 columns and for scripts.
+    # Without frame and color, to fit into 80 columns and for scripts.
     table = Table("camera", box=None, padding=(0, 1, 0, 0))
     for heading in HEADINGS.values():
         table.add_column(heading, justify="right", no_wrap=True)

@@ -16,7 +16,7 @@ Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
 
 def _even(value: int) -> int:
     if value % 2:
-        raise ValueError("must be even: H.264 stores colour at half the size")
+        raise ValueError("must be even: H.264 stores color at half the size")
     return value
 
 

@@ -35,7 +35,7 @@ def test_one_number_in_one_camera_and_another_in_the_other_is_not_whole_but_pure
     }
     matched = MatchedBoxes.of(tracks, GT, 0.5)
     assert matched.across_cameras() == PairScores(recall=0.5, precision=1.0)
-    # In c0 nobody changes; in c1 two boxes of five are track_scene by one of another number two frames later.
+    # In c0 nobody changes; in c1 two boxes of five are followed by one of another number two frames later.
     assert matched.over_time(2) == PairScores(recall=(8 + 6) / 16, precision=1.0)
 
 

@@ -62,8 +62,8 @@ def second(camera: int, pulse: int) -> tuple[int, int]:
 def picture(camera: int, pulse: int) -> npt.NDArray[np.uint8]:
     """Paint a frame, shape (HEIGHT, WIDTH, 3), red, green, blue."""
     frame = np.full((HEIGHT, WIDTH, 3), GROUNDS[camera], np.uint8)
-    for (left, top), colour in ((second(camera, pulse), SECOND), (square(camera, pulse), (255, 255, 255))):
-        frame[top : top + SQUARE, left : left + SQUARE] = colour
+    for (left, top), color in ((second(camera, pulse), SECOND), (square(camera, pulse), (255, 255, 255))):
+        frame[top : top + SQUARE, left : left + SQUARE] = color
     return frame
 
 

@@ -92,7 +92,7 @@ def test_the_intersection_of_shares_equals_that_of_counts(seed: int, size: int, 
     assert float(mismatch(found / found.sum(), model / model.sum())) == pytest.approx(expected)
 
 
-def test_colours_count_and_brightness_does_not() -> None:
+def test_colors_count_and_brightness_does_not() -> None:
     mask = np.full((10, 10), 255, dtype=np.uint8)
 
     def histogram(*bgr: int) -> np.ndarray:

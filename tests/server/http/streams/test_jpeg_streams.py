@@ -44,7 +44,7 @@ def picture_of(jpeg: bytes) -> Image:
 
 
 def green(image: Image) -> Image:
-    """Return which pixels have the colour of the chosen person's box."""
+    """Return which pixels have the color of the chosen person's box."""
     return (np.abs(image.astype(np.int16) - CHOSEN_COLOR).max(axis=2) < 40).astype(np.uint8)
 
 

@@ -136,7 +136,7 @@ async def test_chromium_shows_the_chosen_cameras_pictures() -> None:
     right = np.array([picture[4::8, 4::8, 1].ravel() for picture in rgb], dtype=float)[::3]
     found = np.array(shown_frames["greens"], dtype=float)
     assert len(found) == GOPS * GOP / 3
-    # Colours are converted in two ways; pictures of other pulses or cameras differ by several times as much.
+    # Colors are converted in two ways; pictures of other pulses or cameras differ by several times as much.
     assert np.abs(found - right).mean(axis=1).max() < 20
     assert np.abs(found[1:] - right[:-1]).mean(axis=1)[:4].min() > 40
 
