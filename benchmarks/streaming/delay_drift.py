@@ -65,7 +65,7 @@ class PacedCameras:
             unit = film[number % len(film)]
             head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, taken=0.0, encoded=0.0)
             service.ingest.video(self._message(name, "video", unit.data, msgspec.json.encode(head)))
-        service.pulse = number
+        service.pulses.newest = number
         if (number + 1) % STRIDE:
             return
         places = self._hall.places(max(0, number + 1 - WINDOW), number)

@@ -5,15 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import ssl
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from camsync import Credentials, PulseClient
 from logthrottle import LogThrottle
-from server.config.pulse_access import bestview_client_name, pulse_client_tls, pulse_credentials
 from server.config.sections import ViewSettings
 from server.config.site_config import Config
 from server.media.codec import stream_format_for
@@ -30,6 +26,7 @@ from server.service.ingest.ingest import Ingest
 from server.service.ingest.loss_recorder import LossRecorder
 from server.service.metrics.stage_timers import StageTimers
 from server.service.operator_assist.operator_assist import OperatorAssist
+from server.service.pulse_follower import PulseFollower
 from server.service.recording.recorder import Recorder
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -52,6 +49,7 @@ class BestViewPipeline:
 
     def __init__(self, config: Config, out: Path | None = None) -> None:
         self.config = config
+        self.pulses = PulseFollower(config)
         cameras = config.camera_ids
         fps, stride = config.site.fps, config.track.window.stride
         grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
@@ -86,7 +84,7 @@ class BestViewPipeline:
             self.splicer.publish_frame,
             self.audio_buffer,
             audio_camera=config.audio_camera,
-            current_pulse=lambda: self.pulse,
+            current_pulse=lambda: self.pulses.newest,
             max_ahead=max_ahead,
         )
         self.decider = ViewDecider(
@@ -106,21 +104,13 @@ class BestViewPipeline:
         )
         self.walk_session = WalkSession(config)
         self.recorder = Recorder(config, self.frame_buffers, self.stream_format, frames, self.audio_buffer)
-        self.pulse = -1
         self._last_decided = -1
         """The last pulse of the last epoch; later frames have no tracks."""
-        self.pulse0: float | None = None
-        """When pulse 0 was due, unix seconds; None before the first pulse."""
-        self._pulse_received_at: float | None = None
-        self._clock: Callable[[], float] = time.time
-        """The pulse clock, once connected: it does not jump when the system clock is set."""
         self.loss_recorder = LossRecorder(self.frame_buffers, self.ingest.states, stride)
         self.stage_timers = StageTimers()
         self.on_decision: list[Callable[[GopChoices], None]] = []
         self._out = out
         self._decision_writer: LiveDecisionWriter | None = None
-        self.pulse_credentials: Credentials | None = None
-        self.pulse_tls: ssl.SSLContext | None = None
         self._changed = asyncio.Event()
         self._runs_without_pulses = False
         """Whether waiting for the first pulse has timed out."""
@@ -131,10 +121,7 @@ class BestViewPipeline:
         Raises:
             UserError: its address is in use, or a password file cannot be read.
         """
-        self.pulse_credentials = pulse_credentials(
-            self.config, bestview_client_name(self.config.view.share.index)
-        )
-        self.pulse_tls = pulse_client_tls(self.config)
+        self.pulses.load_credentials()
         handlers = {
             "video": self.ingest.video,
             "tracks": self._tracks,
@@ -155,7 +142,7 @@ class BestViewPipeline:
             self._decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
         self.recorder.open()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
-        follow = asyncio.create_task(self._follow_pulses(), name="pulses")
+        follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
             while not self.aligner.all_ended:
@@ -163,7 +150,8 @@ class BestViewPipeline:
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises its error
-                if (self.pulse >= 0 or self._runs_without_pulses) and not self.state_replication.is_waiting:
+                may_decide = self.pulses.newest >= 0 or self._runs_without_pulses
+                if may_decide and not self.state_replication.is_waiting:
                     await self.decide_cooperatively()
             for decision in self.finish():
                 self._publish(decision)
@@ -203,16 +191,16 @@ class BestViewPipeline:
 
     def _skip_backlog(self) -> None:
         """Skip to the present where decisions do not catch up and their frames are no longer buffered."""
-        backlog = self.aligner.backlog(self.pulse)
+        backlog = self.aligner.backlog(self.pulses.newest)
         if not self._backlog_monitor.is_lost(backlog):
             return
-        self.skipped_epochs += self.aligner.skip_to(self.pulse)
+        self.skipped_epochs += self.aligner.skip_to(self.pulses.newest)
         if (more := self._skip_log.record()) is not None:
             text = "decisions are %.1f s behind and do not catch up%s: skipping to the present"
             log.warning(text, backlog / self.config.site.fps, more)
 
     def _decide_next(self) -> bool:
-        epoch = self.aligner.next_ready(self.pulse)
+        epoch = self.aligner.next_ready(self.pulses.newest)
         if epoch is not None:
             self._step(epoch)
         return epoch is not None
@@ -265,25 +253,6 @@ class BestViewPipeline:
             closing.callback(self.walk_session.discard)
             closing.callback(self.splicer.close)
 
-    async def _follow_pulses(self) -> None:
-        sync, fps = self.config.sync, self.config.site.fps
-        name = bestview_client_name(self.config.view.share.index)
-        async with PulseClient(
-            sync.host, sync.port, name, fps_hint=fps, credentials=self.pulse_credentials, tls=self.pulse_tls
-        ) as pulses:
-            self._clock = pulses.now
-            async for pulse in pulses:
-                self.pulse = pulse.number
-                self.pulse0 = pulse.due - pulse.number / fps
-                self._pulse_received_at = time.monotonic()
-                self._changed.set()
-
-    @property
-    def seconds_since_pulse(self) -> float | None:
-        """Seconds since the newest pulse; None before the first."""
-        received_at = self._pulse_received_at
-        return None if received_at is None else time.monotonic() - received_at
-
     def _tracks(self, message: Message) -> None:
         self.ingest.tracks(message)
         self._changed.set()
@@ -313,16 +282,12 @@ class BestViewPipeline:
 
     def _publish(self, decision: GopDecision) -> None:
         """Publish a GOP's choices, then its frames."""
-        with self.stage_timers.sending(lambda: self._seconds_since(decision.first)):
+        with self.stage_timers.sending(lambda: self.pulses.seconds_since(decision.first)):
             self._send(decision)
-
-    def _seconds_since(self, pulse: int) -> float | None:
-        """Return the seconds since a pulse was due; None before the first pulse."""
-        return None if self.pulse0 is None else self._clock() - self.pulse0 - pulse / self.config.site.fps
 
     def _send(self, decision: GopDecision) -> None:
         choices = self.decision_state.put(decision)
-        self.recorder.put(choices, self.pulse0, self.state_replication.numbers_since)
+        self.recorder.put(choices, self.pulses.pulse0, self.state_replication.numbers_since)
         for callback in self.on_decision:
             callback(choices)
         self.splicer.publish_decision(decision)

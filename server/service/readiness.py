@@ -17,14 +17,14 @@ def why_not_ready(pipeline: BestViewPipeline) -> list[str]:
     """
     reasons = []
     fps = pipeline.config.site.fps
-    since_pulse = pipeline.seconds_since_pulse
-    if pipeline.pulse < 0:
+    since_pulse = pipeline.pulses.seconds_since_newest
+    if pipeline.pulses.newest < 0:
         reasons.append("no pulse received from the pulse server")
     elif since_pulse is not None and since_pulse > max(_MAX_PULSE_GAP_S, 3 / fps):
         reasons.append(f"no pulse received for {since_pulse:.0f} s")
     if not any(state.label == "live" for state in pipeline.ingest.states.values()):
         reasons.append("no camera delivers frames")
-    behind = pipeline.pulse + 1 - pipeline.decision_state.end
+    behind = pipeline.pulses.newest + 1 - pipeline.decision_state.end
     if pipeline.decision_state.end == 0:
         reasons.append("nothing has been decided yet")
     elif behind > max_backlog(pipeline):

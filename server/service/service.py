@@ -52,12 +52,12 @@ class BestViewService:
     @property
     def pulse(self) -> int:
         """The newest pulse; -1 before the first."""
-        return self._pipeline.pulse
+        return self._pipeline.pulses.newest
 
     @property
     def pulse0(self) -> float | None:
         """When pulse 0 was due, unix seconds; None before the first pulse."""
-        return self._pipeline.pulse0
+        return self._pipeline.pulses.pulse0
 
     @property
     def decided_end(self) -> int:

@@ -222,10 +222,10 @@ class SiteSessions(ScriptTarget):
                 self.messages += 1
                 service.handle(Message(key, payload, head))
                 continue
-            service.pulse = end_of_epoch(epoch, STRIDE)
+            service.pulses.newest = end_of_epoch(epoch, STRIDE)
             epoch += 1
             service.decide()
-        service.pulse += 2 * STRIDE
+        service.pulses.newest += 2 * STRIDE
         service.decide()
         if len(script) % _API_EVERY == 0:
             read_api(service)

@@ -228,5 +228,5 @@ def feed_epoch(
         service.handle(status(camera, epoch))
         service.handle(thumbnail(camera, epoch))
     service.handle(sound(epoch))
-    service.pulse = end_of_epoch(epoch, STRIDE)
+    service.pulses.newest = end_of_epoch(epoch, STRIDE)
     service.decide()

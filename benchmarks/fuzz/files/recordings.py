@@ -77,7 +77,7 @@ class RecordedRuns(ScriptTarget):
 
     async def _record(self) -> FedService:
         service, rng = FedService(self._config), Random(1)
-        service.pulse0 = _PULSE0
+        service.pulses.pulse0 = _PULSE0
         service.recorder.open()
         for epoch in range(_EPOCHS):
             feed_epoch(service, rng, epoch, _EPOCHS)

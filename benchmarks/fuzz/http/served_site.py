@@ -54,7 +54,7 @@ class ServedSite:
         self.service, rng = FedService(config), Random(1)
         self.service.recorder.open()
         self._stack.callback(self.service.close)
-        self.service.pulse0 = 1_700_000_000.0
+        self.service.pulses.pulse0 = 1_700_000_000.0
         for epoch in range(EPOCHS):
             feed_epoch(self.service, rng, epoch, EPOCHS, make_tracks)
         self.app = make_app(BestViewService(self.service))

@@ -99,7 +99,7 @@ class _Splice(ScriptTarget):
             self._show(service, units, epoch)
             for name in CAMERAS:
                 service.handle(tracks(make_tracks(rng, name, epoch)))
-            service.pulse = end_of_epoch(epoch, STRIDE)
+            service.pulses.newest = end_of_epoch(epoch, STRIDE)
             service.decide()
         read_api(service)
         for viewer in viewers:

@@ -128,7 +128,7 @@ class AssistService:
             raise InvalidCommandError(
                 f"corrections: {place} is not in a picture of {site.width}x{site.height}"
             )
-        if position.pulse > self._pipeline.pulse:
+        if position.pulse > self._pipeline.pulses.newest:
             raise InvalidCommandError(f"corrections: pulse {position.pulse} is in the future")
 
     def _marked(self, position: OperatorPosition) -> MarkedPosition:

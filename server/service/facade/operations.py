@@ -67,8 +67,8 @@ class OperationsService:
             clients = await query_clients(
                 sync.host,
                 sync.port,
-                credentials=self._pipeline.pulse_credentials,
-                tls=self._pipeline.pulse_tls,
+                credentials=self._pipeline.pulses.credentials,
+                tls=self._pipeline.pulses.tls,
             )
         except SyncError as error:
             return Pulses(address, str(error), [], [])

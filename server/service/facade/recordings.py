@@ -195,12 +195,12 @@ class RecordingService:
             TimeReferenceError: it names none.
         """
         return parse_time_reference(
-            moment, now=now, fps=self._pipeline.config.site.fps, pulse0=self._pipeline.pulse0
+            moment, now=now, fps=self._pipeline.config.site.fps, pulse0=self._pipeline.pulses.pulse0
         )
 
     def time_of(self, pulse: int) -> str | None:
         """Return when a pulse is due, UTC in ISO 8601; None before the first pulse."""
-        return utc_time_of_pulse(pulse, self._pipeline.config.site.fps, self._pipeline.pulse0)
+        return utc_time_of_pulse(pulse, self._pipeline.config.site.fps, self._pipeline.pulses.pulse0)
 
     @property
     def viewers(self) -> int:

@@ -26,7 +26,7 @@ class ServiceCollector(Collector):
     def collect(self) -> Iterable[Metric]:
         """Return all metrics as they are now."""
         pipeline, stages = self._pipeline, self._pipeline.stage_timers
-        yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=pipeline.pulse)
+        yield GaugeMetricFamily("myview_pulse", "Newest pulse.", value=pipeline.pulses.newest)
         yield GaugeMetricFamily(
             "myview_objects", "People known.", value=len(pipeline.decision_state.selected_views)
         )

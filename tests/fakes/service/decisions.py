@@ -34,7 +34,7 @@ def service_with_backlog() -> FedService:
                 service.ingest.video(video(camera, unit))
             boxes = {1: LARGE if (epoch + seed) % 4 < 2 else SMALL}
             service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
-    service.pulse = end_of_epoch(EPOCHS - 1, STRIDE)
+    service.pulses.newest = end_of_epoch(EPOCHS - 1, STRIDE)
     return service
 
 

@@ -93,7 +93,7 @@ class DrawnSite(ServedSite):
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
                 self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {}, tracks=seen, size=SIZE)))
-            self.service.pulse = end_of_epoch(epoch, STRIDE)
+            self.service.pulses.newest = end_of_epoch(epoch, STRIDE)
             self.service.decide()
         self.epochs += epochs
 

@@ -195,5 +195,5 @@ class FedService(BestViewPipeline):
             for unit in units[epoch * STRIDE : (epoch + 1) * STRIDE]:
                 self.ingest.video(video(camera, unit))
             self.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera])))
-        self.pulse = end_of_epoch(epoch, STRIDE)
+        self.pulses.newest = end_of_epoch(epoch, STRIDE)
         self.decide()

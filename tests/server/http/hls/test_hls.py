@@ -59,7 +59,7 @@ def feed(served: ServedSite, epochs: range) -> None:
 @pytest.mark.parametrize("path", ["/objects/1/hls/", "/cameras/c0/hls/"])
 async def test_playlists_change_only_as_the_rfc_allows(path: str) -> None:
     async for served in serve_site(http={"hls_segment_s": 0.2, "hls_window_s": 0.6}):
-        served.service.pulse0 = 1_800_000_000.0
+        served.service.pulses.pulse0 = 1_800_000_000.0
         served.service.connect_cameras(*CAMERAS)
         before: list[tuple[float, str, datetime]] = []
         number, target = 0, ""
@@ -84,7 +84,7 @@ async def test_playlists_change_only_as_the_rfc_allows(path: str) -> None:
 
 
 async def test_wall_clock_times_follow_from_pulses(site_with_people: ServedSite) -> None:
-    site_with_people.service.pulse0 = 1_800_000_000.25
+    site_with_people.service.pulses.pulse0 = 1_800_000_000.25
     site_with_people.service.splicer.close()
     text = await text_of(site_with_people, "/objects/1/" + SEGMENT)
     assert [when.timestamp() for _, _, when in entries(text)] == [1_800_000_000.25]

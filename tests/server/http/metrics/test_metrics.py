@@ -96,7 +96,7 @@ async def test_decisions_are_counted_by_epoch_and_sending_by_gop(site_with_peopl
     assert metrics["myview_decide_seconds_count",] == 3
     assert metrics["myview_send_seconds_count",] == site_with_people.service.decision_state.end // GOP == 2
     assert metrics["myview_delay_seconds_count",] == 0  # unknown when pulses were due
-    site_with_people.service.pulse0 = time.time() - 100.0
+    site_with_people.service.pulses.pulse0 = time.time() - 100.0
     site_with_people.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
     metrics = await samples(site_with_people)
     assert metrics["myview_delay_seconds_count",] == 1
@@ -191,18 +191,18 @@ async def test_a_site_is_ready_when_pulses_and_frames_arrive_and_decisions_keep_
 
 async def test_a_site_whose_decisions_fall_behind_is_not_ready(site_with_people: ServedSite) -> None:
     allowed = max_backlog(site_with_people.service)
-    site_with_people.service.pulse = site_with_people.service.decision_state.end - 1 + allowed
+    site_with_people.service.pulses.newest = site_with_people.service.decision_state.end - 1 + allowed
     assert (await ready(site_with_people))[0] == 200
-    site_with_people.service.pulse += 1
+    site_with_people.service.pulses.newest += 1
     code, text = await ready(site_with_people)
     assert (code, text) == (503, f"decisions are {(allowed + 1) / FPS:.1f} s behind the pulses")
     assert (await samples(site_with_people))["myview_ready",] == 0
 
 
 async def test_a_site_without_pulses_or_live_cameras_is_not_ready(site_with_people: ServedSite) -> None:
-    site_with_people.service._pulse_received_at = time.monotonic() - 60.0
+    site_with_people.service.pulses.received_at = time.monotonic() - 60.0
     assert await ready(site_with_people) == (503, "no pulse received for 60 s")
-    site_with_people.service._pulse_received_at = time.monotonic()
+    site_with_people.service.pulses.received_at = time.monotonic()
     for camera in CAMERAS:
         site_with_people.service.ingest.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=False)
     assert await ready(site_with_people) == (503, "no camera delivers frames")

@@ -20,7 +20,7 @@ async def rows(served: ServedSite, table: str, span: str) -> list[dict[str, str]
 
 
 async def test_every_box_and_choice_of_the_time_range_is_a_line(site_with_people: ServedSite) -> None:
-    site_with_people.service.pulse0 = 1_000_000.0
+    site_with_people.service.pulses.pulse0 = 1_000_000.0
     tracks = await rows(site_with_people, "tracks", "from=p2&to=p4")
     assert [(track["frame"], track["camera"], track["object"]) for track in tracks] == [
         (frame, camera, number) for frame in "34" for camera, number in ((A, "1"), (A, "2"), (B, "1"))

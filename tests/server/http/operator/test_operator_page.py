@@ -194,7 +194,7 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
         trouble = RiskEvent(reason="crossing", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
         served.service.ingest.tracks(tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
         served.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
-        served.service.pulse = 19
+        served.service.pulses.newest = 19
         served.service.decide()
         line = page.locator("#flag-list li")
         await expect(line).to_have_text(re.compile(r"2 and 1.* cross .* \(c0\): open"))
@@ -215,7 +215,7 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
 async def test_recorded_decisions_of_a_time_range_are_downloaded(browser: Browser) -> None:
     async with open_operator_page(browser, "#downloads") as (served, page):
         end = int(time.time())
-        served.service.pulse0 = end - 0.2  # five frames before
+        served.service.pulses.pulse0 = end - 0.2  # five frames before
         show_people(served)
         for label, moment in (("From", end - 60), ("to", end)):
             local = datetime.fromtimestamp(moment)  # noqa: DTZ006 — as the page shows it

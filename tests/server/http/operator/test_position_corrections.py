@@ -131,7 +131,7 @@ async def test_a_flag_is_raised_followed_answered_and_counted(assisted: ServedSi
         tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*unknown, crossing]))
     )
     assisted.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
-    assisted.service.pulse = 4 * STRIDE - 1
+    assisted.service.pulses.newest = 4 * STRIDE - 1
     assisted.service.decide()
 
     async def flags() -> list[Any]:

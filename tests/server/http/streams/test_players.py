@@ -59,8 +59,8 @@ def feed(served: ServedSite, epoch: int) -> None:
         for unit in encoded(seed, EPOCHS * STRIDE)[epoch * STRIDE : (epoch + 1) * STRIDE]:
             served.service.ingest.video(video(camera, unit))
         served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: sizes[camera]})))
-    served.service.pulse = end_of_epoch(epoch, STRIDE)
-    served.service.pulse0 = 1_800_000_000.0
+    served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
+    served.service.pulses.pulse0 = 1_800_000_000.0
     served.service.decide()
 
 

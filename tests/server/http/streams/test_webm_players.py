@@ -134,7 +134,7 @@ async def feed_in_real_time(served: ServedSite) -> None:
                 served.service.ingest.video(video(camera, unit))
             boxes = {1: sizes[seed], 2: sizes[1 - seed]}
             served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
-        served.service.pulse = end_of_epoch(epoch, STRIDE)
+        served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
         served.service.decide()
         await asyncio.sleep(STRIDE / FPS)
 

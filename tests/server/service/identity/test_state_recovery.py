@@ -77,7 +77,7 @@ class Site:
         for epoch in epochs:
             for camera in CAMERAS:
                 self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera], boot=boot)))
-            self.service.pulse = end_of_epoch(epoch, STRIDE)
+            self.service.pulses.newest = end_of_epoch(epoch, STRIDE)
             self.service.decide()
 
     def person_of(self, camera: str, track: int, epoch: int, boot: int = 1) -> int:

@@ -66,7 +66,7 @@ async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
 
     def slow(epoch: Epoch) -> None:
         decided.append(epoch.number)
-        service.pulse += 2 * STRIDE
+        service.pulses.newest += 2 * STRIDE
         step(epoch)
 
     service._step = slow  # type: ignore[method-assign]

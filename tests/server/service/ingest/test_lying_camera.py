@@ -168,7 +168,7 @@ class LyingSite:
         self._viewer = service.splicer.decided_cameras[OTHER].subscribe()
         self.shown: list[MediaChunk] = []
         """The chunks sent to viewers of the other camera."""
-        service.pulse = 0
+        service.pulses.newest = 0
         service.ingest.video(video(OTHER, encoded(1)[0]))
         for epoch in range(EPOCHS):
             self._send(epoch)
@@ -178,7 +178,7 @@ class LyingSite:
         self.last = end_of_epoch(EPOCHS - 2, STRIDE)
         """The last pulse whose look-ahead is complete."""
         # The lying camera is waited for only so long.
-        self._pass(service.pulse + service.aligner._grace + service.aligner._backlog + 1)
+        self._pass(service.pulses.newest + service.aligner._grace + service.aligner._backlog + 1)
 
     def _send(self, epoch: int) -> None:
         ingest = self.service.ingest
@@ -189,8 +189,8 @@ class LyingSite:
         ingest.thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
 
     def _pass(self, pulse: int) -> None:
-        while self.service.pulse < pulse:
-            self.service.pulse += 1
+        while self.service.pulses.newest < pulse:
+            self.service.pulses.newest += 1
             self.service.decide()
             self.shown += [chunk for chunk in self._viewer._queue if isinstance(chunk, MediaChunk)]
             self._viewer._queue.clear()
@@ -242,7 +242,7 @@ def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
             service.ingest.video(video(camera, unit))
         service.ingest.tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
         service.ingest.tracks(tracks(camera_tracks(camera, 1, {1: LARGE}, ended=True)))
-    service.pulse = 2 * STRIDE - 1
+    service.pulses.newest = 2 * STRIDE - 1
     service.decide()
     assert service.aligner.all_ended
     decisions = list(itertools.islice(service.finish(), 10))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,9 +26,11 @@ from fakes.service.scripted_cameras import (
     video,
 )
 from fakes.service.scripted_recordings import playable_files
+from server.config.site_config import Config
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
+from server.service.pulse_follower import PulseFollower
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.media_chunk import MediaChunk
 
@@ -54,7 +57,7 @@ def send_epoch(service: FedService, epoch: int, *cameras: str) -> None:
 def run_epochs(service: FedService, epochs: range) -> None:
     """Let all cameras send some epochs, and decide them."""
     for epoch in epochs:
-        service.pulse = end_of_epoch(epoch, STRIDE)
+        service.pulses.newest = end_of_epoch(epoch, STRIDE)
         send_epoch(service, epoch, *CAMERAS)
         service.decide()
 
@@ -127,18 +130,28 @@ def test_a_backlog_of_a_minute_is_decided_epoch_by_epoch(service: FedService) ->
     service.close()
 
 
+class PulsesOfTest(PulseFollower):
+    """Pulses that the test sends."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config)
+        self.sent: asyncio.Queue[int] = asyncio.Queue()
+
+    async def follow(self, on_pulse: Callable[[], None]) -> None:
+        while True:
+            self.newest = await self.sent.get()
+            on_pulse()
+
+
 class RunningService(FedService):
     """A running service whose pulses come from the test."""
 
+    pulses: PulsesOfTest
+
     def __init__(self) -> None:
         super().__init__(small_config())
+        self.pulses = PulsesOfTest(self.config)
         self.connect_cameras(*CAMERAS)
-        self.pulses: asyncio.Queue[int] = asyncio.Queue()
-
-    async def _follow_pulses(self) -> None:
-        while True:
-            self.pulse = await self.pulses.get()
-            self._changed.set()
 
     async def receive(self, epoch: int, *cameras: str) -> None:
         """Send an epoch of some cameras, and let the service process it."""
@@ -161,11 +174,11 @@ async def test_a_camera_that_counts_alone_does_not_determine_the_first_epoch(oth
     await service.receive(other, "c0")
     await service.receive(now, "c1")
     assert service.aligner._next is None, "the present is not known yet"
-    service.pulses.put_nowait(end_of_epoch(now, STRIDE))
+    service.pulses.sent.put_nowait(end_of_epoch(now, STRIDE))
     for epoch in range(now + 1, now + 4):
         send_epoch(service, other + epoch - now, "c0")
         await service.receive(epoch, "c1")
-        service.pulses.put_nowait(end_of_epoch(epoch, STRIDE))
+        service.pulses.sent.put_nowait(end_of_epoch(epoch, STRIDE))
     await service.process()
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)

@@ -197,7 +197,7 @@ async def test_the_audio_of_an_earlier_session_plays_after_a_restart(recording: 
         async for served in serve_site(
             sound={"source": str(recording)}, record=record, http={"viewer_queue_gops": 100}
         ):
-            served.service.pulse0 = PULSE0
+            served.service.pulses.pulse0 = PULSE0
             served.service.recorder.open()
             served.service.connect_cameras(*CAMERAS)
             if not gops.start:

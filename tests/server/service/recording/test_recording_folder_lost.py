@@ -442,8 +442,8 @@ async def test_stopped_and_resumed_recording_is_reported(served: ServedSite) -> 
     served.service.feed(7, {A: {1: LARGE}, B: {1: SMALL}})
     await until(lambda: writer.lost == 1)
     assert b"myview_recording 0.0" in (await fetch(served, "/metrics"))[1]
-    served.service.pulse = served.service.decision_state.end
-    served.service._pulse_received_at = asyncio.get_running_loop().time()
+    served.service.pulses.newest = served.service.decision_state.end
+    served.service.pulses.received_at = asyncio.get_running_loop().time()
     assert await fetch(served, "/readyz") == (200, b"2 of 2 cameras; nothing is recorded: File exists\n")
     store.folder.unlink()
     served.service.feed(8, {A: {1: LARGE}, B: {1: SMALL}})

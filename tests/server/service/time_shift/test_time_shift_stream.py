@@ -142,7 +142,7 @@ async def test_a_cameras_recording_continues_into_the_live_stream_without_a_gap(
 async def test_a_range_with_an_end_is_a_download_of_its_frames(
     recorded_site: ServedSite, query: str, pulses: range
 ) -> None:
-    recorded_site.service.pulse0 = 1_763_700_000.0
+    recorded_site.service.pulses.pulse0 = 1_763_700_000.0
     shown = await fetch(recorded_site, f"/objects/1/best.mp4?{query}")
     assert [pulse for pulse, _ in shown] == list(pulses)
 
@@ -207,7 +207,7 @@ async def test_impossible_requests_are_answered_with_a_one_line_error(
 
 
 async def test_spans_list_the_recorded_time(recorded_site: ServedSite) -> None:
-    recorded_site.service.pulse0 = 1_763_700_000.0
+    recorded_site.service.pulses.pulse0 = 1_763_700_000.0
     span = {
         "begins": "2025-11-21T04:40:00.000Z",
         "ends": "2025-11-21T04:40:01.200Z",
@@ -432,7 +432,7 @@ async def test_a_cameras_recording_includes_earlier_sessions(tmp_path: Path) -> 
         RecordingFolder(tmp_path / "kept", UNLIMITED), [gop_record(gop, {1: A}) for gop in range(4)]
     ).close()
     async for served in serve_site(record={"folder": str(tmp_path / "kept"), "segment_s": 0.4}):
-        served.service.pulse0 = PULSE0 + 0.01
+        served.service.pulses.pulse0 = PULSE0 + 0.01
         served.service.recorder.open()
         served.service.connect_cameras(*CAMERAS)
         for epoch in range(5, 8):
@@ -467,7 +467,7 @@ async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbe
         )
     store.close()
     async for served in serve_site(record={"folder": str(folder), "segment_s": 0.4}):
-        served.service.pulse0 = PULSE0 + 0.01
+        served.service.pulses.pulse0 = PULSE0 + 0.01
         served.service.recorder.open()
         served.service.connect_cameras(*CAMERAS)
         snapshot = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
