@@ -38,7 +38,7 @@ class CameraDetector(Detector, Protocol):
     """A detector that also knows its histograms' length and whether it is still warming up."""
 
     @property
-    def bins(self) -> int:
+    def appearance_bins(self) -> int:
         """Bins of a detection's appearance histogram."""
         ...
 
@@ -67,10 +67,10 @@ def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) 
         return _create_detector(settings, _floor(config, camera, letterbox))
 
 
-def warm_up_detector(
+def make_prescanned_detector(
     config: Config, camera: CameraSettings, source: FrameSource, letterbox: Letterbox
 ) -> CameraDetector:
-    """Return a camera's detector; for a recording it has learned the background before the first frame.
+    """Return a camera's detector; for a recording it has learned the background by a prescan.
 
     The detector of a live camera learns the background while it runs.
 
@@ -79,10 +79,12 @@ def warm_up_detector(
     """
     detector, settings = make_detector(config, camera, letterbox), config.detect
     if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
-        detector.number_frames_by(source.counted_pulse)
+        detector.number_frames_by(source.pulse_by_frame_count)
     if isinstance(detector, BackgroundDetector):
         indices = range(0, settings.prescan_frames, settings.prescan_every)
-        detector.prepare((letterbox.image(image) for image in source.ahead(indices)), settings.prescan_every)
+        detector.prepare(
+            (letterbox.image(image) for image in source.prescan_images(indices)), settings.prescan_every
+        )
     return detector
 
 
@@ -160,7 +162,7 @@ class LetterboxedDetections:
         self._frame_number = frame_number
 
     @property
-    def bins(self) -> int:
+    def appearance_bins(self) -> int:
         """Bins of a detection's appearance histogram."""
         return self._appearance.bins
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from bestview import shows_ground
 from server.camera.audio import LiveAudioSource
-from server.camera.detector_setup import make_detector, warm_up_detector
+from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
-from server.camera.load.frame_skipper import FrameSkipper
+from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
 from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
@@ -73,7 +73,7 @@ class CameraPipeline:
     ``take`` and ``encode`` may run in one thread, ``detect`` and ``track_detections`` in another: they share
     no state.
 
-    ``ready``: warm up for the first frame, which takes seconds; otherwise only check that everything opens.
+    ``warm_up``: prepare for the first frame, which takes seconds; otherwise only check that everything opens.
 
     Raises:
         UserError: the source or the detections cannot be opened, or the homography does not match the image.
@@ -86,7 +86,7 @@ class CameraPipeline:
         boot: int = 0,
         listener: LiveAudioSource | None = None,
         *,
-        ready: bool = True,
+        warm_up: bool = True,
     ) -> None:
         camera, site = config.camera(camera_id), config.site
         passthrough = open_passthrough(config, camera, listener)
@@ -94,15 +94,15 @@ class CameraPipeline:
         """Whether the source's own H.264 is passed through."""
         self.why_encoded = passthrough.reason
         """Why it cannot be passed through; empty: that was not requested."""
-        self.source: FrameSource = passthrough.source or open_source(camera, site, listener, ready=ready)
+        self.source: FrameSource = passthrough.source or open_source(camera, site, listener, warm_up=warm_up)
         self._letterbox = Letterbox(self.source.size, (site.width, site.height))
         _check_homography(camera, self.source.size)
         self._encoder = (
             PassthroughEncoder(passthrough.source) if passthrough.source else Encoder(site, config.encode)
         )
         self._detector = (
-            warm_up_detector(config, camera, self.source, self._letterbox)
-            if ready
+            make_prescanned_detector(config, camera, self.source, self._letterbox)
+            if warm_up
             else make_detector(config, camera, self._letterbox)
         )
         track = config.track
@@ -113,9 +113,9 @@ class CameraPipeline:
             self.source,
             lambda: create_solver(track.solver),
             self._letterbox,
-            ready=ready,
+            prescan=warm_up,
         )
-        self._tracker = FrameSkipper(tracker, self._detector.bins, track.window.stride)
+        self._tracker = SkippedFrameInterpolator(tracker, self._detector.appearance_bins, track.window.stride)
         self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
@@ -162,7 +162,7 @@ class CameraPipeline:
         must ascend.
         """
         if image is None:
-            detections, has_detection = Detections.empty(self._detector.bins), False
+            detections, has_detection = Detections.empty(self._detector.appearance_bins), False
         else:
             detections = self._detector.detect(image, pulse)
             has_detection = not self._detector.warming_up
@@ -189,17 +189,17 @@ class CameraPipeline:
         pulse, detections = frame.pulse, frame.detections
         if self._last is not None:
             missed = range(max(self._last + 1, pulse - _REPORTED_GAP_MAX), pulse)
-            self._messages.shed(missed)
-            self._messages.without_detection(missed)
+            self._messages.add_without_image(missed)
+            self._messages.add_without_detection(missed)
         self._last = pulse
         if not frame.has_detection:
-            self._messages.without_detection([pulse])
+            self._messages.add_without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
-            self._messages.shed([pulse])
+            self._messages.add_without_image([pulse])
         if self.cross_view is not None and frame.depends_on_peers:
             detections = self.cross_view.rescore(detections, peers.messages)
             if peers.is_incomplete:
-                self._messages.without_peers(pulse)
+                self._messages.add_without_peers(pulse)
         result = (
             self._tracker.skip(pulse) if frame.skipped else self._tracker.push(pulse, detections, frame.image)
         )

@@ -15,12 +15,12 @@ from typing import TypeVar
 import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
-from server.camera.audio import LiveAudioSource, consecutive_runs, open_audio
+from server.camera.audio import LiveAudioSource, consecutive_runs, open_site_audio
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_exchange import PeerDetectionExchange
 from server.camera.pipeline import CameraPipeline
-from server.camera.retained_state import RetainedServiceState
+from server.camera.retained_identity_snapshot import RetainedIdentitySnapshot
 from server.camera.sources import Image, SourceEndedError
 from server.camera.status_meter import StatusMeter
 from server.camera.thumbnails import encode_thumbnails
@@ -80,7 +80,7 @@ class CameraProcess:
         self._boot = time.time_ns() // 1_000_000
         self._clock = steady_unix_clock()  # of pulses and of all times relative to them
         self._keys = ZenohKeys(config.site.name)
-        self._audio = open_audio(config, camera_id)
+        self._audio = open_site_audio(config, camera_id)
         listener = self._audio if isinstance(self._audio, LiveAudioSource) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
         if self._pipeline.is_passthrough:
@@ -113,8 +113,8 @@ class CameraProcess:
         try:
             if self._config.track.assist.enabled:
                 bus.subscribe(self._keys.camera(self._id, "position_corrections"), self._corrections.put)
-            retained = RetainedServiceState(partial(self._publish, "retained_identities"))
-            bus.subscribe(self._keys.camera(self._id, "identities"), retained.put)
+            retained = RetainedIdentitySnapshot(partial(self._publish, "retained_identities"))
+            bus.subscribe(self._keys.camera(self._id, "identities"), retained.replace)
             bus.watch_alive(self._keys.bestview("**"), lambda _, is_present: retained.on_service(is_present))
             await self._wait_for_bestview(bus)
             bus.declare_alive(self._keys.camera(self._id, "alive"))
@@ -194,14 +194,14 @@ class CameraProcess:
         due = asyncio.get_running_loop().time() - late
         await self._send_audio(pulse.number)
         if not self._load.captures(pulse.number):
-            self._meter.missed(pulse.number, 1 + pulse.missed)
+            self._meter.count_missed(pulse.number, 1 + pulse.missed)
             self._queue_for_tracking(pulse.number, None, due, skipped=True)
             return
         image = await self._run_in(self._video, lambda: self._pipeline.take(pulse.number))
         if image is None:
             if self._pipeline.away:
                 self._state = "away"
-            self._meter.missed(pulse.number, 1 + pulse.missed)
+            self._meter.count_missed(pulse.number, 1 + pulse.missed)
             self._queue_for_tracking(pulse.number, None, due)
             return
         self._state = "live"
@@ -217,7 +217,7 @@ class CameraProcess:
             encoded=self._clock(),
         )
         self._publish("video", unit.data, msgspec.json.encode(head))
-        self._meter.frame(pulse.number, pulse.missed)
+        self._meter.count_frame(pulse.number, pulse.missed)
         self._queue_for_tracking(pulse.number, image, due)
 
     async def _send_audio(self, pulse: int) -> None:
@@ -225,7 +225,7 @@ class CameraProcess:
         audio = self._audio
         if audio is None:
             return
-        for run in consecutive_runs(await self._run_in(self._video, lambda: audio.at(pulse))):
+        for run in consecutive_runs(await self._run_in(self._video, lambda: audio.take(pulse))):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             if self._bus is not None:
                 data = b"".join(frame.data for frame in run)
@@ -237,7 +237,7 @@ class CameraProcess:
         """Queue a frame for the tracker, without its image where tracking is far behind."""
         shed = image is not None and self._backlog.qsize() >= self._images_max
         if shed:
-            self._meter.shed()
+            self._meter.count_skipped_detection()
         if not self._backlog.full():
             now = asyncio.get_running_loop().time()
             self._backlog.put_nowait(_QueuedFrame(pulse, None if shed else image, now, due, skipped))
@@ -250,7 +250,7 @@ class CameraProcess:
             pulse, image, skipped = item.pulse, item.image, item.skipped
             if image is not None and not self._load.detects(pulse):
                 image, skipped = None, True
-                self._meter.shed()
+                self._meter.count_skipped_detection()
             began = time.perf_counter()
             detect = partial(self._pipeline.detect, pulse, image, skipped=skipped)
             frame = await self._run_in(self._tracking, detect)

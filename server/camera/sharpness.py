@@ -29,11 +29,11 @@ class SharpnessMemory:
     def __init__(self) -> None:
         self._values: dict[int, float] = {}
 
-    def measure(self, message: CameraTracks, image: Image | None) -> CameraTracks:
-        """Return the message with its tracks' sharpness; ``image`` is the window's last frame, if any."""
+    def measure(self, message: CameraTracks, last_image: Image | None) -> CameraTracks:
+        """Return the message with its tracks' sharpness in the window's last image, if there is one."""
         for track in message.tracks:
             box = track.boxes[-1] if track.boxes else None
-            value = None if image is None or box is None else sharpness(image, box)
+            value = None if last_image is None or box is None else sharpness(last_image, box)
             if value is not None:
                 self._values[track.id] = value
         self._values = {

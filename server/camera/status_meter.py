@@ -27,19 +27,19 @@ class StatusMeter:
         """Use this client's clock offset and round trip."""
         self._client = client
 
-    def frame(self, pulse: int, missed: int) -> None:
+    def count_frame(self, pulse: int, missed: int) -> None:
         """Count a frame, and the pulses missed before it."""
         self._pulse = pulse
         self._missed += missed
         self._times.append(time.monotonic())
 
-    def missed(self, pulse: int, count: int) -> None:
+    def count_missed(self, pulse: int, count: int) -> None:
         """Count pulses without a frame."""
         self._pulse = pulse
         self._missed += count
 
-    def shed(self) -> None:
-        """Count a frame without detection."""
+    def count_skipped_detection(self) -> None:
+        """Count a frame whose detection was skipped."""
         self._shed += 1
 
     def status(

@@ -27,15 +27,15 @@ class TrackMessageBuilder:
         self._without_detection: list[int] = []
         self._without_peers: list[int] = []
 
-    def shed(self, pulses: Iterable[int]) -> None:
-        """Add frames that were missed or shed to the next message."""
+    def add_without_image(self, pulses: Iterable[int]) -> None:
+        """Add frames that were missed, shed or had no image to the next message, as shed."""
         self._shed.extend(pulses)
 
-    def without_detection(self, pulses: Iterable[int]) -> None:
+    def add_without_detection(self, pulses: Iterable[int]) -> None:
         """Add frames without detection to the next message."""
         self._without_detection.extend(pulses)
 
-    def without_peers(self, pulse: int) -> None:
+    def add_without_peers(self, pulse: int) -> None:
         """Add a frame without the detections of some peer to the next message."""
         self._without_peers.append(pulse)
 

@@ -26,9 +26,9 @@ def set_up_tracker(
     solver: Callable[[], Solver],
     letterbox: Letterbox | None = None,
     *,
-    ready: bool = True,
+    prescan: bool = True,
 ) -> Tracker:
-    """Create the tracker of a name; with ``ready``, one that needs a prescan has scanned the recording.
+    """Create the tracker of a name; with ``prescan``, one that needs it has scanned the recording.
 
     Images are scaled by ``letterbox``, if given.
     """
@@ -38,9 +38,9 @@ def set_up_tracker(
     tracker = create_tracker(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
     )
-    if ready and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
+    if prescan and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
         indices = range(0, config.detect.prescan_frames, config.detect.prescan_every)
-        tracker.prepare(letterbox.image(image) for image in source.ahead(indices))
+        tracker.prepare(letterbox.image(image) for image in source.prescan_images(indices))
     return tracker
 
 

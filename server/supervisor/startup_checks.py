@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from server.camera.audio import open_audio
+from server.camera.audio import open_site_audio
 from server.camera.pipeline import CameraPipeline
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
@@ -46,7 +46,7 @@ def check_recordings(config: Config) -> None:
         UserError: a recording, a scene, a file of detections or the sound cannot be opened.
     """
     if config.audio_camera is not None:
-        open_audio(config, config.audio_camera)
+        open_site_audio(config, config.audio_camera)
     for camera in config.camera_ids:
         check_source_opens(config, camera)
 
@@ -58,4 +58,4 @@ def check_source_opens(config: Config, camera: str) -> None:
         UserError: one of them cannot be opened.
     """
     if source_kind(config.camera(camera).source) is not SourceKind.STREAM:
-        CameraPipeline(config, camera, ready=False).close()
+        CameraPipeline(config, camera, warm_up=False).close()

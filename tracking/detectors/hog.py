@@ -64,7 +64,7 @@ class HogDetector:
         self._hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector(), dtype=np.float32))
 
     @property
-    def bins(self) -> int:
+    def appearance_bins(self) -> int:
         """The length of a row of the histograms."""
         return self._appearance.bins
 

@@ -122,7 +122,7 @@ class TemplateDetector:
         """`(B,)`, the template's appearance histogram, of the same kind as those of the observations."""
 
     @property
-    def bins(self) -> int:
+    def appearance_bins(self) -> int:
         """The length of a row of the histograms."""
         return len(self.histogram)
 

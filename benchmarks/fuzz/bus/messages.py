@@ -130,7 +130,7 @@ class PeerMessages(ScriptTarget):
             if received is not None and received.camera == "c1":
                 buffer.put(received, 0.0)
             buffer.expect(pulse, 1.0)
-            buffer.is_missing(pulse)
+            buffer.must_wait(pulse)
             buffer.give_up(pulse)
             buffer.detections_at(pulse)
         return self._exchange.bad_messages == bad

@@ -87,7 +87,7 @@ class LiveIngest(ScriptTarget):
         except (UserError, IncompatibleStreamError) as error:
             self.messages += 1
             return refused(error)
-        sound.at(0)
+        sound.take(0)
         return True
 
     def _watch(self, stream: _SingleRead, pulses: Iterable[int]) -> None:

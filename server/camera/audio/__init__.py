@@ -10,11 +10,17 @@ from server.config.source_address import SourceKind, source_kind
 from server.system.address_redaction import redact_address
 from server.system.errors import UserError
 
-__all__ = ["EncodedAudioFrame", "LiveAudioSource", "RecordedAudioSource", "consecutive_runs", "open_audio"]
+__all__ = [
+    "EncodedAudioFrame",
+    "LiveAudioSource",
+    "RecordedAudioSource",
+    "consecutive_runs",
+    "open_site_audio",
+]
 
 
-def open_audio(config: Config, camera_id: str) -> RecordedAudioSource | LiveAudioSource | None:
-    """Open the site's audio source if this camera's process sends it; None: it does not.
+def open_site_audio(config: Config, camera_id: str) -> RecordedAudioSource | LiveAudioSource | None:
+    """Open the site's one audio source if this camera's process sends it; None: it does not.
 
     Raises:
         UserError: it cannot be opened.

@@ -29,8 +29,8 @@ _MAX_OFFSET_S = 2.0
 class LiveAudioSource:
     """Audio of a network camera, aligned with its video by the camera's own clock.
 
-    The source's thread passes frame times and packets; ``at`` is called in another thread. Frames, and audio
-    with them, wait up to ``waiting_s`` seconds until they are shown.
+    The source's thread passes frame times and packets; ``take`` is called in another thread. Frames, and
+    audio with them, wait up to ``waiting_s`` seconds until they are shown.
     """
 
     def __init__(self, settings: SoundSettings, fps: float, waiting_s: float = 0.0) -> None:
@@ -86,7 +86,7 @@ class LiveAudioSource:
             with self._lock:
                 self._frames.append(frame)
 
-    def at(self, pulse: int) -> list[EncodedAudioFrame]:
+    def take(self, pulse: int) -> list[EncodedAudioFrame]:
         """Return the audio frames since the previous pulse; the newest video frame is shown at this one."""
         with self._lock:
             self._shown_at = pulse / self._fps

@@ -59,7 +59,7 @@ class RecordedAudioSource:
         self._has_warned = False
         """Whether a read error was logged."""
 
-    def at(self, pulse: int) -> list[EncodedAudioFrame]:
+    def take(self, pulse: int) -> list[EncodedAudioFrame]:
         """Return the frames to send at a pulse: a fifth of a second early, to arrive before its video."""
         return self.until(pulse + max(1, round(_LEAD_S * self._fps)))
 

@@ -68,7 +68,7 @@ class PassthroughRecording:
             self._read()
         return None if self.current is None else self.current.image
 
-    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Decode the frames with these indices, from a second reader of the file."""
         return decode_frames(self._path, indices, self._fps)
 

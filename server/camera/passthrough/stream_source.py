@@ -10,7 +10,6 @@ import av
 from av.video.stream import VideoStream
 
 from server.camera.audio import LiveAudioSource
-from server.camera.passthrough.access_unit_queue import AccessUnitQueue
 from server.camera.passthrough.access_units import is_keyframe, parse_packing
 from server.camera.passthrough.compatibility import (
     CompatibilityCheck,
@@ -18,6 +17,7 @@ from server.camera.passthrough.compatibility import (
     RequiredFormat,
 )
 from server.camera.passthrough.encoder import PassthroughUnit
+from server.camera.passthrough.gop_alignment_queue import GopAlignmentQueue
 from server.camera.passthrough.recording_source import (
     access_unit_packets,
     decode_pictures,
@@ -48,7 +48,7 @@ class PassthroughStream(LiveStream):
     ) -> None:
         _check(url, options, required)
         self._required = required
-        self._waiting = AccessUnitQueue(required.gop)
+        self._waiting = GopAlignmentQueue(required.gop)
         self._waiting_lock = threading.Lock()
         self._frame_s = 1 / Fraction(required.fps).limit_denominator(1001)
         self._is_decodable = False

@@ -42,7 +42,7 @@ class CrossViewScorer:
     def build_message(
         self, pulse: int, detections: Detections | None, *, ended: bool = False
     ) -> FrameDetections:
-        """Build the message about a frame; detections are None where detection did not run."""
+        """Build the message about a frame, in the camera's pixels; None: detection did not run."""
         boxes = None
         if detections is not None:
             # The most confident ones, in the detector's order.
@@ -55,7 +55,7 @@ class CrossViewScorer:
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
 
-    def sees_same_ground(self, message: FrameDetections) -> bool:
+    def view_overlaps(self, message: FrameDetections) -> bool:
         """Return whether the sender of a message sees ground that this camera sees."""
         return self._geometry_of(message) is not None
 

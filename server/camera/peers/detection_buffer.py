@@ -37,14 +37,14 @@ class PeerDetectionBuffer:
     Args:
         peers: the peer cameras.
         messages_max: messages to keep per camera; more would be about frames far ahead.
-        sees_same_ground: returns whether the sender of a message sees the same ground.
+        view_overlaps: returns whether the sender of a message sees ground that this camera sees.
     """
 
     def __init__(
-        self, peers: Sequence[str], messages_max: int, sees_same_ground: Callable[[FrameDetections], bool]
+        self, peers: Sequence[str], messages_max: int, view_overlaps: Callable[[FrameDetections], bool]
     ) -> None:
         self._peers = {camera: _Peer() for camera in peers}
-        self._messages_max, self._sees_same_ground = messages_max, sees_same_ground
+        self._messages_max, self._view_overlaps = messages_max, view_overlaps
         self._deadlines: deque[tuple[int, float]] = deque(maxlen=_DEADLINES_MAX)
 
     def put(self, message: FrameDetections, now: float) -> bool:
@@ -55,10 +55,10 @@ class PeerDetectionBuffer:
             peer.boot, peer.newest, peer.ended, peer.trusted = message.boot, -1, False, True
             peer.messages.clear()
         if peer.overlaps is None:
-            peer.overlaps = self._sees_same_ground(message)
-        until = next((until for pulse, until in reversed(self._deadlines) if pulse == message.pulse), None)
+            peer.overlaps = self._view_overlaps(message)
+        deadline = next((limit for pulse, limit in reversed(self._deadlines) if pulse == message.pulse), None)
         current = self._deadlines[-1][0] if self._deadlines else -1
-        peer.trusted |= message.pulse > current or (until is not None and now <= until)
+        peer.trusted |= message.pulse > current or (deadline is not None and now <= deadline)
         peer.newest = max(peer.newest, message.pulse)
         peer.ended |= message.ended
         if (
@@ -70,18 +70,18 @@ class PeerDetectionBuffer:
             peer.messages[message.pulse] = message
         return peer.overlaps
 
-    def expect(self, pulse: int, until: float) -> None:
+    def expect(self, pulse: int, deadline: float) -> None:
         """Set the deadline for messages about a frame, and drop the messages about earlier ones.
 
         Pulses must ascend.
         """
-        self._deadlines.append((pulse, until))
+        self._deadlines.append((pulse, deadline))
         for peer in self._peers.values():
             for old in [buffered for buffered in peer.messages if buffered < pulse]:
                 del peer.messages[old]
 
-    def is_missing(self, pulse: int) -> bool:
-        """Return whether a message about this frame may still arrive in time."""
+    def must_wait(self, pulse: int) -> bool:
+        """Return whether a message about this frame may arrive in time: peers that were late do not count."""
         return any(_missed(peer, pulse) for peer in self._peers.values())
 
     def give_up(self, pulse: int) -> list[str]:

@@ -40,8 +40,8 @@ class PeerDetectionExchange:
         self._keys = ZenohKeys(config.site.name)
         self._peers = config.peers_of(camera_id) if cross_view else ()
         self._wait_s = config.track.cross_view_wait_s
-        sees_same_ground = cross_view.sees_same_ground if cross_view else lambda _: False
-        self._buffer = PeerDetectionBuffer(self._peers, messages_max, sees_same_ground)
+        view_overlaps = cross_view.view_overlaps if cross_view else lambda _: False
+        self._buffer = PeerDetectionBuffer(self._peers, messages_max, view_overlaps)
         self._listening: set[str] = set()
         self._changed = asyncio.Event()
         self._join_task: asyncio.Task[None] | None = None
@@ -112,12 +112,12 @@ class PeerDetectionExchange:
         if self._join_task is not None and self._join_task.done():
             self._join_task.result()
         await self._publish(message)
-        until = captured + self._wait_s
-        self._buffer.expect(pulse, until)
+        deadline = captured + self._wait_s
+        self._buffer.expect(pulse, deadline)
         if not needed:
             return PeerDetections()
         if self._bus is not None:
-            await self._wait_until(lambda: not self._buffer.is_missing(pulse), until)
+            await self._wait_until(lambda: not self._buffer.must_wait(pulse), deadline)
         for camera in self._buffer.give_up(pulse):
             self._log_late(camera, pulse)
         peers = self._buffer.detections_at(pulse)
@@ -145,14 +145,14 @@ class PeerDetectionExchange:
             return
         if not self._has_published:
             self._has_published = True
-            until = asyncio.get_running_loop().time() + _LISTENERS_S
-            await self._wait_until(lambda: self._listening.issuperset(self._peers), until)
+            deadline = asyncio.get_running_loop().time() + _LISTENERS_S
+            await self._wait_until(lambda: self._listening.issuperset(self._peers), deadline)
         self._bus.publish(self._keys.camera(self._camera, "detections"), msgspec.json.encode(message))
 
-    async def _wait_until(self, done: Callable[[], bool], until: float) -> None:
+    async def _wait_until(self, done: Callable[[], bool], deadline: float) -> None:
         """Wait until a condition holds, checked on every event, or the deadline passes."""
         try:
-            async with asyncio.timeout_at(until):
+            async with asyncio.timeout_at(deadline):
                 while not done():
                     self._changed.clear()
                     await self._changed.wait()

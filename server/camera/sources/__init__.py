@@ -16,11 +16,15 @@ __all__ = ["FrameSource", "Image", "ImageFolder", "Recording", "SourceEndedError
 
 
 def open_source(
-    camera: CameraSettings, site: SiteSettings, listener: LiveAudioSource | None = None, *, ready: bool = True
+    camera: CameraSettings,
+    site: SiteSettings,
+    listener: LiveAudioSource | None = None,
+    *,
+    warm_up: bool = True,
 ) -> FrameSource:
     """Open a camera's source; a network camera's audio is passed to ``listener``, if given.
 
-    ``ready``: warm up for the first pulse; otherwise only check that it opens.
+    ``warm_up``: prepare for the first pulse; otherwise only check that it opens.
 
     Raises:
         UserError: it cannot be opened; the text says which camera and why.
@@ -30,7 +34,9 @@ def open_source(
         match source_kind(camera.source):
             case SourceKind.SCENE:
                 scene = SyntheticSource(camera.source, site)
-                return scene.warm_up() if ready else scene
+                if warm_up:
+                    scene.warm_up()
+                return scene
             case SourceKind.STREAM:
                 return LiveStream(camera.source, camera.options, listener)
             case SourceKind.FOLDER:

@@ -32,7 +32,7 @@ class FrameSource(Protocol):
         """
         ...
 
-    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Return a recording's frames with these ascending indices; the playback position stays.
 
         Fewer where the recording is shorter; none for a live source.

@@ -13,7 +13,7 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from server.camera.sources.opening import OpenedVideo
-from server.camera.sources.timestamp_repair import TimestampRepair
+from server.camera.sources.timestamp_jump_repair import TimestampJumpRepair
 from server.system.address_redaction import redact_address
 
 log = logging.getLogger(__name__)
@@ -179,10 +179,10 @@ def _decoded(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
 
 
 def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStream]]:
-    times = TimestampRepair(opened)
+    times = TimestampJumpRepair(opened)
     try:
         for packet in opened.container.demux(opened.stream):
-            if times.repair(packet) and not again:
+            if times.repair_jump(packet) and not again:
                 log.warning(
                     "%s: its time stamps jump: playback continues across the jump",
                     redact_address(opened.container.name),

@@ -31,6 +31,6 @@ def frame_index(seconds: float, fps: float) -> int:
     return math.ceil(seconds * fps - _LATE)
 
 
-def frame_count(seconds: float, rate: float, fps: float) -> int:
-    """Return a recording's length in frames at ``fps``; its last frame is at ``seconds``."""
-    return max(1, frame_index(seconds + 1 / rate, fps))
+def frame_count(last_frame_s: float, rate: float, fps: float) -> int:
+    """Return a recording's length in frames at ``fps``; its last frame is at ``last_frame_s``."""
+    return max(1, frame_index(last_frame_s + 1 / rate, fps))

@@ -66,7 +66,7 @@ class ImageFolder:
             self._newest = self._fitted(image, self._files[index])
         return self._newest
 
-    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Read some of the images; one that cannot be read is left out."""
         files = [self._files[index] for index in indices if index < len(self._files)]
         images = ((_read(file), file) for file in files)

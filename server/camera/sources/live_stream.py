@@ -78,7 +78,7 @@ class LiveStream:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
         return None if picture is None else self._oriented(picture).image(picture)
 
-    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — FrameSource
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — FrameSource
         """Return nothing: a live camera has no future frames."""
         return iter(())
 

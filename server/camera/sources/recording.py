@@ -109,11 +109,11 @@ class Recording:
         self._record_number(pulse, position)
         return self._shown(picture)
 
-    def counted_pulse(self, pulse: int) -> int:
-        """Return the pulse that this pulse's frame would have if frames were counted one per pulse."""
+    def pulse_by_frame_count(self, pulse: int) -> int:
+        """Return the pulse that this pulse's frame would have if frames were counted, one per pulse."""
         return pulse + self._number_offsets.get(pulse, 0)
 
-    def ahead(self, indices: Sequence[int]) -> Iterator[Image]:
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Decode the frames with these indices, from a second reader of the file."""
         return decode_frames(self._path, indices, self._site_fps)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Self
 from urllib.parse import parse_qsl
 
 from server.camera.sources.base import Image
@@ -47,16 +46,15 @@ class SyntheticSource:
         self._camera = camera
         self.size = size
 
-    def warm_up(self) -> Self:
+    def warm_up(self) -> None:
         """Draw one image: painting the room takes a second, which must not delay the first pulse."""
         self._scene.image(self._camera, 0)
-        return self
 
     def take(self, pulse: int) -> Image | None:
         """Draw the image of a pulse."""
         return self._scene.image(self._camera, pulse)
 
-    def ahead(self, pulses: Sequence[int]) -> Iterator[Image]:
+    def prescan_images(self, pulses: Sequence[int]) -> Iterator[Image]:
         """Draw the images of some pulses."""
         return (self._scene.image(self._camera, pulse) for pulse in pulses)
 

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Mapping
 
-from server.camera.audio import open_audio
+from server.camera.audio import open_site_audio
 from server.cli.doctor.camera_probe import CameraProbe, probe_camera
 from server.cli.doctor.findings import Finding, bad, describe_bug, ok, reason_of, warning
 from server.config.site_config import Config
@@ -57,7 +57,7 @@ def sound_findings(config: Config) -> list[Finding]:
     if config.audio_camera is None:
         return []
     try:
-        open_audio(config, config.audio_camera)
+        open_site_audio(config, config.audio_camera)
     except UserError as error:
         return [
             bad("sound", str(error).removeprefix("sound: "), "use another file, or a camera that has sound")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.camera.audio import RecordedAudioSource, consecutive_runs, open_audio
+from server.camera.audio import RecordedAudioSource, consecutive_runs, open_site_audio
 from server.config.site_config import Config
 from server.messaging.messages import AudioHeader
 from server.service.streaming.audio_buffer import AudioBuffer
@@ -21,7 +21,7 @@ class Soundtrack:
 
     def __init__(self, config: Config) -> None:
         camera, form = config.audio_camera, config.sound.format
-        opened = None if camera is None else open_audio(config, camera)
+        opened = None if camera is None else open_site_audio(config, camera)
         self._sound = opened if isinstance(opened, RecordedAudioSource) else None
         self._fps = config.site.fps
         self._begun = False

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from server.camera.detector_setup import warm_up_detector
+from server.camera.detector_setup import make_prescanned_detector
 from server.camera.sources import FrameSource, Image, SourceEndedError, open_source
 from server.camera.tracker_setup import set_up_tracker
 from server.cli.generated_config import config_for_videos
@@ -118,7 +118,7 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     camera = config.cameras[0]
     source = open_source(camera, config.site)
     letterbox = Letterbox(source.size, (config.site.width, config.site.height))
-    detector = warm_up_detector(config, camera, source, letterbox)
+    detector = make_prescanned_detector(config, camera, source, letterbox)
     for number, image in read_frames(source):
         if image is not None:
             detections = detector.detect(letterbox.image(image), number)

@@ -34,7 +34,7 @@ def test_the_kind_selects_the_detector(tmp_path: Path) -> None:
         {"kind": "hog", "hog": {"max_detections": 3}, "appearance": {"color": False}, "gray_bins": 16},
     )
     assert isinstance(hog, HogDetector)
-    assert (hog.settings.max_detections, hog.bins) == (3, 16)
+    assert (hog.settings.max_detections, hog.appearance_bins) == (3, 16)
 
 
 def test_kind_boxes_always_has_the_settings_of_the_paper(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_the_unit_of_the_file_is_that_of_its_homographies(tmp_path: Path) -> Non
 def test_frames_with_and_without_a_picture_have_histograms_of_one_length(tmp_path: Path, kind: str) -> None:
     one = observer(tmp_path, {"kind": kind})
     found = one.detect(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8))
-    assert found.histograms.shape == (0, one.bins)
+    assert found.histograms.shape == (0, one.appearance_bins)
 
 
 def test_a_detection_file_takes_precedence_over_the_kind(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from fakes.cli.command_line import RunCommand
 from fakes.http.passwords import ADDRESSES, PASSWORDS, leaks
 from fakes.system.ports import free_port
-from server.camera.audio import open_audio
+from server.camera.audio import open_site_audio
 from server.camera.passthrough.opening import open_passthrough
 from server.camera.sources import open_source
 from server.config import yaml_file
@@ -170,7 +170,7 @@ def test_errors_of_opening_a_camera_do_not_have_its_password(source: str, passwo
     for attempt in (
         lambda: open_source(CameraSettings(id="door", source=address), SiteSettings()),
         lambda: open_passthrough(config, config.camera("door"), None),
-        lambda: open_audio(config, "door"),
+        lambda: open_site_audio(config, "door"),
     ):
         with pytest.raises(UserError) as refused:
             attempt()

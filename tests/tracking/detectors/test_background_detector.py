@@ -105,7 +105,7 @@ def test_color_histograms_distinguish_people(color: bool, length: int) -> None:
     red, blue = Figure(40, 200, 1.0, 40), Figure(250, 200, -1.0, 40, color=(190, 110, 35))
     detector = BackgroundDetector(BackgroundSettings(appearance=AppearanceSettings(color=color)))
     seen = detect_all(detector, [red, blue], range(80))[-1]
-    assert detector.bins == length == seen.histograms.shape[1]
+    assert detector.appearance_bins == length == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
     histograms = [seen.histograms[np.argmax(iou(seen.boxes, figure.box(79)))] for figure in (red, blue)]
     similarity = np.sqrt(histograms[0] * histograms[1]).sum()

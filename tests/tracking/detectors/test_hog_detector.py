@@ -46,7 +46,7 @@ def test_scores_are_sorted_and_no_person_is_detected_twice() -> None:
 def test_histograms_follow_the_settings() -> None:
     detector = HogDetector(SETTINGS, AppearanceExtractor(AppearanceSettings(color=False), 32))
     seen = detector.detect(room()[0])
-    assert detector.bins == 32 == seen.histograms.shape[1]
+    assert detector.appearance_bins == 32 == seen.histograms.shape[1]
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
 
 

@@ -70,7 +70,7 @@ def test_the_object_looks_most_like_its_template(measure: str) -> None:
     image = clutter()
     detector = TemplateDetector(cut(image), TemplateSettings(appearance=measure))  # type: ignore[arg-type]
     seen = detector.detect(moved(image, 5, 5))
-    assert seen.histograms.shape[1] == detector.bins
+    assert seen.histograms.shape[1] == detector.appearance_bins
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
     away = appearance_distance(detector.histogram[None], seen.histograms)[0]
     assert int(np.argmin(away)) == 0

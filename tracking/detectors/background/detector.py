@@ -169,7 +169,7 @@ class BackgroundDetector:
         segmentation = self._background.segment(small)
         self.warming_up = segmentation is None
         if segmentation is None:
-            return Detections.empty(self.bins)
+            return Detections.empty(self.appearance_bins)
         mask = _clean_mask(segmentation.foreground & grid.visible)
         self._height_estimator.observe(mask, grid.visible)
         found = self._fit(mask, segmentation.shadow & grid.visible & ~mask, grid)
@@ -180,7 +180,7 @@ class BackgroundDetector:
         )
 
     @property
-    def bins(self) -> int:
+    def appearance_bins(self) -> int:
         """The length of a row of the histograms."""
         return self._appearance.bins
 

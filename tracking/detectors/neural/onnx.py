@@ -78,7 +78,7 @@ class OnnxDetector:
             raise ValueError(f"{settings.model}: {error}") from error
 
     @property
-    def bins(self) -> int:
+    def appearance_bins(self) -> int:
         """The length of a row of the histograms."""
         return self._appearance.bins
 

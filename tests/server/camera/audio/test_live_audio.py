@@ -76,7 +76,7 @@ def test_the_audio_of_a_camera_is_received_with_its_video(camera: str) -> None:
     while len(frames) < (FRAMES - 20) / FPS * FORM.rate / FRAME:
         time.sleep(1 / FPS)
         assert time.monotonic() < begin + PATIENCE, "no audio arrives"
-        frames += sound.at(100 + int((time.monotonic() - begin) * FPS))
+        frames += sound.take(100 + int((time.monotonic() - begin) * FPS))
     assert source.take(0) is not None
     source.close()
     assert len(beep_times(frames)) >= 1
@@ -104,7 +104,7 @@ def pass_to_source(path: Path, sound: LiveAudioSource, first: int) -> list[Encod
             picture = Fraction(packet.pts * packet.time_base)
             sound.picture(picture)
             number = round(picture * FPS)
-            frames += sound.at(first + number + number % 3 // 2)  # one in three is late by a pulse
+            frames += sound.take(first + number + number % 3 // 2)  # one in three is late by a pulse
     return frames
 
 
@@ -141,7 +141,7 @@ def test_audio_continues_when_its_format_changes(tmp_path: Path, rate: int, chan
         for packet in container.demux(audio=0):
             if packet.pts is not None:
                 sound.picture(Fraction(packet.pts * packet.time_base))
-                frames += sound.at(round(packet.pts * packet.time_base * FPS))
+                frames += sound.take(round(packet.pts * packet.time_base * FPS))
                 sound.packet(packet)
     assert len(beep_times(frames)) == 2 * len(range(FLASH_INTERVAL, FRAMES, FLASH_INTERVAL))
 
@@ -175,7 +175,7 @@ def test_audio_continues_after_a_time_step_and_after_a_reconnect(
                     sound.packet(shift_packet(packet, wrap if old else 0))
                 else:
                     sound.picture(Fraction(shift_packet(packet, wrap if old else 0).pts * packet.time_base))
-                    frames += sound.at(round(time * FPS) + run * 2 * FRAMES)
+                    frames += sound.take(round(time * FPS) + run * 2 * FRAMES)
     numbers = [frame.number for frame in frames]
     assert numbers == sorted(set(numbers)), "each once, in order"
     halves = [0.0, step, FRAMES / FPS, 2 * FRAMES / FPS, 3 * FRAMES / FPS]
@@ -198,4 +198,4 @@ def test_a_camera_without_audio_is_valid(tmp_path: Path) -> None:
         for packet in container.demux(audio=0):
             sound.picture(Fraction(0))
             sound.packet(packet)
-    assert sound.at(5) == []
+    assert sound.take(5) == []

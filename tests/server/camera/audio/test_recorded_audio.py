@@ -23,7 +23,7 @@ from server.camera.audio import (
     LiveAudioSource,
     RecordedAudioSource,
     consecutive_runs,
-    open_audio,
+    open_site_audio,
 )
 from server.camera.audio.encoder import AudioEncoder
 from server.camera.audio.passthrough import AudioPassthrough
@@ -200,7 +200,7 @@ def test_sources_without_audio_are_refused(tmp_path: Path) -> None:
 
     def opened(camera: str, source: str) -> RecordedAudioSource | LiveAudioSource | None:
         content = {"cameras": cameras, "sound": {"source": source}}
-        return open_audio(build_config(content, where="hall", folder=tmp_path), camera)
+        return open_site_audio(build_config(content, where="hall", folder=tmp_path), camera)
 
     assert opened("c0", "c0") is not None
     assert opened("c1", "c0") is None, "one process sends it"

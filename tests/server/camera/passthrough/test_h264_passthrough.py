@@ -29,9 +29,9 @@ from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, encoded, sma
 from fakes.timeouts import PATIENCE
 from server.camera.audio import LiveAudioSource
 from server.camera.encoder import AccessUnit, Encoder
-from server.camera.passthrough.access_unit_queue import AccessUnitQueue
 from server.camera.passthrough.compatibility import required_format
 from server.camera.passthrough.encoder import PassthroughUnit
+from server.camera.passthrough.gop_alignment_queue import GopAlignmentQueue
 from server.camera.passthrough.stream_source import PassthroughStream
 from server.camera.pipeline import CameraPipeline
 from server.camera.process import CameraProcess
@@ -248,7 +248,7 @@ def test_gops_begin_at_the_sites_and_are_never_incomplete_inside(
     arriving: list[int], phase: int, gop: int, missed: set[int]
 ) -> None:
     """For any arrivals: units leave once and in order, without gaps inside a GOP."""
-    queue, count = AccessUnitQueue(gop), 0
+    queue, count = GopAlignmentQueue(gop), 0
     taken: list[tuple[int, int]] = []
     for pulse, number in enumerate(arriving):
         for _ in range(number):
@@ -269,7 +269,7 @@ def test_gops_begin_at_the_sites_and_are_never_incomplete_inside(
 @given(st.integers(0, 9), st.integers(3, 10), st.lists(st.integers(-1, 1), min_size=100, max_size=100))
 def test_jitter_of_one_frame_loses_nothing(phase: int, gop: int, jitter: list[int]) -> None:
     """A unit that arrives up to one pulse early or late is available when due."""
-    queue, taken, count = AccessUnitQueue(gop), [], 0
+    queue, taken, count = GopAlignmentQueue(gop), [], 0
     for pulse in range(100):
         while count <= pulse + jitter[pulse]:
             queue.put(PassthroughUnit((count + phase) % gop == 0, count.to_bytes(4, "big"), IMAGE))
@@ -417,7 +417,7 @@ def test_audio_is_delayed_as_much_as_the_video(network: NetworkCamera) -> None:
     equal_delays, delay = 0, 0
     for pulse in range(300):
         wait_for_units(network, source)
-        listener.at(pulse)
+        listener.take(pulse)
         if source.take(pulse) is None or source.current is None:
             continue
         before, delay = delay, pulse - numbers()[tuple(nals(source.current.data))]

@@ -263,7 +263,7 @@ def test_every_decoded_message_can_be_used_for_scoring(message: dict[str, Any], 
         except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
             assert content is not good
             continue
-        if not cross_view.sees_same_ground(decoded):
+        if not cross_view.view_overlaps(decoded):
             continue
         [score] = cross_view.rescore(found, [decoded]).scores
         assert 0.0 <= score <= 1.0

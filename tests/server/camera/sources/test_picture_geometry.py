@@ -82,7 +82,7 @@ def test_the_display_matrix_is_applied_to_a_recording(
     recording = Recording(str(path))
     assert recording.size == (expected.shape[1], expected.shape[0]) == read_video_info(path).size
     assert is_same(recording.take(0), expected)
-    assert all(is_same(image, expected) for image in recording.ahead(range(3)))
+    assert all(is_same(image, expected) for image in recording.prescan_images(range(3)))
     recording.close()
 
 

@@ -82,7 +82,7 @@ def test_looking_ahead_does_not_move_the_recording(
     video: str, offset: int, at_end: Literal["stop", "loop"]
 ) -> None:
     source = Recording(video, offset, at_end)
-    assert [frame_in(picture) for picture in source.ahead(range(0, 500, 7))] == [0, 7, 14, 21]
+    assert [frame_in(picture) for picture in source.prescan_images(range(0, 500, 7))] == [0, 7, 14, 21]
     first = max(offset, 0)
     assert shown(source, first) == first - offset
     source.close()
@@ -93,7 +93,7 @@ def test_ahead_skips_unreadable_images(folder: Path, tmp_path: Path) -> None:
         (tmp_path / file.name).write_bytes(file.read_bytes())
     (tmp_path / "002.png").write_text("no image")
     source = ImageFolder(str(tmp_path), 2, "loop")
-    assert [frame_in(picture) for picture in source.ahead(range(0, 500, 2))] == [0, 4]
+    assert [frame_in(picture) for picture in source.prescan_images(range(0, 500, 2))] == [0, 4]
     assert shown(source, 2) == 0
 
 

@@ -144,7 +144,7 @@ def test_damaged_frames_are_counted_and_named_once(
 def test_a_different_frame_rate_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = write_video(tmp_path / "view.mp4", 10, fps=30)
     recording = Recording(str(path), 0, "stop", 25.0)
-    list(recording.ahead(range(5)))
+    list(recording.prescan_images(range(5)))
     recording.close()
     assert caplog.messages == [
         f"{path} has 30 frames a second, the site 25: frames keep their times, some are dropped"

@@ -23,7 +23,7 @@ from fakes.service.scripted_cameras import (
     small_config,
     tracks,
 )
-from server.camera.retained_state import RetainedServiceState
+from server.camera.retained_identity_snapshot import RetainedIdentitySnapshot
 from server.http.app import make_app
 from server.messaging.epochs import end_of_epoch
 from server.messaging.identity_snapshot import (
@@ -56,7 +56,7 @@ class Site:
     def __init__(self, **changes: object) -> None:
         self._changes = changes
         self.cameras = {
-            camera: RetainedServiceState(lambda snapshot, name=camera: self._receive(name, snapshot))
+            camera: RetainedIdentitySnapshot(lambda snapshot, name=camera: self._receive(name, snapshot))
             for camera in CAMERAS
         }
         self.service = FedService(small_config())
@@ -87,7 +87,7 @@ class Site:
         return number
 
     def _send_identities(self, camera: str, payload: bytes) -> None:
-        self.cameras[camera].put(Message(KEYS.camera(camera, "identities"), payload, b""))
+        self.cameras[camera].replace(Message(KEYS.camera(camera, "identities"), payload, b""))
 
     def _receive(self, camera: str, payload: bytes) -> None:
         self.service._retained_identities(Message(KEYS.camera(camera, "retained_identities"), payload, b""))
@@ -186,7 +186,9 @@ def test_numbering_begins_with_the_first_number_however_late_a_camera_connects()
 def test_without_a_cameras_snapshot_only_its_tracks_get_new_numbers() -> None:
     site = tracked_site()
     ann, other = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
-    site.cameras[B] = RetainedServiceState(lambda snapshot: site._receive(B, snapshot))  # restarted as well
+    site.cameras[B] = RetainedIdentitySnapshot(
+        lambda snapshot: site._receive(B, snapshot)
+    )  # restarted as well
     site.start()
     site.track_epochs(range(7, 9))
     assert site.person_of(A, 2, 8) == ann
@@ -218,7 +220,7 @@ def test_no_number_or_name_is_assigned_that_may_be_another_persons(epochs: range
 def test_a_late_snapshot_prevents_numbers_from_being_used_twice() -> None:
     site = tracked_site()
     used = max(site.service.decider.people.registry.all_numbers)
-    site.cameras[A] = RetainedServiceState(lambda snapshot: site._receive(A, snapshot))
+    site.cameras[A] = RetainedIdentitySnapshot(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {}, B: {}})
     site.cameras[B].on_service(is_present=True)
@@ -240,7 +242,7 @@ def test_a_late_snapshot_is_used() -> None:
 def test_numbers_of_a_late_snapshot_that_may_be_reassigned_are_ignored() -> None:
     site = tracked_site()
     before = [site.person_of(A, 1, 5), site.person_of(A, 2, 5), site.person_of(B, 3, 5)]
-    site.cameras[A] = RetainedServiceState(lambda snapshot: site._receive(A, snapshot))
+    site.cameras[A] = RetainedIdentitySnapshot(lambda snapshot: site._receive(A, snapshot))
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {1: SMALL, 2: LARGE}, B: {}})
     assert site.person_of(A, 1, 7) in before, "no snapshot listed it as used"
@@ -347,7 +349,7 @@ NESTED = b'{"more": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
 @pytest.mark.parametrize("damage", [b"\xff", b"[]", b'{"pulse": 1}', b"{" * 100_000, NESTED])
 def test_an_invalid_snapshot_is_counted(damage: bytes, caplog: pytest.LogCaptureFixture) -> None:
     site = tracked_site()
-    site.cameras[B].put(Message("", damage, b""))
+    site.cameras[B].replace(Message("", damage, b""))
     with caplog.at_level(logging.ERROR):
         service = site.start()
     assert service.ingest.states[B].bad_messages == 1
@@ -358,9 +360,9 @@ def test_an_invalid_snapshot_is_counted(damage: bytes, caplog: pytest.LogCapture
 
 def test_a_snapshot_is_limited_in_size() -> None:
     snapshot: list[bytes] = []
-    retained = RetainedServiceState(snapshot.append)
-    retained.put(Message("", b"one", b""))
-    retained.put(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
+    retained = RetainedIdentitySnapshot(snapshot.append)
+    retained.replace(Message("", b"one", b""))
+    retained.replace(Message("", b"2" * (SNAPSHOT_BYTES_MAX + 1), b""))
     retained.on_service(is_present=False)
     retained.on_service(is_present=True)
     assert snapshot == [b"one"]
@@ -394,7 +396,7 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
         people = [msgspec.structs.replace(person, manual=False) for person in retained.people]
         snapshot = msgspec.json.encode(msgspec.structs.replace(retained, people=people))
-        site.cameras[camera].put(Message("", snapshot, b""))
+        site.cameras[camera].replace(Message("", snapshot, b""))
     site.start()
     site.track_epochs(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
     assert site.person_of(A, 1, 11) != site.person_of(A, 2, 11)
@@ -405,7 +407,7 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
 def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, other: IdentitySnapshot) -> None:
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
-        site.cameras[camera].put(Message("", msgspec.json.encode(retained), b""))
+        site.cameras[camera].replace(Message("", msgspec.json.encode(retained), b""))
     site.start()
     site.track_epochs(range(7, 10))
     people = site.service.decider.people
@@ -415,8 +417,8 @@ def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, othe
 
 def falsify_snapshot(site: Site, camera: str, **changes: object) -> None:
     """Change the snapshot that a camera retains."""
-    snapshot = msgspec.json.decode(site.cameras[camera]._state, type=IdentitySnapshot)
-    site.cameras[camera].put(
+    snapshot = msgspec.json.decode(site.cameras[camera]._snapshot, type=IdentitySnapshot)
+    site.cameras[camera].replace(
         Message("", msgspec.json.encode(msgspec.structs.replace(snapshot, **changes)), b"")
     )
 

@@ -12,7 +12,7 @@ _FAR_S, _FAR_FRAMES = 60.0, 10
 """A step forward beyond the larger of the two, in seconds and frames, is a jump."""
 
 
-class TimestampRepair:
+class TimestampJumpRepair:
     """Shifts time stamps so that they continue with the next frame after a jump."""
 
     def __init__(self, opened: OpenedVideo) -> None:
@@ -23,7 +23,7 @@ class TimestampRepair:
         self._last: int | None = None
         self._shift = 0
 
-    def repair(self, packet: av.Packet[VideoStream]) -> bool:
+    def repair_jump(self, packet: av.Packet[VideoStream]) -> bool:
         """Correct a packet's time stamps; return whether they jump here. Packets are in decoding order."""
         time = packet.pts if packet.dts is None else packet.dts
         if time is None:

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from benchmarks.endurance.endless_crowd import crowd
-from server.camera.load.frame_skipper import FrameSkipper
 from server.camera.load.load_shedder import ShedLevel, shed_levels
+from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 
 WINDOW = WindowSettings()
 FRAMES = 80
 
 
-def frame_skipper(bins: int) -> FrameSkipper:
+def interpolator_of(bins: int) -> SkippedFrameInterpolator:
     tracker = OnlineTracker(WINDOW, CostSettings(), create_solver("columns"))
-    return FrameSkipper(tracker, bins, WINDOW.stride)
+    return SkippedFrameInterpolator(tracker, bins, WINDOW.stride)
 
 
 def walker(frame: int) -> Detections:
@@ -33,12 +33,12 @@ def walker(frame: int) -> Detections:
 
 
 def track_with_skipping(level: ShedLevel) -> list[WindowResult]:
-    skipper = frame_skipper(4)
+    interpolator = interpolator_of(4)
     results = []
     for frame in range(FRAMES):
         is_detected = level.detects(frame, WINDOW.stride)
-        results.append(skipper.push(frame, walker(frame)) if is_detected else skipper.skip(frame))
-    return [result for result in (*results, skipper.flush()) if result is not None]
+        results.append(interpolator.push(frame, walker(frame)) if is_detected else interpolator.skip(frame))
+    return [result for result in (*results, interpolator.flush()) if result is not None]
 
 
 @pytest.mark.parametrize(
@@ -64,9 +64,9 @@ def test_a_person_keeps_one_track_at_every_detection_interval(level: ShedLevel) 
 def test_without_skipped_frames_the_tracks_are_the_trackers() -> None:
     scene = list(islice(crowd(3, seed=2), 60))
     tracker = OnlineTracker(WINDOW, CostSettings(), create_solver("columns"))
-    skipper = frame_skipper(scene[0].histograms.shape[1])
+    interpolator = interpolator_of(scene[0].histograms.shape[1])
     for frame, detections in enumerate(scene):
-        expected, actual = tracker.push(frame, detections), skipper.push(frame, detections)
+        expected, actual = tracker.push(frame, detections), interpolator.push(frame, detections)
         assert (expected is None) == (actual is None)
         if expected is not None and actual is not None:
             assert [track.id for track in expected.tracks] == [track.id for track in actual.tracks]
@@ -77,22 +77,24 @@ def test_without_skipped_frames_the_tracks_are_the_trackers() -> None:
 
 
 def test_windows_without_detected_frames_end_in_time() -> None:
-    skipper = frame_skipper(4)
+    interpolator = interpolator_of(4)
     ends = [
-        frame for frame in range(40) if (skipped := skipper.skip(frame)) is not None and skipped.last == frame
+        frame
+        for frame in range(40)
+        if (skipped := interpolator.skip(frame)) is not None and skipped.last == frame
     ]
     assert ends == list(range(4, 40, 5))
 
 
 def test_a_window_whose_last_frame_was_missed_ends_with_the_next_frame() -> None:
-    skipper = frame_skipper(4)
+    interpolator = interpolator_of(4)
     for frame in range(4):
-        assert skipper.push(frame, walker(frame)) is None
-    skipper.skip(6)  # 4 and 5 were missed
-    skipper.skip(7)
-    result = skipper.push(8, walker(8))
+        assert interpolator.push(frame, walker(frame)) is None
+    interpolator.skip(6)  # 4 and 5 were missed
+    interpolator.skip(7)
+    result = interpolator.push(8, walker(8))
     assert result is not None
     assert (result.first, result.last) == (0, 4)
-    following = skipper.push(9, walker(9))
+    following = interpolator.push(9, walker(9))
     assert following is not None
     assert following.last == 9

@@ -13,7 +13,7 @@ _SKIP_BEHIND = 2 * _CUSHION + 1
 _MAX_GOPS = 4
 
 
-class AccessUnitQueue:
+class GopAlignmentQueue:
     """A queue that hands out the first access unit of a GOP only at a pulse where a GOP begins.
 
     A camera begins its GOPs at any time, so units wait for up to a GOP and the cushion, and the camera is

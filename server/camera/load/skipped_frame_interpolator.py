@@ -10,14 +10,18 @@ from tracking.interactive import InteractiveTracker, PositionCorrection
 from tracking.registry import Tracker
 
 
-class FrameSkipper:
+class SkippedFrameInterpolator:
     """Passes frames to the tracker in order, with interpolated detections for skipped ones.
 
     A skipped frame waits for the next one with detection, at most until the end of its window.
     """
 
-    def __init__(self, tracker: Tracker, bins: int, stride: int) -> None:
-        self._tracker, self._no_detections, self._stride = tracker, Detections.empty(bins), stride
+    def __init__(self, tracker: Tracker, bins: int, window_stride: int) -> None:
+        self._tracker, self._no_detections, self._window_stride = (
+            tracker,
+            Detections.empty(bins),
+            window_stride,
+        )
         self._skipped: list[int] = []
         self._before: tuple[int, Detections] | None = None
         """The last frame with detection."""
@@ -26,7 +30,7 @@ class FrameSkipper:
         """Skip a frame. Pulses must ascend."""
         self._skipped.append(pulse)
         # The window must not wait for the next frame, which may never come.
-        return self._release(None) if (pulse + 1) % self._stride == 0 else None
+        return self._release(None) if (pulse + 1) % self._window_stride == 0 else None
 
     def push(self, pulse: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Push a frame's detections."""
@@ -55,6 +59,6 @@ class FrameSkipper:
 
     def _interpolated(self, pulse: int, after: tuple[int, Detections] | None) -> Detections:
         before = self._before
-        if before is None or after is None or after[0] - before[0] > self._stride:
+        if before is None or after is None or after[0] - before[0] > self._window_stride:
             return self._no_detections
         return interpolate_detections(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))
