@@ -86,7 +86,7 @@ async def test_a_pulse_server_with_passwords_lists_its_clients_to_the_service() 
         await anext(aiter(camera))
         served = await anext(sites)
         assert "needs a login" in (await served.get_json("/api/operator/pulses"))["error"]
-        served.service.pulse_credentials = Credentials("bestview", users["bestview"])
+        served.service.pulses.credentials = Credentials("bestview", users["bestview"])
         answer = await served.get_json("/api/operator/pulses")
     assert (answer["error"], [client["name"] for client in answer["clients"]]) == ("", [A])
     assert answer["missing"] == [B, "bestview"]
