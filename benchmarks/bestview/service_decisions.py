@@ -38,10 +38,10 @@ class GroundTruthRegistry:
         self._people = people
 
     def update(
-        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: Sequence[TrackUpdate], last_frame: int, picture_sizes: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         """Return the id of every tracklet."""
-        del last_frame, pictures
+        del last_frame, picture_sizes
         numbers = {TrackletKey(*track.key, 0): self._people[track.key.local_id - 1] for track in tracks}
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 

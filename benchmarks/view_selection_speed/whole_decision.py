@@ -106,10 +106,10 @@ class _AppearanceRegistry:
     """A registry that decodes people's ids from their appearance."""
 
     def update(
-        self, tracks: Sequence[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: Sequence[TrackUpdate], last_frame: int, picture_sizes: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
         """Return the id of every tracklet."""
-        del last_frame, pictures
+        del last_frame, picture_sizes
         numbers = {TrackletKey(*track.key, 0): int(track.appearance[0].histogram[0]) for track in tracks}
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 

@@ -65,15 +65,15 @@ class GroundTrajectories:
         row: (L,) rising.
         camera: (L,) number of the track's camera.
         positions: (5, L, W) x, y and the covariances xx, xy, yy in ground units; NaN where not localized.
-        rows: (S,) row of each sighting.
-        frames: (S,) frame of each sighting.
+        sighting_rows: (S,) row of each sighting.
+        sighting_frames: (S,) frame of each sighting.
     """
 
     row: Ints
     camera: Ints
     positions: Floats
-    rows: Ints
-    frames: Ints
+    sighting_rows: Ints
+    sighting_frames: Ints
 
     @classmethod
     def of(cls, observations: TrackObservations, rows: Ints, camera: Ints) -> GroundTrajectories:
@@ -111,7 +111,7 @@ class GroundTrajectories:
 
 
 def score_ground_proximity(
-    trajectories: GroundTrajectories, gate: float, open_rows: int, known_pairs: tuple[Ints, Ints], rows: int
+    trajectories: GroundTrajectories, gate: float, active_rows: int, known_pairs: tuple[Ints, Ints], rows: int
 ) -> GroundProximity:
     """Score how close to each other the trajectories of different cameras are.
 
@@ -123,19 +123,19 @@ def score_ground_proximity(
     Args:
         trajectories: ground positions.
         gate: distance at which two foot points are as likely of one person as of two, ground units.
-        open_rows: rows from this one on are settled people: two of them are not compared.
+        active_rows: rows from this one on are settled people: two of them are not compared.
         known_pairs: pairs of rows that were scored before, (P,) and (P,), the lower row first.
         rows: how many there are.
     """
     one, two = trajectories.candidate_pairs(gate)
-    compared = (trajectories.row[one] < open_rows) & (trajectories.camera[one] != trajectories.camera[two])
+    compared = (trajectories.row[one] < active_rows) & (trajectories.camera[one] != trajectories.camera[two])
     one, two = one[compared], two[compared]
     above_minimum = (trajectories.scores(one, two, gate) > MINIMUM_FRAME_SCORE).any(axis=1)
     start, stop = (
         np.searchsorted(trajectories.row, np.arange(rows), side=side) for side in ("left", "right")
     )
     lower, higher = known_pairs
-    present = (lower < open_rows) & (stop[lower] > start[lower]) & (stop[higher] > start[higher])
+    present = (lower < active_rows) & (stop[lower] > start[lower]) & (stop[higher] > start[higher])
     new_pairs = trajectories.row[one[above_minimum]] * rows + trajectories.row[two[above_minimum]]
     pair = sorted_unique(np.concatenate([new_pairs, lower[present] * rows + higher[present]]))
     # All trajectories of both: an active row has one, unless its track is split within the update.

@@ -31,27 +31,29 @@ class GhostCheck:
         self._homographies = np.array(list(known.values())).reshape(-1, 3, 3)
 
     def count_missing_cameras(
-        self, cluster: TrackletCluster, pictures: Mapping[str, tuple[int, int]], height: float
+        self, cluster: TrackletCluster, picture_sizes: Mapping[str, tuple[int, int]], height: float
     ) -> int:
-        """Count the cameras that should see a cluster at its last known position and have no track of it.
+        """Count the cameras that should see a cluster at its last known position and never have.
 
         Args:
             cluster: tracklets of one person; the last localized endpoint is its position.
-            pictures: width and height in pixels of the cameras that have reported.
+            picture_sizes: width and height in pixels of the cameras that have reported.
             height: of a person in ground units; NaN: not known yet, the count is 0.
         """
-        missing = [camera in pictures and camera not in cluster.cameras for camera in self._cameras]
+        missing = [
+            camera in picture_sizes and camera not in cluster.cameras_so_far for camera in self._cameras
+        ]
         localized = [
             tracklet.end for tracklet in cluster.tracklets if not np.isnan(tracklet.end.ground_point).any()
         ]
         if not any(missing) or not localized or not height > 0:
             return 0
         ground_point = max(localized, key=lambda endpoint: endpoint.frame).ground_point
-        sizes = np.array([pictures.get(camera, (0, 0)) for camera in self._cameras], dtype=np.float64)
-        return int((fully_in_view(self._homographies, sizes, ground_point, height) & missing).sum())
+        sizes = np.array([picture_sizes.get(camera, (0, 0)) for camera in self._cameras], dtype=np.float64)
+        return int((fully_detectable(self._homographies, sizes, ground_point, height) & missing).sum())
 
 
-def fully_in_view(homographies: Floats, sizes: Floats, place: Floats, height: float) -> NDArray[np.bool_]:
+def fully_detectable(homographies: Floats, sizes: Floats, place: Floats, height: float) -> NDArray[np.bool_]:
     """Return which of C cameras show a person at a place completely and large enough to be detected.
 
     Furniture and other people are not considered.

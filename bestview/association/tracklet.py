@@ -82,7 +82,7 @@ class Tracklet:
     confirmed_continuation: bool = False
 
     @property
-    def gap(self) -> int:
+    def frames_since_predecessor(self) -> int:
         """Frames from the end of the predecessor; 0: there is none."""
         return self.start.frame - self.predecessor.end.frame if self.predecessor is not None else 0
 
@@ -107,15 +107,15 @@ class Tracklet:
         self.unpublished_frames = self.unpublished_frames[len(frames) :]
         return bool(frames and self.person_id)
 
-    def assign_id(self, person_id: int) -> None:
-        """Assign a person id, also to the frames published so far."""
+    def reassign_id(self, person_id: int) -> None:
+        """Replace the person id, also that of the frames published so far."""
         self.published_frames = {person_id: max(1, sum(self.published_frames.values()))}
         self.person_id = person_id
         self.settled_id = person_id if self.settled_id else 0
 
     def continue_as(self, person_id: int, predecessor: Tracklet) -> None:
         """Apply an operator's correction: the person, and the tracklet that this one continues."""
-        self.assign_id(person_id)
+        self.reassign_id(person_id)
         self.predecessor, self.crowd_frames_before, self.confirmed_continuation = predecessor, 0, True
 
     def merge_ids(self, lost: int, kept: int) -> None:

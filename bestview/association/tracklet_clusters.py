@@ -51,8 +51,8 @@ class TrackletCluster:
         )
 
     @cached_property
-    def cameras(self) -> set[str]:
-        """Cameras that see the person or have seen them."""
+    def cameras_so_far(self) -> set[str]:
+        """Cameras that see the person, or have seen them before."""
         current_cameras = {tracklet.key.camera for tracklet in self.tracklets}
         return current_cameras.union(
             *(tracklet.appearance.by_camera for tracklet in self.tracklets),

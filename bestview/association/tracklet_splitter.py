@@ -25,6 +25,18 @@ _STABLE_CLUSTERINGS = 2
 """Clusterings for which a tracklet must have kept one person id to be settled while it continues."""
 
 
+class ObservedTracklets(NamedTuple):
+    """The tracklet of each observation of an update.
+
+    Attributes:
+        rows: (T, W) its row in `TrackletSplitter.active`, -1: none.
+        settled_ids: (T, W) its settled person id, 0: not settled.
+    """
+
+    rows: NDArray[np.int64]
+    settled_ids: NDArray[np.int64]
+
+
 class TrackletSplitter:
     """Splits every camera's tracks into tracklets, update by update.
 
@@ -45,39 +57,35 @@ class TrackletSplitter:
 
     def update(
         self, observations: TrackObservations, appearance: Mapping[TrackKey, Sequence[AppearanceSample]]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Add the observations of an update.
+    ) -> ObservedTracklets:
+        """Add the observations of an update, and return their tracklets.
 
         Args:
             observations: of all tracks.
             appearance: samples by track; those in a crowd do not count.
-
-        Returns:
-            (T, W) the row in `active` of each observation, -1: none; (T, W) its settled person id, 0: not
-            settled.
         """
-        rows, settled = (
-            np.full(observations.visible.shape, -1),
-            np.zeros(observations.visible.shape, dtype=np.int64),
-        )
+        shape = observations.visible.shape
+        rows, settled_ids = np.full(shape, -1), np.zeros(shape, dtype=np.int64)
         crowded = observations.crowded(self._settings.crowd_iou)
         # With a setting of 0 every frame may start a tracklet.
-        whole = min(self._settings.crowd_frames, self._settings.gap_frames) > 0
-        for run in observation_runs(observations.visible, crowded, whole=whole):
+        frame_by_frame = min(self._settings.crowd_frames, self._settings.gap_frames) <= 0
+        for run in observation_runs(observations.visible, crowded, frame_by_frame=frame_by_frame):
             key = observations.keys[run.track]
             tracklet, frame = self._current.get(key), observations.first_frame + run.start
             if key in self._pending_splits:
-                person_id, before = self._pending_splits.pop(key)
-                tracklet = self._start_tracklet(key, _endpoint(observations, run.track, run.start), before)
-                tracklet.continue_as(person_id, before)
+                person_id, predecessor = self._pending_splits.pop(key)
+                tracklet = self._start_tracklet(
+                    key, _endpoint(observations, run.track, run.start), predecessor
+                )
+                tracklet.continue_as(person_id, predecessor)
             elif tracklet is None or self._starts_new_tracklet(tracklet, frame, crowded=run.crowded):
                 tracklet = self._start_tracklet(key, _endpoint(observations, run.track, run.start), tracklet)
                 if key in self._recalled_ids:
-                    tracklet.assign_id(self._recalled_ids.pop(key))
+                    tracklet.reassign_id(self._recalled_ids.pop(key))
             tracklet.add_frames(range(frame, observations.first_frame + run.stop), crowded=run.crowded)
             tracklet.end = _endpoint(observations, run.track, run.stop - 1)
             rows[run.track, run.start : run.stop] = self._row.get(tracklet.key, -1)
-            settled[run.track, run.start : run.stop] = tracklet.settled_id
+            settled_ids[run.track, run.start : run.stop] = tracklet.settled_id
             for sample in appearance.get(key, ()):
                 first, last = (
                     sample.first_frame - observations.first_frame,
@@ -85,15 +93,15 @@ class TrackletSplitter:
                 )
                 if run.start <= last < run.stop and not crowded[run.track, first : last + 1].any():
                     tracklet.appearance.add(key.camera, MeanHistogram.of(sample.histogram, last - first + 1))
-        return rows, settled
+        return ObservedTracklets(rows, settled_ids)
 
-    def _start_tracklet(self, key: TrackKey, at: TrackletEndpoint, before: Tracklet | None) -> Tracklet:
+    def _start_tracklet(self, key: TrackKey, at: TrackletEndpoint, predecessor: Tracklet | None) -> Tracklet:
         tracklet = Tracklet(
             TrackletKey(*key, at.frame),
             at,
             at,
-            before,
-            before.crowd_frames_at_end if before is not None else 0,
+            predecessor,
+            predecessor.crowd_frames_at_end if predecessor is not None else 0,
         )
         self._current[key] = tracklet
         self._row[tracklet.key] = len(self.active)
@@ -120,10 +128,10 @@ class TrackletSplitter:
         current = [self._current[key] for key in sorted(set(tracks)) if key in self._current]
         return [tracklet for tracklet in current if (tracklet.settled_id or tracklet.person_id) in people]
 
-    def predecessor(self, track: TrackKey, frame: int, person_id: int) -> Tracklet | None:
+    def predecessor(self, track: TrackKey, frame: int, settled_id: int) -> Tracklet | None:
         """Return the newest tracklet of a track that started before a frame; None: the track is unknown.
 
-        For a settled tracklet that is over, `person_id` gives the id: nothing else is stored.
+        For a settled tracklet that is over, it has this `settled_id`: nothing else is stored.
         """
         earlier = [
             tracklet
@@ -135,10 +143,10 @@ class TrackletSplitter:
             return earlier[-1] if earlier else current
         endpoint = TrackletEndpoint(frame - 1, current.start.box, current.start.ground_point)
         return Tracklet(
-            TrackletKey(*track, frame - 1), endpoint, endpoint, person_id=person_id, settled_id=person_id
+            TrackletKey(*track, frame - 1), endpoint, endpoint, person_id=settled_id, settled_id=settled_id
         )
 
-    def started_since(self, track: TrackKey, frame: int) -> Tracklet | None:
+    def current_if_started_since(self, track: TrackKey, frame: int) -> Tracklet | None:
         """Return the current tracklet of a track if it is not settled and started in this frame or later."""
         current = self._current.get(track)
         return (
@@ -147,9 +155,9 @@ class TrackletSplitter:
             else None
         )
 
-    def split_next(self, track: TrackKey, person_id: int, before: Tracklet) -> None:
+    def split_next(self, track: TrackKey, person_id: int, predecessor: Tracklet) -> None:
         """Start a new tracklet at a track's next observation: its person, and the tracklet it continues."""
-        self._pending_splits[track] = person_id, before
+        self._pending_splits[track] = person_id, predecessor
 
     def recall(self, track: TrackKey, person_id: int) -> None:
         """Assign a person id to the first tracklet of a track that is not observed yet."""
@@ -161,8 +169,8 @@ class TrackletSplitter:
         for tracklet in chain(self.active, self._current.values()):
             tracklet.merge_ids(lost, kept)
             tracklet.settled_id = kept if tracklet.settled_id == lost else tracklet.settled_id
-        for track, (person_id, before) in self._pending_splits.items():
-            self._pending_splits[track] = kept if person_id == lost else person_id, before
+        for track, (person_id, predecessor) in self._pending_splits.items():
+            self._pending_splits[track] = kept if person_id == lost else person_id, predecessor
         self._recalled_ids = {
             track: kept if person_id == lost else person_id for track, person_id in self._recalled_ids.items()
         }
@@ -236,15 +244,15 @@ class ObservationRun(NamedTuple):
 
 
 def observation_runs(
-    visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, whole: bool
+    visible: NDArray[np.bool_], crowded: NDArray[np.bool_], *, frame_by_frame: bool
 ) -> Iterator[ObservationRun]:
     """Yield runs of observations, (T, W) visible and crowded: only the first frame can start a tracklet.
 
-    With `whole`, runs are as long as possible; without, each is one frame.
+    Runs are as long as possible; with `frame_by_frame` each is one frame.
     """
     kind = np.where(visible, 1 + crowded, 0)
     kind = np.pad(kind, ((0, 0), (1, 1)))
-    change = (kind[:, 1:] != kind[:, :-1]) | (not whole)
+    change = (kind[:, 1:] != kind[:, :-1]) | frame_by_frame
     track, start = np.nonzero(change[:, :-1] & visible)
     # Ends are as many as starts, in the same order.
     _, stop = np.nonzero(change[:, 1:] & visible)

@@ -139,7 +139,7 @@ def covisible_agreement(
     agreements = []
     for own, index in ((0, chosen[0]), (1, chosen[1])):
         other = 1 - own
-        covisible = fully_in_view(cameras[own], samples[own], cameras[other])
+        covisible = fully_detectable(cameras[own], samples[own], cameras[other])
         if len(samples[other].times):
             covisible &= samples[own].times >= samples[other].times.min()
             covisible &= samples[own].times <= samples[other].times.max()
@@ -150,7 +150,7 @@ def covisible_agreement(
     return float(np.sqrt(agreements[0] * agreements[1]))
 
 
-def fully_in_view(camera: Pinhole, samples: WalkSamples, other: Pinhole) -> NDArray[np.bool_]:
+def fully_detectable(camera: Pinhole, samples: WalkSamples, other: Pinhole) -> NDArray[np.bool_]:
     """Return which samples the other camera shows completely and large enough to be detected: (S,)."""
     feet = other.picture(camera.floor(samples.feet))
     heights = other.heights(feet)

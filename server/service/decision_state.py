@@ -52,7 +52,7 @@ class DecisionState:
                 if isinstance(split, Merge)
             ],
             split=[
-                PersonSplit(kept=split.kept, new_object=split.split_off, camera=split.camera)
+                PersonSplit(kept=split.published_id, new_object=split.corrected_id, camera=split.camera)
                 for split in decision.corrections
                 if isinstance(split, Split)
             ],

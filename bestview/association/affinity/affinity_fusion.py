@@ -43,7 +43,7 @@ class AffinityFusion:
         self,
         tracklets: Sequence[Tracklet],
         people: Sequence[Person],
-        visible: NDArray[np.bool_],
+        visible_people: NDArray[np.bool_],
         affinity: AffinityMatrix,
         height: float,
     ) -> Ints:
@@ -52,7 +52,7 @@ class AffinityFusion:
         Args:
             tracklets: active ones.
             people: known people with settled tracklets.
-            visible: (P,) people seen by settled tracklets that continue.
+            visible_people: (P,) people seen by settled tracklets that continue.
             affinity: of all pairs of both.
             height: of a person in ground units.
 
@@ -65,7 +65,7 @@ class AffinityFusion:
         )
         appearances = self._collect_appearances(tracklets, people, affinity)
         links = CandidateLinks.find(evidence, appearances, self._weights, len(tracklets), count)
-        unseen = np.concatenate([np.zeros(len(tracklets), dtype=np.bool_), ~visible])
+        unseen = np.concatenate([np.zeros(len(tracklets), dtype=np.bool_), ~visible_people])
         group = np.arange(count)
         for batch in split_into_batches(links, evidence, appearances):
             label = cluster(
@@ -85,9 +85,9 @@ class AffinityFusion:
     ) -> list[CameraAppearances]:
         """Collect the mean histograms of all rows, camera by camera."""
         by_camera: dict[str, list[tuple[int, MeanHistogram]]] = {camera: [] for camera in self._calibrated}
-        open_rows: dict[str, list[int]] = {camera: [] for camera in self._calibrated}
+        rows_by_camera: dict[str, list[int]] = {camera: [] for camera in self._calibrated}
         for row, tracklet in enumerate(tracklets):
-            open_rows[tracklet.key.camera].append(row)
+            rows_by_camera[tracklet.key.camera].append(row)
         for row, appearance in enumerate(
             [tracklet.appearance for tracklet in tracklets] + [person.appearance for person in people]
         ):
@@ -95,12 +95,12 @@ class AffinityFusion:
                 by_camera[name].append((row, histogram))
         appearances = []
         for camera, histograms in by_camera.items():
-            comparable = comparable_histograms(histograms, len(tracklets))
+            comparable = select_equal_bin_counts(histograms, len(tracklets))
             if len(comparable) > 1:
                 rows = np.array([row for row, _ in comparable], dtype=np.int64)
                 total = np.array([histogram.histogram_sum for _, histogram in comparable])
                 count = np.array([histogram.frame_count for _, histogram in comparable], dtype=np.float64)
-                scale = self._scales.of(camera, open_rows[camera], tracklets, affinity)
+                scale = self._scales.of(camera, rows_by_camera[camera], tracklets, affinity)
                 appearances.append(CameraAppearances(rows, total, count, scale))
         return appearances
 
@@ -111,7 +111,7 @@ class AffinityFusion:
         self._scales.remember_distances(old, tracklets, affinity)
 
 
-def comparable_histograms(
+def select_equal_bin_counts(
     histograms: Sequence[tuple[int, MeanHistogram]], active_rows: int
 ) -> list[tuple[int, MeanHistogram]]:
     """Return the histograms with as many bins as the newest of rows below `active_rows`, or of any."""

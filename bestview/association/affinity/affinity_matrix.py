@@ -13,8 +13,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bestview.association.affinity.localized_frames import LocalizedFrames
 from bestview.association.affinity.pair_table import SparsePairTable, unique_pairs
-from bestview.association.affinity.presence import PresenceBitmap
 from bestview.association.co_occurrence import MINIMUM_FRAME_SCORE
 from bestview.association.index_ranges import expand_counts
 from bestview.association.settings import IdentitySettings
@@ -25,8 +25,8 @@ Ints = NDArray[np.int64]
 
 _MINIMUM_COMMON_FRAMES = 3
 """Frames in which both must be seen before their positions count."""
-_EXTRA_PRESENCE_FRAMES = 256
-"""Frames before the last sighting of a comparable person over which presence is kept."""
+_EXTRA_LOCALIZED_FRAMES = 256
+"""Frames kept beyond those within which people take part in clustering."""
 
 RowKey = TrackletKey | int
 """An active tracklet, or the id of a person with settled tracklets."""
@@ -50,7 +50,7 @@ class AffinityMatrix:
         # Number of each row in the tables, never reused.
         self._row_names: Ints = np.zeros(0, dtype=np.int64)
         self._name_count = 0
-        self._presence = PresenceBitmap(settings.comparable_frames + _EXTRA_PRESENCE_FRAMES)
+        self._localized_frames = LocalizedFrames(settings.comparable_frames + _EXTRA_LOCALIZED_FRAMES)
         # Common frames at different places after which the evidence is capped.
         self._max_common_frames = max(
             _MINIMUM_COMMON_FRAMES,
@@ -77,7 +77,7 @@ class AffinityMatrix:
         if rows == list(self._row_of):
             return
         old = np.array([self._row_of.get(row, -1) for row in rows], dtype=np.int64)
-        self._presence.set_rows(old)
+        self._localized_frames.set_rows(old)
         new = old < 0
         name = np.where(new, 0, self._row_names[old] if self._row_names.size else 0)
         name[new] = self._name_count + np.arange(int(new.sum()))
@@ -129,9 +129,10 @@ class AffinityMatrix:
         return np.asarray(np.where(common >= _MINIMUM_COMMON_FRAMES, evidence, 0.0))
 
     def add_ground_evidence(self, first: Ints, second: Ints, score: Floats, frames: Ints) -> None:
-        """Add ground scores of some frames to (P,) pairs of rows; `add_presence` follows for the frames.
+        """Add ground scores of some frames to (P,) pairs of rows.
 
-        The sum stays within the cap, so that later frames can reverse earlier ones.
+        The sum stays within the cap, so that later frames can reverse earlier ones. `add_localized_frames`
+        must follow for the same frames.
         """
         pair, index = np.unique(
             np.minimum(first, second) * len(self) + np.maximum(first, second), return_inverse=True
@@ -145,12 +146,12 @@ class AffinityMatrix:
         known[:, 1] = np.minimum(known[:, 1], _MINIMUM_COMMON_FRAMES)
         self._ground.set(first_name, second_name, known)
 
-    def add_presence(self, row: Ints, frame: Ints) -> None:
+    def add_localized_frames(self, row: Ints, frame: Ints) -> None:
         """Mark (P,) rows as localized in (P,) frames.
 
         Rows without ground evidence were at different places in common frames.
         """
-        self._presence.add_presence(row, frame)
+        self._localized_frames.add(row, frame)
         # A pair at the lower cap needs no entry if its default evidence is at the cap too.
         capped = np.flatnonzero(self._ground.values[:, 0] <= -self._ground_cap)
         first, second = self._rows_of(self._ground.first[capped]), self._rows_of(self._ground.second[capped])
@@ -190,7 +191,7 @@ class AffinityMatrix:
         into = np.arange(len(self))
         into[lost] = kept
         self._merge_ground_evidence(into)
-        self._presence.merge(kept, lost)
+        self._localized_frames.merge(kept, lost)
         self._cannot_link, self._appearance = (
             table.relabeled(
                 *(self._row_names[into[self._rows_of(side)]] for side in (table.first, table.second))
@@ -233,7 +234,9 @@ class AffinityMatrix:
 
     def _default_ground_entries(self, first: Ints, second: Ints) -> Floats:
         """Return ground evidence and common frames of (P,) pairs of rows that never came close: (P, 2)."""
-        common = self._presence.common(first, second, self._max_common_frames).astype(np.float64)
+        common = self._localized_frames.count_common_frames(first, second, self._max_common_frames).astype(
+            np.float64
+        )
         evidence = np.maximum(MINIMUM_FRAME_SCORE * common / self._frames, -self._ground_cap)
         return np.stack([evidence, np.minimum(common, _MINIMUM_COMMON_FRAMES)], axis=1)
 

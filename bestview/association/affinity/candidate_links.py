@@ -41,16 +41,16 @@ class CandidateLinks:
         evidence: PairEvidence,
         appearances: Sequence[CameraAppearances],
         weights: AppearanceWeights,
-        tracklets: int,
+        active_rows: int,
         rows: int,
     ) -> CandidateLinks:
-        """Find the pairs with evidence above 0 of which at least one is among the first `tracklets` rows.
+        """Find the pairs with evidence above 0 of which at least one is among the first `active_rows`.
 
         Args:
             evidence: without appearance within a camera.
             appearances: one entry a camera; a tracklet is in one only.
             weights: of appearance.
-            tracklets: how many rows are active tracklets.
+            active_rows: how many rows are active tracklets.
             rows: how many there are.
         """
         first, second = evidence.positive_pairs()
@@ -60,7 +60,9 @@ class CandidateLinks:
         place = np.full(rows, -1)
         for camera in appearances:
             place[camera.rows] = np.arange(camera.rows.size)
-            alike = np.triu(camera.evidence_matrix(weights, int(np.searchsorted(camera.rows, tracklets))), 1)
+            alike = np.triu(
+                camera.evidence_matrix(weights, int(np.searchsorted(camera.rows, active_rows))), 1
+            )
             a, b = place[first], place[second]
             known = (a >= 0) & (b >= 0)
             value[known] = alike[a[known], b[known]]

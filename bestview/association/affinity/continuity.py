@@ -32,8 +32,8 @@ def continuation_evidence(tracklet: Tracklet, settings: IdentitySettings) -> flo
     )
     return float(
         evidence
-        if tracklet.gap <= settings.gap_frames
-        else evidence * np.exp(-tracklet.gap / _GAP_DECAY_FRAMES)
+        if tracklet.frames_since_predecessor <= settings.gap_frames
+        else evidence * np.exp(-tracklet.frames_since_predecessor / _GAP_DECAY_FRAMES)
     )
 
 

@@ -16,7 +16,7 @@ from bestview.association.appearance.histograms import (
     MAXIMUM_DIFFERENT_PAIRS,
     HistogramEqualizer,
     MeanHistogram,
-    cdf_distances,
+    cdf_distance,
 )
 from bestview.association.settings import IdentitySettings
 from bestview.association.tracklet import Tracklet, TrackletKey
@@ -76,7 +76,7 @@ class CrossCameraAppearance:
         row_of = np.array(observed, dtype=np.int64)
 
         def distances_between(first: slice, second: slice) -> Floats:
-            return cdf_distances(curves[first][:, None], curves[second][None, :])
+            return cdf_distance(curves[first][:, None], curves[second][None, :])
 
         # Pairs seen simultaneously in one camera, from the last camera back until there are enough.
         different_people: list[Floats] = []
@@ -87,7 +87,7 @@ class CrossCameraAppearance:
                 rivals = affinity.cannot_link(row_of[camera][i], row_of[camera][j])
                 different_people.append(within[i[rivals], j[rivals]])
         self.equalizer.add_different_people(np.concatenate([np.zeros(0), *reversed(different_people)]))
-        scores = score_pairs(
+        scores = score_camera_assignments(
             cameras,
             [self._calibrated[names[camera.start]] for camera in cameras],
             distances_between,
@@ -153,7 +153,7 @@ class PairScores:
         )
 
 
-def score_pairs(
+def score_camera_assignments(
     cameras: Sequence[slice],
     calibrated: Sequence[bool],
     distances_between: Callable[[slice, slice], NDArray[np.float64]],

@@ -24,11 +24,11 @@ class DistanceScales:
     """Learns from active tracklets, and stores the distances of settled ones.
 
     Args:
-        frames: that a histogram needs to be used.
+        minimum_frames: that a histogram needs to be used.
     """
 
-    def __init__(self, frames: int) -> None:
-        self._frames = frames
+    def __init__(self, minimum_frames: int) -> None:
+        self._minimum_frames = minimum_frames
         self._same_person: dict[str, Floats] = {}
         self._different_people: dict[str, Floats] = {}
 
@@ -93,7 +93,7 @@ class DistanceScales:
             if (
                 tracklet.predecessor is not None
                 and id(tracklet.predecessor) in place
-                and tracklet.gap <= _CONTINUOUS_GAP
+                and tracklet.frames_since_predecessor <= _CONTINUOUS_GAP
             ):
                 same_person.append(float(distance[i, place[id(tracklet.predecessor)]]))
         first, second = np.triu_indices(len(rows), 1)
@@ -104,7 +104,7 @@ class DistanceScales:
 
     def _histogram(self, tracklet: Tracklet, camera: str) -> MeanHistogram | None:
         histogram = tracklet.appearance.by_camera.get(camera)
-        return histogram if histogram is not None and histogram.frame_count >= self._frames else None
+        return histogram if histogram is not None and histogram.frame_count >= self._minimum_frames else None
 
 
 def _extended(known: dict[str, Floats], camera: str, more: Floats) -> Floats:

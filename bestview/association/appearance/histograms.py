@@ -101,22 +101,22 @@ class HistogramEqualizer:
         inside = slope * (steps - edges[left]) + cumulative[:, left]
         return np.asarray(np.where(steps < edges[-1], inside, cumulative[:, -1:]))
 
-    def add_different_people(self, cdf_distances: NDArray[np.float64]) -> None:
+    def add_different_people(self, distances: NDArray[np.float64]) -> None:
         """Store distances between people who were seen simultaneously in one camera."""
-        self._different.extend(cdf_distances[-MAXIMUM_DIFFERENT_PAIRS:].tolist())
+        self._different.extend(distances[-MAXIMUM_DIFFERENT_PAIRS:].tolist())
 
-    def same_person_gate(self, maximum: float, share: float) -> float:
+    def same_person_gate(self, maximum: float, quartile_factor: float) -> float:
         """Return the distance below which two histograms are likely of one person.
 
-        At most `maximum`, and at most `share` of the lower quartile of the distances between different
-        people: where all look alike, appearance decides nothing.
+        At most `maximum`, and at most `quartile_factor` times the lower quartile of the distances between
+        different people: where all look alike, appearance decides nothing.
         """
         if len(self._different) < _ENOUGH_PAIRS:
             return maximum
-        return min(maximum, share * float(np.percentile(np.array(self._different), 25)))
+        return min(maximum, quartile_factor * float(np.percentile(np.array(self._different), 25)))
 
 
-def cdf_distances(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+def cdf_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """Compute mean absolute differences between cumulative histograms: (..., 33) and (..., 33) -> (...).
 
     It is the earth mover's distance between the histograms, in units of the whole gray axis; NaN where there

@@ -22,11 +22,11 @@ class DistanceScale:
 
     Attributes:
         same_person: the typical distance between histograms of one person.
-        different_people: the lower quartile of the distances between different people.
+        different_people_quartile: the lower quartile of the distances between different people.
     """
 
     same_person: float
-    different_people: float
+    different_people_quartile: float
 
     @classmethod
     def learned(cls, same_person: Floats, different_people: Floats) -> DistanceScale:
@@ -46,11 +46,11 @@ class DistanceScale:
     @property
     def neutral_distance(self) -> float:
         """Distance with evidence 0."""
-        return (self.same_person + self.different_people) / 2.0
+        return (self.same_person + self.different_people_quartile) / 2.0
 
     def slope(self, weights: AppearanceWeights) -> float:
         """Return the evidence per unit of distance."""
-        half = (self.different_people - self.same_person) / 2.0
+        half = (self.different_people_quartile - self.same_person) / 2.0
         return weights.typical / half if half > 0 else 0.0
 
 

@@ -19,13 +19,13 @@ class Merge:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Split:
-    """A track that was published as person `kept` turned out to be another person, `split_off`.
+    """A track that was published as one person turned out to be another, who may have been known before.
 
-    Person `kept` may not be visible any more. If two people swapped tracks, there are two splits.
+    The published person may not be visible any more. If two people swapped tracks, there are two splits.
     """
 
-    kept: int
-    split_off: int
+    published_id: int
+    corrected_id: int
     camera: str
 
 
@@ -72,7 +72,7 @@ def swap_tracks(
     people: Container[int],
     tracks: tuple[TrackKey, TrackKey],
     frame: int,
-    person_ids: tuple[int, int],
+    ids_before: tuple[int, int],
 ) -> dict[TrackletKey, tuple[int, int]]:
     """Swap the people of two tracks from a frame on.
 
@@ -85,15 +85,15 @@ def swap_tracks(
         people: ids of the remembered people.
         tracks: of one camera.
         frame: the first in which each track shows the other's person.
-        person_ids: of the two tracks before that frame, for tracklets that are settled and over.
+        ids_before: person ids of the two tracks before that frame, for tracklets that are settled and over.
 
     Returns:
         The ids before and after of each changed tracklet; a track that is split only later counts as if a
         tracklet had started in that frame. Empty if one of the two had no id.
     """
     first, second = (
-        tracklets.predecessor(track, frame, person_id)
-        for track, person_id in zip(tracks, person_ids, strict=True)
+        tracklets.predecessor(track, frame, id_before)
+        for track, id_before in zip(tracks, ids_before, strict=True)
     )
     if first is None or second is None:
         return {}
@@ -105,7 +105,7 @@ def swap_tracks(
         (tracks[0], first, second, second_id),
         (tracks[1], second, first, first_id),
     ):
-        current = tracklets.started_since(track, frame)
+        current = tracklets.current_if_started_since(track, frame)
         previous_id = _id_of(predecessor if current is None else current, people)
         already_wrong += previous_id == first_id + second_id - person_id
         if previous_id and previous_id != person_id:
@@ -122,7 +122,7 @@ def swap_tracks(
                 and previous_id in {first_id, second_id}
                 and tracklet.key.track not in tracks
             ):
-                tracklet.assign_id(first_id + second_id - previous_id)
+                tracklet.reassign_id(first_id + second_id - previous_id)
                 changed[tracklet.key] = previous_id, tracklet.person_id
     return changed
 

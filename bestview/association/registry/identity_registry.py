@@ -91,7 +91,7 @@ class IdentityRegistry:
                 for camera, matrix in self._homographies.items()
             }
         )
-        self._pictures: Mapping[str, tuple[int, int]] = {}
+        self._picture_sizes: Mapping[str, tuple[int, int]] = {}
         self._affinity = AffinityMatrix(settings)
         self._fusion = AffinityFusion(settings, calibrated, settings.maximum_speed_heights / fps)
         self._corrections = IdCorrections()
@@ -102,12 +102,12 @@ class IdentityRegistry:
         self,
         tracks: Sequence[TrackUpdate],
         last_frame: int,
-        pictures: Mapping[str, tuple[int, int]] | None = None,
+        picture_sizes: Mapping[str, tuple[int, int]] | None = None,
     ) -> IdentityUpdate:
         """Add the new final frames of all cameras' tracks, up to `last_frame`; single cameras may be ahead.
 
-        A track that is missing may reappear. `pictures` are the width and height in pixels of the cameras
-        that have reported, even without tracks: only these can miss a person.
+        A track that is missing may reappear. `picture_sizes` are the widths and heights in pixels of the
+        cameras that have reported, even without tracks: only these can miss a person.
 
         Raises:
             ValueError: the frame is not after that of the last update, or tracks are invalid
@@ -116,7 +116,7 @@ class IdentityRegistry:
         if self._last_frame is not None and last_frame <= self._last_frame:
             raise ValueError(f"the update for frame {last_frame} comes after that for {self._last_frame}")
         previous_frame, self._last_frame = self._last_frame, last_frame
-        self._pictures = pictures or {}
+        self._picture_sizes = picture_sizes or {}
         observations = align_tracks(tracks, self._homographies, self._foot_error, self._overhead)
         self._height_estimate.learn(observations.person_heights)
         rows, settled = self._splitter.update(observations, {track.key: track.appearance for track in tracks})
@@ -168,7 +168,7 @@ class IdentityRegistry:
             known_ids, {tracklet.key.camera for tracklet in shown}, self._last_frame
         )
         for tracklet in shown:
-            tracklet.assign_id(new_id)
+            tracklet.reassign_id(new_id)
         split_keys = {tracklet.key for tracklet in shown}
         rows = [tracklet.key for tracklet in self._splitter.active]
         others = [
@@ -184,7 +184,7 @@ class IdentityRegistry:
         return new_id
 
     def swap_tracks(
-        self, first: TrackKey, second: TrackKey, frame: int, person_ids: tuple[int, int]
+        self, first: TrackKey, second: TrackKey, frame: int, ids_before: tuple[int, int]
     ) -> tuple[Split, ...]:
         """Apply an operator's correction: two tracks of a camera swapped their people in this frame.
 
@@ -195,12 +195,13 @@ class IdentityRegistry:
             first: one track.
             second: the other track.
             frame: the first in which each of them shows the other's person.
-            person_ids: of the two tracks before that frame, for tracklets that are settled and over.
+            ids_before: person ids of the two tracks before that frame, for tracklets that are settled and
+                over.
 
         Returns:
             The splits to report; none if the evidence has corrected the swap already, or a track has no id.
         """
-        splits = swap_tracks(self._splitter, self._people, (first, second), frame, person_ids)
+        splits = swap_tracks(self._splitter, self._people, (first, second), frame, ids_before)
         self._corrections.reassign_each(splits)
         return tuple(sorted({Split(old_id, new_id, key.camera) for key, (old_id, new_id) in splits.items()}))
 
@@ -236,7 +237,9 @@ class IdentityRegistry:
         )
 
     def _count_missing_cameras(self, cluster: TrackletCluster) -> int:
-        return self._ghost_check.count_missing_cameras(cluster, self._pictures, self._height_estimate.height)
+        return self._ghost_check.count_missing_cameras(
+            cluster, self._picture_sizes, self._height_estimate.height
+        )
 
     def _add_evidence(
         self,
@@ -246,7 +249,7 @@ class IdentityRegistry:
         last_frame: int,
     ) -> None:
         """Add the update's evidence about pairs of tracklets to the affinity matrix."""
-        known_ids = [person.person_id for person in self._people.comparable_people(last_frame)]
+        known_ids = [person.person_id for person in self._people.people_to_cluster(last_frame)]
         affinity = self._affinity
         count = len(self._splitter.active)
         affinity.set_rows([*(tracklet.key for tracklet in self._splitter.active), *known_ids])
@@ -264,14 +267,14 @@ class IdentityRegistry:
             affinity.add_ground_evidence(
                 proximity.first, proximity.second, proximity.score, proximity.frame_count
             )
-            affinity.add_presence(trajectories.rows, trajectories.frames)
+            affinity.add_localized_frames(trajectories.sighting_rows, trajectories.sighting_frames)
         self._cross_camera.update(
             self._splitter.active, np.unique(rows[(rows >= 0) & (rows < count)]), affinity
         )
 
     def _cluster(self, last_frame: int) -> tuple[tuple[int, ...], tuple[Merge, ...]]:
         """Cluster all tracklets and assign ids; return the new ids and the merges."""
-        tracklets, people = self._splitter.active, self._people.comparable_people(last_frame)
+        tracklets, people = self._splitter.active, self._people.people_to_cluster(last_frame)
         visible = np.isin([person.person_id for person in people], self._visible_settled_ids)
         labels = self._fusion.cluster(
             tracklets, people, visible, self._affinity, self._height_estimate.height

@@ -35,7 +35,7 @@ class PersonStore:
         """Return whether a person of this id is remembered."""
         return person_id in self._by_id
 
-    def comparable_people(self, frame: int) -> list[Person]:
+    def people_to_cluster(self, frame: int) -> list[Person]:
         """Return the people who take part in clustering, by id: seen recently, with a settled tracklet."""
         earliest = frame - self._settings.comparable_frames
         return [
@@ -123,7 +123,7 @@ class PersonStore:
         ):
             return False
         unconfirmed_misses = (
-            max(0, count_missing_cameras(new) - len(new.cameras) + 1) if settings.ghost_penalty else 0
+            max(0, count_missing_cameras(new) - len(new.cameras_so_far) + 1) if settings.ghost_penalty else 0
         )
         return new.frame_count >= settings.confirmation_frames * (
             1.0 + settings.ghost_penalty * unconfirmed_misses
@@ -151,7 +151,7 @@ class PersonStore:
         self._by_id[new.person_id] = new
         for camera in cameras:
             new.add_sighting(camera, frame)
-        self.ensure_row([new.person_id, *people])
+        self.include_in_clustering([new.person_id, *people])
         return new.person_id
 
     def reserve_below(self, person_id: int) -> None:
@@ -163,7 +163,7 @@ class PersonStore:
         self.reserve_below(person_id + 1)
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
-    def ensure_row(self, person_ids: Iterable[int]) -> None:
+    def include_in_clustering(self, person_ids: Iterable[int]) -> None:
         """Make people take part in clustering, so that they can have cannot-links."""
         for person_id in person_ids:
             self._by_id[person_id].settled_frames = max(1, self._by_id[person_id].settled_frames)

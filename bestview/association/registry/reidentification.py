@@ -17,7 +17,7 @@ from bestview.association.appearance.histograms import (
     CDF_POINTS,
     HistogramEqualizer,
     PersonAppearance,
-    cdf_distances,
+    cdf_distance,
 )
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
@@ -129,14 +129,14 @@ class Reidentifier:
             # A person who took part in clustering and has no cluster is in that of another id.
             return lost.person.last_frame < frame - self._settings.comparable_frames
         # Pairs that can be compared directly were decided by the clustering.
-        compared = bool(new.cameras & known_cluster.cameras) or (
-            cross_camera.share_ground(new.cameras, known_cluster.cameras)
+        compared = bool(new.cameras_so_far & known_cluster.cameras_so_far) or (
+            cross_camera.share_ground(new.cameras_so_far, known_cluster.cameras_so_far)
             and self._share_view(new, known_cluster)
         )
         return not compared and not affinity.any_cannot_link(new.rows, known_cluster.rows)
 
     def _share_view(self, first: TrackletCluster, second: TrackletCluster) -> bool:
-        pairs = {(min(a, b), max(a, b)) for a in first.cameras for b in second.cameras}
+        pairs = {(min(a, b), max(a, b)) for a in first.cameras_so_far for b in second.cameras_so_far}
         return not pairs.isdisjoint(self._covisible_cameras)
 
 
@@ -243,7 +243,7 @@ def appearance_distances(
     for owner, camera, bins, curve in zip(
         new_curves.owner, new_curves.camera, new_curves.bins, new_curves.curves, strict=True
     ):
-        distance = cdf_distances(curve, old_curves.curves)
+        distance = cdf_distance(curve, old_curves.curves)
         for kind, comparable in enumerate(
             (old_curves.camera == camera, np.ones(old_curves.owner.size, dtype=np.bool_))
         ):

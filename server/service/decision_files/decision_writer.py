@@ -108,7 +108,7 @@ class DecisionWriter:
 def _line(correction: Merge | Split) -> str:
     if isinstance(correction, Merge):
         return f"merged,{correction.kept},{correction.lost},"
-    return f"split,{correction.kept},{correction.split_off},{correction.camera}"
+    return f"split,{correction.published_id},{correction.corrected_id},{correction.camera}"
 
 
 class AtomicFiles:

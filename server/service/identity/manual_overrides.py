@@ -65,9 +65,10 @@ class ManualOverrides:
     def map_splits(self, splits: Iterable[Split]) -> tuple[Split, ...]:
         """Return splits with mapped numbers; a split within one manually merged person is dropped."""
         mapped = {
-            Split(self.current(split.kept), self.current(split.split_off), split.camera) for split in splits
+            Split(self.current(split.published_id), self.current(split.corrected_id), split.camera)
+            for split in splits
         }
-        return tuple(sorted(split for split in mapped if split.kept != split.split_off))
+        return tuple(sorted(split for split in mapped if split.published_id != split.corrected_id))
 
     @property
     def _involved(self) -> set[int]:

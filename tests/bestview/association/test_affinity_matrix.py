@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bestview import IdentitySettings
 from bestview.association.affinity.affinity_matrix import AffinityMatrix, RowKey
-from bestview.association.affinity.presence import PresenceBitmap
+from bestview.association.affinity.localized_frames import LocalizedFrames
 from bestview.association.co_occurrence import GroundTrajectories, score_ground_proximity, simultaneous_pairs
 from bestview.association.sightings import TrackObservations
 from bestview.association.tracklet import TrackKey, TrackletKey
@@ -46,7 +46,7 @@ class ReferenceMatrix:
     def ground_evidence(self, one: RowKey, two: RowKey) -> tuple[float, int]:
         return self.proximity_pairs.get(frozenset((one, two)), self.default_evidence(one, two))
 
-    def add_presence(self, row: RowKey, frame: int) -> None:
+    def add_localized_frame(self, row: RowKey, frame: int) -> None:
         self.frames_of[row].add(frame)
 
     def drop_capped_pairs(self) -> None:
@@ -103,9 +103,9 @@ def test_tables_keep_their_entries_while_rows_are_added_and_removed(data: st.Dat
         for row in data.draw(st.lists(st.integers(0, len(rows) - 1), max_size=4, unique=True)):
             frame_set = data.draw(st.sets(st.integers(0, 9), max_size=8))
             localized_frames = np.array(sorted(frame_set), dtype=np.int64) + 10 * time
-            affinity.add_presence(np.full(localized_frames.size, row), localized_frames)
+            affinity.add_localized_frames(np.full(localized_frames.size, row), localized_frames)
             for frame in localized_frames.tolist():
-                reference.add_presence(rows[row], frame)
+                reference.add_localized_frame(rows[row], frame)
             reference.drop_capped_pairs()
         if data.draw(st.booleans()):
             affinity.merge([(rows[0], rows[1])])
@@ -159,21 +159,21 @@ def test_merging_many_rows_at_once_equals_merging_one_by_one(data: st.DataObject
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 60)), max_size=12), st.sampled_from([10, 100]))
-def test_presence_counts_recent_common_frames(steps: list[tuple[int, int]], frames: int) -> None:
-    presence, frames_of, now = PresenceBitmap(frames), [set[int]() for _ in range(4)], 0
-    presence.set_rows(np.full(4, -1))
+def test_common_frames_are_counted_as_far_as_they_are_kept(steps: list[tuple[int, int]], frames: int) -> None:
+    localized, frames_of, now = LocalizedFrames(frames), [set[int]() for _ in range(4)], 0
+    localized.set_rows(np.full(4, -1))
     for row, later in steps:
         now += later
         frames_of[row] |= {now, now + 1}
         frames_of[0] |= {now}
-        presence.add_presence(np.array([row, row, 0]), np.array([now, now + 1, now]))
+        localized.add(np.array([row, row, 0]), np.array([now, now + 1, now]))
     one, two = np.triu_indices(4, 1)
-    common = presence.common(one, two, 1000)
+    common = localized.count_common_frames(one, two, 1000)
     for i, j, count in zip(one.tolist(), two.tolist(), common.tolist(), strict=True):
         both = frames_of[i] & frames_of[j]
         assert len([frame for frame in both if frame > now - frames]) <= count <= len(both)
     for enough in (1, 2, 3):
-        assert presence.common(one, two, enough).tolist() == np.minimum(common, enough).tolist()
+        assert localized.count_common_frames(one, two, enough).tolist() == np.minimum(common, enough).tolist()
 
 
 @st.composite

@@ -106,7 +106,9 @@ def sites(draw: st.DrawFn) -> Site:
     affinity.add_cannot_links(one[apart], two[apart])
     score, frames = rng.normal(2, 20, one.size), np.full(one.size, 5)
     affinity.add_ground_evidence(one[met], two[met], score[met], frames[met])
-    affinity.add_presence(rng.integers(0, rows, 40 * bool(rows)), rng.integers(0, FRAMES, 40 * bool(rows)))
+    affinity.add_localized_frames(
+        rng.integers(0, rows, 40 * bool(rows)), rng.integers(0, FRAMES, 40 * bool(rows))
+    )
     affinity.add_appearance_evidence(one[alike], two[alike], rng.normal(0, 1, int(alike.sum())))
     return Site(tracklets, people, affinity)
 

@@ -58,11 +58,11 @@ def test_counts_are_expanded_in_order(counts: list[int]) -> None:
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, 4), st.integers(0, 6), st.integers(0, 2**32), st.booleans())
 def test_runs_cover_all_observations_and_end_where_crowding_changes(
-    tracks: int, frames: int, seed: int, whole: bool
+    tracks: int, frames: int, seed: int, frame_by_frame: bool
 ) -> None:
     rng = np.random.default_rng(seed)
     visible, crowded = rng.random((tracks, frames)) < 0.7, rng.random((tracks, frames)) < 0.4
-    runs = list(observation_runs(visible, crowded, whole=whole))
+    runs = list(observation_runs(visible, crowded, frame_by_frame=frame_by_frame))
     sightings = [(run.track, column) for run in runs for column in range(run.start, run.stop)]
     assert sightings == [(int(i), int(k)) for i, k in np.argwhere(visible)]
     assert all((crowded[run.track, run.start : run.stop] == run.crowded).all() for run in runs)
@@ -72,5 +72,5 @@ def test_runs_cover_all_observations_and_end_where_crowding_changes(
             two.start,
             two.crowded,
         )
-        assert not (whole and continues)
-    assert whole or all(run.stop == run.start + 1 for run in runs)
+        assert frame_by_frame or not continues
+    assert not frame_by_frame or all(run.stop == run.start + 1 for run in runs)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings
-from bestview.association.ghost_check import fully_in_view
+from bestview.association.ghost_check import fully_detectable
 from fakes.bestview.identity_scenes import (
     CALIBRATED,
     STRIDE,
@@ -27,11 +27,11 @@ SETTINGS = IdentitySettings(confirmation_frames=25, ghost_penalty=4.0, clusterin
 
 
 def created_at(
-    stays: list[StraightTrack], pictures: dict[str, tuple[int, int]], *uncalibrated: str
+    stays: list[StraightTrack], picture_sizes: dict[str, tuple[int, int]], *uncalibrated: str
 ) -> list[int]:
     """Return the frames at which ids are created."""
     ground = {**CALIBRATED, **dict.fromkeys(uncalibrated)}
-    seen = collect_updates(IdentityRegistry(SETTINGS, ground), stays, 300, pictures=pictures)
+    seen = collect_updates(IdentityRegistry(SETTINGS, ground), stays, 300, picture_sizes=picture_sizes)
     return [(place + 1) * STRIDE for place, update in enumerate(seen) for _ in update.created]
 
 
@@ -59,7 +59,7 @@ def test_a_person_gone_before_confirmation_gets_no_id() -> None:
     assert created_at([StraightTrack("south", 1, 0, 80, (0, 0))], PICTURES) == []
     # The other cameras stop reporting once the person has left: nothing is missing, and nobody is there.
     seen = IdentityRegistry(SETTINGS, CALIBRATED)
-    early = collect_updates(seen, [StraightTrack("south", 1, 0, 80, (0, 0))], 120, pictures=PICTURES)
+    early = collect_updates(seen, [StraightTrack("south", 1, 0, 80, (0, 0))], 120, picture_sizes=PICTURES)
     late = collect_updates(seen, [], 300, start=120)
     assert not [update for update in early + late if update.created]
 
@@ -68,7 +68,9 @@ def test_a_person_gone_before_confirmation_gets_no_id() -> None:
 def test_full_view_means_inside_the_picture_and_large_enough(x: float, y: float) -> None:
     names = list(VIEWS)
     ground = np.array([CALIBRATED[name] for name in names], dtype=np.float64)
-    visible = fully_in_view(ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL)
+    visible = fully_detectable(
+        ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL
+    )
     for name, seen in zip(names, visible, strict=True):
         far = float((VIEWS[name] @ (x, y, 1.0))[2])
         assume(abs(far) > 0.01)
@@ -92,12 +94,12 @@ def margins(person: NDArray[np.float64]) -> list[float]:
 
 def test_a_plan_view_without_horizon_counts_too() -> None:
     plan = np.diag([0.02, 0.02, 1.0])
-    visible = fully_in_view(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
+    visible = fully_detectable(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
     assert visible.tolist() == [True]
 
 
 @pytest.mark.parametrize("penalty", [0.0, 1e-9])
 def test_without_ghost_penalty_everyone_needs_the_same_frames(penalty: float) -> None:
     registry = IdentityRegistry(replace(SETTINGS, ghost_penalty=penalty), CALIBRATED)
-    seen = collect_updates(registry, [StraightTrack("south", 1, 0, 999, (0, 0))], 60, pictures=PICTURES)
+    seen = collect_updates(registry, [StraightTrack("south", 1, 0, 999, (0, 0))], 60, picture_sizes=PICTURES)
     assert sum(len(update.created) for update in seen) == 1

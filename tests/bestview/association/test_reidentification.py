@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.association.affinity.affinity_fusion import comparable_histograms
+from bestview.association.affinity.affinity_fusion import select_equal_bin_counts
 from bestview.association.appearance.histograms import HistogramEqualizer, MeanHistogram, PersonAppearance
 from bestview.association.appearance.likelihood import AppearanceWeights, DistanceScale, appearance_evidence
 from bestview.association.registry.reidentification import (
@@ -37,10 +37,10 @@ def people(draw: st.DrawFn) -> list[PersonAppearance]:
 
 def test_histograms_with_other_bins_are_not_compared_with_earlier_ones() -> None:
     old, new = (MeanHistogram.of(np.ones(bins), 30) for bins in (BINS, 2 * BINS))
-    assert comparable_histograms([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
-    assert comparable_histograms([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
-    assert comparable_histograms([(2, old), (3, old)], 2) == [(2, old), (3, old)]
-    assert comparable_histograms([], 2) == []
+    assert select_equal_bin_counts([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
+    assert select_equal_bin_counts([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
+    assert select_equal_bin_counts([(2, old), (3, old)], 2) == [(2, old), (3, old)]
+    assert select_equal_bin_counts([], 2) == []
 
 
 @settings(deadline=None, max_examples=200)
@@ -123,7 +123,7 @@ def test_appearance_evidence_falls_with_distance_within_its_cap(
         AppearanceWeights(typical=3.0, maximum=4.0, full_weight_frames=8),
         DistanceScale.learned(same_person, different_people),
     )
-    assert 0.0 <= scale.same_person <= scale.different_people
+    assert 0.0 <= scale.same_person <= scale.different_people_quartile
 
     def evidence(distance: float, count: int) -> float:
         counts = np.array([float(count)])
@@ -133,6 +133,6 @@ def test_appearance_evidence_falls_with_distance_within_its_cap(
     assert evidence(near, frames) >= evidence(far, frames)
     assert abs(evidence(one, frames + more)) >= abs(evidence(one, frames)), "more frames have more weight"
     assert abs(evidence(one, frames)) <= weights.maximum * min(frames / weights.full_weight_frames, 1.0)
-    if scale.different_people > 1e-6:
+    if scale.different_people_quartile > 1e-6:
         assert evidence(scale.same_person, 8) == pytest.approx(weights.typical)
-        assert evidence(scale.different_people, 8) == pytest.approx(-weights.typical)
+        assert evidence(scale.different_people_quartile, 8) == pytest.approx(-weights.typical)

@@ -81,9 +81,9 @@ def collect_updates(
     stays: Sequence[StraightTrack],
     frames: int,
     start: int = 0,
-    pictures: Mapping[str, tuple[int, int]] | None = None,
+    picture_sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[IdentityUpdate]:
-    return list(updates(registry, stays, frames, start, pictures))
+    return list(updates(registry, stays, frames, start, picture_sizes))
 
 
 def updates(
@@ -91,7 +91,7 @@ def updates(
     stays: Sequence[StraightTrack],
     frames: int,
     start: int = 0,
-    pictures: Mapping[str, tuple[int, int]] | None = None,
+    picture_sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> Iterator[IdentityUpdate]:
     for last in range(start + STRIDE - 1, frames, STRIDE):
         first = last - STRIDE + 1
@@ -104,7 +104,7 @@ def updates(
                     boxes = np.where(np.isnan(track.boxes), before.boxes, track.boxes)
                     track = replace(track, boxes=boxes, appearance=(*before.appearance, *track.appearance))
                 tracks[stay.camera, stay.local_id] = track
-        yield registry.update(list(tracks.values()), last, pictures)
+        yield registry.update(list(tracks.values()), last, picture_sizes)
 
 
 def registry(

@@ -22,9 +22,9 @@ class ScriptedRegistry:
         self._updates = list(updates)
 
     def update(
-        self, tracks: list[TrackUpdate], last_frame: int, pictures: Mapping[str, tuple[int, int]]
+        self, tracks: list[TrackUpdate], last_frame: int, picture_sizes: Mapping[str, tuple[int, int]]
     ) -> IdentityUpdate:
-        del tracks, last_frame, pictures
+        del tracks, last_frame, picture_sizes
         return self._updates.pop(0)
 
 

@@ -26,7 +26,7 @@ class Counted:
 
 def test_a_decision_is_published_with_its_cuts_and_corrections() -> None:
     choices = (ObjectChoice(1, "c1", "c0", departed=False), ObjectChoice(2, "c0", "c0", departed=False))
-    turned_out = (Merge(kept=1, lost=5), Split(kept=2, split_off=3, camera="c1"))
+    turned_out = (Merge(kept=1, lost=5), Split(published_id=2, corrected_id=3, camera="c1"))
     message = DecisionState(25.0).put(
         GopDecision(20, 10, choices, {"c0": [], "c1": []}, {5: 1}, turned_out, _UNTOLD)
     )

@@ -54,7 +54,7 @@ def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
     recorder = DecisionWriter(tmp_path / "out", CAMERAS, fits)
     boxes: list[list[NumberedBox]] = [[(1, *SMALL)], [(1, *SMALL), (2, *LARGE)]]
     recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
-    turned_out = (Merge(kept=1, lost=3), Split(kept=1, split_off=2, camera=B))
+    turned_out = (Merge(kept=1, lost=3), Split(published_id=1, corrected_id=2, camera=B))
     recorder.write(
         decision(
             1, choice(1, B), choice(2, A, away=True), frames=1, corrections=turned_out, c1=[[(2, *LARGE)]]

@@ -134,8 +134,8 @@ def test_a_manual_split_takes_effect_at_once_and_is_permanent() -> None:
     assert tracker.split_off(one, ["c1"]) is not None
     [split] = tracker.take_corrections()
     assert isinstance(split, Split)
-    new = split.split_off
-    assert (split.kept, split.camera) == (one, "c1")
+    new = split.corrected_id
+    assert (split.published_id, split.camera) == (one, "c1")
     assert new in tracker.known
     for epoch in range(3, 12):
         assert tracker.number("c1", 1, epoch * STRIDE - 1) == new

@@ -238,7 +238,7 @@ def test_merged_numbers_resolve_through_chains() -> None:
 
 
 def test_corrections_are_returned_once_and_in_order() -> None:
-    merge, split = Merge(kept=1, lost=2), Split(kept=1, split_off=4, camera="c0")
+    merge, split = Merge(kept=1, lost=2), Split(published_id=1, corrected_id=4, camera="c0")
     tracker = scripted_people(
         identity_update({("c0", 1): 1}, merge),
         identity_update({("c0", 1): 4}, split),

@@ -11,7 +11,7 @@ _WORD = 64
 """Frames in a word."""
 
 
-class PresenceBitmap:
+class LocalizedFrames:
     """One bit for each row and frame, over the newest frames.
 
     Args:
@@ -30,7 +30,7 @@ class PresenceBitmap:
         bits[old >= 0] = self._bits[old[old >= 0]]
         self._bits = bits
 
-    def add_presence(self, row: Ints, frame: Ints) -> None:
+    def add(self, row: Ints, frame: Ints) -> None:
         """Mark (P,) rows as localized in (P,) frames."""
         if not row.size:
             return
@@ -47,7 +47,7 @@ class PresenceBitmap:
         """Add the frames of (P,) rows to those of others."""
         np.bitwise_or.at(self._bits, kept, self._bits[lost])
 
-    def common(self, first: Ints, second: Ints, maximum: int) -> Ints:
+    def count_common_frames(self, first: Ints, second: Ints, maximum: int) -> Ints:
         """Count the frames in which both rows of (P,) pairs were localized, at most `maximum`."""
         newest_first = (self._newest - np.arange(self._words)) % self._words
         bits = np.ascontiguousarray(self._bits[:, newest_first].T)
