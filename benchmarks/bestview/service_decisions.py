@@ -64,7 +64,7 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
         for message in chain.from_iterable(zip_longest(*messages.values())):
             if message is not None:
                 aligner.add_tracks(message)
-            for epoch in aligner.ready(now=-1):
+            for epoch in aligner.take_ready(now=-1):
                 for decision in decider.step(epoch):
                     recorder.write(decision)
         for decision in decider.finish(max(last.values())):

@@ -29,8 +29,8 @@ def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]
     for message in chain.from_iterable(zip_longest(*messages.values())):
         if message is not None:
             aligner.add_tracks(message)
-        for epoch in aligner.ready(now=-1):
-            tracks = [track for window in reader.read(epoch) for track in window.local_tracks()]
+        for epoch in aligner.take_ready(now=-1):
+            tracks = [track for window in reader.read(epoch) for track in window.fresh_tracks()]
             seen = align_tracks(tracks, ground, error, config.overhead)
             # No tracklet is finalized here, so that a row remains the same tracklet.
             rows, _ = tracklets.update(seen, {track.key: track.appearance for track in tracks})

@@ -59,7 +59,7 @@ def time_stages(views: RecordedViews, config_path: Path, folder: Path) -> Render
         (CameraPipeline, "finish", "publish"),
         (ViewDecider, "step", "decide"),
         (ViewDecider, "finish", "decide"),
-        (EpochAligner, "ready", "write"),
+        (EpochAligner, "take_ready", "write"),
         (Renderer, "take", "write"),
     ):
         frames = _render(config, folder)

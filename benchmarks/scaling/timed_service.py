@@ -95,7 +95,7 @@ def watch(path: Path) -> None:
         (Ingest, "tracks", "ingest tracks"),
         (Ingest, "video", "ingest frames"),
         (Ingest, "thumbnail", "ingest frames"),
-        (EpochAligner, "next_ready", "align"),
+        (EpochAligner, "take_next_ready", "align"),
         (IdentityRegistry, "update", "identities"),
         (PersonTracker, "update", "people"),
         (ViewQualityBuffer, "put", "quality"),

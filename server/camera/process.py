@@ -36,7 +36,7 @@ from server.messaging.messages import (
     ThumbnailHeader,
     ZenohKeys,
 )
-from server.system.address_redaction import redact_endpoint
+from server.system.address_redaction import redact_zenoh_endpoint
 
 log = logging.getLogger(__name__)
 
@@ -160,7 +160,7 @@ class CameraProcess:
             log.warning(
                 "camera %s: no best-view service at %s yet",
                 self._id,
-                redact_endpoint(self._config.zenoh.connect),
+                redact_zenoh_endpoint(self._config.zenoh.connect),
             )
 
     async def _follow_pulses(self) -> None:

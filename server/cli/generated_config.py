@@ -14,7 +14,7 @@ from server.cli.render.video_info import read_video_info
 from server.config.loader import build_config
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 _NAME_CHARACTERS = 32
@@ -79,9 +79,9 @@ def camera_name(video: Path) -> str:
 
 def _check_recorded(video: Path) -> None:
     if source_kind(str(video)) not in {SourceKind.FILE, SourceKind.FOLDER}:
-        raise UserError(f"{redact_address(str(video))}: is not a recorded video or a folder of images")
+        raise UserError(f"{redact_to_host(str(video))}: is not a recorded video or a folder of images")
     if not video.exists():
-        raise UserError(f"{redact_address(str(video))}: no such file or folder")
+        raise UserError(f"{redact_to_host(str(video))}: no such file or folder")
 
 
 def _cameras_of(content: Mapping[str, Any], where: str) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from server.camera.sources.opening import open_video
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 
@@ -25,7 +25,7 @@ def total_frames(videos: list[Path], fps: float | None = None) -> int | None:
         if video.is_dir():
             return None
         if not video.exists():
-            raise UserError(f"{redact_address(str(video))}: no such file or folder")
+            raise UserError(f"{redact_to_host(str(video))}: no such file or folder")
         opened = open_video(str(video))
         opened.container.close()
         if not opened.frames:

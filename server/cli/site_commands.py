@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from server.supervisor.shutdown import run_process
-from server.system.atomic_write import check_new_folder
+from server.system.atomic_write import check_output_folder
 from server.system.errors import UserError
 from server.system.log_setup import log_to_stderr
 
@@ -78,7 +78,7 @@ def bestview(config: ConfigPath, out: LogFolder = None) -> None:
     log_to_stderr("bestview")
     running = _read(config)
     if out is not None:
-        check_new_folder(out)
+        check_output_folder(out)
     run_process(lambda: bestview_process(running, out))
 
 
@@ -91,17 +91,17 @@ def up(
 ) -> None:
     """Run a whole site on this machine: every process, watched and restarted."""
     from server.supervisor.site import check_exposure, run_up
-    from server.supervisor.startup_checks import check_ports, check_recordings
+    from server.supervisor.startup_checks import check_ports, check_sources_open
 
     log_to_stderr("up")
     environment = {} if port is None else {"MYVIEW_HTTP__PORT": str(port)}
     os.environ.update(environment)
     running = _read(config)
     if out is not None:
-        check_new_folder(out)
+        check_output_folder(out)
     check_exposure(running.now)
     check_ports(running.now)
-    check_recordings(running.now)
+    check_sources_open(running.now)
     run_process(lambda: run_up(running, environment, out), release_s=_UP_RELEASE_S)
 
 
@@ -115,5 +115,7 @@ def demo(
 
     log_to_stderr("demo")
     run_process(
-        lambda: run_demo(port, seconds, open_browser=not no_browser), release_s=_UP_RELEASE_S, hang_up=True
+        lambda: run_demo(port, seconds, open_browser=not no_browser),
+        release_s=_UP_RELEASE_S,
+        end_on_sighup=True,
     )

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, Progress, objects, watch
-from server.system.atomic_write import check_new_file
+from server.system.atomic_write import check_output_file
 from server.system.errors import UnavailableError, UserError
 
 _PRINT_EVERY_S = 1.0
@@ -36,7 +36,7 @@ async def run_watch(
     if number is None and (out or seconds is not None or start or end):
         raise UserError("watch: --out, --seconds, --from and --to need --object")
     if out is not None:
-        check_new_file(out)
+        check_output_file(out)
     settings, before = HttpSettings(token=token), _file_at(out)
     try:
         if number is None:

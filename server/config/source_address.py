@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from pathlib import Path
 
-from server.system.address_redaction import has_protocol, is_login
+from server.system.address_redaction import has_protocol, looks_like_login
 
 _MEMORY = Path("/dev/shm")  # noqa: S108 — nothing is written there
 """Below /dev, but a file system in memory."""
@@ -66,4 +66,4 @@ def resolve_source(source: str, folder: Path) -> str:
     if source.startswith("scene:") or "://" in source:
         return source
     path = str((folder / source).absolute())
-    return source if (has_protocol(source) or is_login(source)) and path_is_missing(path) else path
+    return source if (has_protocol(source) or looks_like_login(source)) and path_is_missing(path) else path

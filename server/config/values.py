@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 _MAX_DEPTH = 32
@@ -20,7 +20,7 @@ _CONTAINERS = (dict, list, tuple, set)
 
 def abbreviate(key: str) -> str:
     """Return a key, shortened and redacted for an error line: it may be long, or an address by mistake."""
-    key = redact_address(key)
+    key = redact_to_host(key)
     return key if len(key) <= _MAX_SHOWN else f"{key[:_MAX_SHOWN]}…"
 
 

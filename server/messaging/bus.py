@@ -13,7 +13,7 @@ from server.config.sections import ZenohSettings
 from server.messaging.bus_access import SETTING
 from server.messaging.inbox import Inbox, Message
 from server.messaging.messages import camera_of_key
-from server.system.address_redaction import redact_endpoint
+from server.system.address_redaction import redact_zenoh_endpoint
 from server.system.errors import UserError
 
 _DROP_AFTER_US = 20_000
@@ -57,7 +57,8 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
             raise UserError(
-                f"zenoh.listen: cannot listen on {redact_endpoint(settings.listen)}; is the port in use?"
+                f"zenoh.listen: cannot listen on {redact_zenoh_endpoint(settings.listen)}; "
+                "is the port in use?"
                 + (" Are zenoh.tls.certificate and key a pair?" if settings.tls.key is not None else "")
             ) from error
 
@@ -101,7 +102,7 @@ class Bus:
         except zenoh.ZError as error:
             refusal = "" if settings.users is None else ", or it refuses this user"
             raise UserError(
-                f"zenoh.connect: no router responds at {redact_endpoint(settings.connect)}{refusal}"
+                f"zenoh.connect: no router responds at {redact_zenoh_endpoint(settings.connect)}{refusal}"
             ) from error
 
     @classmethod
@@ -118,7 +119,7 @@ class Bus:
             return cls(zenoh.open(config))
         except zenoh.ZError:
             raise UserError(
-                f"zenoh.connect: cannot use {redact_endpoint(settings.connect)}: does zenoh support "
+                f"zenoh.connect: cannot use {redact_zenoh_endpoint(settings.connect)}: does zenoh support "
                 "this protocol, and are the options after the port valid?"
             ) from None
 

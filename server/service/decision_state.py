@@ -6,7 +6,7 @@ from bestview import Merge, Split
 from server.messaging.messages import GopChoices, PersonMerge, PersonSplit, ViewCut
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import Explanation
-from server.service.view_selection.recent_reasons import RecentReasons, SelectedView, SelectionReason
+from server.service.view_selection.queried_reasons import QueriedReasons, SelectedView, SelectionReason
 
 
 class DecisionState:
@@ -18,7 +18,7 @@ class DecisionState:
         self.cuts = 0
         self.end = 0
         """The first pulse that is not decided yet."""
-        self._reasons = RecentReasons(fps)
+        self._reasons = QueriedReasons(fps)
 
     def put(self, decision: GopDecision) -> GopChoices:
         """Add a decision; return it as the message that is published."""
@@ -73,7 +73,7 @@ class DecisionState:
         view = self.selected_views.get(self.resolve(number))
         if view is None:
             return None
-        newest = self._reasons.newest(view)
+        newest = self._reasons.query_newest(view)
         return newest if pulse is None else self._reasons.at(view.choice.number, pulse)
 
     def _select(self, decision: GopDecision, choice: ObjectChoice, cameras: tuple[str, ...]) -> None:

@@ -115,7 +115,7 @@ class BestViewPipeline:
         self._runs_without_pulses = False
         """Whether waiting for the first pulse has timed out."""
 
-    def open(self) -> None:
+    def open_bus(self) -> None:
         """Open the bus that the cameras connect to.
 
         Raises:
@@ -145,14 +145,14 @@ class BestViewPipeline:
         follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
         try:
-            while not self.aligner.all_ended:
+            while not self.aligner.all_ended_and_decided:
                 await self._changed.wait()
                 self._changed.clear()
                 if follow.done():
                     await follow  # raises its error
                 may_decide = self.pulses.newest >= 0 or self._runs_without_pulses
                 if may_decide and not self.state_replication.is_waiting:
-                    await self.decide_cooperatively()
+                    await self.decide_or_skip()
             for decision in self.finish():
                 self._publish(decision)
             log.info("every camera's recording has ended")
@@ -175,11 +175,11 @@ class BestViewPipeline:
         while self._decide_next():
             pass
 
-    async def decide_cooperatively(self) -> None:
-        """Decide and publish all epochs that are ready, and serve inboxes and tasks between two epochs.
+    async def decide_or_skip(self) -> None:
+        """Decide and publish the epochs that are ready, or skip those that would be decided too late.
 
-        On an overloaded machine another epoch may always be ready. Frames are received first: a lost frame
-        cannot be shown. Epochs whose decisions would be too late are skipped.
+        Inboxes and tasks are served between two epochs: on an overloaded machine another epoch may always be
+        ready. Frames are received first: a lost frame cannot be shown.
         """
         while self._decide_next():
             await asyncio.sleep(0)
@@ -200,7 +200,7 @@ class BestViewPipeline:
             log.warning(text, backlog / self.config.site.fps, more)
 
     def _decide_next(self) -> bool:
-        epoch = self.aligner.next_ready(self.pulses.newest)
+        epoch = self.aligner.take_next_ready(self.pulses.newest)
         if epoch is not None:
             self._step(epoch)
         return epoch is not None
@@ -211,7 +211,7 @@ class BestViewPipeline:
         except OSError as error:
             raise UserError(f"{out}: cannot write there: {error.strerror}") from error
 
-    def apply_view_settings(self, view: ViewSettings) -> None:
+    def apply_live_view_settings(self, view: ViewSettings) -> None:
         """Select views by other settings from the next GOP on, as far as they can change at run time.
 
         Raises:
@@ -226,7 +226,7 @@ class BestViewPipeline:
                 f"view.lookahead: is {view.lookahead} frames but can be at most {self.max_lookahead} while "
                 "the service runs (frame buffers); set a longer view.buffer_s and restart for more"
             )
-        self.decider.apply_view_settings(view)
+        self.decider.apply_live_view_settings(view)
 
     def apply_config(self, config: Config) -> None:
         """Apply a configuration that differs only in what can change at run time, or in the cameras' part.
@@ -237,7 +237,7 @@ class BestViewPipeline:
             UserError: the look-ahead is too short, or longer than the frame buffers allow.
         """
         if config.view != self.config.view:
-            self.apply_view_settings(config.view)
+            self.apply_live_view_settings(config.view)
         # The ground of synthetic cameras is in no file.
         ground = {camera.id: {"ground": camera.ground} for camera in self.config.cameras}
         cameras = [camera.model_copy(update=ground[camera.id]) for camera in config.cameras]
@@ -294,6 +294,6 @@ class BestViewPipeline:
         self.splicer.forget(self.decider.people.known, decision.merged)
         self.bus.publish_choices(choices)
         if self._decision_writer is not None:
-            self._decision_writer.write(decision)
+            self._decision_writer.write_or_skip(decision)
         self.loss_recorder.record_gop(decision)
         self.ingest.forget_thumbnails_before(decision.first - self.config.view.identity.forget_after)

@@ -27,12 +27,12 @@ def why_not_ready(pipeline: BestViewPipeline) -> list[str]:
     behind = pipeline.pulses.newest + 1 - pipeline.decision_state.end
     if pipeline.decision_state.end == 0:
         reasons.append("nothing has been decided yet")
-    elif behind > max_backlog(pipeline):
+    elif behind > max_normal_delay(pipeline):
         reasons.append(f"decisions are {behind / fps:.1f} s behind the pulses")
     return reasons
 
 
-def max_backlog(pipeline: BestViewPipeline) -> int:
+def max_normal_delay(pipeline: BestViewPipeline) -> int:
     """Return the largest normal delay of decisions, in pulses."""
     config, fps = pipeline.config, pipeline.config.site.fps
     wait_s = config.view.late_after_s + config.track.backlog_s + _SLACK_S

@@ -12,9 +12,9 @@ from server.http.app import make_app, serving
 from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.supervisor.exposure_checks import check_bus, check_viewers
-from server.supervisor.scene_ground import add_scene_ground
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_signal import signal_started
+from server.supervisor.synthetic_homographies import add_synthetic_homographies
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
@@ -31,10 +31,10 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     check_viewers(config)
     if config.view.share.index == 0:
         check_bus(config)  # the other shards are not the router
-    pipeline = BestViewPipeline(add_scene_ground(config), out)
+    pipeline = BestViewPipeline(add_synthetic_homographies(config), out)
     reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
-        pipeline.open()
+        pipeline.open_bus()
         async with serving(make_app(BestViewService(pipeline), running.on_disk), config.http) as port:
             scheme = "http" if config.http.tls.key is None else "https"
             log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)

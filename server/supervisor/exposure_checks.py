@@ -7,7 +7,7 @@ import re
 
 from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
-from server.system.address_redaction import redact_endpoint
+from server.system.address_redaction import redact_zenoh_endpoint
 from server.system.errors import UserError
 
 _AUTHORITY = re.compile(r"[a-z]+/(?P<host>[^\s?#]+):[0-9]+")
@@ -52,7 +52,9 @@ def check_bus(config: Config) -> None:
         return
     match = _AUTHORITY.match(zenoh.listen)
     if match is None or not is_loopback(match["host"].strip("[]")):
-        exposure = f"zenoh.listen: {redact_endpoint(zenoh.listen)} lets other machines send frames and tracks"
+        exposure = (
+            f"zenoh.listen: {redact_zenoh_endpoint(zenoh.listen)} lets other machines send frames and tracks"
+        )
         _check_network(config, exposure, "use tls/ and set zenoh.users")
 
 

@@ -30,7 +30,7 @@ class UnhealthyError(Exception):
     """A failed health check; the text is one line."""
 
 
-def check_pulses() -> None:
+def check_pulse_server() -> None:
     """Check whether the pulse server sends its greeting.
 
     Raises:
@@ -112,7 +112,7 @@ def check(words: Sequence[str]) -> None:
     """
     match words:
         case ["sync"]:
-            check_pulses()
+            check_pulse_server()
         case ["bestview"]:
             check_service()
         case ["camera", camera]:

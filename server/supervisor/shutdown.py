@@ -28,11 +28,11 @@ async def run_until_signal(
     main: Callable[[], Coroutine[Any, Any, None]],
     on_signal: Callable[[], None] = lambda: None,
     *,
-    hang_up: bool = True,
+    end_on_sighup: bool = True,
 ) -> bool:
     """Run a coroutine until it ends, or until a signal cancels it; then ``on_signal`` is called first.
 
-    ``hang_up``: SIGHUP cancels it, too.
+    ``end_on_sighup``: SIGHUP cancels it, too.
 
     Returns:
         Whether it ended by itself.
@@ -45,7 +45,7 @@ async def run_until_signal(
         on_signal()
         task.cancel()
 
-    for number in (*TERMINATION_SIGNALS, signal.SIGHUP) if hang_up else TERMINATION_SIGNALS:
+    for number in (*TERMINATION_SIGNALS, signal.SIGHUP) if end_on_sighup else TERMINATION_SIGNALS:
         loop.add_signal_handler(number, end)
     try:
         await task
@@ -55,16 +55,19 @@ async def run_until_signal(
 
 
 def run_process(
-    main: Callable[[], Coroutine[Any, Any, None]], release_s: float = _RELEASE_S, *, hang_up: bool = False
+    main: Callable[[], Coroutine[Any, Any, None]],
+    release_s: float = _RELEASE_S,
+    *,
+    end_on_sighup: bool = False,
 ) -> None:
     """Run a process's coroutine until it ends, or until SIGTERM or SIGINT.
 
-    ``hang_up``: SIGHUP ends it, too; otherwise the coroutine handles SIGHUP.
+    ``end_on_sighup``: SIGHUP ends it, too; otherwise the coroutine handles SIGHUP.
 
     After a signal the process has ``release_s`` seconds to release everything and then exits, since a silent
     camera may block a thread.
     """
-    finished = asyncio.run(run_until_signal(main, lambda: _end_after(release_s), hang_up=hang_up))
+    finished = asyncio.run(run_until_signal(main, lambda: _end_after(release_s), end_on_sighup=end_on_sighup))
     if finished and os.environ.get(SUPERVISED_VARIABLE):
         sys.exit(EXIT_FINISHED)
 

@@ -39,7 +39,7 @@ def check_ports(config: Config) -> None:
         check_port_free(host.strip("[]"), int(port), "zenoh.listen")
 
 
-def check_recordings(config: Config) -> None:
+def check_sources_open(config: Config) -> None:
     """Check that recordings, scenes, detections and the sound can be opened; live cameras are not checked.
 
     Raises:

@@ -16,7 +16,7 @@ from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.supervisor.shutdown import EXIT_FINISHED, SUPERVISED_VARIABLE
 from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
-from server.system.child_process import start_command
+from server.system.child_process import start_cli_command
 from server.system.errors import UserError
 from server.system.processors import available_processors
 
@@ -134,7 +134,7 @@ class Supervisor:
         with open_startup_pipe() as pipe:
             try:
                 self._before_start()
-                process = child.process = await start_command(
+                process = child.process = await start_cli_command(
                     self._arguments(child),
                     {**self._environment, STARTED_FD_VARIABLE: str(pipe.write_end)},
                     inherited=(pipe.write_end,),

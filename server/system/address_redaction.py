@@ -36,12 +36,12 @@ def has_protocol(source: str) -> bool:
     return "://" in source or _OPENED.match(source) is not None
 
 
-def is_login(source: str) -> bool:
+def looks_like_login(source: str) -> bool:
     """Return whether a source without a protocol looks like ``name:password@host``."""
     return _LOGIN.match(source) is not None
 
 
-def redact_address(source: str) -> str:
+def redact_to_host(source: str) -> str:
     """Return a source, address or path without secrets: only protocol and host of an address.
 
     ``rtsp://name:password@10.0.0.1/live`` becomes ``rtsp://10.0.0.1/...``. If an @ follows the apparent host,
@@ -55,7 +55,7 @@ def redact_address(source: str) -> str:
         return f"{match[0]}://{_host_and_port(source[match.end() + 3 :])}"
     if (match := _OPENED.match(source)) is not None:
         return f"{match[0][:-1]}:{_MORE}"
-    return HIDDEN if "://" in source or is_login(source) else source
+    return HIDDEN if "://" in source or looks_like_login(source) else source
 
 
 def _host_and_port(after_scheme: str) -> str:
@@ -68,7 +68,7 @@ def _host_and_port(after_scheme: str) -> str:
     return f"{place}/{_MORE}" if login or beyond.strip("/") else f"{place}{beyond}"
 
 
-def redact_endpoint(endpoint: str) -> str:
+def redact_zenoh_endpoint(endpoint: str) -> str:
     """Return a zenoh endpoint ``protocol/host:port`` without its options, which may contain keys."""
     match = _ENDPOINT.match(endpoint)
     if match is None:
@@ -76,7 +76,7 @@ def redact_endpoint(endpoint: str) -> str:
     return match[0] if match.end() == len(endpoint) else f"{match[0]} {_MORE}"
 
 
-def redact_addresses(text: str) -> str:
+def cut_at_addresses(text: str) -> str:
     """Return a text, such as a traceback, with each line cut where an address begins."""
     return "".join(_cut(line) for line in text.splitlines(keepends=True))
 

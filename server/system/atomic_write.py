@@ -16,7 +16,7 @@ _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 """Errors of a full disk."""
 
 
-def check_new_folder(out: Path) -> None:
+def check_output_folder(out: Path) -> None:
     """Check that a folder does not exist or is empty.
 
     Raises:
@@ -26,8 +26,8 @@ def check_new_folder(out: Path) -> None:
         raise UserError(f"{out}: exists and is not an empty folder; name another, or remove it")
 
 
-def check_new_file(out: Path, *read: Path | None) -> None:
-    """Check that a file can be written; ``read`` are input files, which it must not replace.
+def check_output_file(out: Path, *inputs: Path | None) -> None:
+    """Check that a file can be written; ``inputs`` are input files, which it must not replace.
 
     Raises:
         UserError: it is a folder, a device, or one of the inputs.
@@ -38,7 +38,7 @@ def check_new_file(out: Path, *read: Path | None) -> None:
         return
     if not out.is_file():
         raise UserError(f"{out}: is not a regular file, and would be replaced by one; name another")
-    if any(path is not None and path.exists() and out.samefile(path) for path in read):
+    if any(path is not None and path.exists() and out.samefile(path) for path in inputs):
         raise UserError(f"{out}: is an input, and would be replaced; name another")
 
 
@@ -49,7 +49,7 @@ def atomic_folder(out: Path) -> Iterator[Path]:
     Raises:
         UserError: ``out`` exists and is not an empty folder, or cannot be created.
     """
-    check_new_folder(out)
+    check_output_folder(out)
     target = out.resolve()
     with _cannot_write(out):
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -65,15 +65,15 @@ def atomic_folder(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_file(out: Path, *read: Path | None) -> Iterator[Path]:
+def atomic_file(out: Path, *inputs: Path | None) -> Iterator[Path]:
     """Yield a file to write; it replaces ``out`` only if the block succeeds.
 
-    ``read`` are input files, which it must not replace.
+    ``inputs`` are input files, which it must not replace.
 
     Raises:
         UserError: ``out`` cannot be written; checked before the block runs.
     """
-    check_new_file(out, *read)
+    check_output_file(out, *inputs)
     target = out.resolve()
     with _cannot_write(out):
         target.parent.mkdir(parents=True, exist_ok=True)

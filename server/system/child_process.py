@@ -28,7 +28,7 @@ _WORKER_NICENESS = 5
 """Workers have a lower priority than the service, and cameras than both (`site.niceness`)."""
 
 
-async def start_command(
+async def start_cli_command(
     arguments: Sequence[str],
     environment: Mapping[str, str],
     *,
@@ -87,7 +87,7 @@ def start_function(name: str, function: Callable[..., None], *arguments: Any) ->
 def _run_function(function: Callable[..., None], *arguments: Any) -> None:
     terminate_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and ends its workers
-    restore_termination()
+    unblock_termination()
     function(*arguments)
 
 
@@ -103,7 +103,7 @@ def defer_termination() -> Iterator[None]:
 
     A signal mask alone is not enough: a thread of a library may receive the signal, and Python runs the
     handler in the main thread. The mask is set for children, which would print a traceback if terminated
-    while they start; they call :func:`restore_termination`.
+    while they start; they call :func:`unblock_termination`.
     """
     received: list[int] = []
     before = {
@@ -121,6 +121,6 @@ def defer_termination() -> Iterator[None]:
             signal.raise_signal(received[0])
 
 
-def restore_termination() -> None:
+def unblock_termination() -> None:
     """Unblock SIGINT and SIGTERM in a child that was started within :func:`defer_termination`."""
     signal.pthread_sigmask(signal.SIG_UNBLOCK, TERMINATION_SIGNALS)

@@ -17,7 +17,7 @@ from types import TracebackType
 
 import msgspec
 
-from server.system.address_redaction import redact_addresses
+from server.system.address_redaction import cut_at_addresses
 from server.system.errors import UserError
 
 _ExcInfo = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
@@ -27,15 +27,15 @@ _FORMATS = ("text", "json")
 _PLACE = re.compile(r"(?:\b(camera|object) )?%[-#0 +]*[0-9]*(?:\.[0-9]+)?([a-zA-Z%])")
 
 
-class TextLines(logging.Formatter):
+class RedactingFormatter(logging.Formatter):
     """Formats log lines as text, with tracebacks below them in which addresses are redacted."""
 
     def formatException(self, ei: _ExcInfo) -> str:  # noqa: N802 — as logging calls it
         """Return a traceback with addresses redacted."""
-        return redact_addresses(super().formatException(ei))
+        return cut_at_addresses(super().formatException(ei))
 
 
-class JsonLines(TextLines):
+class JsonLines(RedactingFormatter):
     """Formats each record as one line of JSON, including its traceback."""
 
     def __init__(self, process: str) -> None:
@@ -75,7 +75,7 @@ def formatter(process: str) -> logging.Formatter:
     if is_json():
         return JsonLines(process)
     name = process.replace("%", "%%")
-    return TextLines(f"%(asctime)s %(levelname)-7s {name}: %(message)s", datefmt="%H:%M:%S")
+    return RedactingFormatter(f"%(asctime)s %(levelname)-7s {name}: %(message)s", datefmt="%H:%M:%S")
 
 
 def is_json() -> bool:

@@ -10,20 +10,20 @@ import os
 _MAX_NICENESS = 19
 
 
-def lower_own_priority(by: int) -> None:
-    """Set the niceness of this process to that of its parent plus ``by``, if it is lower.
+def lower_own_priority(below_parent: int) -> None:
+    """Set the niceness of this process to that of its parent plus ``below_parent``, if it is lower.
 
     Called before threads start: each thread inherits the niceness of the thread that starts it.
     """
-    _raise_niceness(0, _niceness(os.getppid()) + by)
+    _raise_niceness(0, _niceness(os.getppid()) + below_parent)
 
 
-def lower_priority(pid: int, by: int) -> None:
-    """Set the niceness of a child process to that of this process plus ``by``, if it is lower.
+def lower_priority(pid: int, below_own: int) -> None:
+    """Set the niceness of a child process to that of this process plus ``below_own``, if it is lower.
 
     This also covers its loading of libraries. A child that has exited already is ignored.
     """
-    _raise_niceness(pid, _niceness(0) + by)
+    _raise_niceness(pid, _niceness(0) + below_own)
 
 
 def _raise_niceness(pid: int, to: int) -> None:

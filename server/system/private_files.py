@@ -48,7 +48,7 @@ def write_private(path: Path, data: bytes) -> None:
         file.write(data)
 
 
-def rights_of_others(path: Path) -> str:
+def mode_if_shared(path: Path) -> str:
     """Return the mode of a file or folder, such as ``755``, if others can access it; otherwise an empty text.
 
     Raises:

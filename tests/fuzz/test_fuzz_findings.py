@@ -33,7 +33,7 @@ from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
-from server.service.recording.session_files import InitSegments, SessionInfo
+from server.service.recording.session_files import InitSegments, RecordingSessionInfo
 from server.service.service import BestViewService
 from server.service.time_shift.playback_audio import read_audio_frames
 from server.system.errors import UserError
@@ -206,7 +206,7 @@ def test_a_recording_session_with_invalid_camera_names_is_not_touched(tmp_path: 
     precious = tmp_path / "precious" / "000000000000.mp4"
     precious.parent.mkdir()
     precious.write_bytes(b"nobody's")
-    head = SessionInfo(
+    head = RecordingSessionInfo(
         site="hall", fps=25.0, width=64, height=48, codec="avc1", cameras=["c0"], started=0.0, pulse0=0.0
     )
     run = tmp_path / "kept" / "20260101T000000Z"

@@ -96,7 +96,7 @@ class IngestMessages(Target):
             for topic, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
                 if f"/{topic}" in key:
                     handle(message)
-        aligner.ready(now=100)
+        aligner.take_ready(now=100)
         ingest.forget_thumbnails_before(1)
         return not any(state.bad_messages for state in ingest.states.values())
 

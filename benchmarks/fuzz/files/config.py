@@ -213,7 +213,7 @@ class TrialSettings(Target):
             view = change_view_settings(self._view, changes, "to try out")
         except UserError as error:
             return refused(error)
-        self._service.decider.apply_view_settings(view)
+        self._service.decider.apply_live_view_settings(view)
         return True
 
 

@@ -28,7 +28,7 @@ from server.service.time_shift.playback import (
     CameraPlayback,
     PersonPlayback,
     PlaybackSource,
-    last_gop_before,
+    last_gop_until,
     play_gops,
     recorded_audio,
 )
@@ -166,7 +166,7 @@ class RecordedRuns(ScriptTarget):
                 count += 1
                 if count == _MAX_GOPS:
                     break
-            await last_gop_before(source, 12)
+            await last_gop_until(source, 12)
         recorded_audio(recorder)
         return len(lines)
 

@@ -222,11 +222,6 @@ class IdentityRegistry:
         self._people.recall(person_id, frame)
         self._splitter.recall(track, person_id)
 
-    @property
-    def pair_count(self) -> int:
-        """Number of pairs with evidence, with which memory grows."""
-        return self._affinity.entry_count
-
     def _gate(self) -> float:
         """Return the ground distance at which two foot points are as likely of one person as of two."""
         settings = self._settings

@@ -7,7 +7,7 @@ from server.camera.audio.live_source import LiveAudioSource
 from server.camera.audio.recorded_source import RecordedAudioSource
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 __all__ = [
@@ -36,7 +36,7 @@ def open_site_audio(config: Config, camera_id: str) -> RecordedAudioSource | Liv
             return LiveAudioSource(settings, fps, config.encode.gop / fps)
         if source_kind(path) is not SourceKind.FILE:
             raise UserError(
-                f"sound: camera {camera_id} has no audio: {redact_address(path)}; name another, or a file"
+                f"sound: camera {camera_id} has no audio: {redact_to_host(path)}; name another, or a file"
             )
     try:
         return RecordedAudioSource(path, settings, fps, offset, at_end)

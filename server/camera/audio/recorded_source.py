@@ -18,7 +18,7 @@ from server.camera.audio.passthrough import select_framer
 from server.camera.sources.frame_timing import frame_count, frame_rate
 from server.config.sections import SoundSettings
 from server.config.source_address import path_is_missing
-from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ class RecordedAudioSource:
         except av.error.FFmpegError as error:
             if not self._has_warned:  # a loop would repeat it
                 log.warning(
-                    "%s: its audio cannot be read any further: %s", redact_address(self._path), error.strerror
+                    "%s: its audio cannot be read any further: %s", redact_to_host(self._path), error.strerror
                 )
             self._has_warned = True
         finally:
@@ -170,7 +170,7 @@ def _video_stream(container: InputContainer) -> VideoStream | None:
 
 
 def _open(path: str) -> tuple[InputContainer, AudioStream]:
-    name = redact_address(path)
+    name = redact_to_host(path)
     if path_is_missing(path):
         raise UserError(f"{name}: is neither a camera of this site nor a file")
     try:

@@ -22,7 +22,7 @@ from server.camera.sources.orientation import Orientation, parse_orientation
 from server.camera.sources.recording import Recording, decode_frames
 from server.config.source_address import path_is_missing
 from server.media.color_conversion import to_bgr
-from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
 
@@ -40,7 +40,7 @@ class PassthroughRecording:
         self, path: str, offset: int, at_end: Literal["stop", "loop"], required: RequiredFormat
     ) -> None:
         if path_is_missing(path):
-            raise UserError(f"{redact_address(path)}: no such file or folder")
+            raise UserError(f"{redact_to_host(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._fps = required.fps
         self._length = _check_file(path, offset, required)
@@ -146,5 +146,5 @@ def _check_file(path: str, offset: int, required: RequiredFormat) -> int:
     finally:
         opened.container.close()
     if frame < 0:
-        raise UserError(f"{redact_address(path)}: this video has no frames; is the file complete?")
+        raise UserError(f"{redact_to_host(path)}: this video has no frames; is the file complete?")
     return frame + 1

@@ -28,7 +28,7 @@ from server.camera.sources.base import Image
 from server.camera.sources.live_stream import OPEN_S, READ_S, LiveStream
 from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
-from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
 _CHECKED_GOPS = 2
@@ -72,7 +72,7 @@ class PassthroughStream(LiveStream):
             CompatibilityCheck(self._required).check_video(opened)
         except IncompatibleStreamError as error:
             opened.container.close()
-            self._log_away(f"{redact_address(self._url)}: its stream does not fit any more: {error}")
+            self._log_away(f"{redact_to_host(self._url)}: its stream does not fit any more: {error}")
             return False
         decode_without_delay(opened)
         self._is_decodable = False
@@ -131,6 +131,6 @@ def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> No
         raise IncompatibleStreamError(f"it cannot be read: {reason}") from None
     except av.error.FFmpegError as error:  # the connection broke: the stream may be compatible
         reason = timeout_message(error, READ_S) or ffmpeg_reason(error)
-        raise UserError(f"{redact_address(url)}: it stopped during the check: {reason}") from None
+        raise UserError(f"{redact_to_host(url)}: it stopped during the check: {reason}") from None
     finally:
         opened.container.close()

@@ -14,7 +14,7 @@ from av.video.stream import VideoStream
 
 from server.camera.sources.opening import OpenedVideo
 from server.camera.sources.timestamp_jump_repair import TimestampJumpRepair
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 
 log = logging.getLogger(__name__)
 
@@ -185,7 +185,7 @@ def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStr
             if times.repair_jump(packet) and not again:
                 log.warning(
                     "%s: its time stamps jump: playback continues across the jump",
-                    redact_address(opened.container.name),
+                    redact_to_host(opened.container.name),
                 )
                 again = True  # warn only once
             yield packet
@@ -194,5 +194,5 @@ def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStr
             raise  # a signal interrupted the read: the file has not ended
         if not again:
             log.warning(
-                "%s: cannot be read any further: %s", redact_address(opened.container.name), error.strerror
+                "%s: cannot be read any further: %s", redact_to_host(opened.container.name), error.strerror
             )

@@ -20,7 +20,7 @@ from server.camera.audio import LiveAudioSource
 from server.camera.sources.base import Image
 from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
 from server.camera.sources.orientation import INTERLACED, Orientation, parse_orientation, pixel_aspect
-from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ class LiveStream:
         """
         del pulse
         if self._resized is not None:
-            raise UnavailableError(f"{redact_address(self._url)}: {self._size_message(self._resized)}")
+            raise UnavailableError(f"{redact_to_host(self._url)}: {self._size_message(self._resized)}")
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
         return None if picture is None else self._oriented(picture).image(picture)
@@ -127,7 +127,7 @@ class LiveStream:
         finally:
             opened.container.close()
         if not self._closing.is_set():
-            self._log_away(f"{redact_address(self._url)}: {reason}")
+            self._log_away(f"{redact_to_host(self._url)}: {reason}")
         return has_frames
 
     def _size_message(self, size: tuple[int, int]) -> str:
@@ -140,14 +140,14 @@ class LiveStream:
 
     def _log_recovered(self) -> None:
         if ended := self._away_log.end():
-            log.info("%s: frames arrive again, after %.0f s", redact_address(self._url), ended.seconds)
+            log.info("%s: frames arrive again, after %.0f s", redact_to_host(self._url), ended.seconds)
 
     def _read_safely(self, opened: OpenedVideo) -> bool:
         """Read, and log unexpected errors: the thread must survive them."""
         try:
             return self._read(opened)
         except Exception as error:  # noqa: BLE001 — logged with its traceback
-            self._log_away(f"{redact_address(self._url)}: unexpected {type(error).__name__}", unexpected=True)
+            self._log_away(f"{redact_to_host(self._url)}: unexpected {type(error).__name__}", unexpected=True)
             opened.container.close()
             return False
 
@@ -184,7 +184,7 @@ class LiveStream:
             self._orientation = self._oriented(first)
             self.size = self._size_of(first)
         if first.interlaced_frame:
-            log.warning("%s: %s", redact_address(self._url), INTERLACED)
+            log.warning("%s: %s", redact_to_host(self._url), INTERLACED)
         self._sized.set()
 
     def _oriented(self, picture: VideoFrame) -> Orientation:

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class MissingFrames:
         if self._damaged:
             log.warning(
                 "%s: %d damaged frames are replaced by the previous one: %s",
-                redact_address(self._path),
+                redact_to_host(self._path),
                 len(self._damaged),
                 _format_spans(self._damaged),
             )
@@ -55,13 +55,13 @@ class MissingFrames:
         if len(missing) > _UNEVEN * length:
             log.warning(
                 "%s: its frame rate is uneven (%.4g a second): each frame is shown at its own time",
-                redact_address(self._path),
+                redact_to_host(self._path),
                 rate,
             )
         elif missing:
             log.warning(
                 "%s: %d frames are missing and replaced by the previous one: %s",
-                redact_address(self._path),
+                redact_to_host(self._path),
                 len(missing),
                 _format_spans(missing),
             )

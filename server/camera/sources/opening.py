@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 
 from server.camera.sources.frame_timing import frame_rate
 from server.config.source_address import is_device
-from server.system.address_redaction import ffmpeg_reason, redact_address
+from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
 _TEXT = "tty"
@@ -54,7 +54,7 @@ def open_video(
     Raises:
         UserError: it cannot be opened, or there is no video in it.
     """
-    name = redact_address(source)
+    name = redact_to_host(source)
     try:
         container = av.open(
             source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout

@@ -16,7 +16,7 @@ from server.camera.sources.opening import open_video
 from server.camera.sources.orientation import INTERLACED, parse_orientation, pixel_aspect
 from server.config.source_address import path_is_missing
 from server.media.letterbox import Letterbox
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -59,7 +59,7 @@ class Recording:
         quiet: bool = False,
     ) -> None:
         if path_is_missing(path):
-            raise UserError(f"{redact_address(path)}: no such file or folder")
+            raise UserError(f"{redact_to_host(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
         self._quiet = quiet
         self._opened = open_video(path)
@@ -82,7 +82,7 @@ class Recording:
             self._missing_frames = None  # all of it is damaged
             self.close()
             raise UserError(
-                f"{redact_address(path)}: this video has no frames; is the file complete?"
+                f"{redact_to_host(path)}: this video has no frames; is the file complete?"
             ) from None
         self.orientation = parse_orientation(first, self._aspect)
         """The orientation of the first frame."""
@@ -193,7 +193,7 @@ class Recording:
             self._resized = True
             log.warning(
                 "%s: its images are %dx%d from frame %d on, they were %dx%d: letterboxed to that size",
-                *(redact_address(self._path), *size, self._requested + 1, *self.size),
+                *(redact_to_host(self._path), *size, self._requested + 1, *self.size),
             )
         return Letterbox(size, self.size).image(image)
 
@@ -201,16 +201,16 @@ class Recording:
         if self._opened.video_streams > 1:
             log.warning(
                 "%s contains %d video streams: the first is used",
-                redact_address(self._path),
+                redact_to_host(self._path),
                 self._opened.video_streams,
             )
         if first.interlaced_frame:
-            log.warning("%s: %s", redact_address(self._path), INTERLACED)
+            log.warning("%s: %s", redact_to_host(self._path), INTERLACED)
         if not self._same_rate:
             effect = "dropped" if self.fps > self._site_fps else "repeated"
             log.warning(
                 "%s has %.4g frames a second, the site %.4g: frames keep their times, some are %s",
-                *(redact_address(self._path), self.fps, self._site_fps, effect),
+                *(redact_to_host(self._path), self.fps, self._site_fps, effect),
             )
 
     def _log_missing_frames(self) -> None:

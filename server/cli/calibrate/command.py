@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 
@@ -49,7 +49,7 @@ def calibrate(
 
     for path in inputs:
         if not path.exists():
-            raise UserError(f"{redact_address(str(path))}: does not exist")
+            raise UserError(f"{redact_to_host(str(path))}: does not exist")
     plan = plan or out.with_suffix(".png")
     if plan.resolve() == out.resolve():
         raise UserError(f"--out: {out}: the floor plan would be written there too; name a .json, or --plan")

@@ -12,7 +12,7 @@ from server.cli.doctor.camera_probe import CameraProbe, probe_camera
 from server.cli.doctor.findings import Finding, bad, describe_bug, ok, reason_of, warning
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, is_device, source_kind
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 _GRACE_S = 3.0
@@ -65,7 +65,7 @@ def sound_findings(config: Config) -> list[Finding]:
     return [
         ok(
             "sound",
-            f"{redact_address(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s",
+            f"{redact_to_host(str(config.sound.source))}: {config.sound.codec}, {config.sound.kbps} kbit/s",
         )
     ]
 

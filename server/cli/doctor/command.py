@@ -33,7 +33,7 @@ from server.cli.doctor.ports import port_findings
 from server.cli.doctor.reachability import reachability_findings
 from server.config.loader import load_config
 from server.config.site_config import Config
-from server.supervisor.scene_ground import add_scene_ground
+from server.supervisor.synthetic_homographies import add_synthetic_homographies
 from server.system.descriptors import descriptor_limit
 from server.system.errors import UserError
 
@@ -150,6 +150,6 @@ def _camera_dependent_findings(
 def _with_scene_ground(config: Config) -> Config:
     """Return the configuration with its scenes' homographies; the cameras report unknown scenes."""
     try:
-        return add_scene_ground(config)
+        return add_synthetic_homographies(config)
     except (UserError, OSError):
         return config

@@ -12,7 +12,7 @@ from pathlib import Path
 from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.findings import Finding, bad, ok, warning
 from server.config.site_config import Config
-from server.system.private_files import rights_of_others
+from server.system.private_files import mode_if_shared
 
 _INDEX_BYTES = 100
 """Bytes per frame of a camera besides its picture: docs/how-to/record.md."""
@@ -41,7 +41,7 @@ def _writable_finding(folder: Path) -> Finding:
     """Report that a folder can be written, and whether other users can list it."""
     text = f"{folder} can be written"
     with suppress(OSError):  # a new folder will be private
-        if mode := rights_of_others(folder):
+        if mode := mode_if_shared(folder):
             text += f", but has mode {mode}: others on this machine may see when it was recorded, not what"
             return warning("record.folder", text, f"chmod 700 {folder}")
     return ok("record.folder", text)

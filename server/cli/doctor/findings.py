@@ -10,7 +10,7 @@ import msgspec
 from rich.console import Console
 from rich.markup import escape
 
-from server.system.address_redaction import redact_address, redact_addresses
+from server.system.address_redaction import cut_at_addresses, redact_to_host
 from server.system.errors import UserError
 from server.system.printable import printable
 
@@ -78,14 +78,14 @@ def reason_of(error: Exception) -> str:
     """Return the reason of an error in one line."""
     if isinstance(error, OSError) and error.strerror:
         return (
-            f"{redact_address(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
+            f"{redact_to_host(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
         )
     return str(error)
 
 
 def describe_bug(error: Exception) -> str:
     """Describe an unexpected exception, with addresses redacted."""
-    return f"a bug in MyView: {type(error).__name__}: {redact_addresses(str(error))}"
+    return f"a bug in MyView: {type(error).__name__}: {cut_at_addresses(str(error))}"
 
 
 _COLORS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.system.address_redaction import redact_address
+from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 _ENDINGS = (".txt", ".txt.gz")
@@ -105,7 +105,7 @@ def _option_files(option: str, paths: Sequence[Path], inner: str) -> _OptionFile
     files: list[Path] = []
     for path in paths:
         if not path.exists():
-            raise UserError(f"{redact_address(str(path))}: does not exist")
+            raise UserError(f"{redact_to_host(str(path))}: does not exist")
         files += _files(path, inner) if path.is_dir() else [path]
     return _OptionFiles(option, tuple(files), any(path.is_dir() for path in paths))
 

@@ -66,7 +66,7 @@ class Renderer:
             self._sizes[batch.camera] = batch.tracks.size
             if batch.ended:
                 self.ended[batch.camera] = batch.tracks.last
-        for epoch in self._aligner.ready(now=-1):
+        for epoch in self._aligner.take_ready(now=-1):
             for decision in self._decider.step(epoch):
                 self._write(decision)
 

@@ -23,7 +23,9 @@ routes = web.RouteTableDef()
 async def get_person_past(request: web.Request) -> web.Response:
     """Return the time ranges in which a person's best view is recorded, within from= and to=."""
     number = int(request.match_info["object"])
-    recorded = request.app[SERVICE].recordings.of_person(number, scoped=is_scoped_to_person(request))
+    recorded = request.app[SERVICE].recordings.of_person(
+        number, scoped_to_person=is_scoped_to_person(request)
+    )
     if (unreadable := await refuse_unreadable(recorded, 0)) is not None:
         return unreadable
     if recorded.available_from(0) is None:
@@ -42,7 +44,7 @@ async def get_decisions(request: web.Request) -> web.StreamResponse:
     """Stream the recorded decisions, one line per GOP, within from= and to=."""
     service = request.app[SERVICE]
     try:
-        playback = parse_time_range(request, service, service.recordings.end)
+        playback = parse_time_range(request, service, service.recordings.decided_end)
     except TimeReferenceError as error:
         return error_response(400, str(error))
     scope = request.app[ACCESS].grant(request).scope
@@ -66,7 +68,7 @@ async def _past(request: web.Request, recorded: RecordedStream) -> web.Response:
         return error_response(400, str(error))
     end = sys.maxsize if playback.end is None else playback.end
     try:
-        await recorded.check_all(playback.start, end)
+        await recorded.forget_missing(playback.start, end)
     except OSError as error:
         return disk_error(error)
     spans = [

@@ -84,7 +84,7 @@ async def get_init(request: web.Request, stream: HlsStream) -> web.Response:
 async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
     """Return a media segment of a stream (HLS), live or recorded."""
     number = int(request.match_info["segment"])
-    segment = None if stream.live is None else stream.live.get(number)
+    segment = None if stream.live is None else stream.live.listed_segment(number)
     if segment is None:
         segment = await time_shift_segment(request, stream, number)
     if segment is None:
@@ -126,8 +126,8 @@ def _stream(request: web.Request) -> HlsStream:
         recorded = service.recordings.of_camera(camera)
         return HlsStream(service.streams.segments_of_camera(camera), recorded)
     number, scoped = int(request.match_info["object"]), is_scoped_to_person(request)
-    live = service.streams.segments_of_person(service.people.current_number(number), scoped=scoped)
-    stream = HlsStream(live, service.recordings.of_person(number, scoped=scoped))
+    live = service.streams.segments_of_person(service.people.current_number(number), scoped_to_person=scoped)
+    stream = HlsStream(live, service.recordings.of_person(number, scoped_to_person=scoped))
     if not stream.exists:
         raise _unknown(request)
     return stream
@@ -152,7 +152,7 @@ def _connected_viewers(request: web.Request) -> tuple[str, int]:
     if "camera" in names:
         return of_live(names["camera"]), service.streams.of_camera(names["camera"]).viewers
     number = service.people.current_number(int(names["object"]))
-    return of_person(number), service.streams.viewers_of_person(number)
+    return of_person(number), service.streams.connected_viewers_of_person(number)
 
 
 def _unknown(request: web.Request) -> RefusedError:

@@ -91,7 +91,7 @@ async def time_shift_segment(request: web.Request, stream: HlsStream, number: in
     recorded, frames = stream.recorded, request.app[SERVICE].streams.segment_plan.segment_frames
     time_shift = recorded.time_shift(has_ended=stream.is_over)
     with suppress(OSError):  # an unreadable segment counts as not recorded
-        await recorded.check_ends(number * frames, (number + 1) * frames)
+        await recorded.forget_missing_ends(number * frames, (number + 1) * frames)
     return await time_shift.build_segment(number)
 
 

@@ -60,7 +60,7 @@ class HttpCollector(Collector):
 
     def _viewers(self) -> Iterable[Metric]:
         service, sessions = self._app[SERVICE], self._app[HLS_SESSIONS]
-        connected, past = service.streams.viewers, service.recordings.viewers
+        connected, past = service.streams.connected_viewers, service.recordings.viewers
         yield GaugeMetricFamily(
             "myview_viewers", "Streams being watched.", value=connected.total + past + sessions.all
         )

@@ -39,7 +39,7 @@ async def get_choices(request: web.Request) -> web.StreamResponse:
 
 async def _send(request: web.Request, kind: str, header: str, rows: RowWriter) -> web.StreamResponse:
     service = request.app[SERVICE]
-    end = service.recordings.end
+    end = service.recordings.decided_end
     try:
         playback = parse_time_range(request, service, end)
     except TimeReferenceError as error:

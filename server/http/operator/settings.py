@@ -20,7 +20,7 @@ from server.http.app_keys import ON_DISK, SERVICE
 from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.schema import SelectionSettings, Setting, Settings
 from server.service.service import BestViewService
-from server.system.address_redaction import HIDDEN, redact_address, redact_endpoint
+from server.system.address_redaction import HIDDEN, redact_to_host, redact_zenoh_endpoint
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
@@ -113,7 +113,7 @@ def _names(section: Any) -> list[str]:
 def _as_yaml(key: str, value: Any) -> str:
     """Return a value as YAML, without secrets."""
     if key in _ENDPOINTS:
-        return dump_yaml_inline(redact_endpoint(value))
+        return dump_yaml_inline(redact_zenoh_endpoint(value))
     if value is not None and _PASSWORD.fullmatch(key):
         return dump_yaml_inline(HIDDEN)
     return dump_yaml_inline(_redacted(value))
@@ -123,13 +123,13 @@ def _redacted(value: Any) -> Any:
     """Return a value without secrets: only the host of URLs, only the names of FFmpeg options."""
     match value:
         case Mapping():
-            return {redact_address(key): HIDDEN for key in value}
+            return {redact_to_host(key): HIDDEN for key in value}
         case list() | tuple():
             return [_redacted(item) for item in value]
         case bool() | int() | float() | None:
             return value
         case _:
-            return redact_address(str(value))
+            return redact_to_host(str(value))
 
 
 def _selection_settings(service: BestViewService) -> SelectionSettings:

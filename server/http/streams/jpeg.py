@@ -141,7 +141,7 @@ def _subject(request: web.Request) -> Subject:
 def _person(request: web.Request) -> Subject:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     current, scoped = service.people.current_number(number), is_scoped_to_person(request)
-    if service.streams.of_person(current, scoped=scoped) is None:
+    if service.streams.of_person(current, scoped_to_person=scoped) is None:
         raise service.people.unknown(number)
     return PersonView(current, scoped)
 

@@ -60,7 +60,7 @@ async def refuse_unreadable(
 ) -> web.Response | None:
     """Drop index entries of deleted files at both ends of a range; return 503 if the disk is unreadable."""
     try:
-        await stream.check_ends(start, end)
+        await stream.forget_missing_ends(start, end)
     except OSError as error:
         return disk_error(error)
     return None
@@ -74,7 +74,7 @@ async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> 
     if first is not None and (playback.end is None or first < playback.end):
         return None
     try:
-        await stream.check_all(0, sys.maxsize)
+        await stream.forget_missing(0, sys.maxsize)
     except OSError as error:
         return disk_error(error)
     spans = stream.spans(0, sys.maxsize)
@@ -88,10 +88,10 @@ async def decisions_in(
     service: BestViewService, playback: PlaybackRange
 ) -> AsyncIterator[bytes] | web.Response:
     """Return the recorded decisions of a range as lines of JSON; 416 if none are recorded."""
-    end = service.recordings.end if playback.end is None else playback.end
+    end = service.recordings.decided_end if playback.end is None else playback.end
     lines = service.recordings.decisions(playback.start, end)
     first = await anext(lines, None)
-    if first is None and playback.start < service.recordings.end:
+    if first is None and playback.start < service.recordings.decided_end:
         until = "on" if playback.end is None else f"to p{playback.end - 1}"
         return error_response(416, f"no decisions are recorded from p{playback.start} {until}")
     return _prepend(first, lines)

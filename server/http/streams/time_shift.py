@@ -23,10 +23,10 @@ async def time_shifted_best(request: web.Request, container: Container) -> web.S
     """Stream the best view of a person from a past moment on."""
     service, number = request.app[SERVICE], int(request.match_info["object"])
     scoped = is_scoped_to_person(request)
-    recorded = service.recordings.of_person(number, scoped=scoped)
+    recorded = service.recordings.of_person(number, scoped_to_person=scoped)
 
     def live() -> Broadcaster | None:
-        return service.streams.of_person(service.people.current_number(number), scoped=scoped)
+        return service.streams.of_person(service.people.current_number(number), scoped_to_person=scoped)
 
     if live() is None:
         if (unreadable := await refuse_unreadable(recorded, 0)) is not None:

@@ -63,20 +63,23 @@ async def _best(request: web.Request, container: Container) -> web.StreamRespons
     service, number = request.app[SERVICE], int(request.match_info["object"])
     streams, scoped = service.streams, is_scoped_to_person(request)
     person = service.people.current_number(number)
-    channel = streams.of_person(person, scoped=scoped)
+    channel = streams.of_person(person, scoped_to_person=scoped)
     if channel is None:
         raise service.people.unknown(number)
     fixed, preferred = request.query.get("camera"), request.query.get("prefer")
     for camera in (fixed, preferred):
         if camera is not None:
             service.cameras.require(camera)
-    slot_name, other_viewers = of_person(person), streams.viewers_of_person(person) - channel.viewers
+    slot_name, other_viewers = (
+        of_person(person),
+        streams.connected_viewers_of_person(person) - channel.viewers,
+    )
     hls_name: str | None = slot_name
     if fixed is not None:
         channel = streams.of_camera_decided(fixed)
         slot_name, hls_name, other_viewers = of_decided(fixed), of_camera(fixed), 0
     elif preferred is not None:
-        channel = streams.of_person_preferring(person, preferred, scoped=scoped)
+        channel = streams.of_person_preferring(person, preferred, scoped_to_person=scoped)
         slot_name, hls_name, other_viewers = f"object {person} preferring {preferred}", None, 0
     return await _send(request, channel, slot_name, hls_name, container, other_viewers)
 

@@ -30,7 +30,7 @@ def refuse_viewer(
     """
     service, slots = request.app[SERVICE], request.app[VIEWER_SLOTS]
     limits = service.config.http
-    total = service.streams.viewers.total + service.recordings.viewers
+    total = service.streams.connected_viewers.total + service.recordings.viewers
     total += service.rendering.viewers + request.app[HLS_SESSIONS].all
     if viewers - slots.ending(streams) >= limits.viewers_per_object:
         if _evict(request, slots, streams):

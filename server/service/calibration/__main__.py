@@ -27,8 +27,8 @@ def calibrate(task: CalibrationTask) -> CalibrationResult:
     """Calibrate; return the result, or why there is none."""
     empty = [boxes.camera for boxes in task.cameras if not boxes.frames]
     walks = tuple(_walk(boxes, task.fps) for boxes in task.cameras if boxes.frames)
-    live = tuple(walk.camera for walk in walks if walk.camera not in task.offsets)
-    recorded = RecordedWalk(walks, task.fps, offsets=task.offsets, live=live)
+    without_offset = tuple(walk.camera for walk in walks if walk.camera not in task.offsets)
+    recorded = RecordedWalk(walks, task.fps, offsets=task.offsets, without_offset=without_offset)
     try:
         report = calibrate_walk(recorded, walk_settings(task.fps, task.max_offset_s), task.person)
     except CalibrationError as error:

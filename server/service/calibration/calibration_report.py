@@ -28,18 +28,18 @@ class RecordedWalk:
     Attributes:
         walks: by camera.
         fps: frames a second.
-        guessed: cameras whose picture size is estimated from the boxes.
+        size_guessed: cameras whose picture size is estimated from the boxes.
         rate_guessed: whether ``fps`` is a default, not measured.
         offsets: by camera, the offset that its frame numbers include already.
-        live: cameras that cannot have an offset.
+        without_offset: cameras that cannot have an offset.
     """
 
     walks: tuple[Walk, ...]
     fps: float
-    guessed: tuple[str, ...] = ()
+    size_guessed: tuple[str, ...] = ()
     rate_guessed: bool = False
     offsets: Mapping[str, int] = field(default_factory=dict)
-    live: tuple[str, ...] = ()
+    without_offset: tuple[str, ...] = ()
 
 
 def walk_settings(fps: float, max_offset_s: float) -> WalkSettings:
@@ -148,7 +148,7 @@ def report_lines(recorded: RecordedWalk, calibration: WalkCalibration, settings:
         )
     lines += [f"{camera.camera}: left out: {camera.reason}" for camera in calibration.uncalibrated]
     lines += _floors(calibration)
-    if recorded.guessed:
+    if recorded.size_guessed:
         sizes = ", ".join(f"{walk.camera} {walk.size[0]}x{walk.size[1]}" for walk in recorded.walks)
         lines.append(f"picture sizes are estimated from the boxes ({sizes}); set them with --size")
     if recorded.rate_guessed:
@@ -193,7 +193,7 @@ def _offsets(recorded: RecordedWalk, calibration: WalkCalibration) -> list[str]:
             verdict = "out of sync" if _is_out_of_sync(camera) else "in sync, within the error"
             if _is_out_of_sync(camera) and abs(camera.offset) / fps < _DOUBTFUL_S:
                 verdict = "perhaps out of sync; late foot points look alike: compare two frames first"
-            if _is_out_of_sync(camera) and camera.camera in recorded.live:
+            if _is_out_of_sync(camera) and camera.camera in recorded.without_offset:
                 verdict += "; a live camera has no configurable offset"
             frames = f"{camera.offset:+.1f} frames ({camera.offset / fps:+.2f} s)"
             margin = f"± {_SIGNIFICANT * camera.offset_error:.1f}"
@@ -206,7 +206,7 @@ def offset_lines(recorded: RecordedWalk, calibration: WalkCalibration) -> str:
     moved = [
         camera
         for camera in calibration.cameras
-        if _is_out_of_sync(camera) and camera.camera not in recorded.live
+        if _is_out_of_sync(camera) and camera.camera not in recorded.without_offset
     ]
     lines = [f"  - id: {camera.camera}\n    offset: {_use(recorded, camera)}\n" for camera in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""

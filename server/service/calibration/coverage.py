@@ -21,13 +21,13 @@ class CameraCoverage:
 
     Attributes:
         camera: its name.
-        feet: foot points at compared moments at which another camera saw a person, too.
+        shared_foot_points: foot points at compared moments at which another camera saw a person, too.
         thirds: shares of them in the left, middle and right third of the picture.
         depth_ratio: apparent height of the nearest over that of the farthest; None: too few foot points.
     """
 
     camera: str
-    feet: int
+    shared_foot_points: int
     thirds: tuple[float, float, float]
     depth_ratio: float | None
 

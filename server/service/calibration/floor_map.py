@@ -20,12 +20,12 @@ class FloorCoverage:
     """One camera's coverage of the floor.
 
     Attributes:
-        homography: (3, 3) from pixels of the site's image to the ground; its third coordinate is positive
-            for points on the floor only, not above the horizon.
+        site_homography: (3, 3) from pixels of the site's image to the ground; its third coordinate is
+            positive for points on the floor only, not above the horizon.
         outline: (V, 2) corners of what the camera covers, in ground units; V is 0 if it sees no floor.
     """
 
-    homography: Floats
+    site_homography: Floats
     outline: Floats
 
 

@@ -31,15 +31,15 @@ class FloorPlanCamera:
     Attributes:
         camera: its name.
         homography: its pixels to the floor, (3, 3).
-        image: the points in its picture, (N, 2) pixels.
-        place: their positions on the floor, (N, 2): marked, or estimated from all cameras.
+        image_points: the points in its picture, (N, 2) pixels.
+        floor_points: their positions on the floor, (N, 2): marked, or estimated from all cameras.
         floor: cameras of one number share a floor; each floor has a plan of its own.
     """
 
     camera: str
     homography: Floats
-    image: Floats
-    place: Floats
+    image_points: Floats
+    floor_points: Floats
     floor: int = 0
 
 
@@ -71,12 +71,12 @@ def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | Bin
 
 
 def _draw(axis: Axes, view: FloorPlanCamera, color: str) -> None:
-    step = -(-len(view.image) // _MAX_POINTS)
-    floor_points = to_ground(view.homography, view.image[::step])
+    step = -(-len(view.image_points) // _MAX_POINTS)
+    mapped = to_ground(view.homography, view.image_points[::step])
     axis.fill(*_area(view).T, facecolor=to_rgba(color, 0.12), edgecolor=color, linewidth=1)
-    lines = np.stack([floor_points, view.place[::step]], axis=1)
+    lines = np.stack([mapped, view.floor_points[::step]], axis=1)
     axis.add_collection(LineCollection(list(lines), colors=color, linewidths=0.6, alpha=0.6))
-    axis.plot(*floor_points.T, ".", markersize=3, color=color, label=_escape(view.camera))
+    axis.plot(*mapped.T, ".", markersize=3, color=color, label=_escape(view.camera))
 
 
 def _escape(text: str) -> str:
@@ -86,5 +86,5 @@ def _escape(text: str) -> str:
 
 def _area(view: FloorPlanCamera) -> Floats:
     """Return the outline of the points, (K, 2): convex in the picture, and so on the floor."""
-    outline = cv2.convexHull(view.image.astype(np.float32)).reshape(-1, 2)
+    outline = cv2.convexHull(view.image_points.astype(np.float32)).reshape(-1, 2)
     return to_ground(view.homography, outline.astype(np.float64))

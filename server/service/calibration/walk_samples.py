@@ -75,9 +75,9 @@ class CameraWalk:
         self._boxes.append(camera_boxes)
         self._sample(self._frames[-1], camera_boxes, message.size)
 
-    def pause(self, until: int) -> None:
-        """Ignore boxes before a frame."""
-        self._next = max(self._next, until)
+    def pause(self, until_frame: int) -> None:
+        """Ignore boxes before a frame, counted from the walk's start."""
+        self._next = max(self._next, until_frame)
 
     @property
     def boxes(self) -> CameraBoxes | None:

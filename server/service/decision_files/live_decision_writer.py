@@ -50,7 +50,7 @@ class LiveDecisionWriter:
         """Add late frames; they are written with the next decision."""
         self._late += (_LateFrame(pulse, camera, reason) for pulse in pulses)
 
-    def write(self, decision: GopDecision) -> None:
+    def write_or_skip(self, decision: GopDecision) -> None:
         """Write a decision; skip it if writing fails."""
         try:
             self._writer.write(decision, self._rows())

@@ -111,7 +111,7 @@ class AssistService:
             raise UnknownCameraError(camera, pipeline.frame_buffers)
         number = pipeline.decider.people.registry.current(command.number)
         if number not in pipeline.decider.people.known:
-            is_recovering = pipeline.state_replication.may_recover(command.number)
+            is_recovering = pipeline.state_replication.is_known_or_recoverable(command.number)
             raise UnknownObjectError(command.number, is_recovering=is_recovering)
         for position in command.positions:
             self._check(position)

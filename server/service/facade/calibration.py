@@ -77,7 +77,7 @@ class CalibrationService:
             seconds=walk.seconds,
             max_seconds=MAX_WALK_S,
             cameras=[
-                WalkCamera(camera.camera, camera.feet, list(camera.thirds), camera.depth_ratio)
+                WalkCamera(camera.camera, camera.shared_foot_points, list(camera.thirds), camera.depth_ratio)
                 for camera in covered.cameras
             ],
             pairs=[WalkPair(pair.one, pair.other, pair.seconds) for pair in covered.pairs],

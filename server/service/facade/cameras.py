@@ -119,7 +119,7 @@ class CameraService:
                 ground = np.array(camera.ground, dtype=np.float64)
                 coverage = floor_coverage(ground, size, (config.site.width, config.site.height))
                 cameras.append(
-                    FloorCamera(camera.id, coverage.homography.tolist(), coverage.outline.tolist())
+                    FloorCamera(camera.id, coverage.site_homography.tolist(), coverage.outline.tolist())
                 )
         return Floor(cameras, [camera.id for camera in config.cameras if camera.ground is None])
 
@@ -147,7 +147,7 @@ class CameraService:
             sync_error=metrics.sync_error,
             tracking_delay=metrics.tracking_delay,
             optimal=metrics.optimal,
-            solved_windows=metrics.solved_windows,
+            solved_windows=metrics.recent_solved_windows,
             last_error=metrics.last_error,
             picture=None if metrics.size is None else self._placement(metrics.size),
         )

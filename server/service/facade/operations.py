@@ -92,8 +92,8 @@ class OperationsService:
         Raises:
             UserError: the look-ahead is too short, or longer than the frame buffers allow.
         """
-        self._pipeline.apply_view_settings(view)
+        self._pipeline.apply_live_view_settings(view)
 
     def reset_view_settings(self) -> None:
         """Apply the configuration's view settings again."""
-        self._pipeline.apply_view_settings(self._pipeline.config.view)
+        self._pipeline.apply_live_view_settings(self._pipeline.config.view)

@@ -151,7 +151,9 @@ class PeopleService:
 
     def unknown(self, number: int) -> UnknownObjectError:
         """Return the error to raise for a number that no person has."""
-        return UnknownObjectError(number, is_recovering=self._pipeline.state_replication.may_recover(number))
+        return UnknownObjectError(
+            number, is_recovering=self._pipeline.state_replication.is_known_or_recoverable(number)
+        )
 
     @property
     def numbered_since(self) -> float:

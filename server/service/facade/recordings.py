@@ -80,7 +80,7 @@ class RecordedStream:
         """Return the recorded ranges of pulses ``start … end - 1`` by camera shown, in order."""
         return available_camera_ranges(self._source, start, end)
 
-    async def check_ends(self, start: int, end: int | None = None) -> None:
+    async def forget_missing_ends(self, start: int, end: int | None = None) -> None:
         """Drop index entries whose files are missing at the two ends of a range.
 
         Raises:
@@ -88,7 +88,7 @@ class RecordedStream:
         """
         await run_in_reader_thread(forget_missing_ends, self._source, start, end)
 
-    async def check_all(self, start: int, end: int) -> None:
+    async def forget_missing(self, start: int, end: int) -> None:
         """Drop all index entries of pulses ``start … end - 1`` whose files are missing.
 
         Raises:
@@ -126,10 +126,10 @@ class RecordedStream:
         rates = [
             8 * entry.length / entry.frames for recorded in source.recorded for entry in recorded.index.all
         ]
-        gop = source.gop_in_memory(0)
+        gop = source.gop_in_memory_from(0)
         while gop is not None:
             rates.append(8 * sum(map(len, gop.fragments)) / len(gop.fragments))
-            gop = source.gop_in_memory(gop.end)
+            gop = source.gop_in_memory_from(gop.end)
         return self._pipeline.config.site.fps * max(rates, default=0.0)
 
     def _timeline(self) -> GaplessTimeline:
@@ -151,7 +151,7 @@ class RecordingService:
         self._pipeline, self._recorder = pipeline, pipeline.recorder
 
     @property
-    def end(self) -> int:
+    def decided_end(self) -> int:
         """The pulse after the newest decided frame."""
         return self._recorder.recent.end
 
@@ -161,13 +161,13 @@ class RecordingService:
         writer = self._recorder.writer
         return RecordingStatus(writer is not None, "" if writer is None else writer.problem)
 
-    def of_person(self, number: int, *, scoped: bool) -> RecordedStream:
-        """Return a person's recorded stream; ``scoped``: blanked where no camera saw them."""
+    def of_person(self, number: int, *, scoped_to_person: bool) -> RecordedStream:
+        """Return a person's recorded stream; ``scoped_to_person``: gray where no camera had seen them."""
         pipeline, recorder = self._pipeline, self._recorder
         current = pipeline.decision_state.resolve(number)
         numbers = (number,) if number == current else (current, number)
         presence = None
-        if scoped:
+        if scoped_to_person:
             fps = pipeline.config.site.fps
             presence = PresenceHistory(
                 recorder, numbers, round(pipeline.config.access.hide_after_s * fps), fps

@@ -14,6 +14,7 @@ __all__ = [
     "Broadcaster",
     "BytesChunk",
     "Chunk",
+    "ConnectedViewers",
     "HlsPart",
     "HlsSegment",
     "HlsSegmenter",
@@ -21,13 +22,12 @@ __all__ = [
     "SegmentLayout",
     "StreamService",
     "Subscriber",
-    "ViewerCounts",
 ]
 
 
 @dataclass(frozen=True, slots=True)
-class ViewerCounts:
-    """How many streams are watched over a connection of their own, by kind."""
+class ConnectedViewers:
+    """How many streams are watched over a connection of their own, by kind; HLS viewers are not in it."""
 
     object: int
     camera: int
@@ -78,16 +78,17 @@ class StreamService:
         """How streams are cut into HLS segments."""
         return self._splicer.layout
 
-    def of_person(self, number: int, *, scoped: bool) -> Broadcaster | None:
+    def of_person(self, number: int, *, scoped_to_person: bool) -> Broadcaster | None:
         """Return the best view of a person, by their current number; None: there is none.
 
-        ``scoped``: blanked while no camera sees the person, for viewers restricted to this person.
+        ``scoped_to_person``: frozen, then gray, while no camera sees the person; for viewers with access to
+        that person alone.
         """
-        return (self._splicer.scoped_persons if scoped else self._splicer.persons).get(number)
+        return (self._splicer.scoped_persons if scoped_to_person else self._splicer.persons).get(number)
 
-    def of_person_preferring(self, number: int, camera: str, *, scoped: bool) -> Broadcaster:
+    def of_person_preferring(self, number: int, camera: str, *, scoped_to_person: bool) -> Broadcaster:
         """Return the best view of a person that stays with a camera for as long as it sees them."""
-        preferring = self._splicer.preferred_scoped if scoped else self._splicer.preferred
+        preferring = self._splicer.preferred_scoped if scoped_to_person else self._splicer.preferred
         return preferring.broadcaster(number, camera)
 
     def of_camera(self, camera: str) -> Broadcaster:
@@ -98,27 +99,27 @@ class StreamService:
         """Return a camera's stream as late as a best view, in whole GOPs."""
         return self._splicer.decided_cameras[camera]
 
-    def segments_of_person(self, number: int, *, scoped: bool) -> HlsSegmenter | None:
+    def segments_of_person(self, number: int, *, scoped_to_person: bool) -> HlsSegmenter | None:
         """Return the newest HLS segments of a person's stream, for a while even when it has ended."""
-        return self._splicer.segmenter_of_person(number, scoped=scoped)
+        return self._splicer.segmenter_of_person(number, scoped_to_person=scoped_to_person)
 
     def segments_of_camera(self, camera: str) -> HlsSegmenter | None:
         """Return the newest HLS segments of a camera; None: there is no such camera."""
         return self._splicer.segmenter_of_camera(camera)
 
-    def viewers_of_person(self, number: int) -> int:
+    def connected_viewers_of_person(self, number: int) -> int:
         """Return how many watch a person's best view over a connection of their own, scoped or not."""
         return self._splicer.viewers_of(number)
 
     @property
-    def viewers(self) -> ViewerCounts:
+    def connected_viewers(self) -> ConnectedViewers:
         """How many streams are watched over a connection of their own."""
         splicer = self._splicer
         cameras = sum(
             broadcaster.viewers
             for broadcaster in (*splicer.cameras.values(), *splicer.decided_cameras.values())
         )
-        return ViewerCounts(splicer.person_viewers, cameras, splicer.preferred_camera_viewers)
+        return ConnectedViewers(splicer.person_viewers, cameras, splicer.preferred_camera_viewers)
 
     def close(self) -> None:
         """End all streams."""

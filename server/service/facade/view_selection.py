@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from server.service.decision_state import reason
-from server.service.view_selection.recent_reasons import SelectionReason
+from server.service.view_selection.queried_reasons import SelectionReason
 
 
 class ViewSelection(msgspec.Struct, frozen=True):

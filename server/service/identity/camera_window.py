@@ -44,7 +44,7 @@ class CameraWindow:
         """The pulse of the first frame."""
         return self.message.first
 
-    def local_tracks(self) -> list[TrackUpdate]:
+    def fresh_tracks(self) -> list[TrackUpdate]:
         """Return the newly final, visible parts of the tracks, boxes in the camera's own pixels."""
         _, height = self.message.size
         final = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))

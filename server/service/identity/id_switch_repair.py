@@ -29,14 +29,14 @@ class IdSwitchRepair:
         self._switches: dict[TrackKey, TrackPart] = {}
         """By track, the number it has since a switch, until the registry no longer revises that time."""
 
-    def read(
+    def repair(
         self,
         window: CameraWindow,
         before: Sequence[HistorySpan[CameraWindow]],
         parts: Parts,
         needed_from: int,
     ) -> tuple[CameraWindow, list[Split]]:
-        """Return the window with its tracks' current keys, and the splits that follow.
+        """Exchange the keys of tracks that had switched; return the window with current keys, and the splits.
 
         ``before`` are the earlier windows of its final frames. ``parts``, each track's person numbers, is
         updated in place; for frames before ``needed_from`` it may be incomplete.

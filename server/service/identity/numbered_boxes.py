@@ -22,7 +22,8 @@ def numbered_boxes(
 ) -> list[list[NumberedBox]]:
     """Return the boxes of each of the frames from `first` on, by rising number.
 
-    Of two tracks of one person in one frame the first counts. Negative numbers are unconfirmed tracks.
+    Of two tracks of one person in one frame the first counts. Unconfirmed tracks, whose numbers are negative,
+    are left out.
     """
     boxes_per_frame: list[list[NumberedBox]] = [[] for _ in range(frames)]
     for span in spans:

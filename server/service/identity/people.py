@@ -87,7 +87,7 @@ class PersonTracker:
         late = [self._store(window) for window in self._reader.read_late(epoch)]
         windows = [self._store(window) for window in self._reader.read(epoch)]
         self._recall(windows)
-        tracks = [track for window in windows for track in window.local_tracks()]
+        tracks = [track for window in windows for track in window.fresh_tracks()]
         since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
         image_sizes = self._detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
@@ -132,10 +132,10 @@ class PersonTracker:
         """Assign no number below this one: an earlier run has used them."""
         self._registry.reserve_below(number)
 
-    def expect(self, tracks: Mapping[TrackName, int], pulse: int) -> None:
-        """Expect tracks that belonged to these people in an earlier run, which ended with a pulse."""
+    def expect(self, tracks: Mapping[TrackName, int], last_pulse: int) -> None:
+        """Expect tracks that belonged to these people in an earlier run, which ended with `last_pulse`."""
         self._expected |= {
-            track: (number, pulse) for track, number in tracks.items() if not self.is_known(track)
+            track: (number, last_pulse) for track, number in tracks.items() if not self.is_known(track)
         }
 
     def cancel_expected(self, tracks: Iterable[TrackName]) -> None:
@@ -219,8 +219,8 @@ class PersonTracker:
         corrections, self._corrections = tuple(self._corrections), []
         return corrections
 
-    def forget_boxes_before(self, pulse: int) -> None:
-        """Forget the boxes and person numbers before a pulse."""
+    def forget_before(self, pulse: int) -> None:
+        """Forget the boxes and person numbers before a pulse; record the tracks published until then."""
         if self.published.frames:
             spans = [span for history in self._histories.values() for span in history.over(0, pulse - 1)]
             for span in sorted(spans, key=lambda span: span.last):
@@ -247,7 +247,7 @@ class PersonTracker:
         history = self._histories[window.message.camera]
         if window.message.revised_from is not None:
             before = history.over(window.first, window.fresh - 1)
-            window, splits = self._id_switch_repair.read(window, before, self._parts, self._needed_from)
+            window, splits = self._id_switch_repair.repair(window, before, self._parts, self._needed_from)
             self._corrections += self._overrides.map_splits(splits)
         history.put(window, window.first, window.message.last)
         return window

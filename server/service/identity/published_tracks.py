@@ -42,7 +42,7 @@ class PublishedTracks:
         """Return whether a frame is still covered."""
         return self._oldest is not None and self._oldest <= pulse
 
-    def of(self, camera: str, numbers: Collection[int], pulse: int) -> TrackName | None:
+    def latest_track(self, camera: str, numbers: Collection[int], pulse: int) -> TrackName | None:
         """Return the track that showed a person in a frame, or else last before it; None: none did.
 
         ``numbers`` are all numbers of the person, former ones included.

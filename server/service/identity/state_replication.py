@@ -122,7 +122,7 @@ class StateReplication:
             if camera in self._present
         )
 
-    def may_recover(self, number: int) -> bool:
+    def is_known_or_recoverable(self, number: int) -> bool:
         """Return whether a person of this number is known, or may still be recovered."""
         if (
             self._started_at is None

@@ -125,27 +125,27 @@ class EpochAligner:
         return self._skip(self._next, to)
 
     @property
-    def waiting(self) -> int:
+    def waiting_windows(self) -> int:
         """The number of windows that wait for others of their epoch."""
         return sum(len(queue.waiting) for queue in self._queues.values())
 
     @property
-    def all_ended(self) -> bool:
+    def all_ended_and_decided(self) -> bool:
         """Whether every camera's recording has ended and was decided."""
         return all(queue.ended and not queue.waiting for queue in self._queues.values())
 
-    def ready(self, now: int) -> list[Epoch]:
+    def take_ready(self, now: int) -> list[Epoch]:
         """Remove and return the epochs that can be decided at pulse ``now``, in order."""
         epochs = []
-        while (epoch := self.next_ready(now)) is not None:
+        while (epoch := self.take_next_ready(now)) is not None:
             epochs.append(epoch)
         return epochs
 
-    def next_ready(self, now: int) -> Epoch | None:
+    def take_next_ready(self, now: int) -> Epoch | None:
         """Remove and return the next epoch that can be decided at pulse ``now``; None: none can."""
         if self._next is None:
             self._begin(now)
-        if self._next is None or self.all_ended:
+        if self._next is None or self.all_ended_and_decided:
             return None
         number = self._next = self._skip_outdated(now, self._next)
         end = end_of_epoch(number, self.stride)

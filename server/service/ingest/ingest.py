@@ -29,7 +29,7 @@ from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.validation import is_plausible
 from server.service.metrics.camera_metrics import CameraMetrics
 from server.service.streaming.audio_buffer import AudioBuffer
-from server.service.streaming.frame_buffer import FrameBuffer, UndecodableFrameError
+from server.service.streaming.frame_buffer import DamagedFrameError, FrameBuffer
 
 log = logging.getLogger(__name__)
 
@@ -66,11 +66,11 @@ class CameraState:
             return "ended"
         if not self.frames:
             return "starting"
-        return "live" if self.alive and not self.away else "gone"
+        return "live" if self.alive and not self.is_source_away else "gone"
 
     @property
-    def away(self) -> bool:
-        """Whether the camera's process is connected but its source delivers no frames."""
+    def is_source_away(self) -> bool:
+        """Whether its source delivers no frames, by the last status of its connected process."""
         return self.status is not None and self.status.state == "away"
 
     @property
@@ -78,7 +78,7 @@ class CameraState:
         """A message to the operator about a problem; empty: none."""
         if self.refused:
             return self.refused
-        if self.alive and self.away:
+        if self.alive and self.is_source_away:
             return "its source delivers no frames; retrying"
         return self.status.load if self.alive and self.status is not None else ""
 
@@ -172,7 +172,7 @@ class Ingest:
                 return
             frame_buffer = self._frame_buffers[camera]
             frame = frame_buffer.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
-        except (*DECODE_ERRORS, UndecodableFrameError) as error:
+        except (*DECODE_ERRORS, DamagedFrameError) as error:
             state.count_bad_message(error)
         except ParameterMismatchError as error:
             state.refused = f"{error}; do all cameras of this site run with the same configuration?"
@@ -232,8 +232,8 @@ class Ingest:
         except DECODE_ERRORS as error:
             state.count_bad_message(error)
         else:
-            was_away, state.status = state.away, status
-            if state.away and not was_away:
+            was_away, state.status = state.is_source_away, status
+            if state.is_source_away and not was_away:
                 state.metrics.record_problem(state.message)
 
     def thumbnail(self, message: Message) -> None:
@@ -267,7 +267,7 @@ class Ingest:
         }
 
     def forget_thumbnails_before(self, pulse: int) -> None:
-        """Drop the thumbnails of tracks not seen since a pulse."""
+        """Drop the thumbnails of frames before a pulse."""
         for thumbnails in self._thumbnails.values():
             for key in [key for key, thumbnail in thumbnails.items() if thumbnail.pulse < pulse]:
                 del thumbnails[key]

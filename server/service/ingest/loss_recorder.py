@@ -66,7 +66,7 @@ class LossRecorder:
             self._record_skipped(range(self._decided_end, decision.first))
         self._decided_end = decision.first + decision.frames
         for camera, frame_buffer in self._frame_buffers.items():
-            lost = frame_buffer.missing(decision.first, decision.frames)
+            lost = frame_buffer.lost(decision.first, decision.frames)
             self.lost_frames[camera] += len(lost)
             if self.decision_writer is not None:
                 self.decision_writer.add_late(camera, lost, "no frame")

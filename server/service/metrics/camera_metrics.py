@@ -147,7 +147,7 @@ class CameraMetrics:
         return _spread(self._delays)
 
     @property
-    def solved_windows(self) -> int:
+    def recent_solved_windows(self) -> int:
         """The number of windows behind :attr:`optimal`."""
         return len(self._optimal)
 

@@ -59,7 +59,7 @@ class ServiceCollector(Collector):
         pipeline, writer = self._pipeline, self._pipeline.recorder.writer
         waiting = GaugeMetricFamily("myview_waiting", "Items waiting, by queue.", labels=["queue"])
         waiting.add_metric(["messages"], sum(inbox.waiting for inbox in pipeline.bus.inboxes))
-        waiting.add_metric(["windows"], pipeline.aligner.waiting)
+        waiting.add_metric(["windows"], pipeline.aligner.waiting_windows)
         waiting.add_metric(["recording"], writer.queued if writer else 0)
         for queue, length in self._more_queues.items():
             waiting.add_metric([queue], length())

@@ -43,7 +43,7 @@ def corrections_for_tracker(
     """
     published, numbers = people.published, [number, *people.registry.aliases(number)]
     known = [position for position in positions if published.covers(position.pulse)]
-    tracks = [(position, published.of(camera, numbers, position.pulse)) for position in known]
+    tracks = [(position, published.latest_track(camera, numbers, position.pulse)) for position in known]
     boots = [track.boot for _, track in tracks if track is not None]
     if not boots:
         return None

@@ -91,9 +91,9 @@ class AgeClockState(msgspec.Struct, frozen=True, kw_only=True):
 class AgeClock:
     """The clock by which recordings age: data written at *a* has the age *b - a* at *b*."""
 
-    def __init__(self, folder: Path, machine: MachineClocks, *, trusted: bool) -> None:
+    def __init__(self, folder: Path, machine: MachineClocks, *, trust_clock: bool) -> None:
         self.id = ""
-        self._path, self._machine, self._trusted = folder / STATE_FILE, machine, trusted
+        self._path, self._machine, self._trust_clock = folder / STATE_FILE, machine, trust_clock
         self._seconds, self._at = 0.0, machine.steady()
         self._origin: float | None = None
         self.anchored = 0.0
@@ -126,16 +126,16 @@ class AgeClock:
         return self._seconds + max(0.0, self._machine.steady() - self._at)
 
     @property
-    def is_right(self) -> bool:
+    def is_wall_clock_trusted(self) -> bool:
         """Whether the wall clock can be trusted now."""
-        return self._trusted or self._machine.is_synchronized()
+        return self._trust_clock or self._machine.is_synchronized()
 
     def wall(self) -> float:
         """Return the wall clock, unix seconds."""
         return self._machine.wall()
 
-    def update(self) -> float:
-        """Compare with the wall clock; time without power counts once that clock can be trusted.
+    def add_off_time(self) -> float:
+        """Add the time without power, by the wall clock, once that can be trusted.
 
         Returns:
             The seconds by which the age clock was moved forward: sessions recorded since the machine is on
@@ -143,8 +143,11 @@ class AgeClock:
         """
         steady, wall = self._machine.steady(), self._machine.wall()
         difference, passed = wall - steady, steady - self._compared_at
-        is_right, jumped = self.is_right, abs(difference - self._difference) > _JUMP_S + _DRIFT * passed
-        if not is_right or jumped:
+        is_trusted, jumped = (
+            self.is_wall_clock_trusted,
+            abs(difference - self._difference) > _JUMP_S + _DRIFT * passed,
+        )
+        if not is_trusted or jumped:
             self._right_since = steady
         if jumped and self._agrees:  # the machine was not off: no time is added
             self._origin, self._agrees = None, False
@@ -152,9 +155,9 @@ class AgeClock:
         off_s = 0.0 if self._origin is None else wall - self._origin - self.now
         if off_s < _SHORTEST_OFF_S:
             self._last_warning = ""
-            if is_right:
+            if is_trusted:
                 self._origin, self._agrees, self.anchored = wall - self.now, True, self.now
-        elif not is_right:
+        elif not is_trusted:
             self._warn_once("unsynchronized", off_s)
         elif steady - self._right_since < _STABLE_S:
             self._warn_once("pending", off_s, wall + _STABLE_S - (steady - self._right_since))

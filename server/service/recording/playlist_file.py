@@ -37,16 +37,22 @@ def file_name(pulse: int) -> str:
 class RecordingPlaylist:
     """One stream's playlist, in memory (``index``) and on the disk.
 
-    ``cameras`` is the relative path to the folder of the cameras, ``header`` that to their init segment;
-    ``pulse0`` is when pulse 0 was due (unix seconds), None if not known.
+    ``cameras_folder`` is the relative path to the folder of the cameras, ``init_path`` that to their init
+    segment; ``pulse0`` is when pulse 0 was due (unix seconds), None if not known.
     """
 
     def __init__(
-        self, path: Path, cameras: str, header: str, fps: float, pulse0: float | None, longest_s: float
+        self,
+        path: Path,
+        cameras_folder: str,
+        init_path: str,
+        fps: float,
+        pulse0: float | None,
+        longest_s: float,
     ) -> None:
         self.path = path
-        self._header = header
-        self._cameras = cameras
+        self._init_path = init_path
+        self._cameras_folder = cameras_folder
         self._fps = fps
         self._pulse0 = pulse0
         self._longest_s = longest_s
@@ -69,10 +75,10 @@ class RecordingPlaylist:
         entries = self.index.all
         self._end = entries[-1].end if entries else None
 
-    def drop(self, files: Collection[int]) -> None:
+    def drop_segments(self, segments: Collection[int]) -> None:
         """Drop the entries of segments, by first pulse; the file on the disk becomes stale."""
-        if files:
-            self.is_stale |= self.index.drop(files)
+        if segments:
+            self.is_stale |= self.index.drop_segments(segments)
 
     def drop_files(self, missing: Collection[tuple[str, int]]) -> None:
         """Drop the entries of files, by camera and first pulse, likewise; any thread may call it."""
@@ -130,7 +136,7 @@ class RecordingPlaylist:
             "#EXTM3U\n#EXT-X-VERSION:7\n"
             f"#EXT-X-TARGETDURATION:{math.ceil(longest)}\n"
             "#EXT-X-MEDIA-SEQUENCE:0\n#EXT-X-INDEPENDENT-SEGMENTS\n"
-            f'#EXT-X-MAP:URI="{self._header}"\n'
+            f'#EXT-X-MAP:URI="{self._init_path}"\n'
         )
         end = None
         for entry in entries:
@@ -159,7 +165,7 @@ class RecordingPlaylist:
         return (
             f"{gap}{date}#EXTINF:{entry.frames / self._fps:.6f},p{entry.first}+{entry.frames}\n"
             f"#EXT-X-BYTERANGE:{entry.length}@{entry.offset}\n"
-            f"{self._cameras}{entry.camera}/{file_name(entry.file)}\n"
+            f"{self._cameras_folder}{entry.camera}/{file_name(entry.file)}\n"
         )
 
 

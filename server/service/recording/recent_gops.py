@@ -52,30 +52,30 @@ class RecentGops:
 
     def _complete(self, number: int, choices: GopChoices) -> RecordedGop | None:
         camera = choices.choices.get(number)
-        gop = None if camera is None else self.arrived(camera, choices.first, choices.frames)
+        gop = None if camera is None else self.arrived_until_gap(camera, choices.first, choices.frames)
         return gop if gop is not None and len(gop.fragments) == choices.frames else None
 
     def of_camera(self, camera: str, pulse: int) -> RecordedGop | None:
-        """Return the frames that arrived of a camera's GOP that holds a pulse, or of the next one."""
+        """Return a camera's GOP that holds a pulse, or the next one, up to its first missing frame."""
         frame_buffer = self._frame_buffers[camera]
         earliest = max(pulse, frame_buffer.newest - self._frames)
         for first in range(earliest // self._gop * self._gop, frame_buffer.newest + 1, self._gop):
-            gop = self.arrived(camera, first, self._gop)
+            gop = self.arrived_until_gap(camera, first, self._gop)
             if gop is not None and gop.end > pulse:
                 return gop
         return None
 
-    def of_camera_before(self, camera: str, pulse: int) -> RecordedGop | None:
+    def of_camera_until(self, camera: str, pulse: int) -> RecordedGop | None:
         """Return a camera's last GOP that begins before a pulse, cut there; None if there is none."""
         newest = self._frame_buffers[camera].newest
         begin = (min(pulse, newest + 1) - 1) // self._gop * self._gop
         for first in range(begin, max(-1, newest - self._frames), -self._gop):
-            gop = self.arrived(camera, first, self._gop)
+            gop = self.arrived_until_gap(camera, first, self._gop)
             if gop is not None:
                 return RecordedGop(gop.first, gop.fragments[: pulse - gop.first])
         return None
 
-    def arrived(self, camera: str, first: int, frames: int) -> RecordedGop | None:
+    def arrived_until_gap(self, camera: str, first: int, frames: int) -> RecordedGop | None:
         """Return a camera's frames of a GOP up to the first missing one; None if there are none."""
         fragments: list[bytes] = []
         for pulse in range(first, first + frames):

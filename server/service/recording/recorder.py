@@ -17,12 +17,12 @@ from server.service.recording.recent_gops import RecentGops
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.retention import RetentionLimits
-from server.service.recording.session_files import InitSegments, SessionInfo
+from server.service.recording.session_files import InitSegments, RecordingSessionInfo
 from server.service.recording.writer_thread import WriterThread
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.system.errors import UserError
-from server.system.private_files import rights_of_others
+from server.system.private_files import mode_if_shared
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ class Recorder:
             self.folder = folder = RecordingFolder(record.folder, limits)
             max_queued = max(4, frames // config.encode.gop)  # no more than the frame buffers hold anyway
             self.writer = WriterThread(
-                self._write, folder.abandon, folder.close, max_queued, where=str(record.folder)
+                self._write, folder.abandon_segment, folder.close, max_queued, where=str(record.folder)
             )
 
     def open(self) -> None:
@@ -83,7 +83,7 @@ class Recorder:
             ) from error
         self.writer.start()
         log.info("recording to %s", self.folder.folder)
-        if mode := rights_of_others(self.folder.folder):
+        if mode := mode_if_shared(self.folder.folder):
             log.warning(
                 "record.folder: %s has mode %s: others on this machine may see when it was recorded, "
                 "not what; chmod 700 closes it",
@@ -121,7 +121,7 @@ class Recorder:
     def _queue_oldest(self, writer: WriterThread) -> None:
         choices = self._pending.popleft()
         arrived = {
-            camera: self.recent.arrived(camera, choices.first, choices.frames)
+            camera: self.recent.arrived_until_gap(camera, choices.first, choices.frames)
             for camera in self._config.camera_ids
         }
         cameras = {camera: gop for camera, gop in arrived.items() if gop is not None}
@@ -135,7 +135,7 @@ class Recorder:
         return None if self.folder is None else self.folder.session
 
     @property
-    def sessions(self) -> list[RecordingSession]:
+    def compatible_sessions(self) -> list[RecordingSession]:
         """This session and the earlier ones of the same pulses and parameter sets, the oldest first."""
         if self.folder is None:
             return []
@@ -148,17 +148,21 @@ class Recorder:
 
     @property
     def sessions_with_same_persons(self) -> list[RecordingSession]:
-        """Those of :attr:`sessions` in which person numbers mean the same persons as now."""
+        """Those of :attr:`compatible_sessions` in which person numbers mean the same persons as now."""
         return [
-            session for session in self.sessions if session is self.session or self._has_same_persons(session)
+            session
+            for session in self.compatible_sessions
+            if session is self.session or self._has_same_persons(session)
         ]
 
     @property
     def sessions_with_same_audio(self) -> list[RecordingSession]:
-        """Those of :attr:`sessions` with the audio format of this site."""
+        """Those of :attr:`compatible_sessions` with the audio format of this site."""
         init = self._init
         return (
-            [] if init is None else [session for session in self.sessions if session.init.audio == init.audio]
+            []
+            if init is None
+            else [session for session in self.compatible_sessions if session.init.audio == init.audio]
         )
 
     def _has_same_persons(self, session: RecordingSession) -> bool:
@@ -198,7 +202,7 @@ class Recorder:
         parameters, init, site = self._stream_format.parameters, self._init, self._config.site
         if self.folder is None or parameters is None or init is None:
             return
-        info = SessionInfo(
+        info = RecordingSessionInfo(
             site=site.name,
             fps=site.fps,
             width=site.width,

@@ -24,8 +24,8 @@ from server.service.recording.media_files import RecordedGop, is_same_file
 from server.service.recording.recording_session import RecordingSegment, RecordingSession
 from server.service.recording.retention import SEGMENTS_PER_DISK_QUOTA, RetentionLimits, RetentionPolicy
 from server.service.recording.segment_writer import SegmentWriter
-from server.service.recording.session_discovery import assign_age, find_sessions
-from server.service.recording.session_files import InitSegments, SessionInfo, remove_session_files
+from server.service.recording.session_discovery import assign_age, load_and_clean_sessions
+from server.service.recording.session_files import InitSegments, RecordingSessionInfo, remove_session_files
 from server.system.private_files import make_private_folder, open_private
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ class RecordingFolder:
 
     def __init__(self, folder: Path, limits: RetentionLimits, machine: MachineClocks = _MACHINE) -> None:
         self.folder, self._limits = folder, limits
-        self._clock = AgeClock(folder, machine, trusted=limits.trust_clock)
+        self._clock = AgeClock(folder, machine, trust_clock=limits.trust_clock)
         self._retention = RetentionPolicy(limits, lambda: self._clock.now)
         self._lock: int | None = None
         self.earlier: list[RecordingSession] = []
@@ -73,14 +73,14 @@ class RecordingFolder:
         self._lock_folder()
         self._apply_retention()
 
-    def write(self, record: GopRecord, info: SessionInfo, init: InitSegments) -> None:
+    def write(self, record: GopRecord, info: RecordingSessionInfo, init: InitSegments) -> None:
         """Write a GOP; ``info`` and ``init`` are for a new session, if one begins with it.
 
         If the session cannot be continued, for another reason than a lack of space, a new one begins: its
         folder may have been removed, made unwritable, or be on a disk that is no longer mounted.
 
         Raises:
-            OSError: writing fails; the caller must call :meth:`abandon`.
+            OSError: writing fails; the caller must call :meth:`abandon_segment`.
         """
         first = record.choices.first
         self._check_folder()
@@ -99,8 +99,8 @@ class RecordingFolder:
             self._check_folder()
             self._append(record, info, init)
 
-    def abandon(self) -> None:
-        """Abandon a segment that could not be continued; its files stay."""
+    def abandon_segment(self) -> None:
+        """Abandon the open segment, which could not be continued; its files stay."""
         ended, self._open = self._open, None
         session = self.session
         try:
@@ -113,7 +113,7 @@ class RecordingFolder:
         finally:
             if session is not None and not session.segments:
                 self.session = None
-                session.remove()
+                session.remove_files()
 
     def close(self) -> None:
         """End the session, and rewrite its playlists."""
@@ -149,16 +149,16 @@ class RecordingFolder:
 
     def _find_sessions(self) -> None:
         """Drop sessions that do not exist any more, and add those that were not known."""
-        sessions = [session for session in self.earlier if session.exists]
-        current = self.session if self.session is not None and self.session.exists else None
+        sessions = [session for session in self.earlier if session.is_loadable]
+        current = self.session if self.session is not None and self.session.is_loadable else None
         known = {session.folder for session in (*sessions, current) if session is not None}
-        discovered = find_sessions(self.folder, known, self._limits.segment_s)
+        discovered = load_and_clean_sessions(self.folder, known, self._limits.segment_s)
         if not known:  # else the age clock is running
             self._clock.open()
         for session in discovered:
             if session.info.age_clock != self._clock.id:
                 assign_age(session, self._clock)
-            session.date_segments(self._clock.now)
+            session.set_written_times(self._clock.now)
         self.earlier = sorted(
             [*sessions, *discovered],
             key=lambda session: session.segments[-1].written if session.segments else 0.0,
@@ -172,7 +172,7 @@ class RecordingFolder:
         """
         if self._lock is None or not is_same_file(self._lock, self.folder / _LOCK):
             self._lock_folder()
-        if self.session is not None and not self.session.exists:
+        if self.session is not None and not self.session.is_loadable:
             self._leave_session("it does not exist any more")
 
     def _leave_session(self, reason: str) -> None:
@@ -183,25 +183,25 @@ class RecordingFolder:
                 "recording: cannot continue in %s: %s%s; starting a new folder", session.folder, reason, more
             )
         with contextlib.suppress(OSError):
-            self.abandon()
+            self.abandon_segment()
         if session is None or self.session is None:
             return
         self.session = None
         if not session.is_in_place:
             return
         with contextlib.suppress(OSError):
-            session.forget_missing()
+            session.forget_missing_entries()
         session.recount()
         if not session.segments:
-            session.remove()
+            session.remove_files()
             return
-        session.rewrite_playlists()
-        if not session.exists:
+        session.rewrite_stale_playlists()
+        if not session.is_loadable:
             with contextlib.suppress(OSError):
                 session.restore_info()
         self.earlier = [*self.earlier, session]
 
-    def _append(self, record: GopRecord, info: SessionInfo, init: InitSegments) -> None:
+    def _append(self, record: GopRecord, info: RecordingSessionInfo, init: InitSegments) -> None:
         first, now = record.choices.first, self._clock.now
         if self._begins_session(first):
             dated_info = msgspec.structs.replace(
@@ -222,7 +222,7 @@ class RecordingFolder:
         """Return whether a GOP begins a session: the pulses may have started again."""
         return self.session is None or first < self._end
 
-    def _begin_session(self, info: SessionInfo, init: InitSegments, first: int) -> None:
+    def _begin_session(self, info: RecordingSessionInfo, init: InitSegments, first: int) -> None:
         name = datetime.fromtimestamp(info.started, UTC).strftime("%Y%m%dT%H%M%SZ")
         existing = {path.name for path in self.folder.glob(f"{name}*")}
         if name in existing:
@@ -256,9 +256,9 @@ class RecordingFolder:
             return
         for playlist in self._open.playlists:
             playlist.is_stale = True
-        self.abandon()
+        self.abandon_segment()
         if self.session is not None:
-            self.session.rewrite_playlists()
+            self.session.rewrite_stale_playlists()
 
     def _apply_retention(self) -> None:
         """Delete what is too old, and as much of the oldest as one more segment needs.
@@ -270,16 +270,16 @@ class RecordingFolder:
         self._retention.delete_expired(sessions)
         for session in self.earlier:
             if not session.segments:
-                session.remove()
+                session.remove_files()
         self.earlier = [session for session in self.earlier if session.segments]
         self._closed_bytes = sum(session.size for session in sessions)
 
     def _update_age_clock(self) -> None:
         """Count the time that the machine was off, once it is known; newer sessions do not age by it."""
         anchored = self._clock.anchored
-        if (off_s := self._clock.update()) > 0:
+        if (off_s := self._clock.add_off_time()) > 0:
             for session in (*self.earlier, *([self.session] if self.session else [])):
-                if session is self.session or session.started >= anchored:
+                if session is self.session or session.age_clock_at_start >= anchored:
                     session.make_younger(off_s)
         with contextlib.suppress(OSError):  # a restart continues from what was written last
             self._clock.save()

@@ -18,8 +18,8 @@ from server.service.recording.session_files import (
     INIT_FILE,
     MISSING,
     InitSegments,
-    SessionInfo,
-    SessionInfoFile,
+    RecordingSessionInfo,
+    RecordingSessionInfoFile,
     SessionPaths,
     file_size,
     is_missing,
@@ -48,7 +48,7 @@ class RecordingSession:
     """
 
     def __init__(
-        self, folder: Path, info_file: SessionInfoFile, init: InitSegments, longest_s: float
+        self, folder: Path, info_file: RecordingSessionInfoFile, init: InitSegments, longest_s: float
     ) -> None:
         self.folder, self.init = folder, init
         self._info_file = info_file
@@ -59,16 +59,16 @@ class RecordingSession:
         self.cameras = {
             camera: self._playlist(folder / "cameras" / f"{camera}.m3u8") for camera in self.info.cameras
         }
-        self.audio = self._playlist(folder / f"{AUDIO}.m3u8", header=f"{AUDIO}/{INIT_FILE}")
+        self.audio = self._playlist(folder / f"{AUDIO}.m3u8", init_path=f"{AUDIO}/{INIT_FILE}")
 
     @property
-    def info(self) -> SessionInfo:
+    def info(self) -> RecordingSessionInfo:
         """The content of ``session.json``."""
         return self._info_file.info
 
     @classmethod
     def create(
-        cls, folder: Path, info: SessionInfo, init: InitSegments, longest_s: float
+        cls, folder: Path, info: RecordingSessionInfo, init: InitSegments, longest_s: float
     ) -> RecordingSession:
         """Create the folder of a new session.
 
@@ -82,7 +82,7 @@ class RecordingSession:
         if init.audio:
             (folder / AUDIO).mkdir(mode=FOLDER)
             write_private(folder / AUDIO / INIT_FILE, init.audio)
-        return cls(folder, SessionInfoFile.create(folder, info), init, longest_s)
+        return cls(folder, RecordingSessionInfoFile.create(folder, info), init, longest_s)
 
     @classmethod
     def load(cls, folder: Path, longest_s: float) -> RecordingSession:
@@ -91,7 +91,7 @@ class RecordingSession:
         Raises:
             OSError, msgspec.DecodeError: the folder does not hold a session.
         """
-        info_file = SessionInfoFile.load(folder)
+        info_file = RecordingSessionInfoFile.load(folder)
         init = SessionPaths(folder, info_file.info.cameras).init_segments()
         session = cls(folder, info_file, init, longest_s)
         for playlist in (*session.cameras.values(), session.audio):
@@ -105,7 +105,7 @@ class RecordingSession:
         session.recount()
         existing = {segment.first for segment in session.segments}
         for playlist in session._playlists:  # files may have been deleted since it was written
-            playlist.drop({entry.file for entry in playlist.index.all} - existing)
+            playlist.drop_segments({entry.file for entry in playlist.index.all} - existing)
         with contextlib.suppress(OSError):  # drafts of a process that was killed
             for draft in (*folder.rglob("*.new"), folder / f".{INFO_FILE}"):
                 draft.unlink(missing_ok=True)
@@ -139,14 +139,14 @@ class RecordingSession:
         ]
         return max([*ends, *(segment.first for segment in self.segments[-1:])], default=0)
 
-    def date_segments(self, now: float) -> None:
+    def set_written_times(self, now: float) -> None:
         """Set when segments were written from the age clock at their pulses, but not later than ``now``."""
         ends = [*(segment.first for segment in self.segments[1:]), self.end]
         for segment, end in zip(self.segments, ends, strict=True):
             segment.written = min(now, self.info.age_clock_at_pulse0 + end / self.info.fps)
 
     @property
-    def started(self) -> float:
+    def age_clock_at_start(self) -> float:
         """The age clock at the beginning of the oldest segment that is left."""
         first = self.segments[0].first if self.segments else self.end
         return self.info.age_clock_at_pulse0 + first / self.info.fps
@@ -164,9 +164,9 @@ class RecordingSession:
         return self._info_file.is_folder_in_place
 
     @property
-    def exists(self) -> bool:
+    def is_loadable(self) -> bool:
         """Whether the folder is in place with its ``session.json``, so that a restart finds it."""
-        return self._info_file.exists
+        return not self._info_file.is_missing
 
     def recount(self) -> None:
         """Recount the bytes of all segments, and forget segments without any file."""
@@ -198,7 +198,7 @@ class RecordingSession:
         except MISSING:
             return False
 
-    def forget_missing(self) -> None:
+    def forget_missing_entries(self) -> None:
         """Drop playlist entries whose files are not on the disk any more; any thread may call it.
 
         Segments stay: their files may appear again, and must then be deleted later.
@@ -238,12 +238,12 @@ class RecordingSession:
             self.objects[number] = self._playlist(path, "../cameras/", f"../cameras/{INIT_FILE}")
         return self.objects[number]
 
-    def index_files(self, start: int, end: int) -> list[Path]:
+    def decision_files(self, start: int, end: int) -> list[Path]:
         """Return the decision files that may cover pulses ``start … end - 1``, in order."""
         firsts = [segment.first for segment in tuple(self.segments)]
         nexts = [*firsts[1:], None]
         return [
-            self.paths.index_file(first)
+            self.paths.decision_file(first)
             for first, following in zip(firsts, nexts, strict=True)
             if first < end and (following is None or following > start)
         ]
@@ -259,7 +259,7 @@ class RecordingSession:
         """
         firsts = {segment.first for segment in segments}
         for playlist in self._playlists:
-            playlist.drop(firsts)
+            playlist.drop_segments(firsts)
         stuck: set[int] = set()
         failed: OSError | None = None
         for first in sorted(firsts):
@@ -275,11 +275,11 @@ class RecordingSession:
         ]
         for segment in self.segments:
             segment.is_stuck = segment.first in stuck or segment.is_stuck
-        self.rewrite_playlists()
+        self.rewrite_stale_playlists()
         if failed is not None:
             raise failed
 
-    def rewrite_playlists(self) -> None:
+    def rewrite_stale_playlists(self) -> None:
         """Rewrite the stale playlists; one that cannot be written stays stale."""
         for playlist in self._playlists:
             if playlist.is_stale:
@@ -291,10 +291,13 @@ class RecordingSession:
             if playlist.index.all or playlist.is_stale
         }
 
-    def remove(self) -> None:
+    def remove_files(self) -> None:
         """Remove the session's files, and its folder if nothing else is in it; only if it is in place."""
         if self.is_in_place:
             remove_session_files(self.folder)
 
-    def _playlist(self, path: Path, cameras: str = "", header: str = INIT_FILE) -> RecordingPlaylist:
-        return RecordingPlaylist(path, cameras, header, self.info.fps, self.info.pulse0, self._longest_s)
+    def _playlist(
+        self, path: Path, cameras_folder: str = "", init_path: str = INIT_FILE
+    ) -> RecordingPlaylist:
+        info = self.info
+        return RecordingPlaylist(path, cameras_folder, init_path, info.fps, info.pulse0, self._longest_s)

@@ -73,11 +73,11 @@ class SegmentIndex:
             else:
                 self._entries.append(new)
 
-    def drop(self, files: Collection[int]) -> bool:
+    def drop_segments(self, segments: Collection[int]) -> bool:
         """Remove the entries of segments, by first pulse; return whether there were any."""
         with self._lock:
             before = len(self._entries)
-            self._entries = [entry for entry in self._entries if entry.file not in files]
+            self._entries = [entry for entry in self._entries if entry.file not in segments]
             return len(self._entries) < before
 
     def drop_files(self, missing: Collection[tuple[str, int]]) -> bool:

@@ -32,7 +32,7 @@ class SegmentWriter:
         self._session, self._init = session, init
         self._files: dict[Path, MediaFile] = {}
         self._playlists: dict[str, RecordingPlaylist] = {}
-        self._index_path = session.paths.index_file(segment.first)
+        self._index_path = session.paths.decision_file(segment.first)
         self._index = open_private(self._index_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
         self._index_bytes = 0
 

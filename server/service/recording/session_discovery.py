@@ -19,7 +19,9 @@ log = logging.getLogger(__name__)
 _FOLDER_NAME = re.compile(r"[0-9]{8}T[0-9]{6}Z(-[0-9]+)?")
 
 
-def find_sessions(folder: Path, known: Collection[Path], longest_s: float) -> list[RecordingSession]:
+def load_and_clean_sessions(
+    folder: Path, known: Collection[Path], longest_s: float
+) -> list[RecordingSession]:
     """Return the sessions in a folder that are not known yet; remains of sessions without media are removed.
 
     ``longest_s`` is the longest duration of a segment.
@@ -54,8 +56,8 @@ def assign_age(session: RecordingSession, clock: AgeClock) -> None:
     files if the machine's clock is right; else it is unknown, and they count as new.
     """
     age = 0.0
-    if clock.is_right:
-        written = [_modified(session.paths.index_file(segment.first)) for segment in session.segments]
+    if clock.is_wall_clock_trusted:
+        written = [_modified(session.paths.decision_file(segment.first)) for segment in session.segments]
         age = max(0.0, clock.wall() - max(written, default=0.0))
     with contextlib.suppress(OSError):  # then it is dated again next time
         session.set_age_clock(clock.id, clock.now - age - session.end / session.info.fps)

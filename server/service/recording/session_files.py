@@ -3,7 +3,7 @@
 Pulses and person numbers may start again with the service, so every session has a folder of its own.
 
 =========================================  ================================================================
-``SESSION/session.json``                   :class:`SessionInfo`
+``SESSION/session.json``                   :class:`RecordingSessionInfo`
 ``SESSION/cameras/init.mp4``               the init segment of the cameras' files
 ``SESSION/cameras/c0/000000001250.mp4``    a camera's frames from pulse 1250 on
 ``SESSION/cameras/c0.m3u8``                the playlist of that camera
@@ -47,7 +47,7 @@ CameraName = Annotated[str, msgspec.Meta(pattern=rf"^{CAMERA_PATTERN}\Z")]
 """Camera names are part of paths: the pattern keeps a damaged file from leading out of the folder."""
 
 
-class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
+class RecordingSessionInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The content of ``session.json``: what holds for a whole session."""
 
     site: str
@@ -95,14 +95,14 @@ class SessionPaths:
         """Return the file of the audio from a pulse on."""
         return self.folder / AUDIO / file_name(first)
 
-    def index_file(self, first: int) -> Path:
+    def decision_file(self, first: int) -> Path:
         """Return the file of the decisions from a pulse on."""
         return (self.folder / "index" / file_name(first)).with_suffix(".jsonl")
 
     def segment_files(self, first: int) -> list[Path]:
         """Return all files of a segment; there is none of a camera that was disconnected."""
         cameras = (self.camera_file(camera, first) for camera in self.cameras)
-        return [*cameras, self.audio_file(first), self.index_file(first)]
+        return [*cameras, self.audio_file(first), self.decision_file(first)]
 
     def segment_starts(self) -> set[int]:
         """Return the first pulses of the segments on the disk, from the names of their files."""
@@ -196,17 +196,17 @@ def _read(path: Path) -> bytes:
         return b""
 
 
-class SessionInfoFile:
+class RecordingSessionInfoFile:
     """The ``session.json`` of a session's folder, which makes a restart find the session."""
 
-    def __init__(self, folder: Path, info: SessionInfo) -> None:
+    def __init__(self, folder: Path, info: RecordingSessionInfo) -> None:
         self.info = info
         self._folder = folder
         self._identity = identity_of(folder)
         self._bytes = file_size(folder / INFO_FILE)
 
     @classmethod
-    def create(cls, folder: Path, info: SessionInfo) -> SessionInfoFile:
+    def create(cls, folder: Path, info: RecordingSessionInfo) -> RecordingSessionInfoFile:
         """Write the file of a new session.
 
         Raises:
@@ -216,15 +216,15 @@ class SessionInfoFile:
         return cls(folder, info)
 
     @classmethod
-    def load(cls, folder: Path) -> SessionInfoFile:
+    def load(cls, folder: Path) -> RecordingSessionInfoFile:
         """Read the file of an existing session.
 
         Raises:
             OSError, msgspec.DecodeError: the folder does not hold a session.
         """
-        return cls(folder, msgspec.json.decode((folder / INFO_FILE).read_bytes(), type=SessionInfo))
+        return cls(folder, msgspec.json.decode((folder / INFO_FILE).read_bytes(), type=RecordingSessionInfo))
 
-    def write(self, info: SessionInfo) -> None:
+    def write(self, info: RecordingSessionInfo) -> None:
         """Replace the file.
 
         Raises:
@@ -246,15 +246,15 @@ class SessionInfoFile:
         return self._identity is not None and identity_of(self._folder) == self._identity
 
     @property
-    def exists(self) -> bool:
-        """Whether the file is there, in the same folder; True if that is not known."""
+    def is_missing(self) -> bool:
+        """Whether the file is certainly gone or replaced, or its folder is; False if that is not known."""
         try:
-            return self.is_folder_in_place and (self._folder / INFO_FILE).stat().st_size == self._bytes
+            return not self.is_folder_in_place or (self._folder / INFO_FILE).stat().st_size != self._bytes
         except MISSING:
-            return False
-        except OSError:
             return True
+        except OSError:
+            return False
 
 
-def _encode(info: SessionInfo) -> bytes:
+def _encode(info: RecordingSessionInfo) -> bytes:
     return msgspec.json.format(msgspec.json.encode(info)) + b"\n"

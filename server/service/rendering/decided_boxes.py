@@ -58,10 +58,12 @@ class DecidedBoxes:
         choices = self._decision_of(fragments)
         return NO_OVERLAY if choices is None else GopOverlay(choices.first, choices.boxes.get(camera, []))
 
-    def overlay_of_person(self, number: int, fragments: bytes, *, scoped: bool = False) -> GopOverlay:
+    def overlay_of_person(
+        self, number: int, fragments: bytes, *, scoped_to_person: bool = False
+    ) -> GopOverlay:
         """Return all boxes in a GOP of a person's stream, and the number that the person had in it.
 
-        ``scoped``: only the person's own boxes, by any of their numbers.
+        ``scoped_to_person``: only the person's own boxes, by any of their numbers.
         """
         choices = self._decision_of(fragments)
         if choices is None:
@@ -71,7 +73,7 @@ class DecidedBoxes:
         if camera is None:
             return NO_OVERLAY
         boxes = choices.boxes.get(camera, [])
-        if scoped:
+        if scoped_to_person:
             person = self._resolve(number)
             boxes = [[box for box in frame if self._resolve(box[0]) == person] for frame in boxes]
         return GopOverlay(choices.first, boxes, chosen)

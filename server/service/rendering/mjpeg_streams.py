@@ -18,7 +18,7 @@ class PicturePacer:
         self._zero: float | None = None
         """When pulse 0 was due."""
 
-    def due(self, pulse: int, now: float) -> float:
+    def schedule(self, pulse: int, now: float) -> float:
         """Return when to show a picture, in seconds of the clock of ``now``, at the rate of the pulses.
 
         A picture that is late is shown now, and later ones are delayed as much. One that would have to wait
@@ -112,7 +112,7 @@ class MjpegStreams:
         ]
         for picture, boxed in sorted(pictures, key=lambda pair: pair[0].pulse):
             if picture.pulse > self._newest:
-                at = now if self._live else self._pacer.due(picture.pulse, now)
+                at = now if self._live else self._pacer.schedule(picture.pulse, now)
                 self._scheduled.append(_ScheduledPicture(at, picture, boxed))
         self._newest = max(self._newest, result.newest)
 

@@ -29,13 +29,13 @@ class RenderPoolFullError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class PersonView:
-    """A person's best view; ``scoped``: for viewers with access to that person alone."""
+    """A person's best view; ``scoped_to_person``: for viewers with access to that person alone."""
 
     number: int
-    scoped: bool = False
+    scoped_to_person: bool = False
 
     def __str__(self) -> str:
-        return f"object {self.number}{' scoped' * self.scoped}"
+        return f"object {self.number}{' scoped' * self.scoped_to_person}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,9 +179,9 @@ class RenderPool:
         splicer, decided = self._pipeline.splicer, self._decided
         overlay_of: Callable[[bytes], GopOverlay]
         match subject:
-            case PersonView(number, scoped):
-                broadcaster = (splicer.scoped_persons if scoped else splicer.persons)[number]
-                overlay_of = partial(decided.overlay_of_person, number, scoped=scoped)
+            case PersonView(number, scoped_to_person):
+                broadcaster = (splicer.scoped_persons if scoped_to_person else splicer.persons)[number]
+                overlay_of = partial(decided.overlay_of_person, number, scoped_to_person=scoped_to_person)
             case CameraView(camera, decided=True):
                 broadcaster = splicer.decided_cameras[camera]
                 overlay_of = partial(decided.overlay_of_camera, camera)
@@ -197,7 +197,7 @@ class RenderPool:
             queue_gops=self._queue_gops,
             audio_buffer=self._pipeline.audio_buffer,
             # The person may not have been present in a gap.
-            mute_gaps=isinstance(subject, PersonView) and subject.scoped,
+            mute_gaps=isinstance(subject, PersonView) and subject.scoped_to_person,
         )
 
     def _end(self, subject: Subject, running: _RunningStream) -> None:

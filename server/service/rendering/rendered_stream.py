@@ -24,7 +24,7 @@ from server.service.streaming.subscriber_queue import Chunk, Subscriber
 
 @dataclass(slots=True)
 class _StillRequest:
-    pulse: int
+    earliest: int
     done: asyncio.Event
     picture: JpegPicture | None = None
 
@@ -38,21 +38,21 @@ class StillRequests:
         """Set when a request arrives or a new frame may answer one; the reader clears it."""
         self._closed = False
 
-    async def get(self, kind: StillKind, pulse: int) -> JpegPicture | None:
-        """Return a picture of this frame or a newer one, once there is one; None: the stream has ended."""
+    async def get(self, kind: StillKind, earliest: int) -> JpegPicture | None:
+        """Return a picture of frame ``earliest`` or a newer one, as soon as there is one; None: the end."""
         while not self._closed:
             request = self._requests.get(kind)
             if request is None:
-                request = self._requests[kind] = _StillRequest(pulse, asyncio.Event())
+                request = self._requests[kind] = _StillRequest(earliest, asyncio.Event())
             self.changed.set()
             await request.done.wait()
-            if request.picture is None or request.picture.pulse >= pulse:
+            if request.picture is None or request.picture.pulse >= earliest:
                 return request.picture  # an older picture answered an earlier request
         return None
 
     def answerable(self, newest: int) -> list[StillKind]:
         """Return the kinds that can be answered when ``newest`` is the newest frame."""
-        return [kind for kind, request in self._requests.items() if request.pulse <= newest]
+        return [kind for kind, request in self._requests.items() if request.earliest <= newest]
 
     def answer(self, kind: StillKind, picture: JpegPicture | None) -> None:
         """Answer all requests of a kind."""
@@ -140,8 +140,8 @@ class RenderedStream:
             self._has_users.clear()
             self._reset_outputs()
 
-    async def still(self, kind: StillKind, pulse: int) -> JpegPicture:
-        """Return a picture of this frame or a newer one.
+    async def still(self, kind: StillKind, earliest: int) -> JpegPicture:
+        """Return a picture of frame ``earliest`` or a newer one.
 
         Raises:
             PictureTimeoutError: none was rendered in time.
@@ -149,7 +149,7 @@ class RenderedStream:
         with contextlib.suppress(TimeoutError):
             await self._wait_until_ready()
             async with asyncio.timeout(_PICTURE_TIMEOUT_S):
-                picture = await self._stills.get(kind, pulse)
+                picture = await self._stills.get(kind, earliest)
                 if picture is not None:
                     return picture
         raise PictureTimeoutError
@@ -229,7 +229,7 @@ class RenderedStream:
                 await asyncio.gather(*tasks, return_exceptions=True)
             finally:
                 self._is_ready.clear()
-                await worker.end()
+                await worker.kill()
                 self.pid = None
 
     async def _watch(self, worker: RenderWorker) -> NoReturn:

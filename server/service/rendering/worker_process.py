@@ -30,7 +30,7 @@ class WorkerDiedError(Exception):
 
 
 class RenderWorker:
-    """A running worker process; the caller of :meth:`start` calls :meth:`end`."""
+    """A running worker process; the caller of :meth:`start` calls :meth:`kill`."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         assert process.stdin is not None  # noqa: S101 — tells mypy that there are pipes
@@ -81,7 +81,7 @@ class RenderWorker:
     async def render(self, request: RenderRequest) -> RenderResult:
         """Send a request and return the answer; requests are answered one at a time.
 
-        A caller that is cancelled must end the worker: the next caller would read its answer.
+        A caller that is cancelled must kill the worker: the next caller would read its answer.
 
         Raises:
             WorkerDiedError: there is no valid answer; the worker must be replaced.
@@ -110,7 +110,7 @@ class RenderWorker:
         await self._process.wait()
         raise WorkerDiedError("died")
 
-    async def end(self) -> None:
+    async def kill(self) -> None:
         """Kill the process, which has nothing to save, and wait until it is gone."""
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()

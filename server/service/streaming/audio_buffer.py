@@ -59,10 +59,10 @@ class AudioBuffer:
         """Return a frame; None if it has not arrived or is no longer kept."""
         return self._frames.get(number)
 
-    def audio_so_far(self, begin: int, end: int, late: int) -> AudioChunk:
-        """Return the frames from ``begin`` on, up to the first missing one that is not before ``late``."""
+    def audio_so_far(self, begin: int, end: int, silent_before: int) -> AudioChunk:
+        """Return frames from ``begin`` to the first missing one; before ``silent_before`` it is silence."""
         at = begin
-        while at < end and (at in self._frames or at < late):
+        while at < end and (at in self._frames or at < silent_before):
             at += 1
         return self._audio(begin, at)
 
@@ -86,7 +86,7 @@ class AudioFollower:
         second = audio_format.rate / audio_format.samples
         if self._next is None or not -_RESTART_S * second <= begin - self._next <= LONGEST_GAP_S * second:
             self._next = begin
-        late = end - buffer.max_late_frames
-        audio = buffer.audio_so_far(self._next, end, late)
+        silent_before = end - buffer.max_late_frames
+        audio = buffer.audio_so_far(self._next, end, silent_before)
         self._next += len(audio.frames)
         return audio

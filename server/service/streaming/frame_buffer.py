@@ -7,7 +7,7 @@ from server.media.picture import EncodedPicture
 from server.media.stream_format import StreamFormat
 
 
-class UndecodableFrameError(ValueError):
+class DamagedFrameError(ValueError):
     """An access unit without a picture, or without the frame number that decoding needs."""
 
 
@@ -32,7 +32,7 @@ class FrameBuffer:
 
         Raises:
             ParameterMismatchError: its parameter sets are not the site's, and the camera must be refused.
-            UndecodableFrameError: it is damaged; nothing is stored.
+            DamagedFrameError: it is damaged; nothing is stored.
         """
         if key:
             self._parameters = self._stream_format.accept(access_unit)
@@ -40,14 +40,14 @@ class FrameBuffer:
         picture = EncodedPicture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
         gap_filler = self._stream_format.gap_filler(picture, self._fps)
         if gap_filler is not None and not gap_filler.can_follow(picture):
-            raise UndecodableFrameError(f"no picture can be read in the access unit of pulse {pulse}")
+            raise DamagedFrameError(f"no picture can be read in the access unit of pulse {pulse}")
         self._pictures[pulse] = picture
         self.newest = max(self.newest, pulse)
         while len(self._pictures) > self._max_frames:
             del self._pictures[next(iter(self._pictures))]
         return picture
 
-    def missing(self, first: int, frames: int) -> list[int]:
+    def lost(self, first: int, frames: int) -> list[int]:
         """Return which of ``first … first + frames - 1`` are missing between frames that arrived."""
         oldest = next(iter(self._pictures), self.newest + 1)
         pulses = range(max(first, oldest), min(first + frames, self.newest + 1))
@@ -64,7 +64,3 @@ class FrameBuffer:
     def pictures(self, first: int, frames: int) -> list[EncodedPicture]:
         """Return the frames of ``first … first + frames - 1`` that are in the buffer."""
         return [self._pictures[pulse] for pulse in range(first, first + frames) if pulse in self._pictures]
-
-    def gop(self, first: int, frames: int) -> bytes:
-        """Return the joined fragments of consecutive frames, all of which must be in the buffer."""
-        return b"".join(self._pictures[pulse].fragment for pulse in range(first, first + frames))

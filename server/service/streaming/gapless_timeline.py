@@ -56,7 +56,7 @@ class GaplessTimeline:
             return self.fill(picture.until)
         return self._fill_before(picture) + self._show(picture)
 
-    def advance_past(self, last: EncodedPicture) -> None:
+    def record_shown(self, last: EncodedPicture) -> None:
         """Record that a complete GOP with this last picture was shown: there is no gap to fill."""
         self._show(last)
 

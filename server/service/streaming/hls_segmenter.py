@@ -210,7 +210,7 @@ class HlsSegmenter:
             return self.until >= (number + 1) * frames
         return self.until >= number * frames + min((index + 1) * gop, frames + gop)
 
-    def get(self, number: int) -> HlsSegment | None:
+    def listed_segment(self, number: int) -> HlsSegment | None:
         """Return a segment that is or was in the playlist."""
         segment = self._segments.get(number)
         return segment if segment is not None and self._is_listed(segment) else None

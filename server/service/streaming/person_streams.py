@@ -6,26 +6,26 @@ from collections.abc import Callable, Collection, Mapping
 
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.hls_segmenter import HlsSegmenter
-from server.service.streaming.presence import Presence
+from server.service.streaming.presence import ScopedPicture
 from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 
-PresenceLookup = Callable[[int], Presence]
+ScopedPictureLookup = Callable[[int], ScopedPicture]
 """Returns what the newest GOP may show of a person."""
 
 
-def always_present(number: int) -> Presence:
-    """Return that the person is present: the best view is shown."""
+def always_shown(number: int) -> ScopedPicture:
+    """Return that the best view is shown, whoever it is."""
     del number
-    return Presence.PRESENT
+    return ScopedPicture.SHOWN
 
 
 class PersonStreams:
-    """Shows every person from their chosen camera; ``presence`` returns whether they may be shown."""
+    """Shows every person from their chosen camera; ``picture_of`` returns whether they may be shown."""
 
     def __init__(
-        self, new_stream: Callable[[], SplicedStream], presence: PresenceLookup = always_present
+        self, new_stream: Callable[[], SplicedStream], picture_of: ScopedPictureLookup = always_shown
     ) -> None:
-        self._new_stream, self._presence = new_stream, presence
+        self._new_stream, self._picture_of = new_stream, picture_of
         self._streams: dict[int, SplicedStream] = {}
         self._ended: dict[int, SplicedStream] = {}
         """Recently ended streams: HLS players still fetch their last segments."""
@@ -37,11 +37,11 @@ class PersonStreams:
             if number not in self._streams:
                 stream = self._streams[number] = self._new_stream()
                 self.broadcasters[number] = stream.broadcaster
-            self._streams[number].show(camera, gop, self._presence(number))
+            self._streams[number].show(camera, gop, self._picture_of(number))
         # The stream of a number that was merged into another continues with that person.
         for lost, kept in merged.items():
             if lost in self._streams and kept in cameras and lost not in cameras:
-                self._streams[lost].show(cameras[kept], gop, self._presence(kept))
+                self._streams[lost].show(cameras[kept], gop, self._picture_of(kept))
 
     def forget(self, known: Collection[int]) -> None:
         """End the streams of persons that are not known any more."""

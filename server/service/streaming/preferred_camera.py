@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from server.service.streaming.broadcaster import Broadcaster
-from server.service.streaming.person_streams import PresenceLookup, always_present
+from server.service.streaming.person_streams import ScopedPictureLookup, always_shown
 from server.service.streaming.presence import Boxes
 from server.service.streaming.spliced_stream import GopAssembler, SplicedStream
 from server.service.view_selection.decider import GopDecision
@@ -19,13 +19,13 @@ from server.service.view_selection.decider import GopDecision
 class PreferredCameraStreams:
     """The streams with a preferred camera, each from its first viewer to its last.
 
-    ``presence`` returns whether a person may be shown.
+    ``picture_of`` returns whether a person may be shown.
     """
 
     def __init__(
-        self, new_stream: Callable[[], SplicedStream], presence: PresenceLookup = always_present
+        self, new_stream: Callable[[], SplicedStream], picture_of: ScopedPictureLookup = always_shown
     ) -> None:
-        self._new_stream, self._presence = new_stream, presence
+        self._new_stream, self._picture_of = new_stream, picture_of
         self._streams: dict[tuple[int, str], SplicedStream] = {}
         self._previous_boxes: Boxes | None = None
         self._newest: tuple[GopDecision, GopAssembler] | None = None
@@ -72,7 +72,7 @@ class PreferredCameraStreams:
         is_seen = _sees(decision.boxes, camera, numbers) and (
             self._previous_boxes is None or _sees(self._previous_boxes, camera, numbers)
         )
-        stream.show(camera if is_seen else best, gop, self._presence(person))
+        stream.show(camera if is_seen else best, gop, self._picture_of(person))
 
 
 def _sees(boxes: Boxes, camera: str, numbers: Collection[int]) -> bool:

@@ -16,26 +16,26 @@ Boxes = Mapping[str, Sequence[Sequence[NumberedBox]]]
 """By camera and frame: the boxes of all persons."""
 
 
-class Presence(Enum):
+class ScopedPicture(Enum):
     """What a GOP shows to viewers with access to one person alone."""
 
-    PRESENT = auto()
+    SHOWN = auto()
     """The best view: some camera has seen the person recently, or sees them in this GOP."""
     FROZEN = auto()
     """The picture that was shown last, muted."""
-    ABSENT = auto()
+    GRAY = auto()
     """Gray, muted."""
 
 
 class PresenceLog:
     """The last frame in which any camera saw each person, updated GOP by GOP.
 
-    A person who was not seen for more than ``unseen`` frames is frozen for as many more, then absent. A
-    person who has never been seen is absent.
+    The picture of a person who was not seen for more than ``freeze_after`` frames is frozen for as many more,
+    then gray. That of a person who has never been seen is gray.
     """
 
-    def __init__(self, unseen: int) -> None:
-        self._unseen = unseen
+    def __init__(self, freeze_after: int) -> None:
+        self._freeze_after = freeze_after
         self._first = 0
         self._last_seen: dict[int, int] = {}
         """By person, the last frame in which they were seen."""
@@ -55,12 +55,12 @@ class PresenceLog:
                 person = decision.merged.get(number, number)
                 self._last_seen[person] = max(pulse, self._last_seen.get(person, pulse))
 
-    def presence_of(self, number: int) -> Presence:
+    def picture_of(self, number: int) -> ScopedPicture:
         """Return what the newest GOP shows of a person, given any of their numbers."""
         last = self._last_seen.get(self._merged.get(number, number))
-        if last is None or self._first - last > 2 * self._unseen:
-            return Presence.ABSENT
-        return Presence.PRESENT if self._first - last <= self._unseen else Presence.FROZEN
+        if last is None or self._first - last > 2 * self._freeze_after:
+            return ScopedPicture.GRAY
+        return ScopedPicture.SHOWN if self._first - last <= self._freeze_after else ScopedPicture.FROZEN
 
     def forget(self, known: Collection[int]) -> None:
         """Forget persons that are not known any more."""

@@ -14,7 +14,7 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.gapless_timeline import GaplessTimeline
 from server.service.streaming.hls_segmenter import HlsSegmenter
 from server.service.streaming.media_chunk import MediaChunk
-from server.service.streaming.presence import Presence
+from server.service.streaming.presence import ScopedPicture
 
 
 class GopAssembler:
@@ -37,7 +37,7 @@ class GopAssembler:
         self.first, self.until = first, first + frames
         self._frame_buffers, self._fps, self._tables = frame_buffers, fps, tables
         self._complete: dict[str, MediaChunk | None] = {}
-        self._blank: dict[ParameterSets | None, MediaChunk | None] = {}
+        self._gray: dict[ParameterSets | None, MediaChunk | None] = {}
 
     def pictures(self, camera: str) -> list[EncodedPicture]:
         """Return the pictures of a camera that have arrived."""
@@ -51,16 +51,16 @@ class GopAssembler:
             self._complete[camera] = self.chunk(pictures) if is_complete else None
         return self._complete[camera]
 
-    def blank_chunk(self, stream_format: StreamFormat, newest: EncodedPicture | None) -> MediaChunk | None:
+    def gray_chunk(self, stream_format: StreamFormat, newest: EncodedPicture | None) -> MediaChunk | None:
         """Return a gray GOP that can follow a picture, shared by all streams of its parameter sets.
 
         None: this format has no gray picture.
         """
         parameters = None if newest is None else newest.parameters
-        if parameters not in self._blank:
+        if parameters not in self._gray:
             pictures = stream_format.blank(newest, self.first, self.until - self.first, self._fps)
-            self._blank[parameters] = self.chunk(pictures, is_muted=True) if pictures else None
-        return self._blank[parameters]
+            self._gray[parameters] = self.chunk(pictures, is_muted=True) if pictures else None
+        return self._gray[parameters]
 
     def chunk(self, pictures: list[EncodedPicture], *, is_muted: bool = False) -> MediaChunk:
         """Return pictures of this GOP as a chunk, with the site's audio or, if muted, with silence."""
@@ -88,7 +88,7 @@ class GopSequencer:
         complete = None if camera is None else gop.complete_chunk(camera)
         self._camera = camera or self._camera
         if complete is not None:
-            self._timeline.advance_past(complete.pictures[-1])
+            self._timeline.record_shown(complete.pictures[-1])
             return [*chunks, complete]
         arrived = [] if self._camera is None else gop.pictures(self._camera)
         pictures = [shown for picture in arrived for shown in self._timeline.push(picture)]
@@ -100,17 +100,17 @@ class GopSequencer:
         self._camera = None  # its late pictures must not be shown any more
         before, frozen = self._timeline.fill(gop.first), self._timeline.fill(gop.until)
         chunks = [gop.chunk(pictures, is_muted=True) for pictures in (before, frozen) if pictures]
-        return chunks if frozen else [*chunks, *self.blank(gop)]
+        return chunks if frozen else [*chunks, *self.gray_out(gop)]
 
-    def blank(self, gop: GopAssembler) -> list[MediaChunk]:
+    def gray_out(self, gop: GopAssembler) -> list[MediaChunk]:
         """Return a gray GOP, muted, after the filler of a gap before it."""
         self._camera = None
         before = self._timeline.fill(gop.first)
         chunks = [gop.chunk(before, is_muted=True)] if before else []
-        gray = gop.blank_chunk(self._timeline.stream_format, self._timeline.newest)
+        gray = gop.gray_chunk(self._timeline.stream_format, self._timeline.newest)
         if gray is None:
             return chunks
-        self._timeline.advance_past(gray.pictures[-1])
+        self._timeline.record_shown(gray.pictures[-1])
         return [*chunks, gray]
 
 
@@ -121,18 +121,20 @@ class SplicedStream:
         self.broadcaster, self.segmenter = broadcaster, segmenter
         self._sequencer = GopSequencer(timeline)
 
-    def show(self, camera: str | None, gop: GopAssembler, presence: Presence = Presence.PRESENT) -> None:
+    def show(
+        self, camera: str | None, gop: GopAssembler, picture: ScopedPicture = ScopedPicture.SHOWN
+    ) -> None:
         """Publish a camera's GOP, filled where pictures are missing.
 
         A person who is not present is not shown: the last picture stands, or gray.
         """
-        match presence:
-            case Presence.PRESENT:
+        match picture:
+            case ScopedPicture.SHOWN:
                 chunks = self._sequencer.show(camera, gop)
-            case Presence.FROZEN:
+            case ScopedPicture.FROZEN:
                 chunks = self._sequencer.freeze(gop)
-            case Presence.ABSENT:
-                chunks = self._sequencer.blank(gop)
+            case ScopedPicture.GRAY:
+                chunks = self._sequencer.gray_out(gop)
         for chunk in chunks:
             self.segmenter.put(chunk)
             self.broadcaster.publish(chunk)

@@ -81,9 +81,9 @@ class Splicer:
         self._presence = PresenceLog(round(config.access.hide_after_s * site.fps))
         self._has_scoped = config.access.tokens is not None
         self._persons = PersonStreams(self._stream)
-        self._scoped = PersonStreams(self._stream, self._presence.presence_of)
+        self._scoped = PersonStreams(self._stream, self._presence.picture_of)
         self.preferred = PreferredCameraStreams(self._stream)
-        self.preferred_scoped = PreferredCameraStreams(self._stream, self._presence.presence_of)
+        self.preferred_scoped = PreferredCameraStreams(self._stream, self._presence.picture_of)
         self._gops = 0
         self.persons = self._persons.broadcasters
         self.scoped_persons = self._scoped.broadcasters
@@ -132,9 +132,9 @@ class Splicer:
         """Return the number of viewers of a person's stream."""
         return self._persons.viewers_of(number) + self._scoped.viewers_of(number)
 
-    def segmenter_of_person(self, number: int, *, scoped: bool = False) -> HlsSegmenter | None:
+    def segmenter_of_person(self, number: int, *, scoped_to_person: bool = False) -> HlsSegmenter | None:
         """Return the newest segments of a person's stream, for a while even when it has ended."""
-        return (self._scoped if scoped else self._persons).segmenter(number)
+        return (self._scoped if scoped_to_person else self._persons).segmenter(number)
 
     def segmenter_of_camera(self, camera: str) -> HlsSegmenter | None:
         """Return the newest segments of a camera's stream."""

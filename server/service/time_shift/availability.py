@@ -19,10 +19,10 @@ from server.service.time_shift.playback import PlaybackSource, SessionEntries
 def available_ranges(source: PlaybackSource, start: int = 0, end: int = sys.maxsize) -> list[PulseRange]:
     """Return which of the pulses ``start … end - 1`` can be played, from the disk or from memory."""
     ranges: list[IndexEntry | PulseRange] = [*_recorded(source, start, end)]
-    gop = source.gop_in_memory(start)
+    gop = source.gop_in_memory_from(start)
     while gop is not None and gop.first < end:
         ranges.append(PulseRange(gop.first, gop.end))
-        gop = source.gop_in_memory(gop.end)
+        gop = source.gop_in_memory_from(gop.end)
     return [
         replace(span, first=max(span.first, start), end=min(span.end, end))
         for span in merge_pulse_ranges(ranges)
@@ -48,7 +48,7 @@ def first_available(source: PlaybackSource, pulse: int) -> int | None:
         for recorded in source.recorded
         if (entry := recorded.index.at_or_after(pulse)) is not None
     ]
-    gop = source.gop_in_memory(pulse)
+    gop = source.gop_in_memory_from(pulse)
     first = min([*firsts, *([] if gop is None else [gop.first])], default=None)
     return None if first is None else max(first, pulse)
 
@@ -58,7 +58,7 @@ def end_of_available(source: PlaybackSource) -> int:
     firsts = [
         entry.end for recorded in source.recorded if (entry := recorded.index.before(sys.maxsize)) is not None
     ]
-    gop = source.gop_in_memory_before(sys.maxsize)
+    gop = source.gop_in_memory_until(sys.maxsize)
     return max([*firsts, *([] if gop is None else [gop.end])], default=0)
 
 
@@ -95,4 +95,4 @@ def forget_missing(source: PlaybackSource, start: int, end: int) -> None:
 
 def _check(recorded: SessionEntries, entries: Iterable[IndexEntry]) -> None:
     if not all(map(recorded.session.has_file_of, entries)):
-        recorded.session.forget_missing()
+        recorded.session.forget_missing_entries()

@@ -18,7 +18,7 @@ class LoggedDecision:
     """The decision about one GOP."""
 
     choices: GopChoices
-    is_numbered: bool = True
+    has_same_persons: bool = True
     """Whether its person numbers mean the same persons as now."""
     line: bytes | None = None
     """Its line of JSON; None: it is not on the disk yet."""
@@ -27,14 +27,16 @@ class LoggedDecision:
 async def read_decisions(recorder: Recorder, start: int, end: int) -> AsyncIterator[LoggedDecision]:
     """Yield the decisions about pulses ``start … end - 1``, in order."""
     at, same_persons = start, recorder.sessions_with_same_persons
-    for session in recorder.sessions:
+    for session in recorder.compatible_sessions:
         name = session.folder.name.encode()
-        for path in session.index_files(at, end):
+        for path in session.decision_files(at, end):
             for line, choices in await run_in_reader_thread(_lines, path, at, end):
                 if session in same_persons:
                     yield LoggedDecision(choices, line=line)
                 else:
-                    yield LoggedDecision(choices, is_numbered=False, line=b'{"run":"%b",' % name + line[1:])
+                    yield LoggedDecision(
+                        choices, has_same_persons=False, line=b'{"run":"%b",' % name + line[1:]
+                    )
                 at = choices.first + choices.frames
     for choices in recorder.recent.choices(at):
         if choices.first < end:

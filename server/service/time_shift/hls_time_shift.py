@@ -16,7 +16,7 @@ from server.service.streaming.gapless_timeline import GaplessTimeline
 from server.service.streaming.hls_segmenter import HlsSegment, SegmentLayout
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.time_shift.availability import end_of_available, first_available
-from server.service.time_shift.playback import PlaybackSource, last_gop_before, play_gops
+from server.service.time_shift.playback import PlaybackSource, last_gop_until, play_gops
 from server.service.time_shift.playback_audio import PlaybackAudio
 from server.service.time_shift.presence_history import visible_pictures
 
@@ -90,7 +90,7 @@ class TimeShift:
         until = min(until, self.end) if self.has_ended else until
         if not first < until <= self.end:
             return None
-        lead = await last_gop_before(self._source, first)
+        lead = await last_gop_until(self._source, first)
         timeline, playback_audio = self._timeline(), self._audio()
         stream_format = timeline.stream_format
         lead_pictures = (
@@ -99,7 +99,7 @@ class TimeShift:
             else (await visible_pictures(lead, self._source, stream_format, self._layout.fps)).pictures
         )
         if lead_pictures:  # with a recent time: a repetition does not depend on its age
-            timeline.advance_past(replace(lead_pictures[-1], pulse=first - 1))
+            timeline.record_shown(replace(lead_pictures[-1], pulse=first - 1))
         arrived, audible = await self._read(first, until, stream_format)
         chunks: list[MediaChunk] = []
         for begin in range(first, until, self._gop):

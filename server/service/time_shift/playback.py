@@ -37,11 +37,14 @@ class PlaybackSource(Protocol):
     def recorded(self) -> Sequence[SessionEntries]:
         """Its indexes on the disk, by session."""
 
-    def gop_in_memory(self, pulse: int) -> RecordedGop | None:
+    def gop_in_memory_from(self, pulse: int) -> RecordedGop | None:
         """Return the GOP in memory that holds a pulse, or the next one; None if nothing follows."""
 
-    def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
-        """Return the last GOP in memory that ends before a pulse; None if there is none."""
+    def gop_in_memory_until(self, pulse: int) -> RecordedGop | None:
+        """Return the last GOP in memory up to a pulse; None if there is none.
+
+        A person's GOP ends before the pulse; a camera's may hold it, and is cut there.
+        """
 
     @property
     def ranges_in_memory(self) -> Sequence[CameraRange]:
@@ -71,7 +74,7 @@ class PersonPlayback:
             if number in session.objects
         ]
 
-    def gop_in_memory(self, pulse: int) -> RecordedGop | None:
+    def gop_in_memory_from(self, pulse: int) -> RecordedGop | None:
         """Return the person's GOP in memory that holds a pulse, or the next one."""
         candidates = [
             gop
@@ -80,7 +83,7 @@ class PersonPlayback:
         ]
         return min(candidates, key=lambda gop: gop.first, default=None)
 
-    def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
+    def gop_in_memory_until(self, pulse: int) -> RecordedGop | None:
         """Return the person's last GOP in memory that ends before a pulse."""
         recent = self.recorder.recent
         candidates = [
@@ -115,25 +118,27 @@ class CameraPlayback:
     @property
     def recorded(self) -> Sequence[SessionEntries]:
         """Its indexes on the disk, also of earlier sessions of the same pulses."""
-        sessions = [session for session in self.recorder.sessions if self.camera in session.cameras]
+        sessions = [
+            session for session in self.recorder.compatible_sessions if self.camera in session.cameras
+        ]
         return [SessionEntries(session, session.cameras[self.camera].index) for session in sessions]
 
-    def gop_in_memory(self, pulse: int) -> RecordedGop | None:
+    def gop_in_memory_from(self, pulse: int) -> RecordedGop | None:
         """Return its GOP in memory that holds a pulse, or the next one, as far as it has arrived."""
         return self.recorder.recent.of_camera(self.camera, pulse)
 
-    def gop_in_memory_before(self, pulse: int) -> RecordedGop | None:
-        """Return its last GOP in memory that ends before a pulse."""
-        return self.recorder.recent.of_camera_before(self.camera, pulse)
+    def gop_in_memory_until(self, pulse: int) -> RecordedGop | None:
+        """Return its last GOP in memory that begins before a pulse, cut there."""
+        return self.recorder.recent.of_camera_until(self.camera, pulse)
 
     @property
     def ranges_in_memory(self) -> Sequence[CameraRange]:
         """The ranges that have arrived from it, as far as in memory."""
         candidates = []
-        gop = self.gop_in_memory(0)
+        gop = self.gop_in_memory_from(0)
         while gop is not None:
             candidates.append(CameraRange(self.camera, gop.first, gop.end))
-            gop = self.gop_in_memory(gop.end)
+            gop = self.gop_in_memory_from(gop.end)
         return candidates
 
     @property
@@ -157,7 +162,7 @@ async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[Record
     is_first = True
     while True:
         on_disk = _next_on_disk(source, at)
-        gop = source.gop_in_memory(at)
+        gop = source.gop_in_memory_from(at)
         if gop is not None and (on_disk is None or gop.first <= max(at, on_disk[1].first)):
             yield gop if is_first else _remainder_of(gop, at)
             at, is_first = gop.end, False
@@ -172,7 +177,7 @@ async def play_gops(source: PlaybackSource, start: int) -> AsyncGenerator[Record
             return
 
 
-async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | None:
+async def last_gop_until(source: PlaybackSource, pulse: int) -> RecordedGop | None:
     """Return the last GOP that begins before a pulse, cut there; None if there is none."""
     candidates = [
         (recorded.session, previous)
@@ -180,7 +185,7 @@ async def last_gop_before(source: PlaybackSource, pulse: int) -> RecordedGop | N
         if (previous := recorded.index.before(pulse)) is not None
     ]
     session, entry = max(candidates, key=lambda candidate: candidate[1].first, default=(None, None))
-    gop = source.gop_in_memory_before(pulse)
+    gop = source.gop_in_memory_until(pulse)
     if session is None or entry is None or (gop is not None and gop.end >= min(entry.end, pulse)):
         return gop
     async with contextlib.aclosing(_read(session, entry, min(entry.end, pulse) - 1)) as reading:

@@ -20,7 +20,7 @@ from server.service.time_shift.playback import SessionEntries
 class PlaybackAudio:
     """Finds audio in memory, else on the disk; missing audio is silent, late audio is waited for.
 
-    ``recorded`` returns what is on the disk, ``now`` the pulse after the newest picture; without it no audio
+    ``recorded`` returns what is on the disk, ``end`` the pulse after the newest picture; without it no audio
     is waited for.
     """
 
@@ -28,9 +28,9 @@ class PlaybackAudio:
         self,
         buffer: AudioBuffer,
         recorded: Callable[[], Sequence[SessionEntries]],
-        now: Callable[[], int] | None = None,
+        end: Callable[[], int] | None = None,
     ) -> None:
-        self._buffer, self._recorded, self._now = buffer, recorded, now
+        self._buffer, self._recorded, self._end = buffer, recorded, end
         self._next: int | None = None
         self._follower: AudioFollower | None = None
 
@@ -45,8 +45,8 @@ class PlaybackAudio:
         begin = self._next
         late = (
             end
-            if self._now is None
-            else audio_format.frame_at(self._now(), buffer.fps) - buffer.max_late_frames
+            if self._end is None
+            else audio_format.frame_at(self._end(), buffer.fps) - buffer.max_late_frames
         )
         frames = {number: buffer.get(number) for number in range(begin, end)}
         missing = [number for number, frame in frames.items() if frame is None]

@@ -43,7 +43,7 @@ class PresenceHistory:
         until = max(end, min(end + self._ahead, decided))
         seen: list[int] = []
         async for decision in read_decisions(self._recorder, begin, until):
-            if decision.is_numbered:
+            if decision.has_same_persons:
                 last = last_seen_offsets(decision.choices.boxes)
                 seen += [decision.choices.first + last[number] for number in self._numbers if number in last]
         self._known, self._seen = range(begin, until), sorted(seen)

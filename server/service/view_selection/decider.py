@@ -108,7 +108,7 @@ class ViewDecider:
         """The settings in force."""
         return self._config.view
 
-    def apply_view_settings(self, view: ViewSettings) -> None:
+    def apply_live_view_settings(self, view: ViewSettings) -> None:
         """Apply other settings from the next GOP on; only those in `LIVE_VIEW_SETTINGS`.
 
         With a longer look-ahead, decisions wait for it; with a shorter one, the GOPs that are then complete
@@ -200,7 +200,7 @@ class ViewDecider:
         self._next_gop = first + self._config.encode.gop
         boxes = {camera: people.boxes(camera, first, frames) for camera in self._cameras}
         self._quality_buffer.forget_before(self._next_gop)
-        people.forget_boxes_before(self._next_gop)
+        people.forget_before(self._next_gop)
         names = [*self._cameras, None]  # NO_CAMERA, -1, indexes the last one
         assert NO_CAMERA == -1  # noqa: S101 — the line above relies on it
         choices = tuple(

@@ -80,7 +80,7 @@ class SelectionReasons:
         columns = self.part.window.views.camera[views]
         undetected = self.part.undetected(number)
         undetected_columns = self.part.window.undetected.camera[undetected]
-        costs = self.part.cost(number)
+        costs = self.part.frame_costs(number)
         cost, mean = (costs * self.weight[:, None]).sum(axis=0), costs.mean(axis=0)
         before = int(self.before[self.part.numbers == number][0])
         stay = np.inf if before == NO_CAMERA else cost[before]

@@ -154,7 +154,7 @@ class LookaheadPart:
         """
         return self._rows(self.window.undetected, number)
 
-    def cost(self, number: int) -> Floats:
+    def frame_costs(self, number: int) -> Floats:
         """Return one person's c(n, b), (N, C); infinite where a camera cannot be shown.
 
         Raises:

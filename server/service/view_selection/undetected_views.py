@@ -54,14 +54,14 @@ class UndetectedViews:
         tested = TestedViews(none, none, np.zeros((0, 2)), np.zeros(0, dtype=np.bool_))
         return cls(none, none, none, np.zeros(0), tested)
 
-    def of(self, people: Ints, count: int, shown: Mask, found: Ints, factor: float) -> UndetectedViews:
+    def of(self, people: Ints, count: int, shown: Mask, detected: Ints, factor: float) -> UndetectedViews:
         """Return the views of some of the people, in frames that can be shown.
 
         Args:
             people: maps each person's index here to the index in the result; -1: left out.
             count: K, the number of people in the result.
             shown: (N, C) whether a camera's frame can be shown.
-            found: flat indices (frame, camera, person) of detected views, which replace inferred ones.
+            detected: flat indices (frame, camera, person) of detected views, which replace inferred ones.
             factor: multiplies the quality.
         """
         if not len(self.frame):
@@ -69,7 +69,7 @@ class UndetectedViews:
         person, cell = people[self.person], self.frame * shown.shape[1] + self.camera
         rows = np.flatnonzero((person >= 0) & shown.reshape(-1)[cell] & (factor * self.quality > 0.0))
         is_detected = np.zeros(shown.size * count, dtype=np.bool_)
-        is_detected[found] = True
+        is_detected[detected] = True
         rows = rows[~is_detected[cell[rows] * count + person[rows]]]
         quality = factor * self.quality[rows]
         return UndetectedViews(self.frame[rows], self.camera[rows], person[rows], quality, self.tested)

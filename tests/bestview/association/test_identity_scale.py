@@ -62,7 +62,7 @@ def run_halls(halls: range) -> tuple[list[dict[tuple[int, str, int, int], int]],
                 for key, number in numbers.items()
             }
         )
-    return ids_by_update, identities.pair_count
+    return ids_by_update, identities._affinity.entry_count
 
 
 @pytest.fixture(scope="module")

@@ -44,7 +44,7 @@ class SiteInOneLoop:
 
     async def start(self) -> asyncio.Task[None]:
         await self.pulses.start()
-        self.service.open()
+        self.service.open_bus()
         task = asyncio.create_task(self.service.run())
         self._tasks.append(task)
         return task

@@ -29,6 +29,7 @@ from server.messaging.messages import (
 )
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.pipeline import BestViewPipeline
+from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.explanation import SelectionReasons
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
@@ -75,6 +76,13 @@ def encoded(
         encoder.encode(pulse, np.repeat(np.repeat(picture, 8, axis=0), 8, axis=1))
         for pulse, picture in enumerate(pictures)
     )
+
+
+def joined_fragments(frame_buffer: FrameBuffer, first: int, frames: int) -> bytes:
+    """Return the bytes of the frames ``first … first + frames - 1``, all of which must be in the buffer."""
+    pictures = frame_buffer.pictures(first, frames)
+    assert len(pictures) == frames
+    return b"".join(picture.fragment for picture in pictures)
 
 
 def color_histogram(person: int) -> list[float]:

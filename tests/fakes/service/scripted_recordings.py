@@ -19,7 +19,7 @@ from server.service.recording.age_clock import MachineClocks
 from server.service.recording.media_files import RecordedGop, _fragments
 from server.service.recording.recording_folder import GopRecord, RecordingFolder
 from server.service.recording.retention import RetentionLimits
-from server.service.recording.session_files import InitSegments, SessionInfo
+from server.service.recording.session_files import InitSegments, RecordingSessionInfo
 from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
@@ -85,8 +85,8 @@ def own_pictures(camera: str) -> list[Picture]:
     ]
 
 
-def session_info(started: float = PULSE0, numbers_since: float | None = None) -> SessionInfo:
-    return SessionInfo(
+def session_info(started: float = PULSE0, numbers_since: float | None = None) -> RecordingSessionInfo:
+    return RecordingSessionInfo(
         site="hall",
         fps=FPS,
         width=WIDTH,

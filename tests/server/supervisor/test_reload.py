@@ -183,7 +183,7 @@ def test_processes_use_the_supervisors_active_configuration(
 
 def test_a_service_applies_a_reload_and_keeps_other_trial_settings() -> None:
     service = FedService(small_config())
-    service.apply_view_settings(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
+    service.apply_live_view_settings(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
     service.apply_config(small_config([{"id": "c0", "source": "scene:room", "offset": 4}, "c1"]))
     assert service.config.camera("c0").offset == 4
     assert service.decider.view.switch_cost_s == 3.0

@@ -72,7 +72,7 @@ def test_without_a_signal_nothing_happens(handled: tuple[signal.Signals, list[in
 
 def test_a_child_inherits_the_signal_mask_and_can_restore_it() -> None:
     code = (
-        "import signal; from server.system.child_process import restore_termination as again\n"
+        "import signal; from server.system.child_process import unblock_termination as again\n"
         "def blocked(): return {2, 15} & set(signal.pthread_sigmask(signal.SIG_BLOCK, ()))\n"
         "before = blocked(); again(); print(len(before), len(blocked()))"
     )

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fakes.http.passwords import ADDRESSES, HOST, PASSWORDS, leaks
 from server.config.source_address import SourceKind, source_kind
-from server.system.address_redaction import redact_address, redact_addresses, redact_endpoint
+from server.system.address_redaction import cut_at_addresses, redact_to_host, redact_zenoh_endpoint
 
 
 @pytest.mark.parametrize(
@@ -40,27 +40,27 @@ from server.system.address_redaction import redact_address, redact_addresses, re
 def test_only_protocol_and_host_of_addresses_are_shown_and_paths_are_unchanged(
     address: str, expected: str
 ) -> None:
-    assert redact_address(address) == expected
-    assert redact_address(expected) == expected, "redaction is idempotent"
+    assert redact_to_host(address) == expected
+    assert redact_to_host(expected) == expected, "redaction is idempotent"
 
 
 @given(st.sampled_from(ADDRESSES), PASSWORDS)
 @example(ADDRESSES[0], "ps/w")
 @example(ADDRESSES[0], "pa@q/xz")
 def test_no_part_of_a_password_is_shown(place: str, password: str) -> None:
-    redacted = redact_address(place.format(password))
+    redacted = redact_to_host(place.format(password))
     assert not leaks(redacted, password, without=place), redacted
-    assert redact_address(redacted) == redacted
+    assert redact_to_host(redacted) == redacted
 
 
 @given(PASSWORDS.filter(lambda password: not set(password) & set("/?#")))
 def test_the_host_is_shown_if_it_is_unambiguous(password: str) -> None:
-    assert redact_address(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
+    assert redact_to_host(f"rtsp://user:{password}@{HOST}:554/live") == f"rtsp://{HOST}:554/..."
 
 
 @given(st.text())
 def test_any_text_can_be_redacted(text: str) -> None:
-    assert isinstance(redact_address(text) + redact_endpoint(text), str)
+    assert isinstance(redact_to_host(text) + redact_zenoh_endpoint(text), str)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_sources_that_ffmpeg_opens_by_protocol_are_not_files(source: str) -> Non
     ],
 )
 def test_options_of_bus_endpoints_are_hidden(endpoint: str, expected: str) -> None:
-    assert redact_endpoint(endpoint) == expected
+    assert redact_zenoh_endpoint(endpoint) == expected
 
 
 @given(
@@ -90,7 +90,7 @@ def test_options_of_bus_endpoints_are_hidden(endpoint: str, expected: str) -> No
 )
 def test_texts_are_cut_where_an_address_begins(place: str, password: str) -> None:
     text = f"Traceback\n  File a.py, line 3\nOSError: [Errno 5] Failed: '{place.format(password)}'\nmore\n"
-    redacted = redact_addresses(text)
+    redacted = cut_at_addresses(text)
     assert not leaks(
         redacted, password, without=f"{place}{text.partition('Failed')[0]}Failed: '...\nmore\n"
     ), redacted

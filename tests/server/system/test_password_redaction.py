@@ -28,7 +28,7 @@ from server.config.site_config import Config
 from server.config.yaml_file import read_yaml
 from server.http.operator.settings import settings_of
 from server.system.errors import UserError
-from server.system.log_format import JsonLines, TextLines
+from server.system.log_format import JsonLines, RedactingFormatter
 
 HARMLESS = "0000"
 NAIVE = ("QXZ/JKV7", "QXZ JKV7", "QXZ@JKV7", "QXZ#JKV7", "QXZ?JKV7", "QXZJKV7")
@@ -212,7 +212,7 @@ def test_an_address_given_as_a_recording_is_not_repeated(
         assert not leaks(result.out + result.err, password, without="")
 
 
-@pytest.mark.parametrize("lines", [TextLines(), JsonLines("door")])
+@pytest.mark.parametrize("lines", [RedactingFormatter(), JsonLines("door")])
 @pytest.mark.parametrize("password", NAIVE)
 def test_logged_tracebacks_are_cut_where_an_address_begins(lines: logging.Formatter, password: str) -> None:
     try:

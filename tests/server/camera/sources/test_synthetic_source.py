@@ -15,7 +15,7 @@ from server.camera.sources.synthetic import SyntheticSource
 from server.config.sections import SiteSettings
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
-from server.supervisor.scene_ground import add_scene_ground
+from server.supervisor.synthetic_homographies import add_synthetic_homographies
 from server.system.errors import UserError
 from synthetic import Scene
 
@@ -98,7 +98,7 @@ def test_cameras_of_a_scene_without_a_floor_have_no_homography() -> None:
         {"id": f"c{number}", "source": f"scene:{name}"} for number, name in enumerate(("fish", "court"))
     ]
     site = Config.model_validate({"site": {"width": 128, "height": 72}, "cameras": cameras})
-    tank, court = add_scene_ground(site).cameras
+    tank, court = add_synthetic_homographies(site).cameras
     assert tank.ground is None
     assert court.ground is not None
     assert SyntheticSource("scene:fish?camera=1&cameras=2", SITE).take(3) is not None

@@ -95,7 +95,7 @@ async def test_recorded_segments_are_gray_without_the_person(
         listed = (await fetch(served, "/objects/1/hls/index.m3u8?from=p0&to=p90", token_name)).decode()
         names = ["init.mp4", *re.findall(r"^[0-9]+\.m4s$", listed, re.MULTILINE)]
         for scoped in (True, False):
-            segmenter = served.service.splicer.segmenter_of_person(1, scoped=scoped)
+            segmenter = served.service.splicer.segmenter_of_person(1, scoped_to_person=scoped)
             assert segmenter is not None
             segmenter._segments.clear()
         shown[token_name] = decoded(
@@ -124,7 +124,7 @@ async def test_recorded_sound_is_silent_without_the_person(tmp_path: Path, *, hl
             if hls:
                 names = [f"hls/{file}" for file in ("init.mp4", *(f"{number}.m4s" for number in range(11)))]
                 for scoped in (True, False):
-                    segmenter = served.service.splicer.segmenter_of_person(1, scoped=scoped)
+                    segmenter = served.service.splicer.segmenter_of_person(1, scoped_to_person=scoped)
                     assert segmenter is not None
                     segmenter._segments.clear()
             data = b"".join([await fetch(served, f"/objects/1/{name}", token_name) for name in names])

@@ -27,7 +27,7 @@ from server.http.metrics.event_loop_lag import LoopLag
 from server.http.viewers.traffic import Traffic
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameHeader, SolverReport, ZenohKeys
-from server.service.readiness import max_backlog
+from server.service.readiness import max_normal_delay
 from server.service.streaming.subscriber_queue import BytesChunk, Subscriber
 
 
@@ -190,7 +190,7 @@ async def test_a_site_is_ready_when_pulses_and_frames_arrive_and_decisions_keep_
 
 
 async def test_a_site_whose_decisions_fall_behind_is_not_ready(site_with_people: ServedSite) -> None:
-    allowed = max_backlog(site_with_people.service)
+    allowed = max_normal_delay(site_with_people.service)
     site_with_people.service.pulses.newest = site_with_people.service.decision_state.end - 1 + allowed
     assert (await ready(site_with_people))[0] == 200
     site_with_people.service.pulses.newest += 1

@@ -44,7 +44,7 @@ def decided(config: Config, tuned: ViewSettings | None = None, after: int = 0) -
     decisions = []
     for number in range(12):
         if tuned is not None and number == after:
-            decider.apply_view_settings(tuned)
+            decider.apply_live_view_settings(tuned)
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
         messages = [
             camera_tracks(A, number, {1: one, 2: SMALL}),
@@ -87,10 +87,10 @@ def test_settings_tuned_while_running_apply_from_the_next_gop_on_to_buffered_vie
 def test_settings_can_be_tuned_back() -> None:
     config = small_config()
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
-    decider.apply_view_settings(TRIED)
+    decider.apply_live_view_settings(TRIED)
     assert decider.view.lookahead == config.view.lookahead
     assert decider.view.identity == config.view.identity
-    decider.apply_view_settings(config.view)
+    decider.apply_live_view_settings(config.view)
     assert decider.view == config.view
     assert np.isclose(decider.switch_cost, 1.0)
 

@@ -26,15 +26,15 @@ def test_skipped_decisions_are_listed_once_there_is_room(
 ) -> None:
     caplog.set_level(logging.INFO)
     writer = LiveDecisionWriter(tmp_path, CAMERAS, LETTERBOXES)
-    writer.write(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
+    writer.write_or_skip(decision(0, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
     before = read_files(tmp_path)
     with files_of_at_most(max(map(len, before.values()))):
         for gop in (1, 2, 3):
             writer.add_late(B, [gop * GOP], "tracks late")
             writer.add_late(B, [4 * GOP], "no frame")
-            writer.write(decision(gop, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
+            writer.write_or_skip(decision(gop, choice(1, A), c0=[[(1, *SMALL)]] * GOP))
             assert read_files(tmp_path) == before
-    writer.write(decision(4, choice(1, B), c0=[[(1, *SMALL)]] * GOP))
+    writer.write_or_skip(decision(4, choice(1, B), c0=[[(1, *SMALL)]] * GOP))
     writer.add_late(A, [5 * GOP], "tracks late")
     writer.close()
     after = read_files(tmp_path)
@@ -56,7 +56,7 @@ def test_a_full_disk_at_the_end_is_logged_and_all_files_are_intact(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     writer = LiveDecisionWriter(tmp_path, CAMERAS, LETTERBOXES)
-    writer.write(decision(0, choice(1, A)))
+    writer.write_or_skip(decision(0, choice(1, A)))
     before = read_files(tmp_path)
     writer.add_late(B, [7], "tracks late")
     with files_of_at_most(0):

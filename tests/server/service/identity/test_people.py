@@ -193,7 +193,7 @@ def test_undecided_frames_keep_their_numbers_after_the_registry_has_settled_them
     for epoch in range(5):
         tracker.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: SMALL})))
     assert current_numbers() == [1, 2, 3]
-    tracker.forget_boxes_before(second)
+    tracker.forget_before(second)
     tracker.update(epoch_of(5, camera_tracks("c0", 5, {1: SMALL})))
     assert current_numbers() == [-1, 2, 3]
     assert len(tracker._parts[TrackKey("c0", 1)]) == 2, "parts before the needed frames are dropped"

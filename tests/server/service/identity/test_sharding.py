@@ -190,7 +190,7 @@ async def test_both_services_receive_all_cameras_and_publish_under_their_keys(
     pair: list[BestViewPipeline],
 ) -> None:
     for service in pair:
-        service.open()
+        service.open_bus()
     keys, camera = ZenohKeys("hall"), Bus.client(pair[0].config.zenoh)
     alive, published = KeyRecorder(), KeyRecorder()
     try:

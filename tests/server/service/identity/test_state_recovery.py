@@ -233,7 +233,7 @@ def test_a_late_snapshot_is_used() -> None:
     ann, b = site.person_of(A, 2, 5), site.person_of(B, 3, 5)
     site.start(without_snapshot=B)
     site.track_epochs(range(7, 8), {A: {2: LARGE}, B: {}})
-    assert site.service.state_replication.may_recover(b), "camera B may still connect"
+    assert site.service.state_replication.is_known_or_recoverable(b), "camera B may still connect"
     site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(8, 12), {A: {2: LARGE, 9: SMALL}, B: {3: LARGE}})
     assert [site.person_of(A, 2, 11), site.person_of(B, 3, 11)] == [ann, b]

@@ -18,7 +18,7 @@ from server.service.ingest.epoch_aligner import Epoch
 
 async def test_other_tasks_run_between_two_epochs() -> None:
     service, turns = service_with_backlog(), list[int]()
-    deciding = asyncio.create_task(service.decide_cooperatively())
+    deciding = asyncio.create_task(service.decide_or_skip())
     while not deciding.done():
         turns.append(service.aligner._next or 0)
         await asyncio.sleep(0)
@@ -39,7 +39,7 @@ async def test_waiting_messages_are_handled_before_the_next_epoch() -> None:
             inbox.put(number)
 
     service._step = noting  # type: ignore[method-assign]
-    await service.decide_cooperatively()
+    await service.decide_or_skip()
     assert waited == [0] * EPOCHS
     assert len(handled) == 5 * EPOCHS
     service.close()
@@ -50,7 +50,7 @@ async def test_a_flood_does_not_keep_the_service_from_deciding() -> None:
     inbox: Inbox[int] = Inbox(lambda left: inbox.put(left - 1) if left else None, turn_s=0.0)
     service.bus.inboxes.append(inbox)
     inbox.put(100_000)
-    await service.decide_cooperatively()
+    await service.decide_or_skip()
     assert inbox.waiting
     assert service.aligner._next == EPOCHS
     service.close()
@@ -70,17 +70,17 @@ async def test_epochs_whose_frames_are_no_longer_buffered_are_skipped(
         step(epoch)
 
     service._step = slow  # type: ignore[method-assign]
-    await service.decide_cooperatively()
+    await service.decide_or_skip()
     assert decided[-1] == EPOCHS - 1, "it continues with the newest"
     assert service.skipped_epochs == EPOCHS - len(decided) > 0
     assert "do not catch up" in caplog.text
-    assert service.aligner.waiting == 0
+    assert service.aligner.waiting_windows == 0
     service.close()
 
 
 async def test_a_cancelled_service_does_not_finish_its_backlog() -> None:
     service = service_with_backlog()
-    deciding = asyncio.create_task(service.decide_cooperatively())
+    deciding = asyncio.create_task(service.decide_or_skip())
     await asyncio.sleep(0)
     deciding.cancel()
     await asyncio.gather(deciding, return_exceptions=True)
@@ -93,7 +93,7 @@ async def test_cooperative_decisions_equal_those_made_at_once() -> None:
     one, other = service_with_backlog(), service_with_backlog()
     at_once, cooperative = collect_decisions(one), collect_decisions(other)
     one.decide()
-    await other.decide_cooperatively()
+    await other.decide_or_skip()
     assert [decision.choices for decision in at_once] == [decision.choices for decision in cooperative]
     assert len(at_once) > 1
     one.close()

@@ -117,7 +117,7 @@ def test_arbitrary_bytes_are_counted_and_dropped(kind: str, payload: bytes, atta
     served.handle(kind, Message(KEYS.camera("c0", kind), payload, attachment))
     assert served.bad() == 1
     assert not served.frames
-    assert served.aligner.ready(now=100) == []
+    assert served.aligner.take_ready(now=100) == []
 
 
 @settings(deadline=None, max_examples=100)
@@ -150,7 +150,7 @@ def test_a_message_with_one_wrong_field_raises_no_error(data: st.DataObject, kin
         kind, Message(good.key, good.payload, changed) if in_head else Message(good.key, changed, b"")
     )
     people = PersonTracker(IdentitySettings(), CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
-    for epoch in served.aligner.ready(now=1000):
+    for epoch in served.aligner.take_ready(now=1000):
         people.update(epoch)
 
 
@@ -257,7 +257,7 @@ def test_messages_of_pulses_far_in_the_future_are_counted_and_dropped() -> None:
     assert not served.ingest.thumbnails
     served.handle("tracks", tracks(camera_tracks("c0", 0, {})))
     served.handle("tracks", tracks(camera_tracks("c1", 0, {})))
-    assert [epoch.number for epoch in served.aligner.ready(now=4)] == [0]
+    assert [epoch.number for epoch in served.aligner.take_ready(now=4)] == [0]
 
 
 def test_thumbnails_are_limited_for_each_camera() -> None:
@@ -304,6 +304,6 @@ def test_frames_and_tracks_become_epochs() -> None:
         for unit in encoded(seed)[:STRIDE]:
             served.ingest.video(video(camera, unit))
         served.ingest.tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
-    [epoch] = served.aligner.ready(now=4)
+    [epoch] = served.aligner.take_ready(now=4)
     assert list(epoch.tracks) == list(CAMERAS)
     assert len(served.frames) == 2 * STRIDE

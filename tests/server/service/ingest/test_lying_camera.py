@@ -244,7 +244,7 @@ def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
         service.ingest.tracks(tracks(camera_tracks(camera, 1, {1: LARGE}, ended=True)))
     service.pulses.newest = 2 * STRIDE - 1
     service.decide()
-    assert service.aligner.all_ended
+    assert service.aligner.all_ended_and_decided
     decisions = list(itertools.islice(service.finish(), 10))
     assert decisions[-1].first + decisions[-1].frames == 2 * STRIDE
 

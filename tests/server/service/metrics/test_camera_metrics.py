@@ -47,7 +47,7 @@ def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float 
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
         measured.window(msgspec.structs.replace(camera_tracks("c0", 0, {}), solve=solve))
     measured.window(camera_tracks("c0", 1, {}))  # no detection, nothing solved
-    assert (measured.optimal, measured.solved_windows) == (share, len(gaps))
+    assert (measured.optimal, measured.recent_solved_windows) == (share, len(gaps))
 
 
 def test_a_new_run_resets_measurements_but_not_the_last_problem() -> None:

@@ -102,7 +102,7 @@ def run_meeting(
         for pulse in range(first, frame - 19):
             positions[pulse] = at(people, pulse)
         first = max(first, frame - 19)
-        people.forget_boxes_before(first)
+        people.forget_before(first)
     return people, positions
 
 
@@ -148,7 +148,7 @@ def test_numbers_follow_a_correction_of_the_distant_past(corrected_at: int) -> N
 def test_points_after_a_correction_still_refer_to_the_same_person() -> None:
     people, positions = run_meeting(99, range(MET + 8, MET + 14))
     left, right = sides(positions, 30)
-    before, after = (people.published.of("c0", [left], pulse) for pulse in (40, 120))
+    before, after = (people.published.latest_track("c0", [left], pulse) for pulse in (40, 120))
     assert before is not None
     assert after is not None
     assert before.track == after.track, "the track id stays with the person"

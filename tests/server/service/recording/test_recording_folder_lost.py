@@ -92,7 +92,7 @@ def write_gops(store: RecordingFolder, gops: range) -> None:
         try:
             store.write(gop_record(gop, {1: A, 2: B}), session_info(), InitSegments(filled_buffers()[1]))
         except OSError:
-            store.abandon()  # as the writer does
+            store.abandon_segment()  # as the writer does
 
 
 def check_no_orphaned_files(folder: Path) -> None:
@@ -204,7 +204,7 @@ def test_a_folder_that_another_process_locked_meanwhile_is_left_to_it(tmp_path: 
     write_gops(other, range(3))
     with pytest.raises(BlockingIOError, match="another process records there"):
         store.write(gop_record(3, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
-    store.abandon()
+    store.abandon_segment()
     other.close()
     write_gops(store, range(4, 6))
     store.close()

@@ -55,7 +55,7 @@ def write_on_full_disk(store: RecordingFolder, clock: ManualClocks, gop: int) ->
     """Try to write a GOP on a full disk; abandon it as the writer does."""
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         record(store, clock, range(gop, gop + 1))
-    store.abandon()
+    store.abandon_segment()
 
 
 def on_disk(folder: Path) -> list[int]:
@@ -181,7 +181,7 @@ def test_a_playlist_that_could_not_be_written_stays_stale(tmp_path: Path, clock:
     record(store, clock, range(12))
     assert store.session is not None
     playlist = store.session.cameras[A]
-    playlist.drop({0})
+    playlist.drop_segments({0})
     with files_of_at_most(0), pytest.raises(OSError, match="large"):
         playlist.rewrite()
     assert playlist.is_stale

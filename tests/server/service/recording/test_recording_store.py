@@ -243,11 +243,11 @@ def test_on_a_full_disk_earlier_gops_play_and_recording_continues_later(tmp_path
     with files_of_at_most(size + 300), pytest.raises(OSError, match="large") as refused:
         store.write(gop_record(2, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     assert refused.value.errno == errno.EFBIG
-    store.abandon()
+    store.abandon_segment()
     assert store.session.paths.camera_file(A, 0).stat().st_size == size
     with files_of_at_most(len(filled_buffers()[1]) + 300), pytest.raises(OSError, match="large"):
         store.write(gop_record(3, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
-    store.abandon()
+    store.abandon_segment()
     store.write(gop_record(4, {1: A}), session_info(), InitSegments(filled_buffers()[1]))
     store.close()
     assert [pulse // GOP for pulse, _ in pictures(store.session.objects[1].path)][::GOP] == [0, 1, 4]

@@ -36,7 +36,7 @@ def test_no_picture_is_shown_before_it_arrives_or_held_back_too_long(
     pacer, now, pulse, last = PicturePacer(FPS, max_delay_s), 0.0, 0, 0.0
     for wait, step in steps:
         now, pulse = now + wait, pulse + step
-        due = pacer.due(pulse, now)
+        due = pacer.schedule(pulse, now)
         assert now - 1e-6 <= due <= now + max_delay_s + 1e-6
         if due > last and wait == 0:
             assert due - last <= step / FPS + 1e-6
@@ -48,7 +48,7 @@ def test_gops_that_arrive_unevenly_are_shown_evenly_after_the_latest(first: int,
     pacer = PicturePacer(FPS, 4 * GOP / FPS)
     worst = late.index(max(late))
     shown = [
-        (pulse, pacer.due(pulse, number * GOP / FPS + delay))
+        (pulse, pacer.schedule(pulse, number * GOP / FPS + delay))
         for number, delay in enumerate(late)
         for pulse in range(first + number * GOP, first + (number + 1) * GOP)
     ]

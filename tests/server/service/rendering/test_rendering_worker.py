@@ -202,6 +202,6 @@ async def test_a_worker_that_is_ended_while_it_answers_leaves_nothing_open() -> 
     async with asyncio.timeout(PATIENCE):
         while not getattr(process.stdout, "_paused"):  # noqa: ASYNC110, B009 — the buffer is full
             await asyncio.sleep(0)
-        await RenderWorker(process).end()
+        await RenderWorker(process).kill()
         while not before.issuperset(Path("/proc/self/fd").iterdir()):  # noqa: ASYNC110
             await asyncio.sleep(0)

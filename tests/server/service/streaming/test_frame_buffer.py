@@ -23,12 +23,12 @@ def test_the_oldest_frames_are_dropped() -> None:
     assert frame_buffer.get(3) is None
 
 
-def test_a_gop_is_the_fragments_of_its_frames_in_order() -> None:
+def test_the_pictures_of_a_gop_are_its_frames_in_order() -> None:
     frame_buffer = FrameBuffer(FPS, 20, StreamFormat())
     for unit in encoded(0)[:10]:
         put(frame_buffer, unit)
     frames = [frame_buffer.get(pulse) for pulse in range(5, 10)]
-    assert frame_buffer.gop(5, 5) == b"".join(frame.fragment for frame in frames if frame is not None)
+    assert frame_buffer.pictures(5, 5) == frames
     assert [frame.key for frame in frames if frame is not None] == [True, False, False, False, False]
 
 

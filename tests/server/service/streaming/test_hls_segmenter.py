@@ -93,7 +93,7 @@ def test_segments_are_numbered_by_their_pulses_and_listed_when_complete() -> Non
         site.show(gop, CAMERAS[gop % 2])
     assert [segment.number for segment in site.segmenter.playlist_segments] == [0, 1, 2, 3]
     assert [segment.until - segment.first for segment in site.segmenter.playlist_segments] == [2 * GOP] * 4
-    assert site.segmenter.get(4) is None, "it is incomplete"
+    assert site.segmenter.listed_segment(4) is None, "it is incomplete"
     site.splicer.close()
     assert [segment.number for segment in site.segmenter.playlist_segments] == [0, 1, 2, 3, 4]
     assert site.segmenter.playlist_segments[-1].until - site.segmenter.playlist_segments[-1].first == GOP
@@ -107,7 +107,7 @@ def test_a_service_that_starts_later_makes_the_same_segments() -> None:
             late.show(gop, CAMERAS[gop % 3 % 2])
     assert [segment.number for segment in late.segmenter.playlist_segments] == list(range(3, 10))
     for segment in late.segmenter.playlist_segments[1:]:
-        other = early.segmenter.get(segment.number)
+        other = early.segmenter.listed_segment(segment.number)
         assert other is not None
         assert segment.data == other.data
 
@@ -120,8 +120,8 @@ def test_a_segment_stays_available_for_a_playlists_duration_after_it_left() -> N
         numbers = [segment.number for segment in site.segmenter.playlist_segments]
         assert len(site.segmenter._segments) <= 2 * listed + 1
         if numbers and numbers[0] >= listed:
-            assert site.segmenter.get(numbers[0] - listed) is not None
-            assert site.segmenter.get(numbers[0] - listed - 2) is None
+            assert site.segmenter.listed_segment(numbers[0] - listed) is not None
+            assert site.segmenter.listed_segment(numbers[0] - listed - 2) is None
 
 
 def test_people_shown_by_one_camera_share_the_bytes_with_each_other_and_the_camera() -> None:

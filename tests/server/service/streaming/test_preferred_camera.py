@@ -7,7 +7,15 @@ from collections.abc import Sequence
 
 import pytest
 
-from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    NO_REASON,
+    encoded,
+    joined_fragments,
+    small_config,
+)
 from fakes.timeouts import PATIENCE
 from server.media.stream_format import StreamFormat
 from server.messaging.messages import NumberedBox
@@ -53,7 +61,7 @@ class Site:
             next(
                 camera
                 for camera in CAMERAS
-                if self.frame_buffers[camera].gop((first + at) * GOP, GOP) == data
+                if joined_fragments(self.frame_buffers[camera], (first + at) * GOP, GOP) == data
             )[1]
             for at, data in enumerate(sent)
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, GOP, NO_REASON
-from server.service.streaming.presence import Presence, PresenceLog
+from server.service.streaming.presence import PresenceLog, ScopedPicture
 from server.service.view_selection.decider import GopDecision
 
 A, B = CAMERAS
@@ -28,8 +28,8 @@ def presence_log() -> PresenceLog:
 
 def test_a_person_who_was_never_seen_is_absent(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0]}))
-    assert presence_log.presence_of(1) is Presence.PRESENT
-    assert presence_log.presence_of(2) is Presence.ABSENT
+    assert presence_log.picture_of(1) is ScopedPicture.SHOWN
+    assert presence_log.picture_of(2) is ScopedPicture.GRAY
 
 
 @pytest.mark.parametrize(("place", "present"), [(0, 2), (GOP - 1, 2)])
@@ -40,43 +40,43 @@ def test_a_person_who_leaves_is_present_for_a_while_then_frozen_then_absent(
     found = []
     for gop in range(1, 9):
         presence_log.update(decision(gop, {}))
-        found.append(presence_log.presence_of(1))
-    held = [Presence.FROZEN] * (found.index(Presence.ABSENT) - present)
-    assert found == [Presence.PRESENT] * present + held + [Presence.ABSENT] * (8 - present - len(held))
+        found.append(presence_log.picture_of(1))
+    held = [ScopedPicture.FROZEN] * (found.index(ScopedPicture.GRAY) - present)
+    assert found == [ScopedPicture.SHOWN] * present + held + [ScopedPicture.GRAY] * (8 - present - len(held))
     assert len(held) == 2
 
 
 def test_one_box_in_any_camera_makes_a_person_present(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0]}))
     presence_log.update(decision(9, {1: [GOP - 1]}, camera=B))
-    assert presence_log.presence_of(1) is Presence.PRESENT
+    assert presence_log.picture_of(1) is ScopedPicture.SHOWN
 
 
 def test_merged_numbers_share_when_they_were_seen(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0], 2: [0]}))
     presence_log.update(decision(4, {2: [0]}))
     presence_log.update(decision(5, {}, merged={2: 1}))
-    assert presence_log.presence_of(1) is presence_log.presence_of(2) is Presence.PRESENT
+    assert presence_log.picture_of(1) is presence_log.picture_of(2) is ScopedPicture.SHOWN
     presence_log.update(decision(8, {2: [3]}, merged={2: 1}))
-    assert presence_log.presence_of(1) is Presence.PRESENT, "also by boxes that still have the other number"
+    assert presence_log.picture_of(1) is ScopedPicture.SHOWN, "also by boxes that still have the other number"
 
 
 def test_restarted_pulses_make_all_persons_absent(presence_log: PresenceLog) -> None:
     presence_log.update(decision(100, {1: [0]}))
     presence_log.update(decision(0, {}))
-    assert presence_log.presence_of(1) is Presence.ABSENT
+    assert presence_log.picture_of(1) is ScopedPicture.GRAY
 
 
 def test_a_forgotten_person_is_absent(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0], 2: [0]}))
     presence_log.forget({2})
-    assert presence_log.presence_of(1) is Presence.ABSENT
-    assert presence_log.presence_of(2) is Presence.PRESENT
+    assert presence_log.picture_of(1) is ScopedPicture.GRAY
+    assert presence_log.picture_of(2) is ScopedPicture.SHOWN
 
 
 def test_without_hide_time_a_person_is_present_only_in_gops_that_show_them() -> None:
     presence_log = PresenceLog(0)
     presence_log.update(decision(0, {1: [GOP - 1]}))
-    assert presence_log.presence_of(1) is Presence.PRESENT
+    assert presence_log.picture_of(1) is ScopedPicture.SHOWN
     presence_log.update(decision(1, {}))
-    assert presence_log.presence_of(1) is Presence.ABSENT
+    assert presence_log.picture_of(1) is ScopedPicture.GRAY

@@ -6,7 +6,15 @@ import asyncio
 from collections.abc import Iterable
 
 from fakes.service.decisions import choice
-from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, encoded, small_config
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    GOP,
+    NO_REASON,
+    encoded,
+    joined_fragments,
+    small_config,
+)
 from fakes.timeouts import PATIENCE
 from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -39,7 +47,10 @@ async def received(viewer: Subscriber) -> list[bytes]:
 
 
 def gops(frame_buffers: dict[str, FrameBuffer], cameras: Iterable[str], first: int = 0) -> list[bytes]:
-    return [frame_buffers[camera].gop((first + place) * GOP, GOP) for place, camera in enumerate(cameras)]
+    return [
+        joined_fragments(frame_buffers[camera], (first + place) * GOP, GOP)
+        for place, camera in enumerate(cameras)
+    ]
 
 
 async def test_a_stream_is_the_chosen_cameras_bytes() -> None:
@@ -70,7 +81,7 @@ async def test_without_a_choice_the_last_camera_continues() -> None:
 async def test_a_partial_gop_at_the_end_is_sent() -> None:
     splicer, frame_buffers = filled()
     splicer.publish_decision(decision(0, choice(1, A), frames=3))
-    assert await received(splicer.persons[1].subscribe()) == [frame_buffers[A].gop(0, 3)]
+    assert await received(splicer.persons[1].subscribe()) == [joined_fragments(frame_buffers[A], 0, 3)]
 
 
 async def test_the_stream_of_a_merged_number_continues_with_the_kept_person() -> None:

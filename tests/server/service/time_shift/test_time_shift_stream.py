@@ -297,10 +297,10 @@ class DiskSource:
     def __init__(self, *recorded_site: SessionEntries, end: int) -> None:
         self.recorded, self.end = recorded_site, end
 
-    def gop_in_memory(self, pulse: int) -> None:
+    def gop_in_memory_from(self, pulse: int) -> None:
         del pulse
 
-    def gop_in_memory_before(self, pulse: int) -> None:
+    def gop_in_memory_until(self, pulse: int) -> None:
         del pulse
 
 

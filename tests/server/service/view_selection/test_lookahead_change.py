@@ -20,6 +20,7 @@ from fakes.service.scripted_cameras import (
     TrackNumbers,
     camera_tracks,
     epoch_of,
+    joined_fragments,
     small_config,
 )
 from server.config.sections import ViewSettings
@@ -50,7 +51,7 @@ def test_every_gop_is_decided_once_in_order_with_known_frames(
     decided: list[GopDecision] = []
     for number in range(45):
         if number in changes:
-            decider.apply_view_settings(with_lookahead(config.view, max(gop, changes[number])))
+            decider.apply_live_view_settings(with_lookahead(config.view, max(gop, changes[number])))
         one, other = (SMALL, LARGE) if number // 3 % 2 else (LARGE, SMALL)
         epoch = epoch_of(number, camera_tracks(A, number, {1: one}), camera_tracks(B, number, {1: other}))
         new = decider.step(epoch)
@@ -74,7 +75,7 @@ def test_after_a_change_settles_views_are_selected_as_if_it_had_always_applied()
         for number in range(30):
             for epoch, frames in changes:
                 if epoch == number:
-                    decider.apply_view_settings(with_lookahead(config.view, frames))
+                    decider.apply_live_view_settings(with_lookahead(config.view, frames))
             boxes = {A: {1: LARGE if number < 20 else SMALL}, B: {1: SMALL if number < 20 else LARGE}}
             decided += decider.step(
                 epoch_of(number, *(camera_tracks(camera, number, boxes[camera]) for camera in CAMERAS))
@@ -102,7 +103,7 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
     viewer = None
     for epoch in range(EPOCHS):
         if epoch in changes:
-            service.apply_view_settings(with_lookahead(service.config.view, changes[epoch]))
+            service.apply_live_view_settings(with_lookahead(service.config.view, changes[epoch]))
         one, other = (SMALL, LARGE) if epoch // 3 % 2 else (LARGE, SMALL)
         service.feed(epoch, {A: {1: one}, B: {1: other}})
         if viewer is None and 1 in service.splicer.persons:
@@ -115,7 +116,8 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
         assert viewer.lost_gops == 0
         names = [camera or "" for camera in shown[change:]]
         assert got == [
-            service.frame_buffers[name].gop((change + n) * GOP, GOP) for n, name in enumerate(names)
+            joined_fragments(service.frame_buffers[name], (change + n) * GOP, GOP)
+            for n, name in enumerate(names)
         ]
     service.close()
 
@@ -165,5 +167,5 @@ def test_frame_buffers_cover_the_longest_look_ahead() -> None:
         assert service.max_lookahead >= config.view.lookahead
         assert service.max_lookahead + late + STRIDE + GOP <= buffered
         with pytest.raises(UserError):
-            service.apply_view_settings(with_lookahead(config.view, service.max_lookahead + 1))
+            service.apply_live_view_settings(with_lookahead(config.view, service.max_lookahead + 1))
         service.close()

@@ -37,8 +37,8 @@ class SelectionReason:
     explanation: Explanation
 
 
-class RecentReasons:
-    """Keeps the reasons of recent GOPs, from the first query about an object on."""
+class QueriedReasons:
+    """Keeps the reasons of recent GOPs, for objects that were recently queried, from their first query on."""
 
     def __init__(self, fps: float) -> None:
         self._query_expiry, self._keep_frames = _QUERY_EXPIRY_S * fps, _KEPT_S * fps
@@ -62,7 +62,7 @@ class RecentReasons:
             if number in selected_views:
                 self._keep(selected_views[number], reasons)
 
-    def newest(self, view: SelectedView) -> SelectionReason:
+    def query_newest(self, view: SelectedView) -> SelectionReason:
         """Explain an object's newest view; from now on its reasons are kept.
 
         Raises:

@@ -7,7 +7,7 @@ from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
 
 
-def add_scene_ground(config: Config) -> Config:
+def add_synthetic_homographies(config: Config) -> Config:
     """Return the configuration with homographies for synthetic cameras that have none configured.
 
     Raises:
