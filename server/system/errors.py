@@ -12,6 +12,6 @@ class UserError(Exception):
 
 
 class UnavailableError(UserError):
-    """Something that this process needs is unavailable now; it is retried."""
+    """Something that this process needs is unavailable now; a supervisor starts the process again."""
 
     code: ClassVar[int] = 3

@@ -39,7 +39,7 @@ def open_private(path: Path | str, flags: int) -> int:
 
 
 def write_private(path: Path, data: bytes) -> None:
-    """Write a file with mode 600.
+    """Write a file in place; a new one has mode 600, an existing one keeps its mode.
 
     Raises:
         OSError: it cannot be written; part of it may exist.

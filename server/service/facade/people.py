@@ -99,7 +99,7 @@ class MergePeople:
 
 @dataclass(frozen=True, slots=True)
 class SplitPerson:
-    """Command: split these cameras' tracks off a person as a new person; no cameras: all of them."""
+    """Command: split these cameras' tracks off a person as a new person; an empty list: all cameras'."""
 
     number: int
     cameras: list[str]

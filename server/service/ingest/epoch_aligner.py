@@ -88,7 +88,7 @@ class EpochAligner:
         queue.connected, queue.first, queue.boot = False, None, None
 
     def frame_received(self, camera: str, boot: int, pulse: int) -> None:
-        """Record a camera's frame: windows are expected from its pulse on."""
+        """Record a camera's frame; from the first one of a boot on, windows are expected."""
         queue = self._queues[camera]
         queue.connected = True
         if queue.boot != boot:

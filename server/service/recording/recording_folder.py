@@ -116,7 +116,7 @@ class RecordingFolder:
                 session.remove_files()
 
     def close(self) -> None:
-        """End the session, and rewrite its playlists."""
+        """End the session, rewrite its playlists, save the age clock, and unlock the folder."""
         try:
             self._close_segment()
             if self._lock is not None and is_same_file(self._lock, self.folder / _LOCK):

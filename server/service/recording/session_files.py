@@ -207,7 +207,7 @@ class RecordingSessionInfoFile:
 
     @classmethod
     def create(cls, folder: Path, info: RecordingSessionInfo) -> RecordingSessionInfoFile:
-        """Write the file of a new session.
+        """Write the file of a new session into its folder, which exists.
 
         Raises:
             OSError: writing fails.

@@ -126,7 +126,7 @@ class SplicedStream:
     ) -> None:
         """Publish a camera's GOP, filled where pictures are missing.
 
-        A person who is not present is not shown: the last picture stands, or gray.
+        ``picture``: instead of the GOP, the last picture may stand, or gray be shown.
         """
         match picture:
             case ScopedPicture.SHOWN:

@@ -1,4 +1,4 @@
-"""A person whom no camera sees is frozen and then absent, by any of their numbers."""
+"""The picture of a person whom no camera sees is frozen and then gray, by any of their numbers."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ def presence_log() -> PresenceLog:
     return PresenceLog(UNSEEN)
 
 
-def test_a_person_who_was_never_seen_is_absent(presence_log: PresenceLog) -> None:
+def test_a_person_who_was_never_seen_is_gray(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0]}))
     assert presence_log.picture_of(1) is ScopedPicture.SHOWN
     assert presence_log.picture_of(2) is ScopedPicture.GRAY
 
 
-@pytest.mark.parametrize(("place", "present"), [(0, 2), (GOP - 1, 2)])
-def test_a_person_who_leaves_is_present_for_a_while_then_frozen_then_absent(
-    presence_log: PresenceLog, place: int, present: int
+@pytest.mark.parametrize(("place", "shown"), [(0, 2), (GOP - 1, 2)])
+def test_a_person_who_leaves_is_shown_for_a_while_then_frozen_then_gray(
+    presence_log: PresenceLog, place: int, shown: int
 ) -> None:
     presence_log.update(decision(0, {1: [place]}))
     found = []
     for gop in range(1, 9):
         presence_log.update(decision(gop, {}))
         found.append(presence_log.picture_of(1))
-    held = [ScopedPicture.FROZEN] * (found.index(ScopedPicture.GRAY) - present)
-    assert found == [ScopedPicture.SHOWN] * present + held + [ScopedPicture.GRAY] * (8 - present - len(held))
+    held = [ScopedPicture.FROZEN] * (found.index(ScopedPicture.GRAY) - shown)
+    assert found == [ScopedPicture.SHOWN] * shown + held + [ScopedPicture.GRAY] * (8 - shown - len(held))
     assert len(held) == 2
 
 
-def test_one_box_in_any_camera_makes_a_person_present(presence_log: PresenceLog) -> None:
+def test_one_box_in_any_camera_shows_a_person(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0]}))
     presence_log.update(decision(9, {1: [GOP - 1]}, camera=B))
     assert presence_log.picture_of(1) is ScopedPicture.SHOWN
@@ -61,13 +61,13 @@ def test_merged_numbers_share_when_they_were_seen(presence_log: PresenceLog) -> 
     assert presence_log.picture_of(1) is ScopedPicture.SHOWN, "also by boxes that still have the other number"
 
 
-def test_restarted_pulses_make_all_persons_absent(presence_log: PresenceLog) -> None:
+def test_restarted_pulses_make_all_persons_gray(presence_log: PresenceLog) -> None:
     presence_log.update(decision(100, {1: [0]}))
     presence_log.update(decision(0, {}))
     assert presence_log.picture_of(1) is ScopedPicture.GRAY
 
 
-def test_a_forgotten_person_is_absent(presence_log: PresenceLog) -> None:
+def test_a_forgotten_person_is_gray(presence_log: PresenceLog) -> None:
     presence_log.update(decision(0, {1: [0], 2: [0]}))
     presence_log.forget({2})
     assert presence_log.picture_of(1) is ScopedPicture.GRAY
