@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 from synthetic.court.court import COURT, SPORTS_HALL
 from synthetic.court.game import Game
-from synthetic.drawing.clothing import choose_casual_outfit, choose_outfit, choose_team_outfit
+from synthetic.drawing.clothing import (
+    choose_distinct_outfit,
+    choose_outfit_with_lookalikes,
+    choose_team_outfit,
+)
 from synthetic.room.layouts import GALLERY, OVERHEAD, OVERHEAD_AREA, ROOM
 from synthetic.room.room import Room
 from synthetic.room.room_world import RoomWorld
@@ -50,14 +54,14 @@ def catalog_entry(name: str) -> CatalogEntry:
 
 def _visited(room: Room) -> Callable[[SceneParameters], World]:
     def build(parameters: SceneParameters) -> World:
-        outfits = [choose_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
+        outfits = [choose_distinct_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
         return RoomWorld(room, VisitingCrowd(room, parameters.objects, parameters.seed), outfits, parameters)
 
     return build
 
 
 def _overhead(parameters: SceneParameters) -> World:
-    outfits = [choose_casual_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
+    outfits = [choose_outfit_with_lookalikes(walker, parameters.seed) for walker in range(parameters.objects)]
     crowd = ChoreographedCrowd(
         Gatherings(OVERHEAD_AREA, parameters.objects, parameters.seed), [outfit.height for outfit in outfits]
     )

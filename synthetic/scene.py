@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats
-from synthetic.cameras.sensor_noise import add_sensor_noise
+from synthetic.cameras.sensor_noise import add_noise_and_drift
 from synthetic.catalog import catalog_entry
 from synthetic.ground_truth import CameraTruth
 from synthetic.world import SceneParameters
@@ -58,9 +58,9 @@ class Scene:
         """Return a camera's BGR image ``(H, W, 3)``. Cameras and frames count from 0."""
         seconds = self._seconds(frame)
         clean = self.world.picture(self._checked(camera), seconds)
-        return add_sensor_noise(clean, camera, frame, seconds, self.seed)
+        return add_noise_and_drift(clean, camera, frame, seconds, self.seed)
 
-    def background(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
+    def clean_background(self, camera: int, frame: int = 0) -> NDArray[np.uint8]:
         """Return a camera's image ``(H, W, 3)`` without objects, noise and drift."""
         return self.world.background(self._checked(camera), self._seconds(frame))
 

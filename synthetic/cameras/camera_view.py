@@ -45,11 +45,11 @@ class CameraView:
         self.view = view
         self.backdrop: Backdrop = paint_backdrop(room, view)
 
-    def draw_people(self, poses: Sequence[Pose], outfits: Sequence[Outfit]) -> list[DrawnPerson]:
+    def draw_visible_people(self, poses: Sequence[Pose], outfits: Sequence[Outfit]) -> list[DrawnPerson]:
         """Draw the people who may be visible, farthest first."""
         drawn = []
         for walker, (pose, outfit) in enumerate(zip(poses, outfits, strict=True)):
-            beyond = self.room.outside(pose.x, pose.y)
+            beyond = self.room.signed_distance_outside(pose.x, pose.y)
             if beyond > _THRESHOLD and not self._near_door(pose):
                 continue
             skeleton = place_joints(pose, outfit.height)
@@ -99,7 +99,7 @@ class CameraView:
 
         Seen from straight above, furniture hides no standing person.
         """
-        if self.view.looks_down:
+        if self.view.looks_straight_down:
             return False
         west, south, east, north = piece.footprint
         x, y = self.view.center[:2].tolist()

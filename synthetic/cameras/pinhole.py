@@ -50,7 +50,7 @@ class PinholeCamera:
         return cls(center, axes, focal, width, height)
 
     @property
-    def looks_down(self) -> bool:
+    def looks_straight_down(self) -> bool:
         """Whether it looks straight down."""
         return bool(self.axes[2, 2] < -_PLUMB)
 
@@ -66,7 +66,7 @@ class PinholeCamera:
         pixels += (self.width / 2, self.height / 2)
         return pixels, depth
 
-    def rays(self, columns: Floats, rows: Floats) -> Floats:
+    def ray_grid(self, columns: Floats, rows: Floats) -> Floats:
         """Return the unit directions ``(R, C, 3)`` of the rays through ``columns x rows``."""
         across = (columns - self.width / 2) / self.focal
         down = (rows - self.height / 2) / self.focal

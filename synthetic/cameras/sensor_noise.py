@@ -36,10 +36,10 @@ def _hash(camera: int, frame: int, seed: int) -> int:
     return value ^ (value >> 32)
 
 
-def add_sensor_noise(
+def add_noise_and_drift(
     image: NDArray[np.uint8], camera: int, frame: int, seconds: float, seed: int
 ) -> NDArray[np.uint8]:
-    """Return an image ``(H, W, 3)`` with the sensor noise and exposure of one camera's frame."""
+    """Return an image ``(H, W, 3)`` with the sensor noise and exposure drift of one camera's frame."""
     height, width = image.shape[:2]
     hashed = _hash(camera, frame, seed)
     noise = _noise_images(width, height, seed)[hashed % _BANK]

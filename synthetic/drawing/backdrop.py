@@ -45,7 +45,7 @@ def paint_backdrop(room: Room, view: PinholeCamera) -> Backdrop:
     for top in range(0, view.height, _BAND):
         bottom = min(top + _BAND, view.height)
         rows = top + (np.arange((bottom - top) * _FINE) + 0.5) / _FINE
-        rays = view.rays(columns, rows)
+        rays = view.ray_grid(columns, rows)
         color, label = _cast(room, view.center, rays.reshape(-1, 3))
         size = (view.width, bottom - top)
         fine = np.clip(color[:, ::-1] * 255, 0, 255).astype(np.float32).reshape(rays.shape)

@@ -61,7 +61,7 @@ _WARDROBE = (
 )
 
 
-def choose_outfit(walker: int, seed: int) -> Outfit:
+def choose_distinct_outfit(walker: int, seed: int) -> Outfit:
     """Return the outfit of walker 0, 1, …; the first twelve are from the catalog, and all of them differ."""
     if walker < len(_WARDROBE):
         return _WARDROBE[walker]
@@ -81,7 +81,7 @@ def choose_outfit(walker: int, seed: int) -> Outfit:
     )
 
 
-def choose_casual_outfit(walker: int, seed: int) -> Outfit:
+def choose_outfit_with_lookalikes(walker: int, seed: int) -> Outfit:
     """Return a catalog outfit for walker 0, 1, …; with some seeds two people have nearly the same clothes."""
     rng = np.random.default_rng([seed, 0xCA50])
     order = rng.permutation(len(_WARDROBE)).tolist()

@@ -45,7 +45,9 @@ def cast_shadow(image: Bytes, floor: Bytes, view: PinholeCamera, joints: Floats)
     width, height = (high - low).tolist()
     size = ((height + _COARSE - 1) // _COARSE, (width + _COARSE - 1) // _COARSE)
     local, scale = (points - low) / _COARSE, pixels_per_meter / _COARSE
-    dark = np.maximum(_body_shadow(size, local, scale), _contact(size, local, scale, round_=view.looks_down))
+    dark = np.maximum(
+        _body_shadow(size, local, scale), _contact(size, local, scale, round_=view.looks_straight_down)
+    )
     full = cv2.resize(dark, None, fx=_COARSE, fy=_COARSE, interpolation=cv2.INTER_LINEAR)[:height, :width]
     area = (slice(low[1], high[1]), slice(low[0], high[0]))
     kept = cv2.cvtColor(255 - cv2.multiply(full, floor[area], scale=1 / 255), cv2.COLOR_GRAY2BGR)

@@ -69,16 +69,16 @@ class Room:
     viewpoints: tuple[Viewpoint, ...]
     style: StyleName = "house"  # of floor, walls and light: surface_styles.py
 
-    def beyond(self, door: Door, along: float, out: float) -> Point:
-        """Return the floor point `out` meters beyond a door's wall, `along` from the opening's center."""
-        middle = door.start + door.width / 2 + along
+    def beyond(self, door: Door, from_center: float, out: float) -> Point:
+        """Return the floor point `out` meters beyond a door's wall, `from_center` meters along it."""
+        middle = door.start + door.width / 2 + from_center
         return (middle, self.depth + out) if door.wall == "north" else (self.width + out, middle)
 
     def footprints(self) -> Floats:
         """Return the furniture's bounds on the floor: ``(F, 4)`` west, south, east, north."""
         return _footprints(self)
 
-    def outside(self, x: float, y: float) -> float:
+    def signed_distance_outside(self, x: float, y: float) -> float:
         """Return the distance of a floor point beyond the walls; negative inside."""
         return max(-x, -y, x - self.width, y - self.depth)
 

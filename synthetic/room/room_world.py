@@ -40,7 +40,7 @@ class RoomWorld:
         self._size = (parameters.width, parameters.height)
         self.camera_view = lru_cache(maxsize=None)(self._create_view)
         # A recording needs the image and the ground truth of a frame: people are drawn once for both.
-        self._people = lru_cache(maxsize=parameters.cameras)(self._draw_people)
+        self._people = lru_cache(maxsize=parameters.cameras)(self._draw_visible_people)
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -67,7 +67,7 @@ class RoomWorld:
     def inside(self, seconds: float) -> NDArray[np.bool_]:
         """Return which people are in the room, not in a corridor."""
         positions = self.positions(seconds).tolist()
-        return np.array([self.room.outside(x, y) <= 0 for x, y in positions], dtype=np.bool_)
+        return np.array([self.room.signed_distance_outside(x, y) <= 0 for x, y in positions], dtype=np.bool_)
 
     def homography(self, camera: int) -> Floats:
         """Return the homography from a camera's pixels to the floor."""
@@ -80,8 +80,8 @@ class RoomWorld:
     def _create_view(self, camera: int) -> CameraView:
         return CameraView(self.room, self.view(camera))
 
-    def _draw_people(self, camera: int, seconds: float) -> tuple[DrawnPerson, ...]:
-        return tuple(self.camera_view(camera).draw_people(self._crowd.poses(seconds), self._outfits))
+    def _draw_visible_people(self, camera: int, seconds: float) -> tuple[DrawnPerson, ...]:
+        return tuple(self.camera_view(camera).draw_visible_people(self._crowd.poses(seconds), self._outfits))
 
 
 def compose(camera_view: CameraView, people: Sequence[DrawnPerson]) -> Bytes:

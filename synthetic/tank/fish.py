@@ -133,7 +133,7 @@ def fish_vertices(swimmers: FishState) -> Floats:
     beat = 2 * np.pi * (swimmers.beats[:, None] - 0.85 * along)
     swing = swimmers.vigour[:, None] * (0.012 + 0.085 * along**2) * np.sin(beat)
     swing -= swimmers.vigour[:, None] * 0.012 * np.sin(beat[:, :1])  # the nose moves nearly straight
-    bend = 0.10 * swimmers.bends[:, None] * np.maximum(along - 0.3, 0) ** 2
+    bend = 0.10 * swimmers.turn_rates[:, None] * np.maximum(along - 0.3, 0) ** 2
     local = np.repeat(rest[None], len(swimmers.places), axis=0)
     local[:, :, 1] += swing + bend
     _move_pectorals(local, swimmers.beats)
@@ -142,8 +142,8 @@ def fish_vertices(swimmers: FishState) -> Floats:
     left = np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(ahead))], axis=1)
     left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
     axes = np.stack([ahead, left, np.cross(ahead, left)], axis=1)
-    corners: Floats = swimmers.places[:, None] + LENGTH * local @ axes
-    return corners
+    vertices: Floats = swimmers.places[:, None] + LENGTH * local @ axes
+    return vertices
 
 
 def _move_pectorals(local: Floats, beats: Floats) -> None:
@@ -159,22 +159,22 @@ _SHIFT = 4  # fractional bits of cv2's coordinates
 _AMBIENT, _SUN, _NET = 0.72, 0.36, 1.1  # ambient light, sunlight from above, and caustics
 
 
-def draw_fish(view: PinholeCamera, corners: Floats, caustic_map: Bytes) -> list[Figure | None]:
-    """Draw fish by their corners ``(P, V, 3)`` in meters, under caustics ``(TILE, TILE)``.
+def draw_fish(view: PinholeCamera, vertices: Floats, caustic_map: Bytes) -> list[Figure | None]:
+    """Draw fish by their vertices ``(P, V, 3)`` in meters, under caustics ``(TILE, TILE)``.
 
     Patches extend beyond the image's edge if fish do. None for a fish that is not in front of the camera.
     """
-    if not len(corners):
+    if not len(vertices):
         return []
-    pixels, depth = view.project(corners.reshape(-1, 3))
-    pixels, depth = pixels.reshape(*corners.shape[:2], 2), depth.reshape(corners.shape[:2])
-    inks = _inks(view, corners, caustic_map)
+    pixels, depth = view.project(vertices.reshape(-1, 3))
+    pixels, depth = pixels.reshape(*vertices.shape[:2], 2), depth.reshape(vertices.shape[:2])
+    inks = _inks(view, vertices, caustic_map)
     return [_draw(*fish) for fish in zip(pixels, depth, inks, strict=True)]
 
 
-def _inks(view: PinholeCamera, corners: Floats, caustic_map: Bytes) -> Floats:
+def _inks(view: PinholeCamera, vertices: Floats, caustic_map: Bytes) -> Floats:
     """Compute the colors ``(P, F, 4)`` of all faces: blue, green, red and alpha."""
-    facing = corners[:, FACES]  # (P, F, 4, 3)
+    facing = vertices[:, FACES]  # (P, F, 4, 3)
     normal = np.cross(facing[:, :, 2] - facing[:, :, 0], facing[:, :, 3] - facing[:, :, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
     rise = np.where(THIN, np.abs(normal[..., 2]) * 0.3 + 0.3, normal[..., 2])

@@ -59,7 +59,7 @@ class Seabed:
         columns = (np.arange(view.width * _FINE) + 0.5) / _FINE
         rows = (np.arange(view.height * _FINE) + 0.5) / _FINE
         shape = (len(rows), len(columns))
-        rays = view.rays(columns, rows).reshape(-1, 3)
+        rays = view.ray_grid(columns, rows).reshape(-1, 3)
         cast = _cast(view.center, rays)
         water = open_water(rays)
         color = attenuate_by_water(cast.color, cast.distance, water)

@@ -14,7 +14,7 @@ import numpy as np
 
 from synthetic.cameras.pinhole import Floats
 from synthetic.tank.steering import CRUISE, HIGH, LOW, RATE, STRAIGHT, Waypoints, swim_between
-from synthetic.walking.trajectory import whole_strides
+from synthetic.walking.trajectory import cumulate_to_whole_strides
 
 ROUND = 32.0  # seconds
 _DRAWS = 60  # candidate positions, of which a fish uses the one farthest from the others
@@ -40,7 +40,7 @@ class FishState:
     ahead: Floats  # (P, 3) unit vectors: where the heads point
     beats: Floats  # (P,) of the tail, counted
     vigour: Floats  # (P,) how far the tail swings, 1 when cruising
-    bends: Floats  # (P,) radians per second: how fast a fish turns to its left
+    turn_rates: Floats  # (P,) radians per second: how fast a fish turns to its left
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class _Round:
     ahead: Floats  # (T, P, 3)
     beats: Floats  # (T, P)
     vigour: Floats  # (T, P)
-    bends: Floats  # (T, P)
+    turn_rates: Floats  # (T, P)
 
 
 class Shoal:
@@ -67,11 +67,11 @@ class Shoal:
         position = (seconds - number * ROUND) * RATE
         index = min(int(position), len(path.places) - 2)
         share = position - index
-        places, ahead, beats, vigour, bends = (
+        places, ahead, beats, vigour, turn_rates = (
             part[index] * (1 - share) + part[index + 1] * share
-            for part in (path.places, path.ahead, path.beats, path.vigour, path.bends)
+            for part in (path.places, path.ahead, path.beats, path.vigour, path.turn_rates)
         )
-        return FishState(places, _unit(ahead), beats, vigour, bends)
+        return FishState(places, _unit(ahead), beats, vigour, turn_rates)
 
     def _waypoints(self, number: int) -> Waypoints:
         if number == 0:
@@ -100,10 +100,12 @@ class Shoal:
         velocities = _steady(velocities, ease)
         speeds = np.linalg.norm(velocities, axis=2)
         steps = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=2)
-        beats = np.array([whole_strides(fish, _BEAT) / _BEAT for fish in steps.T]).T.reshape(speeds.shape)
+        beats = np.array([cumulate_to_whole_strides(fish, _BEAT) / _BEAT for fish in steps.T]).T.reshape(
+            speeds.shape
+        )
         turns = np.unwrap(np.arctan2(velocities[..., 1], velocities[..., 0]), axis=0)
-        bends = np.clip(np.gradient(turns, 1 / RATE, axis=0), -2.5, 2.5) * ease[:, None]
-        return _Round(places, velocities, beats, np.clip(speeds / CRUISE, 0.4, 1.5), bends)
+        turn_rates = np.clip(np.gradient(turns, 1 / RATE, axis=0), -2.5, 2.5) * ease[:, None]
+        return _Round(places, velocities, beats, np.clip(speeds / CRUISE, 0.4, 1.5), turn_rates)
 
 
 def _spots(rng: np.random.Generator) -> tuple[Floats, Floats]:

@@ -21,8 +21,8 @@ from synthetic.walking.trajectory import (
     TURNING,
     Pose,
     Trajectory,
+    cumulate_to_whole_strides,
     smooth,
-    whole_strides,
 )
 
 ROUND = 10.0  # seconds
@@ -37,12 +37,12 @@ class RoundPath:
     times: Floats  # seconds into the round; the first is 0 and the last is `ROUND`
     places: Floats  # meters
     facing: Floats  # radians
-    offsets: Floats  # (T, 2) meters by which the path is bent at `sample_times()`
+    sampled_offsets: Floats  # (T, 2) meters by which the path is bent at `sample_times()`
 
     def at(self, moments: Floats) -> Floats:
         """Return the places ``(T, 2)`` at moments ``(T,)``."""
         straight = [np.interp(moments, self.times, axis) for axis in self.places.T]
-        bends = [np.interp(moments, sample_times(), axis) for axis in self.offsets.T]
+        bends = [np.interp(moments, sample_times(), axis) for axis in self.sampled_offsets.T]
         places: Floats = np.column_stack(straight) + np.column_stack(bends)
         return places
 
@@ -74,7 +74,7 @@ def avoid_collisions(paths: Sequence[RoundPath], keep: Floats) -> tuple[RoundPat
     """Bend paths until all pairs of people are ``(P, P)`` meters apart."""
     straight = np.array([path.at(sample_times()) for path in paths])
     bends = push_paths_apart(straight, keep, _RATE) - straight
-    return tuple(replace(path, offsets=offsets) for path, offsets in zip(paths, bends, strict=True))
+    return tuple(replace(path, sampled_offsets=offsets) for path, offsets in zip(paths, bends, strict=True))
 
 
 def crowding_cost(paths: Sequence[RoundPath], keep: Floats) -> float:
@@ -138,11 +138,13 @@ def _trajectory(paths: list[RoundPath], stride: float, offset: float) -> Traject
     paces = steps[kept] / (1 + _LONGER * np.maximum(speeds - _WALK, 0))
     calm = np.clip(1 - speeds / 0.4, 0, 1)
     sway = _SWAY * np.sin(2 * np.pi * (clock[kept] + offset) / _SWAY_SECONDS)
-    return Trajectory(path[kept], headings[kept] + calm * sway, whole_strides(paces, stride), speeds)
+    return Trajectory(
+        path[kept], headings[kept] + calm * sway, cumulate_to_whole_strides(paces, stride), speeds
+    )
 
 
 def _bends(paths: list[RoundPath], clock: Floats) -> Floats:
     """Return the offsets of three rounds' paths: ``(T, 2)`` meters."""
-    offsets = np.concatenate([path.offsets[:-1] for path in paths])
+    offsets = np.concatenate([path.sampled_offsets[:-1] for path in paths])
     moments = np.concatenate([sample_times()[:-1] + start for start in (-ROUND, 0.0, ROUND)])
     return np.column_stack([np.interp(clock, moments, axis) for axis in offsets.T])

@@ -88,10 +88,10 @@ class VisitPlan:
     seconds: float  # available time
     pace: float  # meters per second
     meetings: tuple[Meeting, ...]  # meetings during the visit
-    slot: float  # radians: the side from which this person joins a meeting
+    meeting_angle: float  # radians: the side from which this person joins a meeting
     camera_positions: tuple[Point, ...]  # the best view should change between these from time to time
     begun: bool = False  # in the room already, walking
-    restless: float = 0.0  # seconds from the visit's beginning in which there is no standing
+    no_pause_seconds: float = 0.0  # seconds from the visit's beginning in which there is no standing
 
 
 def draw_route(rng: np.random.Generator, room: Room, visit: VisitPlan) -> Route:
@@ -134,7 +134,7 @@ def _begin_inside(rng: np.random.Generator, room: Room, visit: VisitPlan, home: 
     for _ in range(2 * _TRIES):
         route = Route(_draw_place(rng, room), visit.pace, visit.camera_positions)
         end = _draw_place(rng, room)
-        is_far = math.dist(route.here, end) > visit.restless * visit.pace
+        is_far = math.dist(route.here, end) > visit.no_pause_seconds * visit.pace
         if is_far and is_walkable(room, route.here, end) and is_walkable(room, end, home):
             route.add(Leg(end))
             break
@@ -144,15 +144,15 @@ def _begin_inside(rng: np.random.Generator, room: Room, visit: VisitPlan, home: 
 def _choose_leg(rng: np.random.Generator, room: Room, route: Route, home: Point, visit: VisitPlan) -> Leg:
     for meeting in visit.meetings:
         arrival = route.seconds + math.dist(route.here, meeting.place) / route.pace
-        due = meeting.begin <= arrival < meeting.end and arrival > visit.restless
+        due = meeting.begin <= arrival < meeting.end and arrival > visit.no_pause_seconds
         if due and rng.random() < 0.6:  # noqa: PLR2004 — most people join
             x, y = meeting.place
-            end = (x + _CIRCLE * math.cos(visit.slot), y + _CIRCLE * math.sin(visit.slot))
+            end = (x + _CIRCLE * math.cos(visit.meeting_angle), y + _CIRCLE * math.sin(visit.meeting_angle))
             if is_walkable(room, route.here, end) and is_walkable(room, end, home):
                 return Leg(end, rng.uniform(1.5, meeting.end - arrival + 1.5), meeting.place)
     end = _choose_place(rng, room, route, home, visit)
     arrival = route.seconds + math.dist(route.here, end) / route.pace
-    stays = rng.random() < 0.45 and arrival > visit.restless  # noqa: PLR2004 — not at every position
+    stays = rng.random() < 0.45 and arrival > visit.no_pause_seconds  # noqa: PLR2004 — not at every position
     pause = rng.uniform(1.5, 4.5) if stays else 0.0
     turn = rng.uniform(0, 2 * np.pi)
     return Leg(end, pause, (end[0] + math.cos(turn), end[1] + math.sin(turn)))
@@ -190,8 +190,8 @@ class BestView:
     """The camera in which a person appears largest, and for how long it has been the same."""
 
     camera: int
-    held_seconds: float  # seconds
-    penalty: float = 0.0  # total seconds by which the best view changed too early or too late
+    held_seconds: float
+    penalty: float = 0.0  # of the last walk: seconds by which the best view changed too early or too late
 
 
 def best_view_at(where: Point, camera_positions: tuple[Point, ...]) -> BestView:
@@ -203,7 +203,7 @@ def best_view_at(where: Point, camera_positions: tuple[Point, ...]) -> BestView:
 def follow_best_view(
     best_view: BestView, start: Point, end: Point, seconds: float, camera_positions: tuple[Point, ...]
 ) -> BestView:
-    """Update the best view while a person walks from a point to another."""
+    """Return the best view after a walk from a point to another, and the penalty of this walk alone."""
     camera, held_seconds, penalty = best_view.camera, best_view.held_seconds, 0.0
     steps = max(math.ceil(seconds / _FRAME), 1)
     for step in range(1, steps + 1):

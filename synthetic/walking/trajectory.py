@@ -104,7 +104,7 @@ def smooth(values: Floats, seconds: float) -> Floats:
     return smooth
 
 
-def whole_strides(steps: Floats, stride: float) -> Floats:
+def cumulate_to_whole_strides(steps: Floats, stride: float) -> Floats:
     """Return cumulative steps ``(S,)``, stretched to whole strides, so that gaits continue across rounds."""
     walked = np.cumsum(steps) - steps[0]
     strides = float(walked[-1]) / stride

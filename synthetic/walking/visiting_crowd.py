@@ -22,7 +22,7 @@ _VISIT_STEP = 3.0  # seconds: walkers' visits differ in length, so that the peop
 _FIRST = (40.0, 58.0, 31.0, 49.0)  # seconds into the scene at which the first visits end
 _FIRST_STEP = 2.3  # seconds added for every four walkers
 _UNDER_WAY = 1.0  # seconds from the first visits' beginning to frame 0: in which all people walk
-_RESTLESS = _UNDER_WAY + 4.5  # seconds of the first visits without standing, for background learning
+_NO_PAUSE = _UNDER_WAY + 4.5  # seconds of the first visits without standing, for background learning
 _CANDIDATES = 16
 _CROWD = (6, 8)  # from walker 6 on there are 8 candidates: in a crowd no route is free
 _BRISK = 0.5  # least meters per second during these
@@ -78,7 +78,7 @@ class VisitingCrowd:
         pace = float(rng.uniform(0.78, 1.08))
         meetings = self._meetings(begin, length)
         others = self._others(walker, begin, length)
-        slot = 2 * np.pi * (walker % _SLOTS) / _SLOTS
+        meeting_angle = 2 * np.pi * (walker % _SLOTS) / _SLOTS
         best, lowest = None, np.inf
         for _ in range(_CANDIDATES if walker < _CROWD[0] or not visit else _CROWD[1]):
             delay = float(rng.uniform(0.0, 4.0)) if visit else 0.0
@@ -86,10 +86,10 @@ class VisitingCrowd:
                 length - delay - 1.0,
                 pace,
                 meetings,
-                slot,
+                meeting_angle,
                 self._camera_positions,
                 visit == 0,
-                0.0 if visit else _RESTLESS,
+                0.0 if visit else _NO_PAUSE,
             )
             trajectory = Trajectory.along(draw_route(rng, self._room, plan), length, delay)
             cost = self._cost(_coarse(trajectory, others), others, first=visit == 0)
@@ -104,11 +104,11 @@ class VisitingCrowd:
         """Return the cost of a path ``(T, 2)`` given those of others ``(O, T, 2)``."""
         cost = proximity_cost(path, others)
         if first:
-            start = slice(int(_UNDER_WAY * _RATE), int(_RESTLESS * _RATE))
+            start = slice(int(_UNDER_WAY * _RATE), int(_NO_PAUSE * _RATE))
             cost += _FIRST_SIGHT * proximity_cost(path[start], others[:, start], _SPREAD)
             speeds = np.hypot(*np.diff(path[start], axis=0).T) * _RATE
             cost += float(np.maximum(_BRISK - speeds, 0).sum())
-            cost += lateral_motion_penalty(path[start][: int(_LEARNING * _RATE)], self._camera_array)
+            cost += missing_lateral_motion_penalty(path[start][: int(_LEARNING * _RATE)], self._camera_array)
         return cost
 
     def _meetings(self, begin: float, length: float) -> tuple[Meeting, ...]:
@@ -141,7 +141,7 @@ def _coarse(trajectory: Trajectory, others: Floats) -> Floats:
     return trajectory.places[: others.shape[1] * _COARSE : _COARSE]
 
 
-def lateral_motion_penalty(path: Floats, camera_positions: Floats) -> float:
+def missing_lateral_motion_penalty(path: Floats, camera_positions: Floats) -> float:
     """Return the cost of a path ``(T, 2)`` for moving too little across the images of cameras ``(C, 2)``."""
     cost = 0.0
     for camera in camera_positions:

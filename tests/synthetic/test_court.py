@@ -114,7 +114,7 @@ def test_a_board_occludes_people_behind_it() -> None:
     floor_point = view.center + sight * (view.center[2] - 1.2) / -sight[2]
     camera_view = world.camera_view(0)
     pose = Pose(float(floor_point[0]), float(floor_point[1]), 0.0, 0.0, 0.0)
-    truth = measure_truth(camera_view, camera_view.draw_people([pose], [choose_team_outfit(0, 0)]))
+    truth = measure_truth(camera_view, camera_view.draw_visible_people([pose], [choose_team_outfit(0, 0)]))
     assert truth.visibility[0] < 0.6
 
 

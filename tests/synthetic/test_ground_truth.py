@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from synthetic import CameraTruth, Scene
-from synthetic.drawing.clothing import choose_outfit
+from synthetic.drawing.clothing import choose_distinct_outfit
 from synthetic.ground_truth import measure_truth
 from synthetic.room.layouts import ROOM
 from synthetic.room.room_world import RoomWorld
@@ -33,7 +33,9 @@ def stand(scene: Scene, camera: int, *places: tuple[float, float]) -> CameraTrut
     poses = [Pose(x, y, 0.0, 0.0, 0.0) for x, y in places]
     return measure_truth(
         camera_view,
-        camera_view.draw_people(poses, [choose_outfit(walker, 0) for walker in range(len(places))]),
+        camera_view.draw_visible_people(
+            poses, [choose_distinct_outfit(walker, 0) for walker in range(len(places))]
+        ),
     )
 
 
@@ -48,7 +50,7 @@ def test_a_box_is_where_the_picture_differs_from_the_empty_room() -> None:
     single = Scene("room", 2, 1, 4, *SIZE)
     found = []
     for camera in range(2):
-        empty = single.background(camera).astype(np.int16)
+        empty = single.clean_background(camera).astype(np.int16)
         for frame in range(30, 900, 60):
             truth = single.truth(frame)[camera]
             if not single.inside(frame)[0] or len(truth.ids) == 0 or truth.visibility[0] < 0.99:
@@ -97,7 +99,9 @@ def test_a_person_has_the_same_height_in_every_camera(crowd: Scene) -> None:
     where = (4.5, 4.0)
     for camera in range(3):
         truth = stand(crowd, camera, where)
-        top, _ = room_world(crowd).view(camera).project(np.array([[*where, choose_outfit(0, 0).height]]))
+        top, _ = (
+            room_world(crowd).view(camera).project(np.array([[*where, choose_distinct_outfit(0, 0).height]]))
+        )
         assert truth.boxes[0, 1] == pytest.approx(
             top[0, 1], abs=0.06 * (truth.boxes[0, 3] - truth.boxes[0, 1])
         )

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from synthetic import Scene
 from synthetic.cameras.pinhole import PinholeCamera, Viewpoint
-from synthetic.drawing.clothing import choose_casual_outfit
+from synthetic.drawing.clothing import choose_outfit_with_lookalikes
 from synthetic.room.layouts import OVERHEAD, OVERHEAD_AREA
 from synthetic.walking.choreographed_crowd import ROUND, ChoreographedCrowd, sample_times
 from synthetic.walking.collision_avoidance import push_paths_apart
@@ -124,7 +124,7 @@ def test_a_camera_that_looks_straight_down_has_north_on_top() -> None:
 
 def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
     scene = Scene("overhead", 1, 1, 4, *SIZE)
-    empty = scene.background(0).astype(np.int16)
+    empty = scene.clean_background(0).astype(np.int16)
     matrix = scene.homography(0)
     assert matrix is not None
     outwards = []
@@ -147,7 +147,7 @@ def test_boxes_are_where_the_picture_differs_and_people_lean_outwards() -> None:
 def test_people_who_stand_together_are_one_blob_and_people_apart_are_several() -> None:
     """Compare with the empty room, as a background model does, for two people."""
     scene = Scene("overhead", 1, 2, 1)
-    empty = scene.background(0).astype(np.int16)
+    empty = scene.clean_background(0).astype(np.int16)
     near, far = [], []
     for frame in range(0, 1500, 15):
         gap = np.linalg.norm(np.subtract(*scene.ground_positions(frame)))
@@ -164,7 +164,11 @@ def test_people_who_stand_together_are_one_blob_and_people_apart_are_several() -
 
 def test_some_people_dress_alike_and_most_do_not() -> None:
     alike = [
-        np.linalg.norm(np.subtract(choose_casual_outfit(0, seed).upper, choose_casual_outfit(1, seed).upper))
+        np.linalg.norm(
+            np.subtract(
+                choose_outfit_with_lookalikes(0, seed).upper, choose_outfit_with_lookalikes(1, seed).upper
+            )
+        )
         < 0.15
         for seed in range(200)
     ]

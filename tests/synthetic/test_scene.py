@@ -50,7 +50,7 @@ def test_a_frame_is_the_same_in_another_process(room: Scene) -> None:
 def test_modifying_a_picture_does_not_change_the_next(room: Scene) -> None:
     before = room.image(0, 40)
     room.image(0, 40)[:] = 0
-    room.background(0)[:] = 0
+    room.clean_background(0)[:] = 0
     assert np.array_equal(room.image(0, 40), before)
 
 
@@ -70,7 +70,7 @@ def test_noise_is_mild_and_differs_between_frames() -> None:
     empty = scene(objects=0)
     first, second = (empty.image(0, frame).astype(float) for frame in (10, 11))
     assert 0.5 < np.abs(first - second).mean() < 4
-    assert np.abs(first - empty.background(0)).mean() < 5
+    assert np.abs(first - empty.clean_background(0)).mean() < 5
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthetic import Scene
-from synthetic.drawing.clothing import choose_outfit
+from synthetic.drawing.clothing import choose_distinct_outfit
 from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
 from synthetic.drawing.skeleton import Joint, place_joints
 from synthetic.room.layouts import ROOM
@@ -74,7 +74,7 @@ def test_people_leave_and_come_back(paths: np.ndarray) -> None:
 def test_a_background_can_be_learned_at_the_beginning(seed: int) -> None:
     """In the first four seconds all people are in the room, apart from each other, and moving."""
     start = [four(seed).poses(t / 10) for t in range(41)]
-    assert all(ROOM.outside(pose.x, pose.y) < -0.5 for poses in start for pose in poses)
+    assert all(ROOM.signed_distance_outside(pose.x, pose.y) < -0.5 for poses in start for pose in poses)
     assert min(pose.speed for poses in start for pose in poses) > 0.2
     first = np.array([(pose.x, pose.y) for pose in start[0]])
     apart = np.hypot(*(first[:, None] - first[None]).transpose(2, 0, 1))[np.triu_indices(4, 1)]
@@ -85,7 +85,7 @@ def test_a_background_can_be_learned_at_the_beginning(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_room_is_hardly_ever_empty(seed: int) -> None:
     poses = [four(seed).poses(float(t)) for t in range(240)]
-    present = [sum(ROOM.outside(pose.x, pose.y) < 0 for pose in people) for people in poses]
+    present = [sum(ROOM.signed_distance_outside(pose.x, pose.y) < 0 for pose in people) for people in poses]
     assert np.mean(np.array(present) >= 2) > 0.95
 
 
@@ -96,13 +96,15 @@ def test_more_people_do_not_change_the_paths_of_the_first() -> None:
 
 
 def test_no_two_people_dress_alike() -> None:
-    outfits = [choose_outfit(walker, 0) for walker in range(40)]
+    outfits = [choose_distinct_outfit(walker, 0) for walker in range(40)]
     assert len({(outfit.upper, outfit.lower) for outfit in outfits}) == len(outfits)
 
 
 @pytest.mark.parametrize("part", ["upper", "lower"])
 def test_the_first_eight_outfits_differ_clearly_in_every_piece(part: str) -> None:
-    colors = np.array([[getattr(choose_outfit(walker, 0), part) for walker in range(8)]], dtype=np.float32)
+    colors = np.array(
+        [[getattr(choose_distinct_outfit(walker, 0), part) for walker in range(8)]], dtype=np.float32
+    )
     lab = cv2.cvtColor(colors, cv2.COLOR_RGB2LAB)[0]
     apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)[np.triu_indices(8, 1)]
     assert apart.min() > 30  # 2.3 is a just noticeable difference
