@@ -47,7 +47,7 @@ def _pixel_ranges(boxes: Floats, shape: tuple[int, ...]) -> NDArray[np.int64]:
     return np.clip(np.rint(boxes), 0.0, limits).astype(np.int64)
 
 
-def appearance_distance(
+def appearance_distance_matrix(
     first: Floats, second: Floats, measure: AppearanceMeasure = "bhattacharyya"
 ) -> Floats:
     """Return the distances of all pairs of rows: g(.) of paper II.B, 0 for identical to 1 for disjoint.

@@ -43,8 +43,8 @@ def intersections(first: Floats, second: Floats) -> Floats:
     return np.asarray(sides[..., 0] * sides[..., 1])
 
 
-def overlap(first: Floats, second: Floats) -> Floats:
-    """Return the shared area over the average area, in [0, 1], shape (...) (paper II.B, conflict sets)."""
+def dice_overlap(first: Floats, second: Floats) -> Floats:
+    """Return the shared over the average area (Dice), in [0, 1], shape (...) (paper II.B, conflict sets)."""
     average = (areas(first) + areas(second)) / 2.0
     return intersections(first, second) / np.where(average > 0.0, average, 1.0)
 
@@ -56,7 +56,7 @@ def iou(first: Floats, second: Floats) -> Floats:
     return np.asarray(shared / np.where(union > 0.0, union, 1.0))
 
 
-def corner_distance(first: Floats, second: Floats) -> Floats:
+def total_corner_distance(first: Floats, second: Floats) -> Floats:
     """Return the total city-block distance of the 4 corners in pixels, shape (...) (paper II.B, Fig. 5).
 
     The distance of a box moved by `(x, y)` is `4 (|x| + |y|)`.
@@ -64,15 +64,15 @@ def corner_distance(first: Floats, second: Floats) -> Floats:
     return _CORNERS_PER_SIDE * _side_distance(first, second)
 
 
-def displacement(first: Floats, second: Floats) -> Floats:
+def mean_corner_distance(first: Floats, second: Floats) -> Floats:
     """Return the mean city-block distance of the corners in pixels, shape (...): d(.) of paper II.B.
 
-    A box moved by `(x, y)` has a displacement of `|x| + |y|`.
+    The distance of a box moved by `(x, y)` is `|x| + |y|`.
     """
     return _MEAN_SIDES * _side_distance(first, second)
 
 
-def normalized_distance(first: Floats, second: Floats) -> Floats:
+def distance_in_heights(first: Floats, second: Floats) -> Floats:
     """Return the distance between boxes in mean box heights, shape (...).
 
     Horizontally between centers, vertically the shorter of head and foot distance: one of them may be cut

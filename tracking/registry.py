@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 from tracking.baselines.stepwise import PredictionMethod, StepwiseTracker
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.detectors.base import Image
-from tracking.interactive import InteractiveSettings, InteractiveTracker
+from tracking.interactive import CorrectableTracker, InteractiveSettings
 from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver
 from tracking.tracker import OnlineTracker
@@ -89,7 +89,7 @@ def create_tracker(
 ) -> Tracker:
     """Create a tracker for `fps` frames per second.
 
-    `costs`, `solver` and `assist` apply to the default tracker only, which is an `InteractiveTracker` if
+    `costs`, `solver` and `assist` apply to the default tracker only, which is a `CorrectableTracker` if
     `assist` is enabled; `temporal` and `fps` apply to temporal consistency only.
 
     Raises:
@@ -97,12 +97,12 @@ def create_tracker(
     """
     if name == DEFAULT_TRACKER:
         if assist is not None and assist.enabled:
-            return InteractiveTracker(window, costs, solver(), assist)
+            return CorrectableTracker(window, costs, solver(), assist)
         return OnlineTracker(window, costs, solver())
     if name == TEMPORAL_TRACKER:
-        tracker: Tracker = import_module("tracking.baselines.temporal_consistency.tracker").TemporalTracker(
-            window, temporal, fps
-        )
+        tracker: Tracker = import_module(
+            "tracking.baselines.temporal_consistency.tracker"
+        ).TemporalBlobTracker(window, temporal, fps)
         return tracker
     if name == _GRAPH:
         from tracking.baselines.track_graph import TrackGraph  # noqa: PLC0415 — imported on demand

@@ -57,7 +57,7 @@ class TemplateTracker:
         self._last += 1
         if (self._last + 1) % self._window.stride:
             return None
-        return self._solve(self._last - self._window.lag)
+        return self._solve(self._last - self._window.min_final_lag)
 
     def flush(self) -> WindowResult | None:
         """End the recording: all frames become final. Return `None` if they were final already."""

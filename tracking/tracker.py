@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tracking.appearance import appearance_distance
+from tracking.appearance import appearance_distance_matrix
 from tracking.appearance_samples import add_appearance_samples
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
@@ -77,12 +77,13 @@ class OnlineTracker:
             return self._restart(frame, detections)
         else:
             results += [
-                self._solve(end, end - self._window.lag) for end in self._window_ends(self._last + 1, frame)
+                self._solve(end, end - self._window.min_final_lag)
+                for end in self._window_ends(self._last + 1, frame)
             ]
         self._detections[frame] = detections
         self._last = frame
         if (frame + 1) % self._window.stride == 0:
-            results.append(self._solve(frame, frame - self._window.lag))
+            results.append(self._solve(frame, frame - self._window.min_final_lag))
         return merge_results(results)
 
     def flush(self) -> WindowResult | None:
@@ -213,7 +214,7 @@ class OnlineTracker:
         if not occluded_objects or not birth.histogram.size:
             return False
         histograms = np.stack([item.histogram for item in occluded_objects])
-        distances = appearance_distance(birth.histogram[None], histograms, self._costs.measure)[0]
+        distances = appearance_distance_matrix(birth.histogram[None], histograms, self._costs.measure)[0]
         best = int(np.argmin(distances))
         if distances[best] > self._window.reidentify_max_distance:
             return False

@@ -56,7 +56,7 @@ class WindowSettings:
             raise ValueError("forget_after and max_objects must be at least 1")
 
     @property
-    def lag(self) -> int:
+    def min_final_lag(self) -> int:
         """Least number of frames that follow a frame before it is final."""
         return self.window - self.stride
 
@@ -108,7 +108,7 @@ class WindowResult:
             provisional. An object without a final frame may still be dropped.
         tracks: the objects detected in any of the frames, by ascending id.
         report: the solver's report on the last window.
-        risk_events: predicted identity failures, the riskiest first; only of an `InteractiveTracker`.
+        risk_events: predicted identity failures, the riskiest first; only of a `CorrectableTracker`.
         revised_from: the first final frame changed by an operator's correction: all frames from `first` on
             replace earlier results. None: no final frame has changed.
     """

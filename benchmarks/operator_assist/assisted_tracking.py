@@ -14,7 +14,7 @@ from benchmarks.operator_assist.simulated_operator import OperatorFlag, Operator
 from server.config.sections import FlagSettings
 from tracking import CostSettings, WindowResult, WindowSettings, create_solver
 from tracking.boxes import Floats
-from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection, RiskEvent
+from tracking.interactive import CorrectableTracker, InteractiveSettings, PositionCorrection, RiskEvent
 from tracking.solvers import DEFAULT_SOLVER
 
 _ALL = FlagSettings(per_minute=600, risk=0.0)
@@ -83,7 +83,7 @@ def track_clip(
     """
     selector = selector or FlagSelector(_ALL, clip.fps)
     selector.begin()
-    tracker = InteractiveTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
+    tracker = CorrectableTracker(setup.window, setup.costs, create_solver(DEFAULT_SOLVER), setup.assist)
     operator = SimulatedOperator(person, selector, clip.truth, clip.fps, clip.seed) if person else None
     shown: dict[int, dict[int, Floats]] = {}
     risk_events: list[tuple[int, RiskEvent]] = []

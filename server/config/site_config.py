@@ -96,7 +96,7 @@ class Config(BaseSettings):
     @property
     def least_lookahead(self) -> int:
         """The fewest look-ahead frames, after which tracks no longer change."""
-        return self.encode.gop + self.track.lag(self.site.fps)
+        return self.encode.gop + self.track.final_lag(self.site.fps)
 
     def check_lookahead(self, view: ViewSettings) -> None:
         """Check that these settings look far enough ahead.

@@ -102,7 +102,7 @@ def _deferred_track_settings(running: Config, wanted: Config, keys: Sequence[str
     """Return settings of `track` that need a restart: they change when windows end or frames are final."""
     fps = running.site.fps
     changed = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
-    late = _BY_LAG if changed.lag(fps) != running.track.lag(fps) else ()
+    late = _BY_LAG if changed.final_lag(fps) != running.track.final_lag(fps) else ()
     return (*late, "window") if any(key in _EPOCHS for key in keys) else late
 
 

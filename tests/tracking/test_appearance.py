@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracking.appearance import AppearanceMeasure, appearance_distance, gray_histograms
+from tracking.appearance import AppearanceMeasure, appearance_distance_matrix, gray_histograms
 
 MEASURES: list[AppearanceMeasure] = ["bhattacharyya", "intersection"]
 
@@ -45,15 +45,15 @@ def test_impossible_bins_are_refused(bins: int) -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_distances_range_from_identical_to_disjoint(measure: AppearanceMeasure, seed: int) -> None:
     histograms = np.random.default_rng(seed).dirichlet(np.ones(8), 5)
-    table = appearance_distance(histograms, histograms, measure)
+    table = appearance_distance_matrix(histograms, histograms, measure)
     assert table.shape == (5, 5)
     np.testing.assert_allclose(table.diagonal(), 0.0, atol=1e-7)
     np.testing.assert_allclose(table, table.T)
     assert ((table >= 0.0) & (table <= 1.0)).all()
-    apart = appearance_distance(np.eye(2)[:1], np.eye(2)[1:], measure)
+    apart = appearance_distance_matrix(np.eye(2)[:1], np.eye(2)[1:], measure)
     np.testing.assert_allclose(apart, 1.0)
 
 
 @pytest.mark.parametrize("measure", MEASURES)
 def test_unknown_appearances_have_distance_zero(measure: AppearanceMeasure) -> None:
-    assert (appearance_distance(np.empty((2, 0)), np.empty((3, 0)), measure) == np.zeros((2, 3))).all()
+    assert (appearance_distance_matrix(np.empty((2, 0)), np.empty((3, 0)), measure) == np.zeros((2, 3))).all()

@@ -67,7 +67,7 @@ def test_every_frame_becomes_final_once_and_in_order(
         assert [track.id for track in result.tracks] == sorted({track.id for track in result.tracks})
     for result in results[:-1]:
         assert (result.last + 1) % window.stride == 0
-        assert result.final_to == max(result.last - window.lag, result.first - 1)
+        assert result.final_to == max(result.last - window.min_final_lag, result.first - 1)
 
 
 @given(streams(), st.sets(st.integers(0, 44)))

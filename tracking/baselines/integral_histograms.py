@@ -76,7 +76,7 @@ _CORE = np.array([0.6, 0.9])
 _ONES = np.eye(LEVELS, dtype=np.uint8)
 
 
-class PartHistograms:
+class ChannelIntegralImage:
     """Histograms of each color channel (3 x 8 bins) in boxes of one region of an image.
 
     Each pixel's three levels are ones among zeros, so that the sums at a corner of a box are one row in

@@ -94,7 +94,7 @@ class McmcFilter:
                 boxes[row] = target.box
         return boxes
 
-    def update(self, target: McmcTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+    def update(self, target: McmcTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 

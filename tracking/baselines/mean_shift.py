@@ -65,7 +65,7 @@ class MeanShift:
                 target.box = boxes[row] = np.concatenate([middle - size / 2, middle + size / 2])
         return boxes
 
-    def update(self, target: MeanShiftTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+    def update(self, target: MeanShiftTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 

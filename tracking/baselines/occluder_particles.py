@@ -38,21 +38,21 @@ class OccluderParticles:
 
     @property
     def visible_and_hidden_shares(self) -> Floats:
-        """The visible share, then each occluder's share: `(P, 1 + occluders)`, rows sum to 1."""
+        """Each particle's visible share, then each occluder's share: `(P, 1 + occluders)`, rows sum to 1."""
         return np.column_stack([1.0 - self.states.sum(axis=1), self.states])
 
     @property
-    def hidden_share(self) -> Floats:
-        """The share hidden by all occluders together, `(P,)`."""
+    def hidden_shares(self) -> Floats:
+        """Each particle's share hidden by all occluders together, `(P,)`."""
         return np.asarray(self.states.sum(axis=1))
 
-    def propagate(
-        self, rng: np.random.Generator, near: Sequence[int], noise: float, jumps: float = 0.0
+    def resample_and_propagate(
+        self, rng: np.random.Generator, near: Sequence[int], noise: float, jump_share: float = 0.0
     ) -> None:
         """Resample, update the set of nearby occluders, and add noise to their shares.
 
-        A share `jumps` of the particles becomes visible, and as many entirely hidden by one occluder (mixed
-        states: Isard, Blake, ICCV 1998): occlusions begin and end faster than the noise can follow.
+        A share of `jump_share` of the particles becomes visible, and as many entirely hidden by one occluder
+        (mixed states: Isard, Blake, ICCV 1998): occlusions begin and end faster than the noise can follow.
         """
         states, self.weights = resample_if_degenerate(rng, self.states, self.weights)
         known = {number: states[:, column] for column, number in enumerate(self.occluder_ids)}
@@ -63,7 +63,7 @@ class OccluderParticles:
         moved /= np.maximum(moved.sum(axis=1, keepdims=True), 1.0)
         if near:
             luck, occluder = rng.random(len(moved)), rng.integers(len(near), size=len(moved))
-            moved[luck < 2 * jumps] = 0.0
-            hidden = luck < jumps
+            moved[luck < 2 * jump_share] = 0.0
+            hidden = luck < jump_share
             moved[hidden, occluder[hidden]] = 1.0
         self.states = moved

@@ -183,7 +183,7 @@ class OcclusionCues:
                 boxes[row] = target.box
         return boxes
 
-    def update(self, target: OcclusionCueTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+    def update(self, target: OcclusionCueTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 
@@ -213,7 +213,7 @@ class OcclusionCues:
         if target.occluders.occluder_ids:
             spread = (
                 settings.occluded_search_noise
-                * float(target.occluders.weights @ target.occluders.hidden_share)
+                * float(target.occluders.weights @ target.occluders.hidden_shares)
                 * target.states[:, 2:3]
             )
             target.states[:, :2] += spread * self._rng.standard_normal((settings.particles, 2))
@@ -221,14 +221,14 @@ class OcclusionCues:
         rings = add_ring(windows)
         area = np.concatenate([rings[:, :2].min(axis=0), rings[:, 2:].max(axis=0)])
         near = [other for other in targets if other is not target and _intersects(other.box, area)]
-        target.occluders.propagate(
+        target.occluders.resample_and_propagate(
             self._rng, [other.id for other in near], settings.occlusion_noise, settings.jump_share
         )
         contrasts = _contrasts(image, area, windows, [target, *near])
         visibilities = contrasts @ target.occluders.visible_and_hidden_shares.T
         likelihoods = np.exp(
             settings.sharpness * (visibilities - visibilities.max())
-            - settings.occlusion_penalty * target.occluders.hidden_share
+            - settings.occlusion_penalty * target.occluders.hidden_shares
         )
         before = target.weights, target.occluders.weights
         target.weights = _normalized(before[0] * (likelihoods @ before[1]))

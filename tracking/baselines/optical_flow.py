@@ -65,7 +65,7 @@ class OpticalFlow:
                 boxes[row] = target.box = moved
         return boxes
 
-    def update(self, target: FlowTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+    def update(self, target: FlowTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 

@@ -97,7 +97,7 @@ class ParticleFilters:
                 boxes[row] = target.box
         return boxes
 
-    def update(self, target: ParticleTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+    def update(self, target: ParticleTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 

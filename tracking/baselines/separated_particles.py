@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tracking.baselines.integral_histograms import (
-    PartHistograms,
+    ChannelIntegralImage,
     bhattacharyya_coefficient,
     core_boxes,
     split_boxes,
@@ -88,7 +88,7 @@ class SeparatedParticles:
     def initialize(self, image: Image, box: Floats) -> SeparatedTarget:
         """Create a target from the part histograms of its box, with all particles at the box."""
         count, (start, aspect) = self._settings.particles, initial_state(box)
-        colors = PartHistograms(image, box).histograms(self._parts(box))
+        colors = ChannelIntegralImage(image, box).histograms(self._parts(box))
         return SeparatedTarget(
             colors, aspect, np.tile(start, (count, 1)), np.full(count, 1.0 / count), box.copy()
         )
@@ -100,10 +100,10 @@ class SeparatedParticles:
             return boxes
         weighed = [self._weigh(image, target) for target in targets]
         factors = overlap_factors([target.states[:, :2] for target in targets], self._settings.cell_pixels)
-        for row, (target, (histograms, distances), factor) in enumerate(
+        for row, (target, (integral, distances), factor) in enumerate(
             zip(targets, weighed, factors, strict=True)
         ):
-            if not self._is_occluded(histograms, target):
+            if not self._is_occluded(integral, target):
                 weights = target.weights * factor**self._settings.overlap_power
                 target.weights = weights / weights.sum()
             target.box = particle_boxes(target.weights @ target.states, target.aspect)
@@ -111,30 +111,30 @@ class SeparatedParticles:
                 boxes[row] = target.box
         return boxes
 
-    def update(self, target: SeparatedTarget, box: Floats) -> Floats:  # noqa: ARG002 — only the image is used
+    def update(self, target: SeparatedTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 
     def _parts(self, boxes: Floats) -> Floats:
         return split_boxes(core_boxes(boxes), self._settings.rows, self._settings.columns)
 
-    def _weigh(self, image: Image, target: SeparatedTarget) -> tuple[PartHistograms, Floats]:
-        """Propagate and weigh a target's particles; return their region's histograms and mean D² `(P,)`."""
+    def _weigh(self, image: Image, target: SeparatedTarget) -> tuple[ChannelIntegralImage, Floats]:
+        """Propagate and weigh a target's particles; return the region's integral image and mean D² `(P,)`."""
         states, target.weights = resample_if_degenerate(self._rng, target.states, target.weights)
         target.states = propagate(self._rng, states)
         boxes = particle_boxes(target.states, target.aspect)
         region = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
-        histograms = PartHistograms(image, region)
-        distances = 1.0 - bhattacharyya_coefficient(histograms.histograms(self._parts(boxes)), target.colors)
+        integral = ChannelIntegralImage(image, region)
+        distances = 1.0 - bhattacharyya_coefficient(integral.histograms(self._parts(boxes)), target.colors)
         total = distances.sum(axis=(-2, -1))
         target.weights = reweight(target.weights, total, self._settings.sharpness)
-        return histograms, distances.mean(axis=(-2, -1))
+        return integral, distances.mean(axis=(-2, -1))
 
-    def _is_occluded(self, histograms: PartHistograms, target: SeparatedTarget) -> bool:
+    def _is_occluded(self, integral: ChannelIntegralImage, target: SeparatedTarget) -> bool:
         """Return whether a target is less similar to its reference than in its first images."""
         box = particle_boxes(target.weights @ target.states, target.aspect)
         similarity = float(
-            bhattacharyya_coefficient(histograms.histograms(self._parts(box)), target.colors).mean()
+            bhattacharyya_coefficient(integral.histograms(self._parts(box)), target.colors).mean()
         )
         if len(target.reference_similarities) < self._settings.reference_frames:
             target.reference_similarities.append(similarity)

@@ -43,8 +43,11 @@ class PredictionMethod(Protocol, Generic[S]):
         """Predict the boxes in the next image: `(N, 4)`, NaN for targets that are lost."""
         ...
 
-    def update(self, target: S, box: Floats) -> Floats:
-        """Update a target with its matched detection `(4,)`; return its new box `(4,)`."""
+    def update(self, target: S, box: Floats, /) -> Floats:
+        """Update a target with its matched detection `(4,)`; return its new box `(4,)`.
+
+        Methods that follow the image alone ignore the detection.
+        """
         ...
 
 

@@ -20,7 +20,7 @@ from tracking.baselines.track_groups import (
     KalmanTrack,
     MeanAppearance,
     SplitCandidate,
-    TrackEnd,
+    TrackEndpoint,
     TrackGraphSettings,
     TrackGroup,
     departed_member,
@@ -131,7 +131,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             if candidate.host is not item
         }
 
-    def _end(self, item: KalmanTrack, frame: int) -> TrackEnd:
+    def _end(self, item: KalmanTrack, frame: int) -> TrackEndpoint:
         """Return the end of a track that enters a group."""
         velocity = np.asarray(item.target.statePost, dtype=np.float64)[_VELOCITY, 0]
         return _track_end(frame, item.box, velocity, self._appearances[item.serial].mean)
@@ -206,8 +206,8 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             other.host = continued if other.host is host else other.host
 
 
-def _track_end(frame: int, box: Floats, velocity: Floats, histogram: Floats) -> TrackEnd:
-    return TrackEnd(frame, (box[:2] + box[2:]) / 2, velocity, float(box[3] - box[1]), histogram)
+def _track_end(frame: int, box: Floats, velocity: Floats, histogram: Floats) -> TrackEndpoint:
+    return TrackEndpoint(frame, (box[:2] + box[2:]) / 2, velocity, float(box[3] - box[1]), histogram)
 
 
 def _take_over(item: KalmanTrack, track: KalmanTrack, first: int) -> None:

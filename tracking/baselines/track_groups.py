@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from tracking.appearance import appearance_distance
+from tracking.appearance import appearance_distance_matrix
 from tracking.baselines.stepwise import StepwiseTrack
 from tracking.boxes import Floats
 from tracking.types import Detections
@@ -54,7 +54,7 @@ _MOTION = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TrackEnd:
+class TrackEndpoint:
     """One end of one person's track: where it merged into a group, or split from one.
 
     Attributes:
@@ -72,13 +72,13 @@ class TrackEnd:
     histogram: Floats
 
 
-def track_distance(before: TrackEnd, after: TrackEnd, motion_frames: int) -> float:
+def track_distance(before: TrackEndpoint, after: TrackEndpoint, motion_frames: int) -> float:
     """Return the distance I of two tracks of one person, 0 to 1.
 
     If they are at most `motion_frames` apart, it includes the distance of the second from the position
     predicted by the first, in heights.
     """
-    appearance = float(appearance_distance(before.histogram[None], after.histogram[None])[0, 0])
+    appearance = float(appearance_distance_matrix(before.histogram[None], after.histogram[None])[0, 0])
     frames = after.frame - before.frame
     if frames > motion_frames:
         return appearance
@@ -89,7 +89,11 @@ def track_distance(before: TrackEnd, after: TrackEnd, motion_frames: int) -> flo
 
 
 def departed_member(
-    group: Sequence[TrackEnd], split: TrackEnd, remaining: TrackEnd, motion_frames: int, max_distance: float
+    group: Sequence[TrackEndpoint],
+    split: TrackEndpoint,
+    remaining: TrackEndpoint,
+    motion_frames: int,
+    max_distance: float,
 ) -> int | None:
     """Return the index of the group member that split off; `None` if it is none of them.
 
@@ -136,7 +140,7 @@ class MeanAppearance:
 class TrackGroup:
     """A group of people merged into one track, that of its first member."""
 
-    entries: list[TrackEnd]
+    entries: list[TrackEndpoint]
     """The ends of the members' tracks; the first is the track that continues."""
     merged_tracks: list[KalmanTrack] = field(default_factory=list)
     """The tracks of all members but the first."""

@@ -47,8 +47,8 @@ class AppearanceSettings:
             raise ValueError(f"color_bins must be 1 to {_LEVELS // _CHANNELS}, not {self.color_bins}")
 
     @property
-    def length(self) -> int:
-        """The length of a row of color histograms."""
+    def color_length(self) -> int:
+        """The length of a row of color histograms, also if `color` is off."""
         return len(_HALVES) * _CHANNELS * self.color_bins
 
 
@@ -62,7 +62,7 @@ class AppearanceExtractor:
     @property
     def bins(self) -> int:
         """The length of a row."""
-        return self.settings.length if self.settings.color else self.gray_bins
+        return self.settings.color_length if self.settings.color else self.gray_bins
 
     def histograms(self, image: Image, boxes: Floats, mask: Mask | None = None) -> Floats:
         """Return the histogram of each box `(K, 4)` of an image `(H, W, 3)`: `(K, bins)`, rows sum to 1.
@@ -75,19 +75,21 @@ class AppearanceExtractor:
         return gray_histograms(gray, boxes, self.gray_bins, mask)
 
 
-def color_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None = None) -> Floats:
-    """Return the six histograms of each box, `(K, 6 bins)`, rows sum to 1.
+def color_histograms(
+    image: Image, boxes: Floats, bins_per_histogram: int, mask: Mask | None = None
+) -> Floats:
+    """Return the six histograms of each box, `(K, 6 bins_per_histogram)`, rows sum to 1.
 
     Args:
         image: `(H, W, 3)`.
         boxes: `(K, 4)` in pixels of the image.
-        bins: of each histogram.
+        bins_per_histogram: brightness, red share and blue share of the upper, then the lower half.
         mask: `(H, W)`, pixels where it is 0 are left out; None: all pixels count.
     """
     if mask is None:
         mask = np.full(image.shape[:2], 255, dtype=np.uint8)
-    codes = _coded(image, bins, mask)
-    counts = np.zeros((len(boxes), len(_HALVES), _CHANNELS * bins))
+    codes = _coded(image, bins_per_histogram, mask)
+    counts = np.zeros((len(boxes), len(_HALVES), _CHANNELS * bins_per_histogram))
     limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
     for k, box in enumerate(np.clip(boxes, 0.0, limits)):
         height = box[3] - box[1]
@@ -96,8 +98,8 @@ def color_histograms(image: Image, boxes: Floats, bins: int, mask: Mask | None =
             lines = slice(round(box[1] + begin * height), round(box[1] + end * height))
             pixels = codes[lines, columns][mask[lines, columns] != 0]
             if len(pixels) >= _MIN_PIXELS:
-                counts[k, half] = np.bincount(pixels.ravel(), minlength=_CHANNELS * bins)
-    return _rows(counts.reshape(len(boxes), len(_HALVES) * _CHANNELS, bins))
+                counts[k, half] = np.bincount(pixels.ravel(), minlength=_CHANNELS * bins_per_histogram)
+    return _rows(counts.reshape(len(boxes), len(_HALVES) * _CHANNELS, bins_per_histogram))
 
 
 def _rows(counts: Floats) -> Floats:

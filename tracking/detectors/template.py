@@ -34,18 +34,18 @@ class SubimageSettings:
         ValueError: a side has no pixel.
     """
 
-    columns: int = 12  # pixels across
-    rows: int = 12  # pixels down
+    width: int = 12  # pixels
+    height: int = 12  # pixels
     color: bool = True  # false: gray
 
     def __post_init__(self) -> None:
-        if self.columns < 1 or self.rows < 1:
-            raise ValueError(f"a sub-image has at least 1x1 pixels, not {self.columns}x{self.rows}")
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"a sub-image has at least 1x1 pixels, not {self.width}x{self.height}")
 
     @property
     def length(self) -> int:
         """The length of a row."""
-        return 2 * self.columns * self.rows * (_CHANNELS if self.color else 1)
+        return 2 * self.width * self.height * (_CHANNELS if self.color else 1)
 
 
 def subimage_histograms(image: Image, boxes: Floats, settings: SubimageSettings) -> Floats:
@@ -62,7 +62,7 @@ def subimage_histograms(image: Image, boxes: Floats, settings: SubimageSettings)
         left, top, right, bottom = edges
         if right <= left or bottom <= top:
             continue
-        size = (settings.columns, settings.rows)
+        size = (settings.width, settings.height)
         small = cv2.resize(image[top:bottom, left:right], size, interpolation=cv2.INTER_AREA)
         if not settings.color:
             small = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY)

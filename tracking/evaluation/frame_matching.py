@@ -30,18 +30,21 @@ class FrameSimilarity:
     similarity: Floats
 
 
-def align_frames(truth: Iterable[MotRow], tracks: Iterable[MotRow], min_iou: float) -> list[FrameSimilarity]:
+def align_frames(
+    truth: Iterable[MotRow], tracks: Iterable[MotRow], ignored_min_iou: float
+) -> list[FrameSimilarity]:
     """Return the overlaps of truth and tracks frame by frame, for frames with any, in order.
 
-    Truth of confidence 0 does not count: such a person need not be detected, and a track matched with one is
-    left out instead of counted as a false positive, as in MOTChallenge.
+    Truth of confidence 0 does not count: such a person need not be detected, and a track matched with one, at
+    an overlap of at least `ignored_min_iou`, is left out instead of counted as a false positive, as in
+    MOTChallenge.
 
     Raises:
         ValueError: an id occurs twice in one frame.
     """
     truth_rows, track_rows = _by_frame(truth, "ground truth"), _by_frame(tracks, "tracks")
     return [
-        _frame(truth_rows.get(number, []), track_rows.get(number, []), min_iou)
+        _frame(truth_rows.get(number, []), track_rows.get(number, []), ignored_min_iou)
         for number in sorted(truth_rows.keys() | track_rows.keys())
     ]
 
@@ -57,12 +60,12 @@ def _by_frame(rows: Iterable[MotRow], what: str) -> dict[int, list[MotRow]]:
     return {number: list(frame.values()) for number, frame in frames.items()}
 
 
-def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], min_iou: float) -> FrameSimilarity:
+def _frame(truth: Sequence[MotRow], tracks: Sequence[MotRow], ignored_min_iou: float) -> FrameSimilarity:
     counts = np.array([row.confidence != 0.0 for row in truth], dtype=bool)
     similarity = iou(_boxes(truth)[:, None], _boxes(tracks)[None])
     kept = np.ones(len(tracks), dtype=bool)
     if not counts.all():
-        people, results = assign_pairs(similarity, min_iou)
+        people, results = assign_pairs(similarity, ignored_min_iou)
         kept[results[~counts[people]]] = False
     return FrameSimilarity(_ids(truth)[counts], _ids(tracks)[kept], similarity[np.ix_(counts, kept)])
 

@@ -36,7 +36,7 @@ class MultiCameraScores:
 
     @property
     def mean(self) -> Scores:
-        """Shares are unweighted means over the cameras; counts are totals."""
+        """The scores over the cameras: shares are unweighted means, counts are totals."""
         return average_scores(list(self.cameras.values()))
 
 

@@ -3,19 +3,19 @@
 from tracking.interactive.corrections import PositionCorrection
 from tracking.interactive.risk import RiskFeatures, RiskPredictor
 from tracking.interactive.settings import InteractiveSettings
-from tracking.interactive.swap_margins import SwapMargins, swap_margin_matrix, swap_margins
-from tracking.interactive.tracker import InteractiveTracker
+from tracking.interactive.swap_margins import CheapestSwaps, find_cheapest_swaps, swap_margin_matrix
+from tracking.interactive.tracker import CorrectableTracker
 from tracking.types import RiskEvent, RiskReason
 
 __all__ = [
+    "CheapestSwaps",
+    "CorrectableTracker",
     "InteractiveSettings",
-    "InteractiveTracker",
     "PositionCorrection",
     "RiskEvent",
     "RiskFeatures",
     "RiskPredictor",
     "RiskReason",
-    "SwapMargins",
+    "find_cheapest_swaps",
     "swap_margin_matrix",
-    "swap_margins",
 ]

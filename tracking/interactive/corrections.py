@@ -39,7 +39,7 @@ class PositionCorrection:
             raise ValueError(f"a correction needs finite coordinates and a positive tolerance, not {self}")
 
 
-def normalized_offset(correction: PositionCorrection, boxes: Floats) -> Floats:
+def normalized_squared_distance(correction: PositionCorrection, boxes: Floats) -> Floats:
     """Return the normalized squared distance of boxes `(..., 4)` from a correction, `(...)` in [0, 1].
 
     The squared distance of the point from the center of the box, in units of twice the tolerance, at most
@@ -52,7 +52,7 @@ def normalized_offset(correction: PositionCorrection, boxes: Floats) -> Floats:
 
 def near_correction(correction: PositionCorrection, boxes: Floats) -> NDArray[np.bool_]:
     """Return which boxes `(K, 4)` are close enough to be the corrected object, `(K,)`."""
-    return np.asarray(normalized_offset(correction, boxes) < 1.0)
+    return np.asarray(normalized_squared_distance(correction, boxes) < 1.0)
 
 
 def apply_corrections(
@@ -65,12 +65,12 @@ def apply_corrections(
 ) -> Network:
     """Return the network of a window with the corrections' costs added to its nodes.
 
-    With `far` the `normalized_offset`, being at node v costs the corrected object `correction_weight
-    far(v)` more, and being occluded costs it `correction_weight hidden_share` more: an operator who points
-    at an occluded object points closer to its true position than to the center of the object in front. Other
-    objects have no extra cost, since conflicts keep them off the place. The corrected object may reappear
-    anywhere near the point: arcs out of the occlusion node that were gated away get the cost
-    `reappearance_cost`.
+    With `far` the `normalized_squared_distance`, being at node v costs the corrected object
+    `correction_weight far(v)` more, and being occluded costs it `correction_weight hidden_share` more: an
+    operator who points at an occluded object points closer to its true position than to the center of the
+    object in front. Other objects have no extra cost, since conflicts keep them off the place. The corrected
+    object may reappear anywhere near the point: arcs out of the occlusion node that were gated away get the
+    cost `reappearance_cost`.
 
     Args:
         network: objects `ids`, which share their observations.
@@ -90,7 +90,7 @@ def apply_corrections(
             own = np.flatnonzero(owners == correction.object)
             if not len(own):
                 continue
-            far = normalized_offset(correction, network.boxes[0, m])
+            far = normalized_squared_distance(correction, network.boxes[0, m])
             node[own, m, :-1] += settings.correction_weight * far
             node[own, m, -1] += settings.correction_weight * settings.hidden_share
             arcs = source[own[0]] if m == 0 else pair[network.pair_sets[own[0]], m - 1, -1]

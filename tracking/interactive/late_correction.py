@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import Floats, heights, normalized_distance
-from tracking.interactive.corrections import PositionCorrection, normalized_offset
-from tracking.interactive.swap_margins import swap_margins
+from tracking.boxes import Floats, distance_in_heights, heights
+from tracking.interactive.corrections import PositionCorrection, normalized_squared_distance
+from tracking.interactive.swap_margins import find_cheapest_swaps
 from tracking.interactive.window_memory import WindowMemory
 from tracking.model.network import build_network
 from tracking.model.object_state import Template
@@ -18,7 +18,7 @@ from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
 
 _MAX_OFFSET = 0.5
-"""Largest `normalized_offset` of the track that the operator pointed at."""
+"""Largest `normalized_squared_distance` of the track that the operator pointed at."""
 
 
 def backdate_correction(
@@ -28,8 +28,8 @@ def backdate_correction(
 
     The operator pointed at object a where the tracker had object b, while a was elsewhere or occluded: a and
     b swapped identities earlier. The swap is dated to the frame from which exchanging the two tracks costs
-    least (`swap_margins` in a network of the two and their boxes, without motion), or to the start of b if a
-    was occluded then. From that frame on, a is corrected to b's boxes and b to a's.
+    least (`find_cheapest_swaps` in a network of the two and their boxes, without motion), or to the start of
+    b if a was occluded then. From that frame on, a is corrected to b's boxes and b to a's.
 
     Returns an empty list if a is already at the point, if no other track is there, or if a may be occluded by
     b.
@@ -55,7 +55,9 @@ def _track_at_point(correction: PositionCorrection, memory: WindowMemory) -> int
     """Return the track at the corrected point, if it is not the corrected track."""
     assigned = memory.assignments.get(correction.frame, {})
     far = {
-        number: float(normalized_offset(correction, memory.detections[correction.frame].boxes[state]))
+        number: float(
+            normalized_squared_distance(correction, memory.detections[correction.frame].boxes[state])
+        )
         for number, state in assigned.items()
     }
     if not far:
@@ -95,7 +97,7 @@ def _first_swapped(
     ).T
     if visible.any(axis=1).all():
         templates = [_template(n, row, selected) for n, row in enumerate(local)]
-        found = swap_margins(build_network(templates, selected, costs), local)
+        found = find_cheapest_swaps(build_network(templates, selected, costs), local)
         if np.isfinite(found.margins[0, 1]):
             return int(found.frames[0, 1])
     return _nearest(local, selected)
@@ -119,5 +121,5 @@ def _nearest(states: NDArray[np.int64], frames: Sequence[Detections]) -> int:
     both = np.flatnonzero((states != OCCLUDED).all(axis=0))
     if not len(both):
         return int(np.flatnonzero(states[1] != OCCLUDED)[0]) if (states[1] != OCCLUDED).any() else 0
-    distances = [float(normalized_distance(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
+    distances = [float(distance_in_heights(*frames[m].boxes[states[:, m]])) for m in both.tolist()]
     return int(both[len(distances) - 1 - int(np.argmin(distances[::-1]))])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from tracking.boxes import Floats, overlap
+from tracking.boxes import Floats, dice_overlap
 from tracking.interactive.solved_window import SolvedWindow
-from tracking.interactive.swap_margins import swap_margins
+from tracking.interactive.swap_margins import find_cheapest_swaps
 from tracking.model.motion import MotionModel
 from tracking.model.network import build_network
 from tracking.model.object_state import Template
@@ -32,29 +33,39 @@ class Crossing:
 
     Attributes:
         first, second: their ids.
-        frame: index of the frame, 0 for the one that follows the window.
+        offset: index of the frame after the window, 0 for the next one.
         length: frames for which they overlap within the horizon.
         margin: cost of swapping the two from then on.
     """
 
     first: int
     second: int
-    frame: int
+    offset: int
     length: int
     margin: float
 
 
-def predict_paths(window: SolvedWindow, frames: int) -> dict[int, tuple[int, Floats]]:
-    """Return for each object the frames it has been occluded and its predicted boxes `(frames, 4)`.
+class PredictedPath(NamedTuple):
+    """An object's extrapolated path.
 
-    The first of these boxes is in the frame after its last detection.
+    Attributes:
+        frames_occluded: frames since its last detection.
+        boxes: `(F, 4)` pixels, from the frame after that detection on.
     """
+
+    frames_occluded: int
+    boxes: Floats
+
+
+def predict_paths(window: SolvedWindow, frames: int) -> dict[int, PredictedPath]:
+    """Return the paths of `frames` frames, by index in `known_ids`, of objects detected often enough."""
     paths = {}
     for n in range(len(window.known_ids)):
         visible = np.flatnonzero(~np.isnan(window.recent_boxes[n, :, 0]))
         if len(visible) >= _RECENT:
             motion = _motion(window.recent_boxes[n], int(visible[-1]) + 1)
-            paths[n] = window.recent_boxes.shape[1] - 1 - int(visible[-1]), motion.predict(frames)
+            occluded = window.recent_boxes.shape[1] - 1 - int(visible[-1])
+            paths[n] = PredictedPath(occluded, motion.predict(frames))
     return paths
 
 
@@ -67,20 +78,20 @@ def _motion(trajectory: Floats, first: int) -> MotionModel:
 def predict_crossings(window: SolvedWindow, horizon: int, costs: CostSettings) -> list[Crossing]:
     """Return the pairs that do not overlap now but will within the horizon.
 
-    The margin is that of `swap_margins` in a predicted window of `horizon` frames, in which each object is
-    detected at its predicted position, with its current appearance. Pairs that differ in appearance, speed or
-    direction, or that pass at a distance, have large margins.
+    The margin is that of `find_cheapest_swaps` in a predicted window of `horizon` frames, in which each
+    object is detected at its predicted position, with its current appearance. Pairs that differ in
+    appearance, speed or direction, or that pass at a distance, have large margins.
     """
     paths = {
-        n: (occluded, path)
-        for n, (occluded, path) in predict_paths(window, horizon + _RECENT).items()
-        if occluded < _RECENT
+        n: path
+        for n, path in predict_paths(window, horizon + _RECENT).items()
+        if path.frames_occluded < _RECENT
     }
     if len(paths) < 2:  # noqa: PLR2004 — a pair
         return []
     rows = list(paths)
-    ahead = np.stack([path[occluded:][:horizon] for occluded, path in paths.values()])
-    overlapping = overlap(ahead[:, None], ahead[None]) > _MIN_OVERLAP
+    ahead = np.stack([path.boxes[path.frames_occluded :][:horizon] for path in paths.values()])
+    overlapping = dice_overlap(ahead[:, None], ahead[None]) > _MIN_OVERLAP
     crossing = np.triu(overlapping.any(axis=2) & ~overlapping[:, :, 0], 1)
     if not crossing.any():
         return []
@@ -92,7 +103,7 @@ def predict_crossings(window: SolvedWindow, horizon: int, costs: CostSettings) -
         for n, histogram, motion in zip(rows, histograms, motions, strict=True)
     ]
     states = np.tile(np.arange(len(rows))[:, None], (1, horizon))
-    found = swap_margins(build_network(templates, predicted, costs), states)
+    found = find_cheapest_swaps(build_network(templates, predicted, costs), states)
     return [
         Crossing(
             window.known_ids[rows[a]],

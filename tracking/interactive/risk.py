@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.appearance import appearance_distance
-from tracking.boxes import Floats, overlap
+from tracking.appearance import appearance_distance_matrix
+from tracking.boxes import Floats, dice_overlap
 from tracking.interactive.lookahead import predict_crossings, predict_paths
 from tracking.interactive.settings import InteractiveSettings
 from tracking.interactive.solved_window import SolvedWindow
-from tracking.interactive.swap_margins import SwapMargins, swap_margins
+from tracking.interactive.swap_margins import CheapestSwaps, find_cheapest_swaps
 from tracking.model.settings import CostSettings
 from tracking.types import RiskEvent, RiskReason
 
@@ -75,7 +75,7 @@ class RiskPredictor:
 
     def predict(self, window: SolvedWindow) -> tuple[RiskEvent, ...]:
         """Return the risk events of a window, the riskiest first, one per pair and reason."""
-        found = swap_margins(window.network, window.states)
+        found = find_cheapest_swaps(window.network, window.states)
         events = [
             *self._swaps(window, found),
             *self._similar_crossings(window),
@@ -88,7 +88,7 @@ class RiskPredictor:
             unique.setdefault((event.reason, tuple(sorted(event.objects))), event)
         return tuple(unique.values())
 
-    def _swaps(self, window: SolvedWindow, found: SwapMargins) -> list[RiskEvent]:
+    def _swaps(self, window: SolvedWindow, found: CheapestSwaps) -> list[RiskEvent]:
         """Return the pairs with a small swap margin in a frame that becomes final with this window."""
         settled = window.first + found.frames <= window.final_to
         first, second = np.nonzero(np.triu((found.margins < self._settings.swap_margin) & settled, 1))
@@ -112,7 +112,7 @@ class RiskPredictor:
                 "crossing",
                 tuple(sorted((crossing.first, crossing.second))),
                 window,
-                window.last + 1 + crossing.frame,
+                window.last + 1 + crossing.offset,
                 crossing.margin,
                 crossing.length,
             )
@@ -133,11 +133,13 @@ class RiskPredictor:
                 continue
             others = window.recent_boxes[:, -occluded:].copy()
             others[n] = np.nan
-            overlaps = np.nan_to_num(overlap(others, path[:occluded])).max(axis=1, initial=0.0)
+            overlaps = np.nan_to_num(dice_overlap(others, path[:occluded])).max(axis=1, initial=0.0)
             b = int(overlaps.argmax())
             frame = window.last - occluded + 1
             distance = float(
-                appearance_distance(histograms[n, None], histograms[b, None], self._costs.measure)[0, 0]
+                appearance_distance_matrix(histograms[n, None], histograms[b, None], self._costs.measure)[
+                    0, 0
+                ]
             )
             margin = length * max(distance - self._costs.unknown_appearance, 0.0)
             if overlaps[b] > _MIN_OVERLAP and margin < self._settings.crossing_margin:
@@ -150,7 +152,7 @@ class RiskPredictor:
     def _low_confidence(self, window: SolvedWindow) -> list[RiskEvent]:
         """Return the objects whose detection scores are low, or will be within the horizon."""
         found = []
-        scores, threshold = window.scores, self._settings.min_confidence
+        scores, threshold = window.track_scores, self._settings.min_confidence
         for n, number in enumerate(window.ids):
             visible = np.flatnonzero(~np.isnan(scores[n]))
             if len(visible) < 2 * _RECENT or visible[-1] < scores.shape[1] - _RECENT:
@@ -193,7 +195,7 @@ def _ambiguous_frames(window: SolvedWindow, a: int, b: int) -> int:
     """Return in how many recent frames objects a and b overlapped, or one of them was occluded."""
     first, second = (window.recent_boxes[window.known_ids.index(window.ids[n])] for n in (a, b))
     occluded = np.isnan(first[:, 0]) | np.isnan(second[:, 0])
-    return int(np.count_nonzero(occluded | (np.nan_to_num(overlap(first, second)) > _MIN_OVERLAP)))
+    return int(np.count_nonzero(occluded | (np.nan_to_num(dice_overlap(first, second)) > _MIN_OVERLAP)))
 
 
 def _pair(window: SolvedWindow, a: int, b: int) -> tuple[int, ...]:

@@ -48,7 +48,7 @@ class SolvedWindow:
         return self.first + len(self.detections) - 1
 
     @property
-    def scores(self) -> Floats:
+    def track_scores(self) -> Floats:
         """Detection scores of the tracks, `(n, M)`, NaN where occluded."""
         scores = np.full(self.states.shape, np.nan)
         for m, detections in enumerate(self.detections):

@@ -14,7 +14,7 @@ from tracking.solvers.objective import nodes_from_states
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SwapMargins:
+class CheapestSwaps:
     """The cheapest identity swap of each pair of objects of a window.
 
     Attributes:
@@ -28,11 +28,11 @@ class SwapMargins:
 
 
 def swap_margin_matrix(network: Network, states: NDArray[np.int64]) -> Floats:
-    """Return the margins of `swap_margins`, (n, n)."""
-    return swap_margins(network, states).margins
+    """Return the margins of `find_cheapest_swaps`, (n, n)."""
+    return find_cheapest_swaps(network, states).margins
 
 
-def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
+def find_cheapest_swaps(network: Network, states: NDArray[np.int64]) -> CheapestSwaps:
     """Compute the cost of swapping each pair of objects from each frame on, and the cheapest frame.
 
     From frame f on, a follows b's path and b follows a's; the others are unchanged, so no new conflicts
@@ -51,7 +51,7 @@ def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
         raise ValueError("identities can only be swapped between objects that share observations")
     n = network.objects
     if not n:
-        return SwapMargins(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
+        return CheapestSwaps(np.empty((0, 0)), np.empty((0, 0), dtype=np.int64))
     path_costs, swapped = _path_costs(network, nodes_from_states(network, states))
     both = swapped + swapped.transpose(1, 0, 2)
     # A swap of two objects that stay occluded to the end has no visible effect.
@@ -62,7 +62,7 @@ def swap_margins(network: Network, states: NDArray[np.int64]) -> SwapMargins:
     cheapest, current = both.min(axis=2), path_costs[:, None] + path_costs[None]
     margins = np.subtract(cheapest, current, out=np.full((n, n), np.inf), where=np.isfinite(current))
     np.fill_diagonal(margins, np.inf)
-    return SwapMargins(margins, frames)
+    return CheapestSwaps(margins, frames)
 
 
 def _path_costs(network: Network, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:

@@ -26,14 +26,14 @@ from tracking.tracker import OnlineTracker
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, merge_results
 
-_MIN_DISAGREEMENT = 0.25
+_MIN_DISAGREEMENT_SHARE = 0.25
 """Share of a correction's weight from which windows are solved again."""
 
 _RECENT_FRAMES = 75
 """Number of recent frames whose boxes are used for risk prediction."""
 
 
-class InteractiveTracker(OnlineTracker):
+class CorrectableTracker(OnlineTracker):
     """An `OnlineTracker` that predicts identity failures and applies an operator's corrections.
 
     Without a correction its tracks are those of an `OnlineTracker`. Memory is bounded by `memory_frames`.
@@ -50,7 +50,7 @@ class InteractiveTracker(OnlineTracker):
         """By frame and object: a later correction replaces an earlier one."""
         self._contradicted_frames: list[int] = []
         """Frames whose corrections contradict the solution."""
-        self._total_disagreement = 0.0
+        self._total_disagreement_cost = 0.0
         """Cost by which these corrections contradict the solution."""
         self._network: tuple[Sequence[int], Network] | None = None
         self._solved: SolvedWindow | None = None
@@ -102,21 +102,21 @@ class InteractiveTracker(OnlineTracker):
         ]
         if (
             not self._contradicted_frames
-            or self._total_disagreement < _MIN_DISAGREEMENT * self._settings.correction_weight
+            or self._total_disagreement_cost < _MIN_DISAGREEMENT_SHARE * self._settings.correction_weight
         ):
             return None
         frame = min(self._contradicted_frames)
-        self._contradicted_frames, self._total_disagreement = [], 0.0
+        self._contradicted_frames, self._total_disagreement_cost = [], 0.0
         return self._solve_again(frame)
 
     def _store_correction(self, correction: PositionCorrection) -> list[int]:
         """Store a correction; return the frames in which it contradicts the solution."""
         self._corrections.setdefault(correction.frame, {})[correction.object] = correction
-        self._insert_hypothesis(correction)
-        disagreement = self._memory.disagreement(correction, self._settings)
-        if not disagreement:
+        self._ensure_hypothesis(correction)
+        disagreement_cost = self._memory.disagreement_cost(correction, self._settings)
+        if not disagreement_cost:
             return []
-        self._total_disagreement += disagreement
+        self._total_disagreement_cost += disagreement_cost
         frames = [correction.frame]
         steps = self._memory.windows_since(correction.frame)
         for implied in backdate_correction(
@@ -126,15 +126,15 @@ class InteractiveTracker(OnlineTracker):
                 self._corrections.setdefault(implied.frame, {}).setdefault(implied.object, implied)
                 frames.append(implied.frame)
         if len(frames) > 1:
-            self._total_disagreement += self._settings.correction_weight
+            self._total_disagreement_cost += self._settings.correction_weight
         return frames
 
-    def _insert_hypothesis(self, correction: PositionCorrection) -> None:
+    def _ensure_hypothesis(self, correction: PositionCorrection) -> None:
         """Insert a hypothesis at the corrected point if no detection fits."""
         histogram = next((item.histogram for item in self._objects if item.id == correction.object), None)
         if histogram is None or correction.frame not in self._memory.detections:
             return
-        self._memory.insert_hypothesis(correction, histogram)
+        self._memory.ensure_hypothesis(correction, histogram)
         if correction.frame in self._detections:
             self._detections[correction.frame] = self._memory.detections[correction.frame]
 
@@ -145,7 +145,7 @@ class InteractiveTracker(OnlineTracker):
             for frame, by_object in self._corrections.items()
             if frame < correction.frame
             and correction.object in by_object
-            and not self._memory.disagreement(by_object[correction.object], self._settings)
+            and not self._memory.disagreement_cost(by_object[correction.object], self._settings)
         ]
         return max(before, default=self._memory.snapshots[0].first)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats, iou
-from tracking.interactive.corrections import PositionCorrection, normalized_offset
+from tracking.interactive.corrections import PositionCorrection, normalized_squared_distance
 from tracking.interactive.hypothesis_insertion import box_around, has_hypothesis, insert_hypothesis
 from tracking.interactive.settings import InteractiveSettings
 from tracking.model.object_state import TrackedObject
@@ -47,7 +47,7 @@ class WindowSnapshot:
     warm_start: WindowWarmStart | None
 
     @property
-    def order(self) -> tuple[int, int]:
+    def solve_order(self) -> tuple[int, int]:
         """Sort key: windows are solved in this order."""
         return self.end, self.final_to
 
@@ -96,8 +96,8 @@ class WindowMemory:
         self._initiated = [track for track in self._initiated if track.frame >= oldest - _MAX_START_SHIFT]
         self._undone = [track for track in self._undone if track.frame >= oldest - _MAX_START_SHIFT]
 
-    def insert_hypothesis(self, correction: PositionCorrection, histogram: Floats) -> None:
-        """Insert or move the hypothesis of a corrected object if no detection fits."""
+    def ensure_hypothesis(self, correction: PositionCorrection, histogram: Floats) -> None:
+        """Ensure that a corrected object has a fitting observation: insert a hypothesis, or move it."""
         frame, number = correction.frame, correction.object
         size, detections = self._size(number, frame), self.detections.get(frame)
         if size is None or detections is None:
@@ -124,13 +124,13 @@ class WindowMemory:
         ]
         return np.median([box[2:] - box[:2] for box in sides], axis=0) if sides else None
 
-    def record_window(self, step: WindowSnapshot) -> None:
+    def record_window(self, snapshot: WindowSnapshot) -> None:
         """Record a window about to be solved; later windows become invalid."""
-        while self.snapshots and self.snapshots[-1].order >= step.order:
+        while self.snapshots and self.snapshots[-1].solve_order >= snapshot.solve_order:
             self.snapshots.pop()
-        self.snapshots.append(step)
-        self._undone += [track for track in self._initiated if track.window >= step.order]
-        self._initiated = [track for track in self._initiated if track.window < step.order]
+        self.snapshots.append(snapshot)
+        self._undone += [track for track in self._initiated if track.window >= snapshot.solve_order]
+        self._initiated = [track for track in self._initiated if track.window < snapshot.solve_order]
 
     def record_states(self, first: int, ids: Sequence[int], states: npt.NDArray[np.int64]) -> None:
         """Record a window's solution `(n, M)` from the frame `first` on, -1 where occluded."""
@@ -162,11 +162,11 @@ class WindowMemory:
             return ()
         return [window for window in self.snapshots if window.end >= frame]
 
-    def disagreement(self, correction: PositionCorrection, settings: InteractiveSettings) -> float:
+    def disagreement_cost(self, correction: PositionCorrection, settings: InteractiveSettings) -> float:
         """Return the cost by which a correction contradicts the solution; 0 if they agree."""
         if correction.frame not in self.assignments or correction.frame not in self.detections:
             return 0.0
-        far = normalized_offset(correction, self.detections[correction.frame].boxes)
+        far = normalized_squared_distance(correction, self.detections[correction.frame].boxes)
         state = self.assignments[correction.frame].get(correction.object)
         current = settings.hidden_share if state is None else float(far[state])
         return settings.correction_weight * (
@@ -182,7 +182,7 @@ class WindowMemory:
         if known is not None:
             self._undone.remove(known)
         number = new_id if known is None else known.id
-        self._initiated.append(InitiatedTrack(frame, box, number, self.snapshots[-1].order))
+        self._initiated.append(InitiatedTrack(frame, box, number, self.snapshots[-1].solve_order))
         return number
 
     def _undone_track(self, frame: int, box: Floats) -> InitiatedTrack | None:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tracking.boxes import Floats, heights, normalized_distance
+from tracking.boxes import Floats, distance_in_heights, heights
 from tracking.model.network import Network
 from tracking.model.object_state import TrackedObject
 from tracking.types import Detections
@@ -29,7 +29,7 @@ def gate_detections(
 def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
     """Return which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
-    It may have moved by `gate_heights + gate_growth (elapsed - 1)` heights (`normalized_distance`), and its
+    It may have moved by `gate_heights + gate_growth (elapsed - 1)` heights (`distance_in_heights`), and its
     height may have changed by `max_height_ratio`.
     """
     height, other_heights = float(heights(box)), heights(boxes)
@@ -38,7 +38,7 @@ def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings
         height <= window.max_height_ratio * np.maximum(other_heights, 1.0)
     )
     return np.asarray(
-        (normalized_distance(box, boxes) <= max_distance) & (similar | (elapsed > window.window))
+        (distance_in_heights(box, boxes) <= max_distance) & (similar | (elapsed > window.window))
     )
 
 

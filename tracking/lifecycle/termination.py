@@ -15,19 +15,19 @@ _MIN_COMMON_FRAMES = 5
 _MIN_COMMON_SHARE = 0.7
 
 
-def duplicate_ids(ids: Sequence[int], boxes: Sequence[Floats], overlap: float) -> list[int]:
+def duplicate_ids(ids: Sequence[int], boxes: Sequence[Floats], duplicate_overlap: float) -> list[int]:
     """Return the ids of tracks that duplicate an older track, ascending.
 
     Args:
         ids: ascending ids.
         boxes: for each track `(F, 4)`, NaN where it is occluded.
-        overlap: mean IoU from which two tracks are duplicates; of the intersection over the smaller box a
-            slightly larger mean is required.
+        duplicate_overlap: mean IoU from which two tracks are duplicates; of the intersection over the smaller
+            box a slightly larger mean is required.
     """
     ended: list[int] = []
     for younger in range(len(ids) - 1, 0, -1):
         for older in range(younger):
-            if ids[older] not in ended and _is_duplicate(boxes[older], boxes[younger], overlap):
+            if ids[older] not in ended and _is_duplicate(boxes[older], boxes[younger], duplicate_overlap):
                 ended.append(ids[younger])
                 break
     return sorted(ended)
@@ -49,13 +49,15 @@ _MIN_VISIBLE_FRAMES = 3
 """Least visible frames of a new object in the window's joint solution; with fewer it is dropped."""
 
 
-def terminated_ids(objects: Sequence[TrackedObject], boxes: Sequence[Floats], duplicate: float) -> set[int]:
+def terminated_ids(
+    objects: Sequence[TrackedObject], boxes: Sequence[Floats], duplicate_overlap: float
+) -> set[int]:
     """Return the ids that end with this window: duplicates and unconfirmed tracks.
 
-    `boxes` are those of each object, `(F, 4)`, NaN where occluded; `duplicate` is the `overlap` of
+    `boxes` are those of each object, `(F, 4)`, NaN where occluded; `duplicate_overlap` is as in
     `duplicate_ids`.
     """
-    ended = set(duplicate_ids([item.id for item in objects], boxes, duplicate))
+    ended = set(duplicate_ids([item.id for item in objects], boxes, duplicate_overlap))
     for item, rows in zip(objects, boxes, strict=True):
         if not item.is_confirmed and np.count_nonzero(~np.isnan(rows[:, 0])) < _MIN_VISIBLE_FRAMES:
             ended.add(item.id)

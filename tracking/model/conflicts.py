@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import BOX_SIDES, corner_distance, overlap
+from tracking.boxes import BOX_SIDES, dice_overlap, total_corner_distance
 from tracking.model.observations import ObservationArrays
 from tracking.model.settings import CostSettings
 
@@ -24,9 +24,9 @@ def conflict_relation(places: ObservationArrays, settings: CostSettings) -> Bool
     for m in range(frames):
         pair = boxes[m, :, None], boxes[m, None]
         if settings.conflict_rule == "corners":
-            relation[m] = corner_distance(*pair) < settings.conflict_distance
+            relation[m] = total_corner_distance(*pair) < settings.conflict_distance
         else:
-            relation[m] = overlap(*pair) > settings.conflict_overlap
+            relation[m] = dice_overlap(*pair) > settings.conflict_overlap
         np.fill_diagonal(relation[m], val=True)
     return relation & present[:, :, None] & present[:, None]
 
@@ -55,7 +55,7 @@ def clique_rows(relation: Bools, owners: NDArray[np.int64] | None) -> Bools:
     return np.array(rows).reshape(len(rows), len(relation))
 
 
-def connected_places(relation: Bools, place: int) -> NDArray[np.int64]:
+def connected_component(relation: Bools, place: int) -> NDArray[np.int64]:
     """Return the places of a frame that `place` conflicts with, directly or through others, ascending."""
     reached = relation[place]
     while True:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.appearance import appearance_distance
-from tracking.boxes import BOX_SIDES, Floats, displacement, heights
+from tracking.appearance import appearance_distance_matrix
+from tracking.boxes import BOX_SIDES, Floats, heights, mean_corner_distance
 from tracking.model.motion import MotionModel
 from tracking.model.object_state import Template
 from tracking.model.observations import ObservationArrays
@@ -53,7 +53,7 @@ def _object_motion_costs(
     motion: MotionModel, boxes: Floats, distances: Floats, settings: CostSettings
 ) -> tuple[Floats, Floats]:
     """Return the costs `moving` and `reappearing` of one object for boxes (M, K, 4), both (M, K)."""
-    deviations, elapsed = motion.deviations(boxes), motion.damped_elapsed(len(boxes))[:, None]
+    deviations, elapsed = motion.deviations_in_heights(boxes), motion.damped_elapsed(len(boxes))[:, None]
     share = np.minimum(deviations / (settings.motion_slack + settings.motion_drift * elapsed), 1.0)
     moving = settings.motion * share
     if not settings.reappearance:
@@ -107,7 +107,7 @@ def pair_costs(motion: MotionCosts | None, places: ObservationArrays, settings: 
     costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))
     before, after = places.histograms[:, :-1], places.histograms[:, 1:]
     between = costs[:, :, :width, :width]
-    between += settings.appearance * appearance_distance(before, after, settings.measure)
+    between += settings.appearance * appearance_distance_matrix(before, after, settings.measure)
     between += _displacement_costs(places.boxes[:, :-1], places.boxes[:, 1:], settings)
     costs[:, :, width, :width] = settings.change
     costs[:, :, :width, width] = settings.disappearance
@@ -127,7 +127,7 @@ def sink_costs(objects: int, places: ObservationArrays, settings: CostSettings) 
 def _displacement_costs(before: Floats, after: Floats, settings: CostSettings) -> Floats:
     """Return the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
     before, after = before[..., :, None, :], after[..., None, :, :]
-    moved = displacement(before, after)
+    moved = mean_corner_distance(before, after)
     if settings.displacement_unit == "heights":
         mean = (heights(before) + heights(after)) / 2.0
         moved = moved / np.where(mean > 0.0, mean, 1.0)
@@ -152,10 +152,10 @@ def template_distances(
     histograms = np.array([templates[n].histogram for n in known])
     if sets == 1:
         observed = places.histograms.reshape(frames * width, bins)
-        table = appearance_distance(histograms, observed, settings.measure)
+        table = appearance_distance_matrix(histograms, observed, settings.measure)
         distances[known] = table.reshape(len(known), frames, width)
     else:
         own = places.histograms[known].reshape(len(known), frames * width, bins)
-        table = appearance_distance(histograms[:, None], own, settings.measure)
+        table = appearance_distance_matrix(histograms[:, None], own, settings.measure)
         distances[known] = table.reshape(len(known), frames, width)
     return distances

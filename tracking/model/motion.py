@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.boxes import Floats, normalized_distance
+from tracking.boxes import Floats, distance_in_heights
 
 # Frames after which the velocity of an occluded object has decayed to 1/e: people turn and stop.
 _VELOCITY_DECAY_FRAMES = 20.0
@@ -55,6 +55,6 @@ class MotionModel:
         """Return the predicted boxes in the window's frames, (M, 4)."""
         return np.asarray(self.box + self.damped_elapsed(frames)[:, None] * np.tile(self.velocity, 2))
 
-    def deviations(self, boxes: Floats) -> Floats:
+    def deviations_in_heights(self, boxes: Floats) -> Floats:
         """Return the distances of boxes (M, K, 4) from the predicted ones, in heights, (M, K)."""
-        return normalized_distance(self.predict(len(boxes))[:, None], boxes)
+        return distance_in_heights(self.predict(len(boxes))[:, None], boxes)

@@ -80,7 +80,7 @@ class Network:
         return int(self.node.shape[1])
 
     @property
-    def places(self) -> int:
+    def max_places(self) -> int:
         """The number K of places in the fullest frame."""
         return int(self.node.shape[2]) - 1
 
@@ -103,7 +103,7 @@ class Network:
     @property
     def owners(self) -> NDArray[np.int64] | None:
         """The object of each place `p K + i`, (P K,); None if all objects share them."""
-        return None if self.shared else np.repeat(np.arange(self.objects), self.places)
+        return None if self.shared else np.repeat(np.arange(self.objects), self.max_places)
 
     def exclusions(self) -> Bools:
         """Return which places of each frame two objects cannot both take, (M, P K, P K)."""
@@ -114,7 +114,7 @@ class Network:
     def rows(self, frame: int) -> Bools:
         """Return the conflict rows of a frame, (R, n, K): at most one path passes through each."""
         relation = self.conflicts[frame]
-        places = self.places
+        places = self.max_places
         if self.objects < 2 or not relation.size:  # noqa: PLR2004 — one object has no conflicts
             return np.zeros((0, self.objects, places), dtype=np.bool_)
         if self.conflict_rows == "clique":
@@ -124,7 +124,7 @@ class Network:
 
     def _stars(self, frame: int) -> Bools:
         """Return one row per place of each object: the place and the conflicting places of other objects."""
-        sets, n, places = self.sets, self.objects, self.places
+        sets, n, places = self.sets, self.objects, self.max_places
         relation = self.conflicts[frame].reshape(len(self.boxes), places, len(self.boxes), places)
         rows = relation[sets][:, :, sets].copy()
         for k in range(n):
@@ -140,7 +140,7 @@ class Network:
             conflicts, locations = self.conflicts, self.locations
         else:
             boxes, present = self.boxes[chosen], self.present[chosen]
-            places = (chosen[:, None] * self.places + np.arange(self.places)).ravel()
+            places = (chosen[:, None] * self.max_places + np.arange(self.max_places)).ravel()
             conflicts = self.conflicts[:, places[:, None], places]
             locations = self.locations[chosen]
         return Network(

@@ -50,7 +50,7 @@ class ArcGeneration:
         self._finder = finder
         self._master = self._new_master()
         # An object that is always occluded violates no row, so the program is feasible.
-        occluded = np.full((network.objects, network.frames), network.places)
+        occluded = np.full((network.objects, network.frames), network.max_places)
         self._master.add_arcs(path_arcs(np.arange(network.objects), occluded))
         self._master.add_arcs(starts)
         self._master.add_rows(rows)
@@ -82,9 +82,9 @@ class ArcGeneration:
                 return self._relaxed(point, priced, rounds)
 
     def _relaxed(self, point: ArcMasterSolution, priced: _PricedTrellis, rounds: int) -> RelaxedSolution:
-        charges = np.zeros(self._network.frames)
+        bound_reductions = np.zeros(self._network.frames)
         frames = np.array([row.frame for row in self._master.rows], dtype=np.int64)
-        np.add.at(charges, frames, point.prices)
+        np.add.at(bound_reductions, frames, point.prices)
         return RelaxedSolution(
             usage=self._master.usage(),
             bound=priced.bound,
@@ -92,13 +92,13 @@ class ArcGeneration:
             rounds=rounds,
             prices=conflict_prices(self._network, self._master.rows, point.prices),
             layout_prices=point.layout_prices,
-            charges=charges,
+            bound_reductions=bound_reductions,
         )
 
     def _solve_with_violated_rows(self) -> ArcMasterSolution:
         """Solve the program with all conflict rows that its solution violates."""
         point = self._master.solve()
-        while rows := self._finder.find_violated(self._master.usage()):
+        while rows := self._finder.find_new_violated(self._master.usage()):
             self._master.add_rows(rows)
             point = self._master.solve()
         return point
@@ -106,15 +106,17 @@ class ArcGeneration:
     def _price(self, point: ArcMasterSolution) -> _PricedTrellis:
         """Price all nodes at a point's duals, and compute the bound."""
         trellis = self._trellis.with_node(self._priced_nodes(point))
-        ahead = forward(trellis)
-        costs = (ahead[-1] + trellis.sink).min(axis=1)
-        return _PricedTrellis(trellis, ahead, point.reduced_cost_limits, float(costs.sum()) - point.charge)
+        forward_costs = forward(trellis)
+        costs = (forward_costs[-1] + trellis.sink).min(axis=1)
+        return _PricedTrellis(
+            trellis, forward_costs, point.reduced_cost_limits, float(costs.sum()) - point.bound_reduction
+        )
 
     def _add_improving_arcs(self, priced: _PricedTrellis) -> bool:
         """Add arcs whose best path improves the program; return whether there are any."""
         layout, objects = self._network.layout, self._network.objects
         passes = MinMarginals.of(priced.trellis, priced.forward)
-        for states in (_STATES_WITH_LAYOUT if layout else _STATES, self._network.places + 1):
+        for states in (_STATES_WITH_LAYOUT if layout else _STATES, self._network.max_places + 1):
             arcs, costs = find_improving_arcs(priced.trellis, passes, priced.reduced_cost_limits, states)
             chosen = _cheapest_arcs(arcs.owner, costs, objects, _ARCS_WITH_LAYOUT if layout else _ARCS)
             if self._master.add_arcs(arcs.select(chosen)):

@@ -70,14 +70,14 @@ class ArcMasterSolution:
         prices: (R,) the price of each conflict row, not negative.
         layout_prices: (n, M - 1, 4) the gain per pixel of movement by the layout term.
         reduced_cost_limits: (n,) the cost below which a path of an object improves the program.
-        charge: the amount by which prices and layout term reduce the bound.
+        bound_reduction: the amount by which prices and layout term reduce the bound.
     """
 
     objective: float
     prices: Floats
     layout_prices: Floats
     reduced_cost_limits: Floats
-    charge: float
+    bound_reduction: float
 
 
 class ArcMaster:
@@ -202,12 +202,14 @@ class ArcMaster:
         self._values = found.values[self._columns]
         objects, frames = self._network.objects, self._network.frames
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
-        layout_prices, charge = np.zeros((objects, frames - 1, BOX_SIDES)), float(prices.sum())
+        layout_prices, bound_reduction = np.zeros((objects, frames - 1, BOX_SIDES)), float(prices.sum())
         if self._layout is not None:
             forces = self._layout.forces(found.duals)
             layout_prices = self._layout.layout_prices(forces)
-            charge += self._layout.slack(forces)
-        return ArcMasterSolution(found.objective, prices, layout_prices, found.duals[:objects], charge)
+            bound_reduction += self._layout.bound_reduction(forces)
+        return ArcMasterSolution(
+            found.objective, prices, layout_prices, found.duals[:objects], bound_reduction
+        )
 
     def usage(self) -> Floats:
         """Return y (n, M, S), the flow through each node."""
@@ -232,10 +234,12 @@ def find_improving_arcs(
     begin = ArcSet(n, zero, zero, packed.index[n, 0, j])
     begin_costs = through[n, 0, begin.target]
 
-    ahead, behind = (np.swapaxes(passed, 0, 1) for passed in (passes.forward, passes.backward))
+    forward_costs, backward_costs = (
+        np.swapaxes(passed, 0, 1) for passed in (passes.forward, passes.backward)
+    )
     costs = packed.pairs(trellis.pair)
-    costs += packed.states(ahead, np.inf)[:, :-1, :, None]
-    costs += packed.states(behind + trellis.node, np.inf)[:, 1:, None, :]
+    costs += packed.states(forward_costs, np.inf)[:, :-1, :, None]
+    costs += packed.states(backward_costs + trellis.node, np.inf)[:, 1:, None, :]
     n, m, i, j = np.nonzero(costs < limits[:, None, None, None])
     between = ArcSet(n, m + 1, packed.index[n, m, i], packed.index[n, m + 1, j])
     return begin.concatenate(between), np.concatenate([begin_costs, costs[n, m, i, j]])

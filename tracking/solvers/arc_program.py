@@ -39,18 +39,18 @@ class ArcProgram:
     moves: Ints
 
 
-def build_arc_program(network: Network, allowed: NDArray[np.bool_] | None = None) -> ArcProgram:
+def build_arc_program(network: Network, allowed_arcs: NDArray[np.bool_] | None = None) -> ArcProgram:
     """Build the program of a network with at least one object.
 
-    `allowed` (n, M - 1, S, S) restricts the arcs between frames.
+    `allowed_arcs` (n, M - 1, S, S) restricts the arcs between frames.
     """
     build = LinearProgramBuilder()
     exists = np.isfinite(network.node)
     # Arcs are the first columns, then nodes; the flow rows connect them.
     pair = network.pair[network.pair_sets] + network.node[:, 1:, None, :]
     usable = np.isfinite(pair) & exists[:, :-1, :, None]
-    if allowed is not None:
-        usable &= allowed
+    if allowed_arcs is not None:
+        usable &= allowed_arcs
     start = network.source + network.node[:, 0]
     from_source, between, to_sink = np.nonzero(np.isfinite(start)), np.nonzero(usable), _ends(network, exists)
     source_arcs = build.add_columns(start[from_source])

@@ -22,7 +22,7 @@ _SOLVERS = {
     "arcs": ("tracking.solvers.arc_program", "ArcProgramSolver"),
     "columns": ("tracking.solvers.column_generation", "ColumnGenerationSolver"),
     "exact": ("tracking.solvers.exact", "ExactSolver"),
-    "extended-dp": ("tracking.solvers.extended_dp", "ExtendedDpSolver"),
+    "extended-dp": ("tracking.solvers.joint_dp", "JointDpSolver"),
     "greedy-dp": ("tracking.solvers.dynamic_programming", "GreedyDpSolver"),
     "l2": ("tracking.solvers.column_generation", "SquaredLayoutSolver"),
     "separate-dp": ("tracking.solvers.dynamic_programming", "SeparateDpSolver"),

@@ -72,14 +72,14 @@ class PathGeneration:
         return self._resolve_conflicts(warm_start)
 
     def _resolve_conflicts(self, warm_start: WarmStart | None) -> RelaxedSolution:
-        rows = self._finder.find_violated(self._usage)
+        rows = self._finder.find_new_violated(self._usage)
         warm = try_warm_start(self._network, self._pricing, self._finder, warm_start) if warm_start else None
         if warm is not None and warm.proven is not None:
             return warm.proven
         self._link_objects(rows)
         if self._largest_group() > _MAX_PATH_GROUP:
             return start_arc_generation(self._network, self._pricing, ConflictSeparator(self._network)).run()
-        self._add_rows([*rows, *self._finder.drop_known(warm.rows)] if warm else rows)
+        self._add_rows([*rows, *self._finder.take_new(warm.rows)] if warm else rows)
         for paths in warm.paths if warm else ():
             active = np.flatnonzero(self._active)
             self._master.add_paths(active, paths.select(active))
@@ -121,7 +121,7 @@ class PathGeneration:
 
     def _add_violated_rows(self) -> None:
         """Add violated rows and solve until none is violated."""
-        while rows := self._finder.find_violated(self._usage):
+        while rows := self._finder.find_new_violated(self._usage):
             self._add_rows(rows)
             self._solve()
 
@@ -147,7 +147,7 @@ class PathGeneration:
             self._master.add_objects(new.tolist())
         self._master.add_rows(rows)
         # An object that is always occluded violates no row, so the program is feasible.
-        occluded = np.full((self._network.objects, self._network.frames), self._network.places)
+        occluded = np.full((self._network.objects, self._network.frames), self._network.max_places)
         self._master.add_paths(new, Paths(occluded, path_costs(self._network, occluded)).select(new))
         self._master.add_paths(new, self._alone.select(new))
         self._add_detours(np.flatnonzero(concerned))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.model.conflicts import Bools, clique_rows, connected_places
+from tracking.model.conflicts import Bools, clique_rows, connected_component
 from tracking.model.network import Network
 from tracking.solvers.objective import Ints
 from tracking.solvers.warm_start import ConflictPrice
@@ -50,7 +50,7 @@ def conflict_prices(
 
 
 class ConflictSeparator:
-    """Finds the rows of `Network.rows` that a point violates."""
+    """Finds the rows of `Network.rows` that a point violates; it returns each row once."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -59,7 +59,7 @@ class ConflictSeparator:
         self._components: dict[tuple[int, int], _ConflictComponent] = {}
         self._returned: set[tuple[int, bytes]] = set()
 
-    def find_violated(self, usage: Floats) -> list[ConflictRow]:
+    def find_new_violated(self, usage: Floats) -> list[ConflictRow]:
         """Return the rows that y = `usage` (n, M, S) violates and that were not returned before."""
         found = []
         visits = self._visits(usage)
@@ -83,7 +83,7 @@ class ConflictSeparator:
         if not self._network.shared or self._stars:
             return found, prices
         for row in rows:
-            member = np.zeros(self._network.places)
+            member = np.zeros(self._network.max_places)
             if row.frame >= self._network.frames:
                 continue
             present = np.flatnonzero(self._network.present[0, row.frame])
@@ -97,7 +97,7 @@ class ConflictSeparator:
                     prices.append(row.price)
         return found, prices
 
-    def drop_known(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
+    def take_new(self, rows: Sequence[ConflictRow]) -> list[ConflictRow]:
         """Return those of the rows that were not returned before, and mark them as returned."""
         keys = [(row.frame, self._entries(row).tobytes()) for row in rows]
         found = {key: row for key, row in zip(keys, rows, strict=True) if key not in self._returned}
@@ -116,8 +116,8 @@ class ConflictSeparator:
 
     def _row(self, frame: int, row: Floats) -> ConflictRow:
         network = self._network
-        members = np.zeros((network.objects, network.places + 1), dtype=np.bool_)
-        members[:, :-1] = row.reshape(-1, network.places) > 0.0
+        members = np.zeros((network.objects, network.max_places + 1), dtype=np.bool_)
+        members[:, :-1] = row.reshape(-1, network.max_places) > 0.0
         return ConflictRow(frame, members)
 
     def _components_at(self, frame: int, places: Ints) -> list[_ConflictComponent]:
@@ -140,7 +140,7 @@ class ConflictSeparator:
     def _cover(self, frame: int, place: int) -> None:
         """Compute the rows of a place's component."""
         relation, owners = self._network.conflicts[frame], self._network.owners
-        inside = connected_places(relation, place)
+        inside = connected_component(relation, place)
         cliques = clique_rows(relation[np.ix_(inside, inside)], None if owners is None else owners[inside])
         rows = np.zeros((len(cliques), len(relation)))
         rows[:, inside] = cliques

@@ -209,7 +209,7 @@ def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator
         if step < _EARLY_STEPS or step % _SEPARATION_INTERVAL == 0:
             usage = np.zeros(network.node.shape)
             usage[each, frames, last_paths[-1]] = 1.0
-            prices.add_rows(finder.find_violated(usage))
+            prices.add_rows(finder.find_new_violated(usage))
         length = schedule.decay**step
         moved = prices.ascend(paths.nodes, length * schedule.price * typical)
         if locations is not None:

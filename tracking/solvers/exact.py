@@ -65,7 +65,7 @@ class JointStateSearch:
         # Lower bound of the cost from each state on, without the layout price that acts at that frame.
         self._bound_ahead = np.swapaxes(passes.backward, 0, 1).copy()
         self._bound_ahead[:, :-1] += np.einsum("nml,nmsl->nms", found.layout_prices, self._locations[:, :-1])
-        self._charges = np.append(np.cumsum(found.charges[::-1])[::-1][1:], 0.0)
+        self._bound_reductions = np.append(np.cumsum(found.bound_reductions[::-1])[::-1][1:], 0.0)
 
     def cheaper_than(self, cost: float) -> Ints | None:
         """Return the cheapest nodes (n, M) if they cost less than `cost`, else None.
@@ -106,7 +106,7 @@ class JointStateSearch:
 
     def _excluded(self, frame: int, pair: tuple[int, int]) -> Bools:
         """Return which states of two objects conflict, (S, S)."""
-        places, sets = self._network.places, self._network.sets
+        places, sets = self._network.max_places, self._network.sets
         excluded = np.zeros((places + 1, places + 1), dtype=np.bool_)
         first, second = (slice(sets[n] * places, (sets[n] + 1) * places) for n in pair)
         excluded[:places, :places] = self._exclusions[frame, first, second]
@@ -115,7 +115,7 @@ class JointStateSearch:
     def _prune(self, frame: int, frontier: _Frontier, limit: float) -> _Frontier:
         """Drop the joint states whose bound exceeds the limit."""
         each = np.arange(self._network.objects)
-        ahead = self._bound_ahead[each, frame, frontier.nodes].sum(axis=1) - self._charges[frame]
+        ahead = self._bound_ahead[each, frame, frontier.nodes].sum(axis=1) - self._bound_reductions[frame]
         kept = frontier.costs + ahead <= limit
         return _Frontier(frontier.nodes[kept], frontier.costs[kept], frontier.origin[kept])
 
@@ -208,23 +208,23 @@ def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
     Shape (n, M - 1, S, S); infinite where there is no arc.
     """
     trellis = Trellis.of(network).with_node(found.priced)
-    ahead, behind = forward(trellis), backward(trellis)
-    least = (ahead[-1] + trellis.sink).min(axis=1)
+    forward_costs, backward_costs = forward(trellis), backward(trellis)
+    least = (forward_costs[-1] + trellis.sink).min(axis=1)
     objects, frames, states = network.node.shape
     excess = np.empty((objects, frames - 1, states, states))
     for m in range(1, frames):
-        after = (trellis.node[:, m] + behind[m])[:, None]
-        excess[:, m - 1] = ahead[m - 1][:, :, None] + trellis.pair[:, m - 1] + after
+        after = (trellis.node[:, m] + backward_costs[m])[:, None]
+        excess[:, m - 1] = forward_costs[m - 1][:, :, None] + trellis.pair[:, m - 1] + after
     excess -= least[:, None, None, None]
     return excess
 
 
-def _solve_restricted(network: Network, nodes: Ints, allowed: Bools) -> Ints:
+def _solve_restricted(network: Network, nodes: Ints, allowed_arcs: Bools) -> Ints:
     """Return the cheapest states on the allowed arcs and those of `nodes`."""
     each, steps = np.indices(nodes[:, 1:].shape)
-    allowed = allowed.copy()
-    allowed[each, steps, nodes[:, :-1], nodes[:, 1:]] = True
-    built = build_arc_program(network, allowed)
+    allowed_arcs = allowed_arcs.copy()
+    allowed_arcs[each, steps, nodes[:, :-1], nodes[:, 1:]] = True
+    built = build_arc_program(network, allowed_arcs)
     integer = np.zeros(len(built.program.costs), dtype=np.bool_)
     integer[built.nodes[built.nodes >= 0]] = True
     values = solve_program(built.program, integer).values

@@ -104,6 +104,6 @@ class LayoutConstraints:
         np.add.at(prices, self._pairs[:, 1], -forces)
         return prices
 
-    def slack(self, forces: Floats) -> float:
+    def bound_reduction(self, forces: Floats) -> float:
         """Return the reduction of the bound by the duals: the conjugate of the square; 0 for the L1 norm."""
         return float((forces**2).sum() / (4.0 * self._network.layout)) if self._squared else 0.0

@@ -14,12 +14,12 @@ Ints = NDArray[np.int64]
 
 def nodes_from_states(network: Network, states: Ints) -> Ints:
     """Return node numbers for states: the occlusion node is the last one instead of -1."""
-    return np.where(states == OCCLUDED, network.places, states)
+    return np.where(states == OCCLUDED, network.max_places, states)
 
 
 def states_from_nodes(network: Network, nodes: Ints) -> Ints:
     """Return states for node numbers: occluded is -1."""
-    return np.where(nodes == network.places, OCCLUDED, nodes)
+    return np.where(nodes == network.max_places, OCCLUDED, nodes)
 
 
 def path_costs(network: Network, nodes: Ints) -> Floats:
@@ -40,7 +40,7 @@ def path_cost(network: Network, nodes: Ints, owner: int) -> float:
     return float(visited + between + network.source[owner, nodes[0]] + network.sink[owner, nodes[-1]])
 
 
-def layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
+def unweighted_layout_cost(network: Network, nodes: Ints, power: int = 1) -> float:
     """Return the layout term of II.C without its weight μ, over all pairs of objects.
 
     `power` 1: the L1 norm, pixels; 2: the square of the L2 norm, square pixels.
@@ -59,15 +59,15 @@ def total_cost(network: Network, nodes: Ints, power: int = 1) -> float:
     """Return the cost of all paths together, the layout term with its `power` included (II.C)."""
     total = float(path_costs(network, nodes).sum())
     if network.layout:
-        total += network.layout * layout_cost(network, nodes, power)
+        total += network.layout * unweighted_layout_cost(network, nodes, power)
     return total
 
 
 def conflict_count(network: Network, nodes: Ints) -> int:
     """Count the pairs of objects that exclude each other, over all frames."""
     exclusions = network.exclusions()
-    visible = nodes < network.places
-    places = np.where(visible, network.sets[:, None] * network.places + nodes, 0)
+    visible = nodes < network.max_places
+    places = np.where(visible, network.sets[:, None] * network.max_places + nodes, 0)
     first, second = np.triu_indices(network.objects, 1)
     if not exclusions.size or not len(first):
         return 0
@@ -83,7 +83,7 @@ def block_conflicting_nodes(
     owner, path = fixed
     if not exclusions.size:
         return
-    places, frames = network.places, np.arange(network.frames)
+    places, frames = network.max_places, np.arange(network.frames)
     visible = path < places
     index = np.where(visible, network.sets[owner] * places + path, 0)
     blocked = (exclusions[frames, index] & visible[:, None]).reshape(network.frames, -1, places)

@@ -29,8 +29,8 @@ class RelaxedSolution:
         rounds: how often paths or arcs were priced.
         prices: the binding conflict rows, if all objects share the observations.
         layout_prices: (n, M - 1, 4) the gain per pixel of movement; empty without layout term.
-        charges: (M,) the reduction of the bound by the prices of each frame's rows; empty without layout
-        term.
+        bound_reductions: (M,) by how much the prices of each frame's rows reduce the bound; empty without
+            layout term.
     """
 
     usage: Floats
@@ -39,7 +39,7 @@ class RelaxedSolution:
     rounds: int
     prices: tuple[ConflictPrice, ...] = ()
     layout_prices: Floats = field(default_factory=lambda: np.empty(0))
-    charges: Floats = field(default_factory=lambda: np.empty(0))
+    bound_reductions: Floats = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,13 +97,13 @@ def _follow_warm_start(
         return nodes
     known = warm_start.states[:, : network.frames]
     frames = known.shape[1]
-    hinted = np.where(known == -1, network.places, known)
-    usable = (hinted >= 0) & (hinted <= network.places)
+    hinted = np.where(known == -1, network.max_places, known)
+    usable = (hinted >= 0) & (hinted <= network.max_places)
     differing = np.flatnonzero((usable & (hinted != nodes[:, :frames])).any(axis=1))
     if not len(differing):
         return nodes
     restricted = node[differing].copy()
-    off = np.arange(network.places + 1) != hinted[differing, :, None]
+    off = np.arange(network.max_places + 1) != hinted[differing, :, None]
     restricted[:, :frames][off & usable[differing, :, None]] = np.inf
     found = best_paths(pricing.trellis.with_node(node).select(differing).with_node(restricted))
     # Ignore the warm start where it requires missing arcs.

@@ -30,7 +30,7 @@ def round_relaxation(network: Network, usage: Floats) -> Ints:
     occluded.
     """
     exclusions = network.exclusions()
-    nodes = np.full((network.objects, network.frames), network.places, dtype=np.int64)
+    nodes = np.full((network.objects, network.frames), network.max_places, dtype=np.int64)
     integral = usage.max(axis=2, initial=0.0) >= 1.0 - INTEGRALITY_TOLERANCE
     for m in range(network.frames):
         if integral[:, m].all():
@@ -41,7 +41,7 @@ def round_relaxation(network: Network, usage: Floats) -> Ints:
 
 
 def _round_frame(network: Network, usage: Floats, exclusions: Bools) -> Ints:
-    places, sets = network.places, network.sets
+    places, sets = network.max_places, network.sets
     nodes = np.full(network.objects, places, dtype=np.int64)
     for _ in range(network.objects):
         owner, state = divmod(int(usage.argmax()), places + 1)
@@ -149,7 +149,7 @@ class _CoordinateDescent:
     def _excluded(self, owner: int) -> Bools:
         """Return the places of one object that the others exclude, (M, K)."""
         network = self._network
-        places, sets = network.places, network.sets
+        places, sets = network.max_places, network.sets
         others = np.delete(np.arange(network.objects), owner)
         occupied = self.nodes[others]
         visible = occupied < places

@@ -119,10 +119,10 @@ class MinMarginals:
     least: Floats
 
     @classmethod
-    def of(cls, trellis: Trellis, ahead: Floats | None = None) -> MinMarginals:
-        """Run both passes; `ahead` is the forward pass, if known."""
-        ahead = forward(trellis) if ahead is None else ahead
-        return cls(ahead, backward(trellis), (ahead[-1] + trellis.sink).min(axis=1))
+    def of(cls, trellis: Trellis, known_forward: Floats | None = None) -> MinMarginals:
+        """Run both passes; `known_forward` is the forward pass, if known."""
+        forward_costs = forward(trellis) if known_forward is None else known_forward
+        return cls(forward_costs, backward(trellis), (forward_costs[-1] + trellis.sink).min(axis=1))
 
     @property
     def through(self) -> Floats:

@@ -32,7 +32,7 @@ def path_histograms(
         firsts: each path's first frame.
         boxes: each path's boxes (F, 4) in pixels of the camera's picture, NaN where it has none.
     """
-    histograms = [np.zeros((len(box), AppearanceSettings().length), dtype=np.float32) for box in boxes]
+    histograms = [np.zeros((len(box), AppearanceSettings().color_length), dtype=np.float32) for box in boxes]
     pixels = [np.zeros(len(box), dtype=np.float32) for box in boxes]
     pipeline = CameraPipeline(config, camera)
     for frame in range(len(masks.foreground)):

@@ -15,7 +15,7 @@ from server.config.site_config import Config
 from tracking.boxes import Floats
 from tracking.detectors import BackgroundDetector
 from tracking.detectors.background.cell_grid import CellGrid
-from tracking.detectors.background.foreground_fit import ForegroundFit
+from tracking.detectors.background.foreground_fit import PersonHypotheses
 from tracking.detectors.background.height_model import HeightModel
 from tracking.detectors.base import Mask
 
@@ -74,7 +74,7 @@ def compute_masks(config: Config, camera: str) -> ForegroundMasks:
         raise CannotMapError(f"camera {camera}: the heights of people were never learned")
     weight = np.asarray(_cells(grid.visible) > 127, dtype=np.float64)
     return ForegroundMasks(
-        pipeline.source.size, foreground, shadow, weight, height_model.in_cells(grid.scale, 0.0)
+        pipeline.source.size, foreground, shadow, weight, height_model.in_cells(grid.work_scale, 0.0)
     )
 
 
@@ -86,7 +86,7 @@ class _MaskRecorder:
         self._last: tuple[Mask | None, Mask | None] = (None, None)
         self.grid: CellGrid | None = None
 
-    def __call__(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
+    def __call__(self, mask: Mask, shadow: Mask, grid: CellGrid) -> PersonHypotheses:
         """Fit people to the foreground."""
         self.grid = grid
         self._last = _cells(mask), _cells(shadow)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tracking import Detections, WindowResult, interpolate_detections, merge_results
 from tracking.detectors import Image
-from tracking.interactive import InteractiveTracker, PositionCorrection
+from tracking.interactive import CorrectableTracker, PositionCorrection
 from tracking.registry import Tracker
 
 
@@ -42,7 +42,7 @@ class SkippedFrameInterpolator:
         """Apply operator corrections; None: they change nothing, or the tracker does not support them."""
         return (
             self._tracker.apply_corrections(corrections)
-            if isinstance(self._tracker, InteractiveTracker)
+            if isinstance(self._tracker, CorrectableTracker)
             else None
         )
 

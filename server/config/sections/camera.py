@@ -82,9 +82,13 @@ class TrackSettings(Section):
     cross_view_wait_s: NonNegativeFloat = 0.3
     """Seconds after its capture that a frame waits for the other cameras' detections."""
 
-    def lag(self, fps: float) -> int:
+    def final_lag(self, fps: float) -> int:
         """Return the frames that follow a final frame at most when a window ends."""
-        return self.temporal.lag(fps) if self.tracker == TEMPORAL_TRACKER else self.window.lag
+        return (
+            self.temporal.max_final_lag(fps)
+            if self.tracker == TEMPORAL_TRACKER
+            else self.window.min_final_lag
+        )
 
     @field_validator("tracker")
     @classmethod

@@ -89,7 +89,7 @@ class ViewDecider:
             self._cameras,
             camera_homographies,
             size,
-            config.track.lag(fps),
+            config.track.final_lag(fps),
             share,
             config.overhead,
             fps,

@@ -91,7 +91,7 @@ def network_of(case: Case) -> Network:
 
 def exhaustive_optimum(network: Network) -> float:
     """Return the cost of the optimum by exhaustive search over all states."""
-    states = range(network.places + 1)
+    states = range(network.max_places + 1)
     best = np.inf
     for flat in product(states, repeat=network.objects * network.frames):
         nodes = np.array(flat).reshape(network.objects, network.frames)

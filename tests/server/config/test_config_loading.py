@@ -128,7 +128,7 @@ def test_the_lookahead_must_cover_the_stages_of_temporal_consistency() -> None:
     wrong = error_of(site(view={"lookahead": 28}, track=track))
     assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
     enough = build_config(site(view={"lookahead": 29}, track=track), where="", folder=Path())
-    assert enough.track.lag(25.0) == 19
+    assert enough.track.final_lag(25.0) == 19
 
 
 def test_too_many_stages_are_refused_before_their_frames_are_counted() -> None:

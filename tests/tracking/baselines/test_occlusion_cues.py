@@ -110,7 +110,7 @@ def test_shares_stay_between_0_and_1(seed: int, neighbors: list[set[int]]) -> No
     rng, shares = np.random.default_rng(seed), OccluderParticles.unoccluded(30)
     for near in neighbors:
         known = dict(zip(shares.occluder_ids, shares.states.mean(axis=0), strict=True))
-        shares.propagate(rng, sorted(near), 0.3, 0.1)
+        shares.resample_and_propagate(rng, sorted(near), 0.3, 0.1)
         assert shares.occluder_ids == tuple(sorted(near))
         assert shares.visible_and_hidden_shares.shape == (30, 1 + len(near))
         assert (shares.visible_and_hidden_shares >= -1e-12).all()
@@ -120,9 +120,9 @@ def test_shares_stay_between_0_and_1(seed: int, neighbors: list[set[int]]) -> No
 
 def test_a_share_stays_with_its_occluder_when_others_come_and_go() -> None:
     shares = OccluderParticles((4, 7), np.tile([0.1, 0.6], (10, 1)), np.full(10, 0.1))
-    shares.propagate(np.random.default_rng(1), [7, 9], 0.0)
+    shares.resample_and_propagate(np.random.default_rng(1), [7, 9], 0.0)
     assert np.allclose(shares.states, [0.6, 0.0])
-    assert np.allclose(shares.hidden_share, 0.6)
+    assert np.allclose(shares.hidden_shares, 0.6)
 
 
 def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_filter_fails() -> None:
@@ -158,7 +158,7 @@ def test_the_hidden_share_is_large_only_during_the_occlusion() -> None:
     hidden = []
     for frame in range(1, FRAMES):
         method.predict(scene.picture(frame), people)
-        hidden.append([float(person.occluders.weights @ person.occluders.hidden_share) for person in people])
+        hidden.append([float(person.occluders.weights @ person.occluders.hidden_shares) for person in people])
     behind, before = np.array(hidden).T
     assert behind[27:29].min() > 0.7
     assert max(behind[:20].max(), behind[36:].max(), before.max()) < 0.1

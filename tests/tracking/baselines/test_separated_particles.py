@@ -11,7 +11,7 @@ from fakes.tracking.crossings import BLUE, RED, Clothes, Crossing, count_tracked
 from tracking.baselines.integral_histograms import (
     CHANNELS,
     LEVELS,
-    PartHistograms,
+    ChannelIntegralImage,
     bhattacharyya_coefficient,
     split_boxes,
 )
@@ -39,7 +39,7 @@ def test_part_histograms_equal_counted_ones(seed: int, corners: list[tuple[int, 
             for x in range(left, right):
                 for channel in range(CHANNELS):
                     expected[row, channel, image[y, x, channel] // 32] += one
-    assert np.allclose(PartHistograms(image, field_box).histograms(boxes), expected)
+    assert np.allclose(ChannelIntegralImage(image, field_box).histograms(boxes), expected)
 
 
 def test_parts_are_cut_row_by_row() -> None:
@@ -104,7 +104,7 @@ def test_only_a_person_in_other_clothes_counts_as_an_occluder(in_front: Clothes,
     covered = apart.picture(0)
     (left, top), (other, _) = (apart.where(person, 0)[:2].astype(int) for person in range(2))
     covered[top : top + 44, left : left + 18] = covered[top : top + 44, other : other + 18]
-    field = PartHistograms(covered, np.array([0.0, 0.0, 200.0, 120.0]))
+    field = ChannelIntegralImage(covered, np.array([0.0, 0.0, 200.0, 120.0]))
     assert method._is_occluded(field, people[0]) is behind
 
 

@@ -16,7 +16,7 @@ from tracking.baselines.temporal_consistency.distance import (
     blob_gap,
     distance_cost,
     distance_costs,
-    distance_score,
+    stepped_distance_m,
 )
 from tracking.baselines.temporal_consistency.regional_appearance import (
     BINS,
@@ -37,18 +37,18 @@ def _blob(left: float, top: float, right: float, bottom: float, shape: np.ndarra
 
 def test_a_blob_within_another_has_distance_zero() -> None:
     outer, inner = _blob(0, 0, 40, 40), _blob(10, 10, 30, 40)
-    assert distance_score(outer, inner, PIXELS_PER_METER, SETTINGS) == 0.0
-    assert distance_score(inner, outer, PIXELS_PER_METER, SETTINGS) == 0.0
+    assert stepped_distance_m(outer, inner, PIXELS_PER_METER, SETTINGS) == 0.0
+    assert stepped_distance_m(inner, outer, PIXELS_PER_METER, SETTINGS) == 0.0
 
 
 def test_blobs_that_overlap_in_part_are_six_centimetres_apart() -> None:
-    assert distance_score(_blob(0, 0, 40, 40), _blob(20, 20, 60, 60), PIXELS_PER_METER, SETTINGS) == 0.06
+    assert stepped_distance_m(_blob(0, 0, 40, 40), _blob(20, 20, 60, 60), PIXELS_PER_METER, SETTINGS) == 0.06
 
 
 def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimetres() -> None:
     left, right = _blob(0, 0, 20, 20), _blob(70, 0, 100, 20)
     assert blob_gap(left, right) == pytest.approx(50.0, abs=1.5)
-    assert distance_score(left, right, PIXELS_PER_METER, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
+    assert stepped_distance_m(left, right, PIXELS_PER_METER, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)
 
 
 def test_the_gap_is_measured_between_shapes_and_not_between_boxes() -> None:
@@ -116,14 +116,14 @@ def test_appearance_is_compared_with_the_nearest_learned_region() -> None:
     red, blue = np.eye(BINS)[0], np.eye(BINS)[1]
     here, there = np.array([[40.0, 40.0]]), np.array([[250.0, 250.0]])
     assert regions.costs(here, red[None], 0.5) == [0.5]
-    regions.learn(here[0], red)
-    regions.learn(there[0], blue)
+    regions.store(here[0], red)
+    regions.store(there[0], blue)
     assert regions.costs(here + 20, red[None], 0.5) == [0.0]
     assert regions.costs(there - 20, red[None], 0.5) == [1.0]
     for step in range(40):
-        regions.learn(np.array([float(step * 7 % 300), float(step * 13 % 300)]), red)
+        regions.store(np.array([float(step * 7 % 300), float(step * 13 % 300)]), red)
     assert len(regions) <= 9
-    regions.learn(here[0], blue)
+    regions.store(here[0], blue)
     assert regions.costs(here, blue[None], 0.5) == [0.0], "the appearance of that region is replaced"
 
 
@@ -161,7 +161,7 @@ def test_the_distance_is_the_mahalanobis_distance_in_yuv() -> None:
     image[5:15, 5:15] = (60, 60, 170)
     offset = cv2.cvtColor(image, cv2.COLOR_BGR2YUV) - mean
     expected = np.einsum("hwi,hwij,hwj->hw", offset, np.linalg.inv(covariance), offset)
-    np.testing.assert_allclose(background.distance(image), expected, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(background.squared_distance(image), expected, rtol=1e-3, atol=1e-3)
 
 
 def test_a_person_walking_through_during_learning_is_not_part_of_the_background() -> None:

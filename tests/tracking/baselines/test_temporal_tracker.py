@@ -11,7 +11,7 @@ from fakes.tracking.strolls import final_boxes
 from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
 from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
 from tracking.baselines.temporal_consistency.blobs import BlobDetector
-from tracking.baselines.temporal_consistency.tracker import TemporalTracker
+from tracking.baselines.temporal_consistency.tracker import TemporalBlobTracker
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.registry import create_tracker, needs_images
@@ -41,13 +41,13 @@ def _meet(frame: int) -> dict[int, tuple[float, float]]:
     return {0: (100.0 - away, 75.0), 1: (100.0 + away, 75.0)}
 
 
-def _tracker(settings: TemporalSettings = SETTINGS) -> TemporalTracker:
-    tracker = TemporalTracker(WINDOW, settings, FPS)
+def _tracker(settings: TemporalSettings = SETTINGS) -> TemporalBlobTracker:
+    tracker = TemporalBlobTracker(WINDOW, settings, FPS)
     tracker.prepare(_picture({}, seed) for seed in range(1000, 1020))
     return tracker
 
 
-def _follow(tracker: TemporalTracker, pictures: dict[int, Image | None]) -> list[WindowResult]:
+def _follow(tracker: TemporalBlobTracker, pictures: dict[int, Image | None]) -> list[WindowResult]:
     results = [tracker.push(frame, _NO_DETECTIONS, image) for frame, image in pictures.items()]
     return [result for result in (*results, tracker.flush()) if result is not None]
 
@@ -110,7 +110,7 @@ def test_every_frame_is_published_once_within_the_lag() -> None:
     assert results[-1].final_to == 119
     for earlier, later in pairwise(results):
         assert later.first == earlier.final_to + 1
-    lag = SETTINGS.lag(FPS)
+    lag = SETTINGS.max_final_lag(FPS)
     for result in results:
         assert result.last - result.final_to <= lag
         for track in result.tracks:
@@ -146,7 +146,7 @@ def test_without_preparation_the_background_is_learned_online() -> None:
     settings = TemporalSettings(
         window_stages=2, stage_s=0.2, blobs=BlobSettings(bootstrap_frames=20, samples=10)
     )
-    tracker = TemporalTracker(WINDOW, settings, FPS)
+    tracker = TemporalBlobTracker(WINDOW, settings, FPS)
     pictures = {frame: _picture({} if frame < 20 else {0: (60.0, 40.0)}, frame) for frame in range(60)}
     boxes = final_boxes(_follow(tracker, pictures))
     assert not any(boxes.get(frame) for frame in range(20))
@@ -183,7 +183,7 @@ def test_the_registry_creates_it_by_name_with_pictures_required() -> None:
     created = create_tracker(
         "temporal", WINDOW, CostSettings(), lambda: create_solver("columns"), SETTINGS, FPS
     )
-    assert isinstance(created, TemporalTracker)
+    assert isinstance(created, TemporalBlobTracker)
 
 
 @pytest.mark.parametrize(

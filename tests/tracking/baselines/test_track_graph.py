@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from fakes.tracking.strolls import BINS, WalkingPerson, detections_at, final_boxes, peaked_histogram
 from tracking import CostSettings, Detections, WindowSettings, create_solver
-from tracking.appearance import appearance_distance
-from tracking.baselines.track_groups import TrackEnd, TrackGraphSettings, departed_member
+from tracking.appearance import appearance_distance_matrix
+from tracking.baselines.track_groups import TrackEndpoint, TrackGraphSettings, departed_member
 from tracking.boxes import iou
 from tracking.registry import Tracker, create_tracker
 
@@ -25,13 +25,15 @@ def _tracker(name: str) -> Tracker:
     return create_tracker(name, window, CostSettings(), lambda: create_solver("columns"))
 
 
-def _end(rng: np.random.Generator, frame: int) -> TrackEnd:
+def _end(rng: np.random.Generator, frame: int) -> TrackEndpoint:
     look = rng.dirichlet(np.ones(BINS))
-    return TrackEnd(frame, rng.uniform(0, 100, 2), rng.uniform(-3, 3, 2), float(rng.uniform(40, 90)), look)
+    return TrackEndpoint(
+        frame, rng.uniform(0, 100, 2), rng.uniform(-3, 3, 2), float(rng.uniform(40, 90)), look
+    )
 
 
-def _unlike(before: TrackEnd, after: TrackEnd) -> float:
-    distance = float(appearance_distance(before.histogram[None], after.histogram[None])[0, 0])
+def _unlike(before: TrackEndpoint, after: TrackEndpoint) -> float:
+    distance = float(appearance_distance_matrix(before.histogram[None], after.histogram[None])[0, 0])
     frames = after.frame - before.frame
     if frames > CLOSE:
         return distance
@@ -57,8 +59,8 @@ def test_the_departed_member_is_the_most_probable_of_all_states(seed: int, count
 
 def test_a_person_unlike_all_members_was_not_in_the_group() -> None:
     place, still = np.zeros(2), np.zeros(2)
-    group = [TrackEnd(0, place, still, 80.0, peaked_histogram(kind)) for kind in (0, 1)]
-    stranger = TrackEnd(90, place, still, 80.0, peaked_histogram(5))
+    group = [TrackEndpoint(0, place, still, 80.0, peaked_histogram(kind)) for kind in (0, 1)]
+    stranger = TrackEndpoint(90, place, still, 80.0, peaked_histogram(5))
     assert departed_member(group, stranger, group[0], CLOSE, max_distance=0.5) is None
 
 

@@ -192,10 +192,10 @@ def test_many_small_people_lower_the_height_model() -> None:
     height = 0.8 * 0.6 * (foot - 30.0) * rng.normal(1.0, 0.05, 300)
     prior = height_prior(HeightModelSettings(), FloorGeometry(30.0, 0.6), HEIGHT)
     samples = np.stack([foot, height], axis=1)
-    line = fit_height_model(samples, HeightModelSettings(), prior, people=8)
+    line = fit_height_model(samples, HeightModelSettings(), prior, distinct_people=8)
     assert line is not None
     np.testing.assert_allclose(line.expected_height(np.array([120.0, 200.0])), [43.2, 81.6], rtol=0.08)
-    one = fit_height_model(samples, HeightModelSettings(), prior, people=1)
+    one = fit_height_model(samples, HeightModelSettings(), prior, distinct_people=1)
     assert one is not None
     assert line.expected_height(np.array([200.0])) < one.expected_height(np.array([200.0])) < 102.0, (
         "one small person may be a child"
@@ -205,7 +205,7 @@ def test_many_small_people_lower_the_height_model() -> None:
 def test_the_height_model_is_more_uncertain_with_fewer_people() -> None:
     foot = np.linspace(100, 280, 900)
     samples = np.stack([foot, 0.65 * foot - 20.0], axis=1)
-    lines = [fit_height_model(samples, HeightModelSettings(), people=people) for people in (1, 2, 8)]
+    lines = [fit_height_model(samples, HeightModelSettings(), distinct_people=people) for people in (1, 2, 8)]
     deviations = [float(line.standard_deviation(np.array([200.0]))[0]) for line in lines if line is not None]
     assert len(deviations) == 3
     assert deviations[0] > 1.3 * deviations[1] > 1.6 * deviations[2]
@@ -257,7 +257,7 @@ def test_without_a_unit_the_horizon_constrains_the_height_model() -> None:
     assert prior.model is None
     samples = np.stack([foot, height], axis=1)
     held, free = (
-        fit_height_model(samples, HeightModelSettings(), model_prior, people=4)
+        fit_height_model(samples, HeightModelSettings(), model_prior, distinct_people=4)
         for model_prior in (prior, None)
     )
     assert held is not None

@@ -77,7 +77,7 @@ def test_heights_outside_the_range_are_not_searched() -> None:
     heights, feet = peaks.boxes[:, 3] - peaks.boxes[:, 1], peaks.boxes[:, 3]
     assert len(heights) > 3
     assert (np.abs(heights - 0.55 * feet) <= np.maximum(0.15 * 0.55 * feet, 1.0)).all()
-    assert ((peaks.priors > 0.0) & (peaks.priors <= 1.0)).all()
+    assert ((peaks.gain_factors > 0.0) & (peaks.gain_factors <= 1.0)).all()
 
 
 def test_small_people_are_searched_down_to_the_least_height_of_the_model() -> None:
@@ -124,7 +124,7 @@ def test_incremental_gains_equal_recomputed_ones() -> None:
 def test_a_small_set_explains_the_foreground_and_other_boxes_score_low() -> None:
     foreground, cost, weight = scene()
     explained = fit_foreground(find_peaks(), foreground, cost, weight, ForegroundFitSettings())
-    assert explained.people == 3
+    assert explained.person_count == 3
     assert (explained.scores[:3] > 0.6).all()
     assert (explained.scores[3:] < 0.4).all()
 
@@ -145,9 +145,11 @@ def test_a_crowd_is_explained_by_its_number_of_people() -> None:
     )
     settings = ForegroundFitSettings()
     explained = fit_foreground(peaks, foreground, cost, weight, settings)
-    assert explained.people == len(crowd) > settings.max_hypotheses
-    assert explained.people < len(explained.boxes) <= len(crowd) + settings.max_alternatives
-    assert fit_foreground(peaks, foreground, cost, weight, ForegroundFitSettings(max_people=7)).people == 7
+    assert explained.person_count == len(crowd) > settings.max_hypotheses
+    assert explained.person_count < len(explained.boxes) <= len(crowd) + settings.max_alternatives
+    assert (
+        fit_foreground(peaks, foreground, cost, weight, ForegroundFitSettings(max_people=7)).person_count == 7
+    )
 
 
 def test_without_foreground_fit_boxes_score_independently() -> None:
@@ -156,7 +158,7 @@ def test_without_foreground_fit_boxes_score_independently() -> None:
     explained = fit_foreground(
         peaks, foreground, cost, weight, ForegroundFitSettings(enabled=False, max_hypotheses=5)
     )
-    assert len(explained.boxes) == 5 == explained.people
+    assert len(explained.boxes) == 5 == explained.person_count
     np.testing.assert_array_equal(explained.boxes[0], peaks.boxes[0])
     assert explained.scores[0] == pytest.approx(peaks.gains[0] / peaks.areas[0])
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tracking.appearance import appearance_distance
+from tracking.appearance import appearance_distance_matrix
 from tracking.boxes import iou
 from tracking.detectors import SubimageSettings, TemplateDetector, TemplateSettings
 from tracking.detectors.template import subimage_histograms
@@ -72,17 +72,17 @@ def test_the_object_looks_most_like_its_template(measure: str) -> None:
     seen = detector.detect(moved(image, 5, 5))
     assert seen.histograms.shape[1] == detector.appearance_bins
     np.testing.assert_allclose(seen.histograms.sum(axis=1), 1.0)
-    away = appearance_distance(detector.histogram[None], seen.histograms)[0]
+    away = appearance_distance_matrix(detector.histogram[None], seen.histograms)[0]
     assert int(np.argmin(away)) == 0
     assert away[0] < 0.01
 
 
 def test_the_intersection_of_sub_images_is_their_mean_absolute_difference() -> None:
-    image, settings = clutter(), SubimageSettings(columns=32, rows=40)
+    image, settings = clutter(), SubimageSettings(width=32, height=40)
     boxes = np.array([[120.0, 90, 152, 130], [10, 20, 42, 60]])
     rows = subimage_histograms(image, boxes, settings)
     first, second = (cut(image, box).astype(np.float64) / 255.0 for box in (TOY, (10, 20, 32, 40)))
-    distance = appearance_distance(rows[:1], rows[1:], "intersection")[0, 0]
+    distance = appearance_distance_matrix(rows[:1], rows[1:], "intersection")[0, 0]
     assert distance == pytest.approx(np.abs(first - second).mean())
 
 

@@ -11,18 +11,18 @@ from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
 from tracking.interactive import InteractiveSettings, PositionCorrection
-from tracking.interactive.corrections import apply_corrections, normalized_offset
+from tracking.interactive.corrections import apply_corrections, normalized_squared_distance
 from tracking.solvers.base import create_solver
 
 ASSIST = InteractiveSettings(enabled=True)
 
 
-def test_the_normalized_offset_is_0_at_the_middle_of_a_box_and_at_most_1() -> None:
+def test_the_normalized_squared_distance_is_0_at_the_middle_of_a_box_and_at_most_1() -> None:
     boxes = np.array(
         [[0.0, 0.0, 20.0, 40.0], [20.0, 0.0, 40.0, 40.0], [40.0, 0.0, 60.0, 40.0], [400.0, 0, 420, 40]]
     )
     np.testing.assert_allclose(
-        normalized_offset(PositionCorrection(0, 1, 10.0, 20.0, 20.0), boxes), [0.0, 0.25, 1.0, 1.0]
+        normalized_squared_distance(PositionCorrection(0, 1, 10.0, 20.0, 20.0), boxes), [0.0, 0.25, 1.0, 1.0]
     )
 
 
@@ -47,7 +47,9 @@ def test_a_correction_raises_only_node_costs_of_its_object_in_its_frame(
         assert changed is network
         return
     more = network.node.copy()
-    more[0, frame, :-1] += ASSIST.correction_weight * normalized_offset(correction, network.boxes[0, frame])
+    more[0, frame, :-1] += ASSIST.correction_weight * normalized_squared_distance(
+        correction, network.boxes[0, frame]
+    )
     more[0, frame, -1] += ASSIST.correction_weight * ASSIST.hidden_share
     np.testing.assert_array_equal(changed.node, more)
     for before, after in ((network.source, changed.source), (network.pair, changed.pair)):

@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
-from tracking.interactive import swap_margin_matrix, swap_margins
+from tracking.interactive import find_cheapest_swaps, swap_margin_matrix
 from tracking.model.network import Network
 from tracking.solvers.base import OCCLUDED, create_solver
 from tracking.solvers.objective import conflict_count, nodes_from_states, total_cost
@@ -33,7 +33,7 @@ def _swap_from(states: np.ndarray, a: int, b: int, frame: int) -> np.ndarray:
 @settings(deadline=None, max_examples=60)
 def test_a_margin_equals_the_cost_of_the_cheapest_swap(case: Case) -> None:
     network, states, cost = _solved(case)
-    found = swap_margins(network, states)
+    found = find_cheapest_swaps(network, states)
     for a, b in combinations(range(network.objects), 2):
         swap_costs = [
             total_cost(network, nodes_from_states(network, _swap_from(states, a, b, frame))) - cost
@@ -64,7 +64,7 @@ def test_a_margin_is_at_least_the_cost_of_the_best_solution_with_swapped_ends(
             continue
         node = network.node.copy()
         for one, other in ((a, b), (b, a)):
-            forbidden = np.arange(network.places + 1) != states[other, -1] % (network.places + 1)
+            forbidden = np.arange(network.max_places + 1) != states[other, -1] % (network.max_places + 1)
             node[one, -1, forbidden] = np.inf
         best = create_solver("exact").solve(replace(network, node=node))
         assert best.report.objective - cost <= margins[a, b] + 1e-9
@@ -87,4 +87,4 @@ def test_margins_need_shared_observations() -> None:
     case = Case(2, 2, 2, shared=False, settings=replace(SETTINGS, layout=0.0), seed=4)
     network = network_of(case)
     with pytest.raises(ValueError, match="share observations"):
-        swap_margins(network, np.zeros((2, 2), dtype=np.int64))
+        find_cheapest_swaps(network, np.zeros((2, 2), dtype=np.int64))

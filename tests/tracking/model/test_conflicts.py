@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import Case, cases, network_of
-from tracking.model.conflicts import clique_rows, connected_places
+from tracking.model.conflicts import clique_rows, connected_component
 from tracking.model.network import CostSettings, Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers.cutting_planes import ConflictSeparator
@@ -60,7 +60,7 @@ def test_the_star_of_a_place_contains_itself_and_conflicting_places_of_other_obj
 @given(case=cases(objects=4, frames=2, places=6))
 def test_rows_forbid_exactly_the_exclusions(case: Case) -> None:
     network = network_of(case)
-    exclusions, sets, places = network.exclusions(), network.sets, network.places
+    exclusions, sets, places = network.exclusions(), network.sets, network.max_places
     for m in range(network.frames):
         rows = network.rows(m)
         together = np.einsum("rai,rbj->aibj", rows.astype(int), rows.astype(int)) > 0
@@ -84,7 +84,7 @@ def test_rows_are_cliques_and_components_are_covered_independently(seed: int, ow
     for row in rows:
         assert joined[np.ix_(row, row)].all()
     for place in range(12):
-        part = connected_places(relation, place)
+        part = connected_component(relation, place)
         inside = rows[rows[:, part].any(axis=1)]
         alone = clique_rows(relation[np.ix_(part, part)], None if owners is None else owners[part])
         assert {row.tobytes() for row in inside[:, part]} == {row.tobytes() for row in alone}
@@ -95,7 +95,7 @@ def test_rows_are_cliques_and_components_are_covered_independently(seed: int, ow
 def test_the_separator_finds_every_violated_row_once(case: Case) -> None:
     network = network_of(case)
     rng = np.random.default_rng(case.seed)
-    usage = rng.dirichlet(np.full(network.places + 1, 0.3), (network.objects, network.frames))
+    usage = rng.dirichlet(np.full(network.max_places + 1, 0.3), (network.objects, network.frames))
     usage[:, :, :-1] *= network.present[network.sets]
     expected = {
         (m, row.tobytes())
@@ -106,7 +106,7 @@ def test_the_separator_finds_every_violated_row_once(case: Case) -> None:
     finder = ConflictSeparator(network)
     found = [
         (row.frame, np.ascontiguousarray(row.members[:, :-1]).tobytes())
-        for row in finder.find_violated(usage)
+        for row in finder.find_new_violated(usage)
     ]
     assert sorted(found) == sorted(expected)
-    assert not finder.find_violated(usage)
+    assert not finder.find_new_violated(usage)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracking.appearance import appearance_distance
+from tracking.appearance import appearance_distance_matrix
 from tracking.model.network import Template, build_network, build_network_per_object
 from tracking.model.settings import PAPER_COSTS
 from tracking.types import Detections
@@ -24,7 +24,7 @@ def seen(*boxes: np.ndarray, appearance: tuple[np.ndarray, ...] = ()) -> Detecti
 
 
 def g(first: np.ndarray, second: np.ndarray) -> float:
-    return float(appearance_distance(first[None], second[None])[0, 0])
+    return float(appearance_distance_matrix(first[None], second[None])[0, 0])
 
 
 def test_an_arc_between_observations_costs_appearance_change_and_displacement() -> None:

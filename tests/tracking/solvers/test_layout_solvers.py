@@ -13,7 +13,7 @@ from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
 from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import create_solver
-from tracking.solvers.objective import conflict_count, layout_cost, total_cost
+from tracking.solvers.objective import conflict_count, total_cost, unweighted_layout_cost
 from tracking.types import Detections
 
 SQUARE = 2
@@ -22,7 +22,7 @@ PERSON = np.array([0.0, 0.0, 20.0, 50.0])
 
 def best_square_by_trying(network: Network) -> float:
     best = np.inf
-    for flat in product(range(network.places + 1), repeat=network.objects * network.frames):
+    for flat in product(range(network.max_places + 1), repeat=network.objects * network.frames):
         nodes = np.array(flat).reshape(network.objects, network.frames)
         cost = total_cost(network, nodes, SQUARE)
         if cost < best and conflict_count(network, nodes) == 0:
@@ -86,5 +86,5 @@ def test_the_layout_term_keeps_people_in_step(name: str) -> None:
 def test_a_step_of_one_object_costs_its_pixels_on_every_side() -> None:
     network = side_by_side(layout=0.01)
     nodes = np.array([[0, 0, 0], [1, 1, 2]])
-    assert layout_cost(network, nodes) == 2 * 30.0
-    assert layout_cost(network, nodes, SQUARE) == 2 * 30.0**2
+    assert unweighted_layout_cost(network, nodes) == 2 * 30.0
+    assert unweighted_layout_cost(network, nodes, SQUARE) == 2 * 30.0**2

@@ -62,7 +62,7 @@ def test_a_jump_that_gating_forbids_is_repaired() -> None:
 def test_any_shares_round_without_conflict_and_improving_never_raises_the_cost(case: Case) -> None:
     network = network_of(case)
     rng = np.random.default_rng(case.seed)
-    usage = rng.dirichlet(np.full(network.places + 1, 0.5), (network.objects, network.frames))
+    usage = rng.dirichlet(np.full(network.max_places + 1, 0.5), (network.objects, network.frames))
     usage[:, :, :-1] *= network.present[network.sets]
     nodes = round_relaxation(network, usage)
     assert conflict_count(network, nodes) == 0

@@ -14,7 +14,7 @@ import numpy as np
 from tracking.baselines.temporal_consistency.regional_appearance import uv_histogram
 from tracking.baselines.temporal_consistency.settings import BlobSettings
 from tracking.boxes import Floats
-from tracking.detectors.background.color_gain import apply_gains, channel_gains
+from tracking.detectors.background.color_gain import apply_gains, gains_over_reference
 from tracking.detectors.base import Image, Mask, Plane
 
 _INLIERS = 3.0
@@ -56,10 +56,10 @@ class YuvBackground:
 
     def foreground(self, image: Image) -> Mask:
         """Return the foreground mask `(H, W)`: pixels farther from the background than the threshold."""
-        distance = self.distance(image)
+        distance = self.squared_distance(image)
         return np.where(distance > self._squared, np.uint8(255), np.uint8(0))
 
-    def distance(self, image: Image) -> Plane:
+    def squared_distance(self, image: Image) -> Plane:
         """Return the squared Mahalanobis distance of every pixel from the background, `(H, W)`."""
         y, u, v = cv2.split(_yuv(self._normalized(image)) - self._mean)
         # With the Cholesky factor L of the inverse covariance, |L' d|^2 is d' C^-1 d.
@@ -72,7 +72,7 @@ class YuvBackground:
 
     def _normalized(self, image: Image) -> Image:
         """Return the image at the exposure of the reference image."""
-        return apply_gains(image, 1.0 / channel_gains(image, self._reference))
+        return apply_gains(image, 1.0 / gains_over_reference(image, self._reference))
 
 
 def _yuv(image: Image) -> Plane:
@@ -146,25 +146,27 @@ class BlobDetector:
             return image
         return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
-    def prepare(self, images: Sequence[Image]) -> None:
+    def prepare(self, work_images: Sequence[Image]) -> None:
         """Learn the background from working images.
 
         Raises:
             ValueError: there is no image.
         """
-        self._background = YuvBackground(images, self._settings)
+        self._background = YuvBackground(work_images, self._settings)
 
-    def detect(self, image: Image, *, learn: bool) -> tuple[Blob, ...]:
+    def detect(self, work_image: Image, *, learn: bool) -> tuple[Blob, ...]:
         """Return the blobs of a working image, from left to right; none while the background is unknown.
 
         `learn`: update the background outside the blobs.
         """
         if self._background is None:
             return ()
-        filtered = np.asarray(cv2.medianBlur(self._background.foreground(image), _MEDIAN), dtype=np.uint8)
+        filtered = np.asarray(
+            cv2.medianBlur(self._background.foreground(work_image), _MEDIAN), dtype=np.uint8
+        )
         grown = np.asarray(cv2.dilate(filtered, self._kernel), dtype=np.uint8)
         if learn:
-            self._background.learn(image, np.asarray(cv2.bitwise_not(grown), dtype=np.uint8))
+            self._background.learn(work_image, np.asarray(cv2.bitwise_not(grown), dtype=np.uint8))
         count, labels, stats, _ = cv2.connectedComponentsWithStats(grown, connectivity=8)
         blobs = []
         for label in range(1, count):
@@ -174,5 +176,5 @@ class BlobDetector:
             part = slice(top, top + height), slice(left, left + width)
             mask = np.where(labels[part] == label, np.uint8(255), np.uint8(0))
             box = np.array([left, top, left + width, top + height], dtype=np.float64)
-            blobs.append(Blob(box, mask, area, uv_histogram(image[part], mask & filtered[part])))
+            blobs.append(Blob(box, mask, area, uv_histogram(work_image[part], mask & filtered[part])))
         return tuple(sorted(blobs, key=lambda blob: tuple(blob.box.tolist())))

@@ -22,8 +22,10 @@ def is_nested(first: Floats, second: Floats) -> bool:
     return contains or bool((second[:2] <= first[:2]).all() and (second[2:] >= first[2:]).all())
 
 
-def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSettings) -> float:
-    """Return the distance score d_s in meters; `meter` is one meter in pixels.
+def stepped_distance_m(
+    before: Blob, after: Blob, pixels_per_meter: float, settings: TemporalSettings
+) -> float:
+    """Return the distance score d_s in meters: two fixed steps, then the gap.
 
     0 if one box is within the other, `partial_overlap_m` if they overlap, otherwise `no_overlap_m` plus the
     gap.
@@ -32,7 +34,7 @@ def distance_score(before: Blob, after: Blob, meter: float, settings: TemporalSe
         return 0.0
     if float(intersections(before.box, after.box)) > 0.0:
         return settings.partial_overlap_m
-    return settings.no_overlap_m + blob_gap(before, after) / meter
+    return settings.no_overlap_m + blob_gap(before, after) / pixels_per_meter
 
 
 def blob_gap(first: Blob, second: Blob) -> float:
@@ -61,20 +63,24 @@ def _inside(blob: Blob, points: Floats) -> NDArray[np.bool_]:
     return inside
 
 
-def distance_cost(share: float) -> float:
-    """Return g(x): x up to 1, the distance walked in that time; beyond, a sigmoid that rises to 51."""
-    if share <= 1.0:
-        return share
-    return _HEIGHT / (math.exp(-(share - _MIDDLE) / _WIDTH) + 1.0) + 1.0
+def distance_cost(reach_ratio: float) -> float:
+    """Return g(x), x the distance over the reach in that time: x up to 1, then a sigmoid rising to 51."""
+    if reach_ratio <= 1.0:
+        return reach_ratio
+    return _HEIGHT / (math.exp(-(reach_ratio - _MIDDLE) / _WIDTH) + 1.0) + 1.0
 
 
 def distance_costs(
-    before: Sequence[Blob], after: Sequence[Blob], seconds: float, meter: float, settings: TemporalSettings
+    before: Sequence[Blob],
+    after: Sequence[Blob],
+    seconds: float,
+    pixels_per_meter: float,
+    settings: TemporalSettings,
 ) -> Floats:
     """Compute f_dist from each blob to each blob `seconds` later, `(B', B)`."""
     allowed = settings.speed_m_s * seconds
     costs = [
-        [distance_cost(distance_score(old, new, meter, settings) / allowed) for new in after]
+        [distance_cost(stepped_distance_m(old, new, pixels_per_meter, settings) / allowed) for new in after]
         for old in before
     ]
     return np.array(costs, dtype=np.float64).reshape(len(before), len(after))

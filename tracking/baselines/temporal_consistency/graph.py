@@ -50,7 +50,7 @@ class WindowGraph:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Links:
+class StepLinks:
     """The links of one person between two stages.
 
     Attributes:
@@ -68,7 +68,7 @@ class Links:
         return int(np.isfinite(self.costs).sum())
 
 
-PersonLinks = tuple[tuple[Links, ...], ...]
+PersonLinks = tuple[tuple[StepLinks, ...], ...]
 """For each person, their links stage by stage."""
 
 
@@ -80,7 +80,7 @@ def prune_links(graph: WindowGraph) -> PersonLinks:
     return tuple(_links_of(graph, person) for person in range(graph.people))
 
 
-def _links_of(graph: WindowGraph, person: int) -> tuple[Links, ...]:
+def _links_of(graph: WindowGraph, person: int) -> tuple[StepLinks, ...]:
     blobs: Indices = graph.start[person : person + 1]
     links = []
     for step, appearance in zip(graph.distance_costs, graph.appearance_costs, strict=True):
@@ -89,11 +89,11 @@ def _links_of(graph: WindowGraph, person: int) -> tuple[Links, ...]:
         if np.isinf(short).all():
             short = costs
         blobs = np.flatnonzero(np.isfinite(short).any(axis=0))
-        links.append(Links(blobs, short[:, blobs] + appearance[person, blobs]))
+        links.append(StepLinks(blobs, short[:, blobs] + appearance[person, blobs]))
     return tuple(links)
 
 
-def count_joint_edges(links: Sequence[Sequence[Links]]) -> list[int]:
+def count_joint_edges(links: Sequence[Sequence[StepLinks]]) -> list[int]:
     """Count the links between joint nodes of adjacent stages, stage by stage.
 
     A joint link combines one link of every person, so the counts multiply.

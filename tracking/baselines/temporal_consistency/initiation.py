@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.baselines.temporal_consistency.blobs import Blob
-from tracking.baselines.temporal_consistency.distance import distance_score
+from tracking.baselines.temporal_consistency.distance import stepped_distance_m
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
 from tracking.baselines.temporal_consistency.window import Stage, StageDecision, TemporalWindow
 
@@ -23,8 +23,8 @@ class _UnassignedBlob:
 class PersonLifecycle:
     """Decides which blobs are new people, and which people have left."""
 
-    def __init__(self, settings: TemporalSettings, meter: float) -> None:
-        self._settings, self._meter = settings, meter
+    def __init__(self, settings: TemporalSettings, pixels_per_meter: float) -> None:
+        self._settings, self._pixels_per_meter = settings, pixels_per_meter
         self._unassigned: list[_UnassignedBlob] = []
         self._absent_stages: dict[int, int] = {}
         """By person id: consecutive decided stages of absence."""
@@ -36,7 +36,7 @@ class PersonLifecycle:
         stages count too.
         """
         assigned = set(done.blob_by_id.values())
-        least = self._settings.min_person_m2 * self._meter**2
+        least = self._settings.min_person_m2 * self._pixels_per_meter**2
         new, unassigned = [], []
         for at, blob in enumerate(done.stage.blobs):
             if at in assigned or blob.area < least:
@@ -85,11 +85,13 @@ class PersonLifecycle:
     def _reachable(self, before: Blob, after: Blob) -> bool:
         """Return whether a person can have walked from one blob to the other within a stage."""
         reach = self._settings.speed_m_s * self._settings.stage_s
-        return distance_score(before, after, self._meter, self._settings) <= reach
+        return stepped_distance_m(before, after, self._pixels_per_meter, self._settings) <= reach
 
 
-def initial_people(stage: Stage, settings: TemporalSettings, meter: float) -> list[tuple[int, int]]:
+def initial_people(
+    stage: Stage, settings: TemporalSettings, pixels_per_meter: float
+) -> list[tuple[int, int]]:
     """Return pairs of new id and blob index for the first stage's blobs that are as large as a person."""
-    least = settings.min_person_m2 * meter**2
+    least = settings.min_person_m2 * pixels_per_meter**2
     large = [at for at, blob in enumerate(stage.blobs) if blob.area >= least]
     return [(number + 1, at) for number, at in enumerate(large[: settings.max_people])]

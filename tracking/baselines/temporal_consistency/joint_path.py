@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from tracking.baselines.temporal_consistency.graph import (
     Indices,
-    Links,
     PersonLinks,
+    StepLinks,
     WindowGraph,
     merge_costs,
 )
@@ -99,7 +99,7 @@ def _largest_part(links: PersonLinks, people: list[int], most_states: int) -> li
 
 
 def cheapest_joint_path(
-    links: Sequence[Sequence[Links]],
+    links: Sequence[Sequence[StepLinks]],
     shared: Sequence[NDArray[np.bool_]],
     occupied: Sequence[NDArray[np.int64]],
     merge: float,
@@ -145,7 +145,7 @@ def _step(value: Floats, axis: int, costs: Floats) -> tuple[Floats, Indices]:
 
 
 def cheapest_path_by_edges(
-    links: Sequence[Sequence[Links]], shared: Sequence[NDArray[np.bool_]], merge: float
+    links: Sequence[Sequence[StepLinks]], shared: Sequence[NDArray[np.bool_]], merge: float
 ) -> tuple[Indices, float]:
     """Find the best path along every joint link (section 2.1): the reference for `cheapest_joint_path`."""
     people = len(links)

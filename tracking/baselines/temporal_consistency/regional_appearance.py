@@ -45,18 +45,18 @@ class RegionalAppearance:
     def __len__(self) -> int:
         return len(self._histograms)
 
-    def learn(self, center: Floats, colors: Floats) -> None:
+    def store(self, center: Floats, colors: Floats) -> None:
         """Store the histogram seen at a position `(2,)`, replacing that region's previous one."""
         across, down = np.clip((center / self._size * self._parts).astype(int), 0, self._parts - 1).tolist()
         self._histograms[across, down] = center.copy(), colors
 
-    def costs(self, centers: Floats, colors: Floats, unknown: float) -> Floats:
+    def costs(self, centers: Floats, colors: Floats, cost_if_empty: float) -> Floats:
         """Return the color mismatch of blobs with centers `(B, 2)` and colors `(B, 64)`: `(B,)`.
 
         Each is compared with the histogram learned nearest to it.
         """
         if not self._histograms:
-            return np.full(len(centers), unknown)
+            return np.full(len(centers), cost_if_empty)
         positions = np.stack([position for position, _ in self._histograms.values()])
         models = np.stack([model for _, model in self._histograms.values()])
         nearest = np.square(centers[:, None] - positions).sum(axis=-1).argmin(axis=1)

@@ -100,6 +100,6 @@ class TemporalSettings:
         """Return the frames from one sample to the next."""
         return max(1, round(self.stage_s * fps))
 
-    def lag(self, fps: float) -> int:
+    def max_final_lag(self, fps: float) -> int:
         """Return the largest number of frames that follow a frame before it is final."""
         return self.window_stages * self.stage_frames(fps) - 1

@@ -21,7 +21,7 @@ from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings, WindowTrack
 
 
-class TemporalTracker:
+class TemporalBlobTracker:
     """Person-to-blob matching over a window of samples. A decided sample is final.
 
     It tracks in the images only; detections only provide appearance histograms.
@@ -55,9 +55,9 @@ class TemporalTracker:
 
     def prepare(self, images: Iterable[Image]) -> None:
         """Learn the background from images of a recording before its first frame; without any, live."""
-        small = [self._blobs_of(image).resize(image) for image in images]
-        if small and self._blobs is not None:
-            self._blobs.prepare(small)
+        work_images = [self._blobs_of(image).resize(image) for image in images]
+        if work_images and self._blobs is not None:
+            self._blobs.prepare(work_images)
 
     def push(self, frame: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Add a frame; return a result if one or more windows end.
@@ -106,12 +106,12 @@ class TemporalTracker:
     def _observe(self, frame: int, image: Image) -> None:
         """Segment an image into blobs, and decide the stages that are due."""
         blobs = self._blobs_of(image)
-        small = blobs.resize(image)
+        work_image = blobs.resize(image)
         if not blobs.ready:
-            self._bootstrap(blobs, small)
+            self._bootstrap(blobs, work_image)
             return
         is_due = frame >= self._next_stage
-        found = blobs.detect(small, learn=is_due)
+        found = blobs.detect(work_image, learn=is_due)
         boxes = np.array([blob.box for blob in found]).reshape(-1, 4) * self._scale
         self._blob_history.add(frame, boxes)
         if not is_due or (self._settings.closed_world and not found):
@@ -121,7 +121,7 @@ class TemporalTracker:
 
     def _decide_overdue(self, frame: int) -> None:
         """Decide overdue stages if images have been missing for long."""
-        oldest = frame - self._settings.lag(self._fps)
+        oldest = frame - self._settings.max_final_lag(self._fps)
         while self._people is not None and self._final is not None and self._final < oldest:
             done = self._people.commit()
             if done is None:
@@ -129,11 +129,11 @@ class TemporalTracker:
             else:
                 self._apply_decision(done)
 
-    def _bootstrap(self, blobs: BlobDetector, small: Image) -> None:
+    def _bootstrap(self, blobs: BlobDetector, work_image: Image) -> None:
         settings = self._settings.blobs
         used = (self._bootstrap_frames + 1) * settings.samples // settings.bootstrap_frames
         if used > self._bootstrap_frames * settings.samples // settings.bootstrap_frames:
-            self._bootstrap_images.append(small)
+            self._bootstrap_images.append(work_image)
         self._bootstrap_frames += 1
         if self._bootstrap_frames >= settings.bootstrap_frames:
             blobs.prepare(self._bootstrap_images)

@@ -63,10 +63,15 @@ class TemporalWindow:
     """
 
     def __init__(
-        self, settings: TemporalSettings, size: tuple[int, int], meter: float, frame_s: float
+        self, settings: TemporalSettings, size: tuple[int, int], pixels_per_meter: float, frame_s: float
     ) -> None:
-        """Set up for images of `size` (width, height), with `meter` in pixels and frames of `frame_s`."""
-        self._settings, self._size, self._meter, self._frame_s = settings, size, meter, frame_s
+        """Set up for images of `size` (width, height), with frames of `frame_s`."""
+        self._settings, self._size, self._pixels_per_meter, self._frame_s = (
+            settings,
+            size,
+            pixels_per_meter,
+            frame_s,
+        )
         self.people: list[TrackedPerson] = []
         self.decided: Stage | None = None
         self.pending: deque[Stage] = deque()
@@ -161,7 +166,9 @@ class TemporalWindow:
         """Compute f_dist between two stages, absence included: `(B' + 1, B + 1)`."""
         seconds = (after.frame - before.frame) * self._frame_s
         costs = np.full((len(before.blobs) + 1, len(after.blobs) + 1), np.inf)
-        costs[:-1, :-1] = distance_costs(before.blobs, after.blobs, seconds, self._meter, self._settings)
+        costs[:-1, :-1] = distance_costs(
+            before.blobs, after.blobs, seconds, self._pixels_per_meter, self._settings
+        )
         if not self._settings.closed_world:
             costs[:-1, -1] = [self._exit_cost(blob) for blob in before.blobs]
             costs[-1, :-1] = [self._exit_cost(blob) for blob in after.blobs]
@@ -172,7 +179,7 @@ class TemporalWindow:
         """Return the cost of leaving the image from a blob, or of entering there."""
         left, top, right, bottom = blob.box.tolist()
         margin = min(left, top, self._size[0] - right, self._size[1] - bottom)
-        at_edge = margin < self._settings.no_overlap_m * self._meter
+        at_edge = margin < self._settings.no_overlap_m * self._pixels_per_meter
         return self._settings.border_exit_cost if at_edge else self._settings.inner_exit_cost
 
     def _learn(self, stage: Stage) -> None:
@@ -188,7 +195,7 @@ class TemporalWindow:
         others = [other.blob for other in self.people if other is not person and other.blob < stage.absent]
         if person.blob in others:
             return
-        blob, reach = stage.blobs[person.blob], self._settings.isolated_m * self._meter
+        blob, reach = stage.blobs[person.blob], self._settings.isolated_m * self._pixels_per_meter
         around = blob.box + reach * np.array([-1.0, -1.0, 1.0, 1.0])
         if not any(float(intersections(around, stage.blobs[other].box)) > 0.0 for other in others):
-            person.appearance.learn(blob.center, blob.colors)
+            person.appearance.store(blob.center, blob.colors)

@@ -43,14 +43,14 @@ class ScanPeaks:
         boxes: `(P, 4)` in cells.
         gains: `(P,)`, the sum over the cells of the body.
         areas: `(P,)`, the number of visible cells of the body, at least 1.
-        priors: `(P,)`, the factor on the gain for the height, 1 at the expected height.
+        gain_factors: `(P,)`, the factor on the gain for the height, 1 at the expected height.
         parts: the bodies' parts.
     """
 
     boxes: Floats
     gains: Floats
     areas: Floats
-    priors: Floats
+    gain_factors: Floats
     parts: PartRectangles
 
 
@@ -63,14 +63,14 @@ class HeightRange:
     tolerance_std: float  # standard deviations of the model allowed in addition
     min_height: float  # smallest person, in image heights
 
-    def priors(self, feet: Floats, height: float | Floats) -> Floats:
+    def gain_factors(self, foot_rows: Floats, height: float | Floats) -> Floats:
         """Return the factor on the gain at each foot row: 1 at the expected height, 0 where impossible.
 
         It falls to `1 - _EDGE` at the edge of the possible range.
         """
-        expected = self.model.expected_height(feet)
+        expected = self.model.expected_height(foot_rows)
         allowed = np.maximum(
-            self.tolerance * expected + self.tolerance_std * self.model.standard_deviation(feet), 1.0
+            self.tolerance * expected + self.tolerance_std * self.model.standard_deviation(foot_rows), 1.0
         )
         deviation = np.abs(height - expected) / allowed
         return np.where((deviation <= 1.0) & (expected > 0.0), 1.0 - _EDGE * deviation**2, 0.0)
@@ -85,7 +85,7 @@ _OFFSETS = np.array([(x, y, x, y) for y in (0, -1, 1) for x in (0, -1, 1)], dtyp
 class BoxFilter:
     """Scans planes of one size for the positions and heights of bodies with the largest gain.
 
-    The gain of a body is the sum over its cells, times the prior of its height at its foot row.
+    The gain of a body is the sum over its cells, times the factor for its height at its foot row.
     """
 
     def __init__(self, weight: Plane, rows: int, settings: BoxFilterSettings) -> None:
@@ -115,15 +115,19 @@ class BoxFilter:
         return self._refine(boxes[order], sums)
 
     def _plan_heights(self, height_range: HeightRange | None) -> list[HeightPlan]:
-        feet = np.arange(self._shape[0] + 1, dtype=np.float64)
+        foot_rows = np.arange(self._shape[0] + 1, dtype=np.float64)
         plans: list[HeightPlan] = []
         smallest = self._settings.min_height * self._rows
         if height_range is not None:
             smallest = min(smallest, max(height_range.min_height * self._rows, height_range.model.min_height))
         for height in scan_heights(self._rows, smallest, self._settings).astype(np.int64).tolist():
             size = max(round(self._settings.aspect_ratio * height), 2), height
-            priors = np.ones(len(feet)) if height_range is None else height_range.priors(feet, float(height))
-            plan = plan_height(self._shape, size, self._parts, priors, self._settings.min_gain)
+            gain_factors = (
+                np.ones(len(foot_rows))
+                if height_range is None
+                else height_range.gain_factors(foot_rows, float(height))
+            )
+            plan = plan_height(self._shape, size, self._parts, gain_factors, self._settings.min_gain)
             if plan is not None:
                 plans.append(plan)
         return plans
@@ -133,24 +137,24 @@ class BoxFilter:
         step = np.maximum((boxes[:, 3] - boxes[:, 1]) // STEPS_PER_HEIGHT, 1.0)
         while (step := step // 2).any():
             moved = boxes[:, None] + step[:, None, None] * _OFFSETS
-            gains, priors, _ = self._measure(moved.reshape(-1, 4), sums)
-            best = np.argmax((gains * priors).reshape(len(boxes), len(_OFFSETS)), axis=1)
+            gains, gain_factors, _ = self._measure(moved.reshape(-1, 4), sums)
+            best = np.argmax((gains * gain_factors).reshape(len(boxes), len(_OFFSETS)), axis=1)
             boxes = moved[np.arange(len(boxes)), best]
-        gains, priors, corners = self._measure(boxes, sums)
+        gains, gain_factors, corners = self._measure(boxes, sums)
         visible = part_rectangles(boxes, BODY_PARTS["box"], self._shape).sums(self._weights)
         extent = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
-        order = _best_first(boxes, gains * priors)
+        order = _best_first(boxes, gains * gain_factors)
         order = order[(visible >= self._settings.min_visible * extent)[order]]
         sizes = np.maximum(corners.sums(self._weights), 1.0)
-        return ScanPeaks(boxes[order], gains[order], sizes[order], priors[order], corners.select(order))
+        return ScanPeaks(boxes[order], gains[order], sizes[order], gain_factors[order], corners.select(order))
 
     def _measure(self, boxes: Floats, sums: Floats) -> tuple[Floats, Floats, PartRectangles]:
-        """Return the gains, priors and parts of boxes."""
+        """Return the gains, gain factors and parts of boxes."""
         corners = part_rectangles(boxes, self._parts, self._shape)
         gains = corners.sums(sums)
         if self._range is None:
             return gains, np.ones(len(boxes)), corners
-        return gains, self._range.priors(boxes[:, 3], boxes[:, 3] - boxes[:, 1]), corners
+        return gains, self._range.gain_factors(boxes[:, 3], boxes[:, 3] - boxes[:, 1]), corners
 
 
 def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:

@@ -22,14 +22,19 @@ class CellGrid:
     """
 
     def __init__(
-        self, size: tuple[int, int], work_width: int, cell: int, outside: float, ignore: Sequence[Polygon]
+        self,
+        size: tuple[int, int],
+        work_width: int,
+        cell_pixels: int,
+        outside: float,
+        ignore: Sequence[Polygon],
     ) -> None:
         height, width = size
         self._size = size
         scale = min(1.0, work_width / width)
-        self._work = (max(round(height * scale), cell), max(round(width * scale), cell))
-        self._cell = cell
-        self.margin = round(outside * self._work[0] / cell)
+        self._work = (max(round(height * scale), cell_pixels), max(round(width * scale), cell_pixels))
+        self._cell_pixels = cell_pixels
+        self.margin = round(outside * self._work[0] / cell_pixels)
         self.visible = visible_mask(*self._work, ignore, scale)
         self.weight: Plane = (self.cell_shares(self.visible) > 0.5).astype(np.float32)  # noqa: PLR2004 — half
 
@@ -42,24 +47,26 @@ class CellGrid:
 
     def cell_shares(self, mask: Mask) -> Plane:
         """Return the share of the mask in each cell, 0 to 1, padded by the margin."""
-        size = (self._work[1] // self._cell, self._work[0] // self._cell)
+        size = (self._work[1] // self._cell_pixels, self._work[0] // self._cell_pixels)
         shares = cv2.resize(mask, size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255.0
         return np.pad(shares, self.margin)
 
     def cells_to_work(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Convert boxes from cells to pixels of the working image, clipped to it."""
         height, width = self._work
-        per_cell = np.array([width / (width // self._cell), height / (height // self._cell)] * 2)
+        per_cell = np.array(
+            [width / (width // self._cell_pixels), height / (height // self._cell_pixels)] * 2
+        )
         limits = np.array([width, height, width, height], dtype=np.float64)
         return np.asarray(np.clip((boxes - self.margin) * per_cell, 0.0, limits))
 
     @property
-    def rows(self) -> int:
-        """The height of the working image."""
+    def work_height(self) -> int:
+        """The height of the working image, pixels."""
         return self._work[0]
 
     @property
-    def scale(self) -> float:
+    def work_scale(self) -> float:
         """Size of the working image over that of the camera's image."""
         return self._work[0] / self._size[0]
 

@@ -16,7 +16,7 @@ _MAX_LEVEL = 240
 _MIN_PIXELS = 30
 
 
-def channel_gains(image: Image, reference: Image) -> npt.NDArray[np.float64]:
+def gains_over_reference(image: Image, reference: Image) -> npt.NDArray[np.float64]:
     """Return the gain of the image over the reference per channel, `(3,)`.
 
     The median over the image of the ratio, which is robust to people who cover less than half of it.

@@ -14,8 +14,8 @@ from tracking.appearance import GRAY_LEVELS
 from tracking.detectors.background.box_filter import BoxFilter, BoxFilterSettings, HeightRange
 from tracking.detectors.background.cell_grid import CellGrid
 from tracking.detectors.background.foreground_fit import (
-    ForegroundFit,
     ForegroundFitSettings,
+    PersonHypotheses,
     fit_foreground,
     shrink_to_foreground,
 )
@@ -149,10 +149,10 @@ class BackgroundDetector:
         background = self._background
         if not isinstance(background, MedianBackground):
             return
-        small = [self._grid_for(image).resize(image) for image in images]
-        background.prepare(small)
-        for image in small:
-            segmentation = background.segment_still(image)
+        work_images = [self._grid_for(image).resize(image) for image in images]
+        background.prepare(work_images)
+        for work_image in work_images:
+            segmentation = background.segment_still(work_image)
             if segmentation is not None and self._grid is not None:
                 self._height_estimator.observe(
                     _clean_mask(segmentation.foreground & self._grid.visible), self._grid.visible, every
@@ -165,8 +165,8 @@ class BackgroundDetector:
             ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
         grid = self._grid_for(image)
-        small = grid.resize(image)
-        segmentation = self._background.segment(small)
+        work_image = grid.resize(image)
+        segmentation = self._background.segment(work_image)
         self.warming_up = segmentation is None
         if segmentation is None:
             return Detections.empty(self.appearance_bins)
@@ -174,9 +174,9 @@ class BackgroundDetector:
         self._height_estimator.observe(mask, grid.visible)
         found = self._fit(mask, segmentation.shadow & grid.visible & ~mask, grid)
         boxes = grid.cells_to_work(found.boxes)
-        self._background.learn(mask, _occupied_mask(boxes[: found.people], mask.shape))
+        self._background.learn(mask, _occupied_mask(boxes[: found.person_count], mask.shape))
         return Detections(
-            grid.work_to_image(boxes), found.scores, self._appearance.histograms(small, boxes, mask)
+            grid.work_to_image(boxes), found.scores, self._appearance.histograms(work_image, boxes, mask)
         )
 
     @property
@@ -189,7 +189,7 @@ class BackgroundDetector:
         """Expected box height by foot row, in pixels of the working image; None: not known yet."""
         return self._height_estimator.model
 
-    def _fit(self, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundFit:
+    def _fit(self, mask: Mask, shadow: Mask, grid: CellGrid) -> PersonHypotheses:
         settings = self.settings
         foreground = grid.cell_shares(mask)
         empty = np.maximum(grid.weight - foreground - grid.cell_shares(shadow), 0.0)
@@ -202,8 +202,8 @@ class BackgroundDetector:
             limit = min(fit_settings.max_people, fit_settings.max_people_uncalibrated)
             fit_settings = replace(fit_settings, max_people=limit)
         found = fit_foreground(peaks, foreground, cost, grid.weight, fit_settings)
-        return ForegroundFit(
-            shrink_to_foreground(found.boxes, foreground, grid.weight), found.scores, found.people
+        return PersonHypotheses(
+            shrink_to_foreground(found.boxes, foreground, grid.weight), found.scores, found.person_count
         )
 
     def _heights(self, grid: CellGrid) -> HeightRange | None:
@@ -233,9 +233,9 @@ class BackgroundDetector:
                 self.settings.ignore,
             )
             if self._floor is not None:
-                floor = self._floor.scaled_by(self._grid.scale)
+                floor = self._floor.scaled_by(self._grid.work_scale)
                 self._height_estimator = HeightModelEstimator(
-                    self.settings.height_model, floor, self._grid.rows
+                    self.settings.height_model, floor, self._grid.work_height
                 )
         if image.shape != self._shape:
             raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")

@@ -27,20 +27,20 @@ class ForegroundFitSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForegroundFit:
-    """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `people` explain the foreground.
+class PersonHypotheses:
+    """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `person_count` explain the foreground.
 
-    Without a fit any of them may be a person, and `people` is at least K.
+    Without a fit any of them may be a person, and `person_count` is at least K.
     """
 
     boxes: npt.NDArray[np.float64]
     scores: npt.NDArray[np.float64]
-    people: int
+    person_count: int
 
 
 def fit_foreground(
     peaks: ScanPeaks, foreground: Plane, cost: Plane, weight: Plane, settings: ForegroundFitSettings
-) -> ForegroundFit:
+) -> PersonHypotheses:
     """Select people whose bodies explain the foreground, refine each, then add alternatives.
 
     The gain of a body is the foreground inside that no selected body covers, minus the background inside (a
@@ -57,17 +57,17 @@ def fit_foreground(
     """
     search = GreedySearch(peaks, foreground, cost, weight, settings)
     chosen = search.select_people() if settings.enabled else []
-    shares = search.gain_per_area()
+    shares = search.gain_per_visible_area()
     scores = []
     for index in chosen:
         search.remove(index)
-        scores.append(float(search.gain_per_area()[index]))
+        scores.append(float(search.gain_per_visible_area()[index]))
         search.add(index)
-    people = len(chosen) if settings.enabled else settings.max_hypotheses
+    person_count = len(chosen) if settings.enabled else settings.max_hypotheses
     for index in _alternatives(peaks.boxes, chosen, settings):
         chosen.append(index)
         scores.append(float(shares[index]))
-    return ForegroundFit(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), people)
+    return PersonHypotheses(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), person_count)
 
 
 # Rounds in which each person is selected again given all others.
@@ -120,10 +120,10 @@ class GreedySearch:
                 break
         return chosen
 
-    def gain_per_area(self) -> npt.NDArray[np.float64]:
+    def gain_per_visible_area(self) -> npt.NDArray[np.float64]:
         """Return each candidate's gain per visible body area given the selected, `(P,)`."""
         least = _MIN_VISIBLE * self._peaks.areas
-        return np.asarray(self._peaks.priors * self.gains / np.maximum(self.visible, least))
+        return np.asarray(self._peaks.gain_factors * self.gains / np.maximum(self.visible, least))
 
     def add(self, index: int) -> None:
         """Add a candidate to the selected: it covers its cells."""
@@ -151,7 +151,7 @@ class GreedySearch:
         """Return the candidate with the largest gain given the selected, or `None` if none gains enough."""
         if not len(self.gains):
             return None
-        shares = self.gain_per_area()
+        shares = self.gain_per_visible_area()
         gains = np.where(shares >= self._settings.min_gain, shares * self._peaks.areas, -np.inf)
         gains[chosen] = -np.inf
         best = int(np.argmax(gains))

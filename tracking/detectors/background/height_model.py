@@ -70,23 +70,23 @@ class HeightModel:
     min_height: float = 0.0
     """Smallest person expected: the model does not extrapolate far below the samples."""
 
-    def expected_height(self, foot: Floats) -> Floats:
-        """Return the expected heights at foot rows, in the unit of `foot`."""
-        return self.slope * foot + self.offset
+    def expected_height(self, foot_rows: Floats) -> Floats:
+        """Return the expected heights at foot rows, in the unit of `foot_rows`."""
+        return self.slope * foot_rows + self.offset
 
-    def standard_deviation(self, foot: Floats) -> Floats:
-        """Return the standard deviations of the expected heights, in the unit of `foot`."""
-        return np.hypot(self.level_std, self.slope_std * (foot - self.center))
+    def standard_deviation(self, foot_rows: Floats) -> Floats:
+        """Return the standard deviations of the expected heights at foot rows, in the unit of `foot_rows`."""
+        return np.hypot(self.level_std, self.slope_std * (foot_rows - self.center))
 
-    def in_cells(self, cell: float, margin: float) -> HeightModel:
-        """Return the model in cells of `cell` pixels, in a plane with `margin` cells added above."""
+    def in_cells(self, cell_pixels: float, top_margin_cells: float) -> HeightModel:
+        """Return the model in cells of `cell_pixels`, in a plane with `top_margin_cells` added above."""
         return HeightModel(
             self.slope,
-            self.offset / cell - self.slope * margin,
-            self.center / cell + margin,
-            self.level_std / cell,
+            self.offset / cell_pixels - self.slope * top_margin_cells,
+            self.center / cell_pixels + top_margin_cells,
+            self.level_std / cell_pixels,
             self.slope_std,
-            self.min_height / cell,
+            self.min_height / cell_pixels,
         )
 
 
@@ -132,7 +132,7 @@ class HeightModelEstimator:
         self._max_people = max(self._max_people, len(people))
         weight = max(round(frames / _FRAMES), 1)
         for person in self._novelty_filter.new_samples(people, frames * self._settings.sample_every):
-            self._samples.extend([(person.foot, person.height)] * weight)
+            self._samples.extend([(person.foot_row, person.height)] * weight)
             self._sample_count += weight
         # Refit when the number of samples has grown by a tenth.
         if len(self._samples) >= self._settings.min_samples and self._sample_count >= 1.1 * self._fitted_on:
@@ -194,30 +194,30 @@ def height_prior(
 
 
 def fit_height_model(
-    samples: Floats, settings: HeightModelSettings, prior: HeightPrior | None = None, people: int = 1
+    samples: Floats, settings: HeightModelSettings, prior: HeightPrior | None = None, distinct_people: int = 1
 ) -> HeightModel | None:
     """Fit the model to samples `(N, 2)` of foot row and height; return the prior's model if no line fits.
 
-    The samples are of at least `people` different people, whose common deviation from the average stature is
-    estimated too: the fewer people, the larger the uncertainty of the line.
+    The samples are of at least `distinct_people` different people, whose common deviation from the average
+    stature is estimated too: the fewer people, the larger the uncertainty of the line.
 
     The fit maximizes the posterior under Tukey's biweight: first over a grid of slopes, which is robust to
     almost half of the samples being outliers, then by a few rounds of reweighted least squares.
     """
     prior = prior or height_prior(settings)
-    foot, height = samples.T
-    slope, offset = _best_of_grid(foot, height, prior)
-    precision = np.diag([1e-9, prior.slope_std**-2, people / _STATURE**2])
-    center, stature = float(foot.mean()), 0.0
+    foot_rows, height = samples.T
+    slope, offset = _best_of_grid(foot_rows, height, prior)
+    precision = np.diag([1e-9, prior.slope_std**-2, distinct_people / _STATURE**2])
+    center, stature = float(foot_rows.mean()), 0.0
     for _ in range(_ROUNDS):
-        expected = slope * foot + offset
+        expected = slope * foot_rows + offset
         deviation = (height - (1.0 + stature) * expected) / height
         weight = np.maximum(1.0 - (deviation / _OUTLIER) ** 2, 0.0) ** 2
         if not weight.any():
             return prior.model
-        center = float(np.average(foot, weights=weight))
+        center = float(np.average(foot_rows, weights=weight))
         weight = weight / (_CORRELATED_SAMPLES * (_NOISE * height) ** 2)
-        terms = np.stack([np.ones_like(foot), foot - center, expected])
+        terms = np.stack([np.ones_like(foot_rows), foot_rows - center, expected])
         information = (terms * weight) @ terms.T + precision
         moment = (terms * weight) @ height + precision @ [0.0, prior.slope, 0.0]
         if prior.horizon is not None:
@@ -225,7 +225,7 @@ def fit_height_model(
             information += np.outer(horizon_terms, horizon_terms) / prior.horizon_std**2
         level, slope, stature = (float(value) for value in np.linalg.solve(information, moment))
         offset = level - slope * center
-    fitted = (1.0 + stature) * (slope * foot + offset)
+    fitted = (1.0 + stature) * (slope * foot_rows + offset)
     scatter = _median(np.abs(height - fitted) / height, _sample_weights(height))
     # In an upright image people are taller towards the bottom; anything else is a misfit.
     if slope <= 0.0 or scatter > settings.max_scatter:
@@ -256,14 +256,14 @@ def _median(values: Floats, weights: Floats) -> float:
     return float(values[order][np.searchsorted(total, total[-1] / 2.0)])
 
 
-def _best_of_grid(foot: Floats, height: Floats, prior: HeightPrior) -> tuple[float, float]:
+def _best_of_grid(foot_rows: Floats, height: Floats, prior: HeightPrior) -> tuple[float, float]:
     """Return slope and offset of the grid's best line through a sample or the horizon."""
     slopes = prior.slope + prior.slope_std * _SLOPES
-    through = np.linspace(0, len(foot) - 1, min(len(foot), _SAMPLES_PER_SLOPE)).astype(np.int64)
-    offsets = height[through] - slopes[:, None] * foot[through]
+    through = np.linspace(0, len(foot_rows) - 1, min(len(foot_rows), _SAMPLES_PER_SLOPE)).astype(np.int64)
+    offsets = height[through] - slopes[:, None] * foot_rows[through]
     if prior.horizon is not None:
         offsets = np.concatenate([offsets, -slopes[:, None] * prior.horizon], axis=1)
-    deviation = (height - slopes[:, None, None] * foot - offsets[..., None]) / height
+    deviation = (height - slopes[:, None, None] * foot_rows - offsets[..., None]) / height
     loss = (
         np.minimum((deviation / _OUTLIER) ** 2, 1.0)
         @ _sample_weights(height)

@@ -26,7 +26,7 @@ class IsolatedPerson:
     """An isolated standing person, in pixels: center column, foot row and height."""
 
     center: float
-    foot: float
+    foot_row: float
     height: float
 
 
@@ -85,7 +85,7 @@ class SampleNoveltyFilter:
         self._ages += frames
         new: list[IsolatedPerson] = []
         for person in people:
-            position = np.array([person.center, person.foot, person.foot - person.height])
+            position = np.array([person.center, person.foot_row, person.foot_row - person.height])
             same = np.abs(self._positions - position).max(axis=1, initial=0.0) <= _STEP * person.height
             self._ages[same] = 0.0
             if not same.any():

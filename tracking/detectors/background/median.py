@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detectors.background.color_gain import apply_gains, channel_gains
+from tracking.detectors.background.color_gain import apply_gains, gains_over_reference
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import StaticForegroundFilter, StaticForegroundSettings
 from tracking.detectors.base import Image, Mask, require_at_least_one
@@ -106,7 +106,7 @@ class MedianBackground:
 
     def _compare(self, image: Image, background: Image) -> tuple[Segmentation, npt.NDArray[np.float64]]:
         """Return the segmentation against the background at the image's gains, and the gains."""
-        gains = channel_gains(image, background)
+        gains = gains_over_reference(image, background)
         expected = apply_gains(background, gains)
         blue, green, red = cv2.split(cv2.absdiff(image, expected))
         difference = cv2.max(cv2.max(blue, green), red)
@@ -131,7 +131,7 @@ class MedianBackground:
 
     def _sample(self, image: Image) -> None:
         first = self._samples[0] if self._samples else image
-        self._samples.append(apply_gains(image, 1.0 / channel_gains(image, first)))
+        self._samples.append(apply_gains(image, 1.0 / gains_over_reference(image, first)))
 
     def _take_median(self) -> None:
         ordered = np.sort(np.stack(self._samples), axis=0)

@@ -34,7 +34,7 @@ class Mog2Background:
         )
 
     def segment(self, image: Image) -> Segmentation | None:
-        """Segment the next frame; `None` during the warm-up."""
+        """Segment the next frame and update the mixture; `None` during the warm-up."""
         mask = self._model.apply(image)
         self._frames += 1
         if self._frames <= self._settings.warm_up_frames:

@@ -28,7 +28,7 @@ class HeightPlan:
         size: width and height.
         tops: `(R,)` rows of the top left corners.
         lefts: `(C,)` their columns.
-        priors: `(R, 1)`, the factor on the gain in each row.
+        gain_factors: `(R, 1)`, the factor on the gain in each row.
         min_gain: least gain of a peak.
         neighborhood: a peak is the maximum of this neighborhood, `(rows, columns)` of positions.
         corner_slices: for each part, slices of the integral image at its bottom right, top right, bottom
@@ -38,7 +38,7 @@ class HeightPlan:
     size: tuple[int, int]
     tops: npt.NDArray[np.int64]
     lefts: npt.NDArray[np.int64]
-    priors: Floats
+    gain_factors: Floats
     min_gain: float
     neighborhood: npt.NDArray[np.uint8]
     corner_slices: tuple[tuple[_GridSlice, _GridSlice, _GridSlice, _GridSlice], ...]
@@ -51,7 +51,7 @@ class HeightPlan:
             gains -= sums[right_top]
             gains -= sums[left_bottom]
             gains += sums[left_top]
-        gains *= self.priors
+        gains *= self.gain_factors
         if gains.max() < self.min_gain:
             return _NO_BOXES, _NO_GAINS
         highest = cv2.dilate(gains, self.neighborhood, borderType=cv2.BORDER_REPLICATE)
@@ -69,7 +69,7 @@ def plan_height(
     shape: tuple[int, int],
     size: tuple[int, int],
     parts: tuple[BodyPart, ...],
-    priors: Floats,
+    gain_factors: Floats,
     min_gain: float,
 ) -> HeightPlan | None:
     """Plan the scan of one height; `None` if no such body is possible.
@@ -78,13 +78,13 @@ def plan_height(
         shape: rows and columns of the plane, in cells.
         size: width and height of the boxes, in cells.
         parts: the body parts, in shares of the box.
-        priors: `(H,)` the factor on the gain for each row of the feet, 0 where this height is impossible.
+        gain_factors: `(H,)` the factor on the gain for each foot row, 0 where this height is impossible.
         min_gain: least gain of a peak, as a share of the body's area.
     """
     width, height = size
     step = max(1, height // STEPS_PER_HEIGHT)
     tops, lefts = np.arange(0, shape[0] - height, step), np.arange(0, shape[1] - width, step)
-    possible = np.flatnonzero(priors[tops + height])
+    possible = np.flatnonzero(gain_factors[tops + height])
     if not (possible.size and lefts.size):
         return None
     tops = tops[possible[0] : possible[-1] + 1]
@@ -103,7 +103,7 @@ def plan_height(
         size=size,
         tops=tops,
         lefts=lefts,
-        priors=priors[tops + height][:, None],
+        gain_factors=gain_factors[tops + height][:, None],
         min_gain=min_gain * area,
         neighborhood=np.ones(neighborhood, dtype=np.uint8),
         corner_slices=tuple(

@@ -15,7 +15,7 @@ from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.operator_assist.operator_assist import MarkedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver
-from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
+from tracking.interactive import CorrectableTracker, InteractiveSettings, PositionCorrection
 
 WIDTH, HEIGHT = 640, 360
 WINDOW = WindowSettings()
@@ -45,7 +45,7 @@ class Camera:
 
     def __init__(self) -> None:
         solver = create_solver("columns")
-        self._tracker = InteractiveTracker(WINDOW, CostSettings(), solver, ASSIST)
+        self._tracker = CorrectableTracker(WINDOW, CostSettings(), solver, ASSIST)
         self._reporter = TrackMessageBuilder("c0", 1, (WIDTH, HEIGHT), WINDOW.stride)
 
     def take(self, frame: int, marked: Sequence[PositionCorrection] = ()) -> CameraTracks | None:
@@ -70,7 +70,7 @@ def run_meeting(
     Returns:
         The person tracker, and by pulse the published positions of people.
     """
-    people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.lag)
+    people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.min_final_lag)
     people.published.frames = ASSIST.memory_frames
     camera, positions, first = Camera(), {}, 0
     pending: list[CameraTracks] = []

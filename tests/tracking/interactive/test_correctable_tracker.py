@@ -11,7 +11,7 @@ import pytest
 from fakes.tracking.strolls import TEST_COSTS, WIDTH, WalkingPerson, detections_at, final_boxes, track_all
 from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.boxes import iou
-from tracking.interactive import InteractiveSettings, InteractiveTracker, PositionCorrection
+from tracking.interactive import CorrectableTracker, InteractiveSettings, PositionCorrection
 from tracking.interactive.late_correction import backdate_correction
 from tracking.registry import create_tracker
 
@@ -19,9 +19,9 @@ SIMILAR = [WalkingPerson(0, 50, 4.0, 1), WalkingPerson(300, 50, -4.0, 1)]
 """Two similar people who cross in frame 37; only their motion distinguishes them."""
 
 
-def _interactive_tracker(memory: int = 250) -> InteractiveTracker:
+def _interactive_tracker(memory: int = 250) -> CorrectableTracker:
     assist = InteractiveSettings(enabled=True, memory_frames=memory)
-    return InteractiveTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
+    return CorrectableTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
 
 
 def _online_tracker() -> OnlineTracker:
@@ -228,7 +228,7 @@ def test_corrections_are_applied_after_the_end_of_a_recording() -> None:
     [
         (None, OnlineTracker),
         (InteractiveSettings(), OnlineTracker),
-        (InteractiveSettings(enabled=True), InteractiveTracker),
+        (InteractiveSettings(enabled=True), CorrectableTracker),
     ],
 )
 def test_the_interactive_tracker_is_created_only_if_enabled(

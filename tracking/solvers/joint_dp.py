@@ -16,7 +16,7 @@ _MAX_NUMBERS = 30_000_000
 """Numbers in memory at once: 240 MB, for example three objects with 70 places."""
 
 
-class ExtendedDpSolver(TimedSolver):
+class JointDpSolver(TimedSolver):
     """The integer optimum over all joint states: a reference for up to about three objects.
 
     Without the layout term a step between frames separates by object, and a window takes O(M n S^(n+1)); with
@@ -34,10 +34,10 @@ class ExtendedDpSolver(TimedSolver):
         if not network.objects:
             return empty_solution(self.name, network)
         power = 2 * network.objects if network.layout else network.objects + 1
-        if (network.places + 1) ** power > _MAX_NUMBERS:
+        if (network.max_places + 1) ** power > _MAX_NUMBERS:
             raise ValueError(
                 f"extended-dp cannot hold the joint states of {network.objects} objects in"
-                f" {network.places} places; columns or exact can"
+                f" {network.max_places} places; columns or exact can"
             )
         nodes = _JointStates(network).best()
         return build_solution(network, nodes, Certificate(self.name, np.inf, integral=True, rounds=1))
@@ -76,7 +76,7 @@ class _JointStates:
     def _exclusion_costs(self, frame: int) -> Floats:
         """Return infinity for conflicting joint states, else 0."""
         network = self._network
-        objects, places = network.objects, network.places
+        objects, places = network.objects, network.max_places
         costs = np.zeros((places + 1,) * objects)
         for a in range(objects):
             for b in range(a + 1, objects):
@@ -87,7 +87,7 @@ class _JointStates:
 
     def _pair_exclusions(self, frame: int, first: int, second: int) -> Bools:
         network = self._network
-        places, sets = network.places, network.sets
+        places, sets = network.max_places, network.sets
         excluded = np.zeros((places + 1, places + 1), dtype=np.bool_)
         rows = slice(sets[first] * places, (sets[first] + 1) * places)
         columns = slice(sets[second] * places, (sets[second] + 1) * places)
