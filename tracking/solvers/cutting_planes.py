@@ -39,7 +39,7 @@ class _ConflictComponent:
 def conflict_prices(
     network: Network, rows: Sequence[ConflictRow], prices: Floats
 ) -> tuple[ConflictPrice, ...]:
-    """Return the rows with a positive price, if all objects share the observations."""
+    """Return the rows with a positive price; none for star rows or separate observations."""
     if not network.shared or network.conflict_rows == "star":
         return ()
     return tuple(

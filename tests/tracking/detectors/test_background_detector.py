@@ -144,7 +144,7 @@ def test_the_height_model_is_uncertain_where_it_has_no_samples() -> None:
     foot = np.linspace(150, 170, 20)
     line = fit_height_model(np.stack([foot, 0.6 * foot - 20.0], axis=1), HeightModelSettings())
     assert line is not None
-    near, far = line.standard_deviation(np.array([160.0, 280.0]))
+    near, far = line.height_standard_deviation(np.array([160.0, 280.0]))
     assert far > 2.0 * near
 
 
@@ -206,7 +206,9 @@ def test_the_height_model_is_more_uncertain_with_fewer_people() -> None:
     foot = np.linspace(100, 280, 900)
     samples = np.stack([foot, 0.65 * foot - 20.0], axis=1)
     lines = [fit_height_model(samples, HeightModelSettings(), distinct_people=people) for people in (1, 2, 8)]
-    deviations = [float(line.standard_deviation(np.array([200.0]))[0]) for line in lines if line is not None]
+    deviations = [
+        float(line.height_standard_deviation(np.array([200.0]))[0]) for line in lines if line is not None
+    ]
     assert len(deviations) == 3
     assert deviations[0] > 1.3 * deviations[1] > 1.6 * deviations[2]
     assert deviations[0] >= 0.03 * 110.0, "many samples of one tall person do not help"
@@ -264,7 +266,7 @@ def test_without_a_unit_the_horizon_constrains_the_height_model() -> None:
     assert free is not None
     near = np.array([260.0])
     np.testing.assert_allclose(held.expected_height(near), [192.0], rtol=0.08)
-    assert held.standard_deviation(near) < 0.5 * free.standard_deviation(near)
+    assert held.height_standard_deviation(near) < 0.5 * free.height_standard_deviation(near)
 
 
 def test_more_fragments_than_people_do_not_change_the_height_model() -> None:

@@ -70,7 +70,8 @@ class HeightRange:
         """
         expected = self.model.expected_height(foot_rows)
         allowed = np.maximum(
-            self.tolerance * expected + self.tolerance_std * self.model.standard_deviation(foot_rows), 1.0
+            self.tolerance * expected + self.tolerance_std * self.model.height_standard_deviation(foot_rows),
+            1.0,
         )
         deviation = np.abs(height - expected) / allowed
         return np.where((deviation <= 1.0) & (expected > 0.0), 1.0 - _EDGE * deviation**2, 0.0)

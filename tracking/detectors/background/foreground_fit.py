@@ -28,9 +28,13 @@ class ForegroundFitSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonHypotheses:
-    """Hypotheses `(K, 4)` in cells; scores `(K,)` in [0, 1]; the first `person_count` explain the foreground.
+    """The people that explain a frame's foreground, then alternatives to them.
 
-    Without a fit any of them may be a person, and `person_count` is at least K.
+    Attributes:
+        boxes: `(K, 4)` in cells.
+        scores: `(K,)` in [0, 1].
+        person_count: the first so many explain the foreground. Without a fit any of the boxes may be a
+            person, and it is at least K.
     """
 
     boxes: npt.NDArray[np.float64]

@@ -74,7 +74,7 @@ class HeightModel:
         """Return the expected heights at foot rows, in the unit of `foot_rows`."""
         return self.slope * foot_rows + self.offset
 
-    def standard_deviation(self, foot_rows: Floats) -> Floats:
+    def height_standard_deviation(self, foot_rows: Floats) -> Floats:
         """Return the standard deviations of the expected heights at foot rows, in the unit of `foot_rows`."""
         return np.hypot(self.level_std, self.slope_std * (foot_rows - self.center))
 
