@@ -14,7 +14,7 @@ from benchmarks.bestview.camera_tracks import Messages, Rows
 from bestview import NO_CAMERA, IdentityUpdate, TrackletKey, TrackUpdate, size_quality
 from server.cli.evaluate.choices_file import Choice, read_choices
 from server.config.site_config import Config
-from server.messaging.epochs import closing_epoch
+from server.messaging.epochs import epoch_of_recording_end
 from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import EpochAligner
@@ -94,7 +94,7 @@ def _messages_of(
             camera=camera,
             boot=1,
             size=(config.site.width, config.site.height),
-            epoch=closing_epoch(last, stride) if place == len(spans) - 1 else place,
+            epoch=epoch_of_recording_end(last, stride) if place == len(spans) - 1 else place,
             first=first,
             last=last,
             final_to=last,

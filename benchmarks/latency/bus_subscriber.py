@@ -19,7 +19,7 @@ class FrameTimes:
     """Timestamps of an access unit of a camera, unix seconds."""
 
     due: float
-    taken: float
+    captured_at: float
     encoded: float
     received: float
 
@@ -49,7 +49,7 @@ class BusTimestamps:
 
     def video(self, camera: str, head: FrameHeader, received: float) -> None:
         """Add a frame."""
-        self.frames[camera, head.pulse] = FrameTimes(head.due, head.taken, head.encoded, received)
+        self.frames[camera, head.pulse] = FrameTimes(head.due, head.captured_at, head.encoded, received)
 
     def tracks(self, message: CameraTracks) -> None:
         """Add a window."""

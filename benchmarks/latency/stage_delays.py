@@ -85,7 +85,7 @@ def _rows(marks: BusTimestamps, shown: ShownFrames) -> Iterator[tuple[int, list[
             turn = (pulse - decision.first) / shown.fps
             ahead = frame.due + (solved.last - pulse) / shown.fps
             ready = ahead if solved.at is None else solved.at
-            times = [frame.due, frame.taken, frame.encoded, frame.received]
+            times = [frame.due, frame.captured_at, frame.encoded, frame.received]
             times += [moment + turn for moment in (ahead, ready, decision.received)]
             yield pulse, [float(step) for step in np.diff([*times, at])]
 

@@ -158,9 +158,9 @@ def _cores(used: Mapping[str, Mapping[str, float]], stages: list[str]) -> str:
 
 def _describe_waits(report: Report, watched: LiveRun) -> None:
     frames = [frame for (_, pulse), frame in watched.marks.frames.items() if pulse >= watched.first_pulse]
-    times = np.array([(frame.due, frame.taken, frame.encoded, frame.received) for frame in frames]).reshape(
-        -1, 4
-    )
+    times = np.array(
+        [(frame.due, frame.captured_at, frame.encoded, frame.received) for frame in frames]
+    ).reshape(-1, 4)
     waits = [*np.diff(times, axis=1).T, watched.solved[:, 1]]
     rows = [
         [name, *(f"{_MS * value:.1f}" for value in np.percentile(wait, [50, 95, 100])), what]

@@ -74,7 +74,7 @@ def _frames(
 ) -> None:
     unit = gop[pulse % len(gop)]
     now = time.time()
-    head = FrameHeader(pulse=pulse, key=unit.key, boot=boot, due=now, taken=now, encoded=now)
+    head = FrameHeader(pulse=pulse, key=unit.key, boot=boot, due=now, captured_at=now, encoded=now)
     attachment = msgspec.json.encode(head)
     for camera in cameras:
         bus.publish(keys.camera(hall.ids[camera], "video"), unit.data, attachment)

@@ -63,7 +63,7 @@ class PacedCameras:
         service = self._service
         for name, film in zip(self._hall.ids, self._films, strict=True):
             unit = film[number % len(film)]
-            head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, taken=0.0, encoded=0.0)
+            head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, captured_at=0.0, encoded=0.0)
             service.ingest.video(self._message(name, "video", unit.data, msgspec.json.encode(head)))
         service.pulses.newest = number
         if (number + 1) % STRIDE:

@@ -72,7 +72,12 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: SimulatedHa
                 for name, film in zip(hall.ids, films, strict=True):
                     unit = film[pulse.number % len(film)]
                     head = FrameHeader(
-                        pulse=pulse.number, key=unit.key, boot=boot, due=pulse.due, taken=now, encoded=now
+                        pulse=pulse.number,
+                        key=unit.key,
+                        boot=boot,
+                        due=pulse.due,
+                        captured_at=now,
+                        encoded=now,
                     )
                     bus.publish(keys.camera(name, "video"), unit.data, msgspec.json.encode(head))
                 if (pulse.number + 1) % STRIDE == 0:

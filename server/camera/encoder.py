@@ -36,8 +36,8 @@ class AccessUnit:
     pulse: int
     key: bool
     data: bytes
-    after: int | None = None
-    """The pulse of the access unit that it references; None: unknown."""
+    reference_pulse: int | None = None
+    """The pulse of the access unit that it references; None: unknown. A keyframe's has no meaning."""
 
 
 class Encoder:
@@ -70,8 +70,8 @@ class Encoder:
         frame.time_base = _CLOCK
         frame.pict_type = PictureType.I if key else PictureType.NONE
         data = b"".join(bytes(packet) for packet in self._context.encode(frame))
-        before, self._last = self._last, pulse
-        return AccessUnit(pulse, key, data, before)
+        reference_pulse, self._last = self._last, pulse
+        return AccessUnit(pulse, key, data, reference_pulse)
 
 
 def _open_x264(

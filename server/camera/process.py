@@ -211,9 +211,9 @@ class CameraProcess:
             pulse=pulse.number,
             key=unit.key,
             boot=self._boot,
-            after=unit.after,
+            reference_pulse=unit.reference_pulse,
             due=pulse.due,
-            taken=captured_at,
+            captured_at=captured_at,
             encoded=self._clock(),
         )
         self._publish("video", unit.data, msgspec.json.encode(head))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX
+from server.messaging.camera_identity_snapshot import SNAPSHOT_BYTES_MAX
 from server.messaging.inbox import Message
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tracking
-from server.messaging.epochs import closing_epoch, epoch_of_window
+from server.messaging.epochs import epoch_of_recording_end, epoch_of_window
 from server.messaging.messages import AppearanceHistogram, Box, CameraTracks, SolverReport, TrackMessage
 from server.messaging.number_types import COORDINATE_MAX
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
@@ -45,7 +45,7 @@ class TrackMessageBuilder:
 
     def closing(self, result: WindowResult | None, last: int) -> CameraTracks:
         """Build the last message of a recording."""
-        epoch = closing_epoch(last, self._stride)
+        epoch = epoch_of_recording_end(last, self._stride)
         if result is not None:
             return self._message(result, epoch, ended=True)
         return CameraTracks(

@@ -88,10 +88,10 @@ def token(
     import yaml
     from pydantic import ValidationError
 
-    from server.config.tokens_file import Token, token_digest
+    from server.config.tokens_file import Token, secret_digest
 
     secret = secrets.token_urlsafe(_TOKEN_BYTES)
-    line = {"name": name, "sha256": token_digest(secret), "role": "operate" if operate else "watch"}
+    line = {"name": name, "sha256": secret_digest(secret), "role": "operate" if operate else "watch"}
     limits = {"object": number, "camera": camera}
     made = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
     content = {**line, **{key: value for key, value in limits.items() if value is not None}, "made": made}

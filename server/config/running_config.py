@@ -28,13 +28,13 @@ class ConfigFileState:
 
     error: str
     """Why the file is invalid; empty: it is valid."""
-    pending_restart: tuple[str, ...]
+    changed_keys: tuple[str, ...]
     """Keys of the settings that differ."""
 
     @property
     def differs(self) -> bool:
         """Whether the file differs from the active configuration."""
-        return bool(self.error or self.pending_restart)
+        return bool(self.error or self.changed_keys)
 
 
 class ActiveConfig:

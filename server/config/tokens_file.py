@@ -49,9 +49,10 @@ class Token(Section):
         return self
 
 
-def token_digest(token: str) -> str:
-    """Return a token's SHA-256 in hex, as in the file."""
-    return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()  # HTTP headers may hold any bytes
+def secret_digest(secret: str) -> str:
+    """Return the SHA-256 of a token, in hex as in the file, or of a session identifier."""
+    # HTTP headers may hold any bytes.
+    return hashlib.sha256(secret.encode(errors="surrogatepass")).hexdigest()
 
 
 def read_tokens(path: Path) -> tuple[Token, ...]:

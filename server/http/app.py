@@ -19,7 +19,7 @@ from server.http.access import session_routes
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import ACCESS, AccessControl, authorize, forbid_shared_caching
 from server.http.access.cors import answer_preflight
-from server.http.access.csrf import forbid_cross_origin_reads
+from server.http.access.csrf import remove_cors_header
 from server.http.api import openapi, recordings
 from server.http.api import routes as api
 from server.http.api.events import EVENTS, Events
@@ -29,11 +29,11 @@ from server.http.connections.connection_limit import FOR_OPERATORS, connection_l
 from server.http.connections.connection_limiter import ConnectionLimiter, ConnectionLimits
 from server.http.connections.listener import Listener
 from server.http.connections.malformed_requests import AIOHTTP_LOG, refuse_expectations
-from server.http.connections.overload import limit_connections
+from server.http.connections.overload import guard_reserved_connections
 from server.http.error_responses import FAILURES, answer_errors, note_begun
 from server.http.hls import routes as hls
 from server.http.metrics import http_collector
-from server.http.metrics.http_collector import add_metrics
+from server.http.metrics.http_collector import register_metrics
 from server.http.operator import routes as operator
 from server.http.streams import jpeg, video
 from server.http.streams.request_validation import check_container, validate_query
@@ -77,7 +77,7 @@ def make_app(
     app = web.Application(
         middlewares=[
             answer_errors,
-            limit_connections,
+            guard_reserved_connections,
             authorize,
             answer_preflight,
             validate_query,
@@ -98,11 +98,11 @@ def make_app(
         numbered_since=lambda: service.people.numbered_since,
     )
     app[ACCESS] = AccessControl(authenticator, service.people.current_number)
-    add_metrics(app)
+    register_metrics(app)
     for module in _ROUTES:
         app.add_routes(module.routes)
     app.on_response_prepare.extend(
-        (app[TRAFFIC].count, forbid_cross_origin_reads, forbid_shared_caching, note_begun)
+        (app[TRAFFIC].count_body, remove_cors_header, forbid_shared_caching, note_begun)
     )
     app.cleanup_ctx.append(_background_tasks)
     app.on_shutdown.append(_end_streams)

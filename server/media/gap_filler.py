@@ -23,13 +23,13 @@ _MAX_COUNTED_LOSS = 15
 class GapFiller(Protocol):
     """Writes pictures that repeat the last one, in the stream's codec."""
 
-    def can_follow(self, picture: EncodedPicture) -> bool:
+    def can_read(self, picture: EncodedPicture) -> bool:
         """Return whether the other methods can read this picture."""
 
-    def after(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
+    def repeat_until_keyframe(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
         """Return repetitions of the newest picture; only a keyframe can be decoded after them."""
 
-    def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
+    def repeat_before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
         """Return a repetition of the last picture; the given picture can still be decoded after it."""
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
@@ -48,7 +48,7 @@ class H264GapFiller:
     parameters: ParameterSets | None = None
     """As in :class:`EncodedPicture`."""
 
-    def can_follow(self, picture: EncodedPicture) -> bool:
+    def can_read(self, picture: EncodedPicture) -> bool:
         """Return whether the picture has a frame_num."""
         try:
             self.header_format.frame_num(picture.sample)
@@ -56,7 +56,7 @@ class H264GapFiller:
             return False
         return True
 
-    def after(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
+    def repeat_until_keyframe(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
         """Return repetitions whose frame_num counts on from the newest picture's."""
         number, pictures = self.header_format.frame_num(newest.sample), []
         for span in spans:
@@ -64,7 +64,7 @@ class H264GapFiller:
             pictures.append(self._picture(self.header_format.repeat(number, reference=True), span))
         return pictures
 
-    def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
+    def repeat_before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
         """Return one non-reference picture with the frame_num of the given picture."""
         number = self.header_format.frame_num(picture.sample)
         return [self._picture(self.header_format.repeat(number, reference=False), span)]

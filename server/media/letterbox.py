@@ -17,7 +17,7 @@ class Letterbox:
     """
 
     def __init__(self, camera: tuple[int, int], site: tuple[int, int]) -> None:
-        self.camera_size, self._site = camera, site
+        self.camera_size, self.site_size = camera, site
         self._is_identity = camera == site
         self.scale = min(site[0] / camera[0], site[1] / camera[1])
         self._inner = (
@@ -27,22 +27,17 @@ class Letterbox:
         self._left = (site[0] - self._inner[0]) // 2
         self._top = (site[1] - self._inner[1]) // 2
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """The site's image size."""
-        return self._site
-
     def image(self, image: Image) -> Image:
         """Return a camera's image at the site's size."""
-        if self._is_identity and image.shape[1::-1] == self._site:
+        if self._is_identity and image.shape[1::-1] == self.site_size:
             return image
         shrinking = self.scale < 1
         scaled = cv2.resize(
             image, self._inner, interpolation=cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
         )
-        if self._inner == self._site:
+        if self._inner == self.site_size:
             return np.asarray(scaled, dtype=np.uint8)
-        canvas = np.zeros((self._site[1], self._site[0], 3), dtype=np.uint8)
+        canvas = np.zeros((self.site_size[1], self.site_size[0], 3), dtype=np.uint8)
         canvas[self._top : self._top + self._inner[1], self._left : self._left + self._inner[0]] = scaled
         return canvas
 

@@ -20,7 +20,7 @@ class EncodedPicture:
     """The run of the camera's process; a picture never references one of another run."""
     duration: int = 1
     """The number of pulses it is shown for."""
-    after: int | None = None
+    reference_pulse: int | None = None
     """The pulse of its reference picture; None: unknown, or it has none."""
     parameters: ParameterSets | None = None
     """Its parameter sets; None where all cameras of the site share theirs."""

@@ -40,8 +40,8 @@ class StreamFormat:
         """The codec string of RFC 6381; None before the first keyframe."""
         return None if self.parameters is None else self.parameters.codec
 
-    def check(self, parameters: ParameterSets | None) -> None:
-        """Compare the parameter sets of a keyframe with the site's; None: it has none.
+    def adopt_or_check(self, parameters: ParameterSets | None) -> None:
+        """Make a first keyframe's parameter sets the site's, or compare a later one's; None: it has none.
 
         Raises:
             ParameterMismatchError: they are missing, or not the site's.
@@ -53,13 +53,13 @@ class StreamFormat:
         elif parameters != self.parameters:
             raise ParameterMismatchError("its H.264 parameter sets differ from the other cameras'")
 
-    def accept(self, key: bytes) -> ParameterSets | None:
+    def accept(self, access_unit: bytes) -> ParameterSets | None:
         """Check a camera's keyframe; return its parameter sets, None where all cameras share theirs.
 
         Raises:
             ParameterMismatchError: it does not fit the site; the camera must be refused.
         """
-        self.check(parameter_sets(nal_units(key)))
+        self.adopt_or_check(parameter_sets(nal_units(access_unit)))
         return None
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
@@ -87,9 +87,9 @@ class StreamFormat:
         """Return a fragment shifted into a stream whose time 0 is the pulse ``origin``."""
         return shift_fragment(fragment, -ticks(origin, fps))
 
-    def parameters_of(self, key: bytes) -> ParameterSets | None:
+    def camera_parameters(self, fragment: bytes) -> ParameterSets | None:
         """Return a keyframe fragment's parameter sets; None where all cameras share theirs."""
-        del key
+        del fragment
         return None
 
     def gap_filler(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
@@ -131,28 +131,33 @@ class StreamFormat:
         if gap_filler is None:
             return [key]
         gap_filler = replace(gap_filler, parameters=attached)
-        return [key, *gap_filler.after(key, [(pulse, 1) for pulse in range(first + 1, first + frames)])]
+        return [
+            key,
+            *gap_filler.repeat_until_keyframe(
+                key, [(pulse, 1) for pulse in range(first + 1, first + frames)]
+            ),
+        ]
 
 
 class PerCameraStreamFormat(StreamFormat):
     """H.264 in MP4 where parameter sets differ among cameras; keyframes carry them."""
 
-    def accept(self, key: bytes) -> ParameterSets:
+    def accept(self, access_unit: bytes) -> ParameterSets:
         """Return the parameter sets of a camera's keyframe.
 
         Raises:
             ParameterMismatchError: it has none.
         """
-        parameters = parameter_sets(nal_units(key))
+        parameters = parameter_sets(nal_units(access_unit))
         if parameters is None:
             raise ParameterMismatchError("it sends a keyframe without parameter sets")
         if self.parameters is None:
             self.parameters = replace(parameters, may_change=True)
         return parameters
 
-    def parameters_of(self, key: bytes) -> ParameterSets | None:
+    def camera_parameters(self, fragment: bytes) -> ParameterSets | None:
         """Return the parameter sets in a keyframe fragment, which always has them."""
-        return parameter_sets(split_sample(sample_of(key)))
+        return parameter_sets(split_sample(sample_of(fragment)))
 
     def gap_filler(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
         """Return the gap filler after a picture, for its parameter sets."""

@@ -86,7 +86,7 @@ class Bus:
         return cls._connected(settings, "router", user)
 
     @classmethod
-    def listener(cls, settings: ZenohSettings, user: str | None = None) -> Self:
+    def peer_listener(cls, settings: ZenohSettings, user: str | None = None) -> Self:
         """Open a session that also receives the messages of the router's other clients.
 
         The router must be running; later the session reconnects. Blocks for some seconds at most.
@@ -148,8 +148,8 @@ class Bus:
         self._undeclare.append(self._session.declare_subscriber(key, receive).undeclare)
         return inbox
 
-    def listen(self, key: str, handler: Callable[[Message], None]) -> Callable[[], None]:
-        """Subscribe; the returned function ends the subscription."""
+    def subscribe_temporarily(self, key: str, handler: Callable[[Message], None]) -> Callable[[], None]:
+        """Subscribe as :meth:`subscribe` does; the returned function ends the subscription."""
         self.subscribe(key, handler)
         undeclare = self._undeclare[-1]
 

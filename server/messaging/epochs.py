@@ -1,7 +1,7 @@
 """The epochs of a site: the tracking windows of all cameras end at the same pulses.
 
 Epoch *k* is the result of the window that ends with pulse ``(k + 1) · stride - 1``. A recording that ends in
-between adds a closing epoch.
+between adds an epoch that closes it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ def epoch_of_window(last: int, stride: int) -> int:
     return last // stride
 
 
-def closing_epoch(last: int, stride: int) -> int:
-    """Return the closing epoch of a recording with the last pulse ``last``.
+def epoch_of_recording_end(last: int, stride: int) -> int:
+    """Return the extra epoch that closes a recording whose last pulse is ``last``.
 
     If a regular window ends with ``last``, that epoch is used already, and the closing one is the next.
     """

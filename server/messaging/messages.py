@@ -4,25 +4,25 @@ Everything but pictures and audio is JSON, so that any zenoh subscriber can read
 H.264 (or VP8 frames) with a small JSON header in zenoh's attachment. JSON floats are written with as many
 digits as they need to be read back exactly.
 
-============================================  ===================================  ==========================
-key                                           payload                              attachment
-============================================  ===================================  ==========================
-``myview/SITE/camera/ID/video``               one access unit, Annex B or VP8      :class:`FrameHeader`
-``myview/SITE/camera/ID/tracks``              :class:`CameraTracks`
-``myview/SITE/camera/ID/status``              :class:`CameraStatus`
-``myview/SITE/camera/ID/thumbs/LOCAL``        JPEG of one person                   :class:`ThumbnailHeader`
-``myview/SITE/camera/ID/detections``          :class:`FrameDetections`
-``myview/SITE/camera/ID/position_corrections``     ``PositionCorrections``, to the camera
-``myview/SITE/camera/ID/identities``          ``IdentitySnapshot``, to the camera
-``myview/SITE/camera/ID/retained_identities``  the same, to a service that starts; empty: none
-``myview/SITE/camera/ID/peer_listener``       liveliness token: receives the other cameras' detections
-``myview/SITE/camera/ID/alive``               liveliness token
-``myview/SITE/sound``                         consecutive frames of audio          :class:`AudioHeader`
-``myview/SITE/bestview/choices``              :class:`GopChoices`
-``myview/SITE/bestview/INDEX/choices``        of a further service that shares the site
-``myview/SITE/bestview/alive``                liveliness token
-``myview/SITE/bestview/INDEX/alive``          of a further service
-============================================  ===================================  ==========================
+===============================================  ===================================  ==========================
+key                                              payload                              attachment
+===============================================  ===================================  ==========================
+``myview/SITE/camera/ID/video``                  one access unit, Annex B or VP8      :class:`FrameHeader`
+``myview/SITE/camera/ID/tracks``                 :class:`CameraTracks`
+``myview/SITE/camera/ID/status``                 :class:`CameraStatus`
+``myview/SITE/camera/ID/thumbs/LOCAL``           JPEG of one person                   :class:`ThumbnailHeader`
+``myview/SITE/camera/ID/detections``             :class:`FrameDetections`
+``myview/SITE/camera/ID/position_corrections``   ``PositionCorrections``, to the camera
+``myview/SITE/camera/ID/identities``             ``CameraIdentitySnapshot``, to the camera
+``myview/SITE/camera/ID/retained_identities``    the same, to a service that starts; empty: none
+``myview/SITE/camera/ID/peer_listener``          liveliness token: receives the other cameras' detections
+``myview/SITE/camera/ID/alive``                  liveliness token
+``myview/SITE/sound``                            consecutive frames of audio          :class:`AudioHeader`
+``myview/SITE/bestview/choices``                 :class:`GopChoices`
+``myview/SITE/bestview/INDEX/choices``           of a further service that shares the site
+``myview/SITE/bestview/alive``                   liveliness token
+``myview/SITE/bestview/INDEX/alive``             of a further service
+===============================================  ===================================  ==========================
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
     """Whether it begins a GOP: it contains SPS, PPS and an IDR picture."""
     boot: Number
     """Identifies the run of the camera's process."""
-    after: Pulse | None = None
-    """The pulse of the access unit that it references; null: unknown."""
+    reference_pulse: Pulse | None = None
+    """The pulse of the access unit that it references; null: unknown. A keyframe's has no meaning."""
     due: Time
     """When the pulse was due."""
-    taken: Time
+    captured_at: Time
     """When the frame was captured."""
     encoded: Time
 

@@ -32,7 +32,7 @@ def due(pulse: int) -> float:
 
 def head(pulse: int) -> FrameHeader:
     at = due(pulse)
-    return FrameHeader(pulse=pulse, key=False, boot=1, due=at, taken=at + 0.01, encoded=at + 0.015)
+    return FrameHeader(pulse=pulse, key=False, boot=1, due=at, captured_at=at + 0.01, encoded=at + 0.015)
 
 
 def window(camera: str, last: int, solved_at: float) -> CameraTracks:

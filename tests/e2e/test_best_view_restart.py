@@ -69,7 +69,9 @@ async def test_a_restarted_best_view_shows_the_same_people_under_the_same_addres
     async with running(config) as site:
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
         messages: list[CameraTracks] = []
-        bus = await asyncio.to_thread(Bus.listener, ZenohSettings(connect=site.config["zenoh"]["connect"]))
+        bus = await asyncio.to_thread(
+            Bus.peer_listener, ZenohSettings(connect=site.config["zenoh"]["connect"])
+        )
         try:
             bus.subscribe(
                 ZenohKeys("e2e").camera("*", "tracks"), lambda message: messages.append(read(message))

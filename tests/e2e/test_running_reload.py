@@ -64,7 +64,7 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         await wait_for_log(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")
         await wait_for_log(site, "c1: configuration reloaded: this camera restarts")
         assert (await ask("api/operator/view_selection"))["values"]["switch_cost_s"] == 0.7
-        assert (await ask("api/operator/config"))["pending_restart"] == ["encode.crf"]
+        assert (await ask("api/operator/config"))["changed_keys"] == ["encode.crf"]
         await with_timeout(viewer)
         await wait_for_log(site, "waits for a restart of all processes: encode.crf")
         now = site.children()

@@ -9,8 +9,8 @@ import msgspec
 from benchmarks.fuzz.bus.damaged_messages import damaged_message
 from benchmarks.fuzz.engine.fed_site import CAMERAS, FPS, HEIGHT, KEYS, STRIDE, WIDTH, make_tracks, site
 from benchmarks.fuzz.engine.target import ScriptTarget
+from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot, PersonSnapshot
 from server.messaging.epochs import end_of_epoch
-from server.messaging.identity_snapshot import IdentitySnapshot, PersonSnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
 from server.service.identity.people import PersonTracker
@@ -35,7 +35,7 @@ class RetainedStates(ScriptTarget):
         script = []
         for _ in range(_SNAPSHOTS):
             camera = rng.choice(CAMERAS)
-            snapshot = IdentitySnapshot(
+            snapshot = CameraIdentitySnapshot(
                 pulse=rng.randrange(40),
                 boot=rng.randrange(1, 3),
                 next_number=rng.randrange(1, 9),
@@ -87,5 +87,5 @@ class RetainedStates(ScriptTarget):
                 "a merged number is still in use"
             )
         for payload in published:
-            msgspec.json.decode(payload, type=IdentitySnapshot)
+            msgspec.json.decode(payload, type=CameraIdentitySnapshot)
         return not bad

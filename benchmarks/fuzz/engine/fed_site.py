@@ -82,9 +82,9 @@ def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
         pulse=unit.pulse,
         key=unit.key,
         boot=boot,
-        after=None if unit.key else unit.pulse - 1,
+        reference_pulse=None if unit.key else unit.pulse - 1,
         due=unit.pulse / FPS,
-        taken=unit.pulse / FPS,
+        captured_at=unit.pulse / FPS,
         encoded=unit.pulse / FPS,
     )
     return Message(KEYS.camera(camera, "video"), unit.data, msgspec.json.encode(head))

@@ -21,7 +21,7 @@ from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes
 from benchmarks.fuzz.engine.target import Target, folder
 from benchmarks.fuzz.http.addresses import WORDS, address, some_range
 from benchmarks.fuzz.http.served_site import EPOCHS, ServedSite, check_response
-from server.config.tokens_file import token_digest
+from server.config.tokens_file import secret_digest
 from server.http.access.authorization import ACCESS
 from server.http.access.sessions import _Session
 from server.http.app_keys import SERVICE
@@ -71,7 +71,7 @@ class UnauthenticatedRequests(Target):
         self._folder = folder()
         tokens = Path(self._folder.name) / "tokens.yaml"
         listed: list[dict[str, object]] = [
-            {"name": f"token {who}", "sha256": token_digest(SECRETS[who]), **rights}
+            {"name": f"token {who}", "sha256": secret_digest(SECRETS[who]), **rights}
             for who, rights in _RIGHTS.items()
         ]
         tokens.write_text(yaml.safe_dump({"tokens": listed}))
@@ -86,7 +86,7 @@ class UnauthenticatedRequests(Target):
         self._authenticator = self._served.app[ACCESS].authenticator
         ends = time.monotonic() + 1e9
         self._sessions = {
-            token_digest(_COOKIES[who]): _Session(token_digest(SECRETS[who]), ends) for who in _TOKEN_NAMES
+            secret_digest(_COOKIES[who]): _Session(secret_digest(SECRETS[who]), ends) for who in _TOKEN_NAMES
         }
         self._paths = [
             address for address in self._served.documented_addresses if not address[0].endswith(_RENDERED)
@@ -206,7 +206,7 @@ def _nearly(rng: Random, secret: str) -> str:
     if rng.random() < 0.5:
         return secret
     if rng.random() < 0.2:
-        return token_digest(secret)
+        return secret_digest(secret)
     damaged = mutate_bytes(rng, secret.encode()).decode("utf-8", "surrogateescape")
     return damaged.replace("\r", "").replace("\n", "") if rng.random() < 0.8 else damaged
 

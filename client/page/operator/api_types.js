@@ -30,7 +30,7 @@
  * @property {{text: string, at: number} | null} last_error
  * @property {CameraPicture | null} picture
  *
- * @typedef {object} Pulses /api/operator/pulses
+ * @typedef {object} PulseClients /api/operator/pulses
  * @property {string} server
  * @property {string} error
  * @property {{name: string | null, expected: boolean, behind: number}[]} clients
@@ -72,7 +72,7 @@
  * @typedef {object} Settings /api/operator/config
  * @property {Setting[]} settings
  * @property {string} error why the file on disk is invalid; empty: it is valid
- * @property {string[]} pending_restart keys whose values in the file are not in force
+ * @property {string[]} changed_keys keys whose values in the file are not in force
  *
  * @typedef {Record<string, number | boolean>} Values
  *

@@ -5,7 +5,7 @@ import { element, make, setText } from '../shared/dom.js';
 import { Repeater } from './section.js';
 import { CameraStills } from './camera_stills.js';
 
-/** @import {CameraDiagnostics, Pulses, Spread} from './api_types.js' */
+/** @import {CameraDiagnostics, PulseClients, Spread} from './api_types.js' */
 /** @import {Section, ShowError} from './section.js' */
 /** @import {Palette} from '../people/palette.js' */
 
@@ -128,7 +128,7 @@ function formatOptimal({ optimal, solved_windows: windows }) {
   return `${Math.floor(optimal * 1000) / 10} % of ${windows}`; // rounded down: 100 % only if all are
 }
 
-/** @param {Pulses} pulses */
+/** @param {PulseClients} pulses */
 function showPulses({ server, error, clients, missing }) {
   const absent = missing.length ? ` Not connected: ${missing.join(', ')}.` : '';
   setText(element('pulses'), error ? `${error}.` : `${server} sends to ${clients.length} clients.${absent}`);

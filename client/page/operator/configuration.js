@@ -25,9 +25,9 @@ export class ConfigurationTable {
   }
 
   open() {
-    void requestOperator('config').then((/** @type {Settings} */ { settings, error, pending_restart: pending }) => {
+    void requestOperator('config').then((/** @type {Settings} */ { settings, error, changed_keys: changedKeys }) => {
       this.#settings = settings;
-      setText(element('config-file-status'), describeFile(error, pending));
+      setText(element('config-file-status'), describeFile(error, changedKeys));
       this.#show();
     }, this.showError);
   }
@@ -51,11 +51,11 @@ export class ConfigurationTable {
 
 /**
  * @param {string} error
- * @param {string[]} pending
+ * @param {string[]} changedKeys
  */
-function describeFile(error, pending) {
+function describeFile(error, changedKeys) {
   if (error) return `The file is not in force: ${error}`;
-  return pending.length ? `Changed in the file, not in force: ${pending.join(', ')}` : '';
+  return changedKeys.length ? `Changed in the file, not in force: ${changedKeys.join(', ')}` : '';
 }
 
 /** @param {Setting} setting */

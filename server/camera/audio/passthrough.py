@@ -28,7 +28,7 @@ def is_compatible(stream: AudioStream, audio_format: AudioFormat) -> bool:
         return False
     config, extension = context.extradata[:2], context.extradata[2:]
     is_extended = extension.startswith(_EXTENSION) and len(extension) > 2 and bool(extension[2] & _PRESENT)  # noqa: PLR2004
-    return config == audio_format.config and not is_extended
+    return config == audio_format.aac_config and not is_extended
 
 
 class AudioPassthrough:

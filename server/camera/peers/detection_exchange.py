@@ -78,7 +78,7 @@ class PeerDetectionExchange:
     async def _join(self) -> None:
         while True:
             self._open_task = asyncio.create_task(
-                asyncio.to_thread(Bus.listener, self._config.zenoh, self._camera)
+                asyncio.to_thread(Bus.peer_listener, self._config.zenoh, self._camera)
             )
             try:
                 # Shielded: a session opened after cancellation could not be closed, and the process hangs.
@@ -166,7 +166,7 @@ class PeerDetectionExchange:
                 unsubscribe()  # only a few of many cameras see the same ground
             self._changed.set()
 
-        unsubscribe = bus.listen(self._keys.camera(peer, "detections"), receive)
+        unsubscribe = bus.subscribe_temporarily(self._keys.camera(peer, "detections"), receive)
 
     def _decode(self, received: Message) -> FrameDetections | None:
         peer = camera_of_key(received.key)

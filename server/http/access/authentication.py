@@ -15,7 +15,7 @@ from pathlib import Path
 
 from aiohttp import web
 
-from server.config.tokens_file import Token, token_digest
+from server.config.tokens_file import Token, secret_digest
 from server.http.access.permissions import Grant
 from server.http.access.sessions import Sessions
 from server.http.access.token_store import TokenStore
@@ -23,6 +23,8 @@ from server.http.access.wrong_token_rate_limit import WrongTokenRateLimit
 from server.http.json_responses import error_response
 
 COOKIE_PREFIX = "myview"
+VoidReason = str
+"""Why a token is void, in words."""
 _VALID_KEPT = 4096
 """Valid tokens remembered by address; wrong tokens from the same address do not delay them."""
 
@@ -31,8 +33,8 @@ _VALID_KEPT = 4096
 class Credential:
     """The SHA-256 of a request's token, and of its session identifier if it has a session."""
 
-    token: str
-    session: str | None = None
+    token_digest: str
+    session_digest: str | None = None
 
 
 class Authenticator:
@@ -74,20 +76,20 @@ class Authenticator:
         token = bearer.strip() if kind.lower() == "bearer" else request.query.get("token")
         if token is not None:
             return self.check_token(request, token)
-        session = self.session_of(request)
-        digest = self.sessions.token(session)
-        return None if digest is None else Credential(digest, session)
+        session_digest = self.session_digest_of(request)
+        digest = self.sessions.token_digest_of(session_digest)
+        return None if digest is None else Credential(digest, session_digest)
 
     def check_token(self, request: web.Request, token: str) -> Credential | web.Response:
         """Look up a token; answer 401 to a wrong one, and 429 after several wrong ones."""
-        digest, address = token_digest(token), request.remote or "?"
+        digest, address = secret_digest(token), request.remote or "?"
         wait = 0.0 if (address, digest) in self._valid else self._rate_limit.wait(address)
         if wait > 0:
             seconds = math.ceil(wait)
             response = error_response(429, f"too many wrong tokens; try again in {seconds} s")
             response.headers["Retry-After"] = str(seconds)
             return response
-        if self.file is not None and self.file.find(digest) is not None:
+        if self.file is not None and self.file.find_in_constant_time(digest) is not None:
             self._valid[address, digest] = None
             self._valid.move_to_end((address, digest))
             if len(self._valid) > _VALID_KEPT:
@@ -98,20 +100,23 @@ class Authenticator:
         self.wrong_tokens += 1
         return challenge("unknown or revoked token")
 
-    def session_of(self, request: web.Request) -> str:
+    def session_digest_of(self, request: web.Request) -> str:
         """Return the SHA-256 of a request's session identifier, whether or not the session exists."""
-        return token_digest(request.cookies.get(self.cookie, ""))
+        return secret_digest(request.cookies.get(self.cookie, ""))
 
-    def grant_of(self, credential: Credential) -> Grant | str | None:
-        """Return the current grant of a credential; None: revoked or expired; a string: why it is void."""
-        if credential.session is not None and self.sessions.token(credential.session) is None:
+    def grant_of(self, credential: Credential) -> Grant | VoidReason | None:
+        """Return the current grant of a credential, or why its token is void; None: revoked or expired."""
+        if (
+            credential.session_digest is not None
+            and self.sessions.token_digest_of(credential.session_digest) is None
+        ):
             return None
-        token = None if self.file is None else self.file.get(credential.token)
+        token = None if self.file is None else self.file.get_unless_revoked(credential.token_digest)
         if token is None:
             return None
         return self._void_reason(token) or Grant.of(token)
 
-    def _void_reason(self, token: Token) -> str | None:
+    def _void_reason(self, token: Token) -> VoidReason | None:
         """Return why a token for one person is void: person numbers have restarted since it was made."""
         if token.object is None or token.made is None or token.made.timestamp() >= self._numbered_since():
             return None

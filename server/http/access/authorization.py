@@ -68,13 +68,16 @@ class AccessControl:
         """Return the client whose share of slots a request that is being answered counts towards."""
         opened = self._open_requests.get(id(request))
         if opened is not None:
-            return ClientIdentity(f"token {opened.credential.token}", opened.grant.is_operator)
+            return ClientIdentity(f"token {opened.credential.token_digest}", opened.grant.is_operator)
         if is_local_request(request):
             return ClientIdentity("this machine", is_operator=True)
         return ClientIdentity(network_of(request.remote or ""))
 
-    def is_operator(self, request: web.Request) -> bool:
-        """Return whether an operator sent a request that is not being answered yet."""
+    def authenticates_as_operator(self, request: web.Request) -> bool:
+        """Authenticate a request that is not being answered yet: return whether an operator sent it.
+
+        A wrong token counts towards the rate limit of its address.
+        """
         if not self.needs_token:
             return is_local_request(request)
         credential = self.authenticator.credential_of(request)

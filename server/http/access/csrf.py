@@ -32,7 +32,7 @@ def check_csrf(request: web.Request) -> web.Response | None:
     return None
 
 
-async def forbid_cross_origin_reads(request: web.Request, response: web.StreamResponse) -> None:
+async def remove_cors_header(request: web.Request, response: web.StreamResponse) -> None:
     """Remove the CORS header from the answers of protected routes."""
     if _is_protected(route_pattern(request)):
         response.headers.popall("Access-Control-Allow-Origin", None)

@@ -57,12 +57,12 @@ _BY_PREFIX = {
 }
 
 
-def permission_for(method: str, path: str) -> Permission | None:
+def permission_for(method: str, route_pattern: str) -> Permission | None:
     """Return the permission that a route pattern requires; None: no rule covers it, so it is refused."""
-    if path == SESSION_PATH and method not in {"GET", "HEAD"}:
+    if route_pattern == SESSION_PATH and method not in {"GET", "HEAD"}:
         return Permission.PUBLIC  # signing in and out
-    by_prefix = (permission for prefix, permission in _BY_PREFIX.items() if path.startswith(prefix))
-    return _BY_ROUTE.get(path) or next(by_prefix, None)
+    by_prefix = (permission for prefix, permission in _BY_PREFIX.items() if route_pattern.startswith(prefix))
+    return _BY_ROUTE.get(route_pattern) or next(by_prefix, None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,12 +55,12 @@ async def post_session(request: web.Request) -> web.StreamResponse:
     grant = authenticator.grant_of(credential)
     if not isinstance(grant, Grant):
         return error_response(403, grant or "the token was revoked")
-    authenticator.sessions.close(authenticator.session_of(request))
+    authenticator.sessions.close(authenticator.session_digest_of(request))
     response = json_response(_session_info(access, grant))
     encrypted = "https" in (request.scheme, request.headers.get("X-Forwarded-Proto"))
     response.set_cookie(
         authenticator.cookie,
-        authenticator.sessions.open(credential.token),
+        authenticator.sessions.open(credential.token_digest),
         max_age=SESSION_LIFETIME_S,
         httponly=True,
         samesite="Strict",
@@ -74,7 +74,7 @@ async def delete_session(request: web.Request) -> web.Response:
     """Sign out, and end the session's open streams."""
     access = request.app[ACCESS]
     authenticator = access.authenticator
-    authenticator.sessions.close(authenticator.session_of(request))
+    authenticator.sessions.close(authenticator.session_digest_of(request))
     access.end_expired()
     response = web.Response(status=204)
     response.del_cookie(authenticator.cookie, samesite="Strict", httponly=True)

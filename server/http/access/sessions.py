@@ -6,7 +6,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.config.tokens_file import token_digest
+from server.config.tokens_file import secret_digest
 
 SESSION_LIFETIME_S = 12 * 3600
 _SESSIONS_PER_TOKEN = 1024
@@ -15,7 +15,7 @@ _SESSIONS_PER_TOKEN = 1024
 
 @dataclass(frozen=True, slots=True)
 class _Session:
-    token: str
+    token_digest: str
     expires: float
 
 
@@ -27,26 +27,26 @@ class Sessions:
         self._sessions: dict[str, _Session] = {}
         """By the identifier's SHA-256, so that the timing of a lookup reveals nothing of the identifier."""
 
-    def open(self, token: str) -> str:
-        """Open a session for a token, given by its SHA-256; return the identifier for the cookie."""
+    def open(self, token_digest: str) -> str:
+        """Open a session for the token of this SHA-256; return the session's identifier, for the cookie."""
         now = self._now()
         self._sessions = {key: session for key, session in self._sessions.items() if session.expires > now}
-        same_token = [key for key, session in self._sessions.items() if session.token == token]
+        same_token = [key for key, session in self._sessions.items() if session.token_digest == token_digest]
         if len(same_token) >= _SESSIONS_PER_TOKEN:
             del self._sessions[same_token[0]]  # the oldest
         identifier = secrets.token_urlsafe(32)
-        self._sessions[token_digest(identifier)] = _Session(token, now + SESSION_LIFETIME_S)
+        self._sessions[secret_digest(identifier)] = _Session(token_digest, now + SESSION_LIFETIME_S)
         return identifier
 
-    def token(self, key: str) -> str | None:
-        """Return the SHA-256 of a session's token; ``key`` is that of its identifier.
+    def token_digest_of(self, session_digest: str) -> str | None:
+        """Return the SHA-256 of a session's token; ``session_digest`` is that of its identifier.
 
         Returns:
             None: there is no such session, or it has expired.
         """
-        session = self._sessions.get(key)
-        return session.token if session is not None and session.expires > self._now() else None
+        session = self._sessions.get(session_digest)
+        return session.token_digest if session is not None and session.expires > self._now() else None
 
-    def close(self, key: str) -> None:
-        """Close a session."""
-        self._sessions.pop(key, None)
+    def close(self, session_digest: str) -> None:
+        """Close the session whose identifier has this SHA-256."""
+        self._sessions.pop(session_digest, None)

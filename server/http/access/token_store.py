@@ -39,17 +39,17 @@ class TokenStore:
         else:
             log.info("%s: %d tokens are in force", self._path, len(self._tokens))
 
-    def find(self, digest: str) -> Token | None:
-        """Return the token with a SHA-256, comparing all of them in constant time."""
+    def find_in_constant_time(self, token_digest: str) -> Token | None:
+        """Return the token with this SHA-256, comparing it with all of them in constant time."""
         match = None
         for token in self._tokens.values():
-            if hmac.compare_digest(token.sha256, digest):
+            if hmac.compare_digest(token.sha256, token_digest):
                 match = token
         return match
 
-    def get(self, digest: str) -> Token | None:
-        """Return the token with a SHA-256 that was found before; None: it has been revoked."""
-        return self._tokens.get(digest)
+    def get_unless_revoked(self, token_digest: str) -> Token | None:
+        """Return the token with a SHA-256 that was found before; None: it has been revoked since."""
+        return self._tokens.get(token_digest)
 
 
 def _by_digest(path: Path) -> dict[str, Token]:

@@ -12,8 +12,13 @@ from server.http.api.scope_filter import filter_decisions
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, json_response
 from server.http.streams.sending import send_bytes
-from server.http.streams.time_range import decisions_in, disk_error, parse_time_range, refuse_unreadable
-from server.http.viewers.viewer_limits import event_slot, refuse_event_listener
+from server.http.streams.time_range import (
+    decisions_in,
+    disk_error,
+    forget_missing_or_refuse,
+    parse_time_range,
+)
+from server.http.viewers.viewer_limits import event_slot, evict_or_refuse_listener
 from server.service.facade.recordings import RecordedStream, TimeReferenceError
 
 routes = web.RouteTableDef()
@@ -26,7 +31,7 @@ async def get_person_past(request: web.Request) -> web.Response:
     recorded = request.app[SERVICE].recordings.of_person(
         number, scoped_to_person=is_scoped_to_person(request)
     )
-    if (unreadable := await refuse_unreadable(recorded, 0)) is not None:
+    if (unreadable := await forget_missing_or_refuse(recorded, 0)) is not None:
         return unreadable
     if recorded.available_from(0) is None:
         return error_response(404, f"nothing is recorded of object {number}")
@@ -51,7 +56,7 @@ async def get_decisions(request: web.Request) -> web.StreamResponse:
     lines = await decisions_in(service, playback)
     if isinstance(lines, web.Response):
         return lines
-    refused = refuse_event_listener(request)
+    refused = evict_or_refuse_listener(request)
     if refused is not None:
         return refused
     visible = filter_decisions(lines, scope, service.people.current_number)

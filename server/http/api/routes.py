@@ -12,7 +12,7 @@ from server.http.api.scope_filter import filter_cameras, filter_flag, filter_obj
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, json_response
 from server.http.streams.sending import send_viewer
-from server.http.viewers.viewer_limits import event_slot, refuse_event_listener
+from server.http.viewers.viewer_limits import event_slot, evict_or_refuse_listener
 from server.service.facade.recordings import TimeReferenceError
 
 routes = web.RouteTableDef()
@@ -52,7 +52,7 @@ async def get_flags(request: web.Request) -> web.Response:
 async def get_events(request: web.Request) -> web.StreamResponse:
     """Stream events as server-sent events."""
     events, scope = request.app[EVENTS], request.app[ACCESS].grant(request).scope
-    refused = refuse_event_listener(request)
+    refused = evict_or_refuse_listener(request)
     if refused is not None:
         return refused
     with event_slot(request):

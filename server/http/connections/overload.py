@@ -14,7 +14,7 @@ from server.http.json_responses import unavailable
 
 
 @web.middleware
-async def limit_connections(
+async def guard_reserved_connections(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
     """Mark the connection as busy; on a reserved one answer only operators and public routes, then close it.
@@ -29,7 +29,7 @@ async def limit_connections(
     if not protocol.connection.is_reserved:
         return await handler(request)
     permission = permission_for(request.method, route_pattern(request))
-    if permission is Permission.PUBLIC or request.app[ACCESS].is_operator(request):
+    if permission is Permission.PUBLIC or request.app[ACCESS].authenticates_as_operator(request):
         response = await handler(request)
     else:
         response = unavailable("all connections of this server (http.connections_max) are busy")

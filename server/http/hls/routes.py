@@ -14,8 +14,13 @@ from server.http.hls.playlist import with_token
 from server.http.hls.time_shift_playlist import HlsStream, time_shift_playlist, time_shift_segment
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.time_range import is_time_shifted
-from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsClient, of_camera, of_live, of_person
-from server.http.viewers.viewer_limits import refuse_viewer
+from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsClient
+from server.http.viewers.viewer_limits import (
+    evict_or_refuse_viewer,
+    hls_camera_slot_name,
+    live_camera_slot_name,
+    person_slot_name,
+)
 from server.service.facade.errors import RefusedError
 
 routes = web.RouteTableDef()
@@ -32,8 +37,8 @@ _Handler = Callable[[web.Request], Awaitable[web.Response]]
 _StreamHandler = Callable[[web.Request, HlsStream], Awaitable[web.Response]]
 
 
-def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
-    """Count the player as a viewer, or refuse it; ``awaits`` is the kind of data that it may wait for."""
+def _counted(blocking_kind: str | None = None) -> Callable[[_StreamHandler], _Handler]:
+    """Count the player as a viewer, or refuse it; ``blocking_kind`` is as in :class:`HlsSessions`."""
 
     def counted(handler: _StreamHandler) -> _Handler:
         @wraps(handler)
@@ -42,13 +47,13 @@ def _counted(awaits: str | None = None) -> Callable[[_StreamHandler], _Handler]:
             if request.method == "HEAD":
                 return await handler(request, stream)
             sessions, player = request.app[HLS_SESSIONS], _client(request)
-            if sessions.is_new_viewer(player, awaits):
+            if sessions.is_new_viewer(player, blocking_kind):
                 slot_name, connected = _connected_viewers(request)
                 viewers = connected + sessions.of(player.stream)
-                refused = refuse_viewer(request, viewers, (player.stream, slot_name))
+                refused = evict_or_refuse_viewer(request, viewers, (player.stream, slot_name))
                 if refused is not None:
                     return refused
-            with sessions.request(player, awaits):
+            with sessions.request(player, blocking_kind):
                 return await handler(request, stream)
 
         return run
@@ -137,9 +142,9 @@ def _client(request: web.Request) -> HlsClient:
     """Return the player that sent a request, identified by client, address and User-Agent."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
-        stream = of_camera(names["camera"])
+        stream = hls_camera_slot_name(names["camera"])
     else:
-        stream = of_person(service.people.current_number(int(names["object"])))
+        stream = person_slot_name(service.people.current_number(int(names["object"])))
     client = request.app[ACCESS].client_of(request)
     return HlsClient(
         stream, client, request.remote or "", request.headers.get("User-Agent", "")[:_AGENT_CHARS]
@@ -150,9 +155,9 @@ def _connected_viewers(request: web.Request) -> tuple[str, int]:
     """Return the slot name of the stream's viewers outside HLS, and their number."""
     service, names = request.app[SERVICE], request.match_info
     if "camera" in names:
-        return of_live(names["camera"]), service.streams.of_camera(names["camera"]).viewers
+        return live_camera_slot_name(names["camera"]), service.streams.of_camera(names["camera"]).viewers
     number = service.people.current_number(int(names["object"]))
-    return of_person(number), service.streams.connected_viewers_of_person(number)
+    return person_slot_name(number), service.streams.connected_viewers_of_person(number)
 
 
 def _unknown(request: web.Request) -> RefusedError:

@@ -55,7 +55,9 @@ class HttpCollector(Collector):
         size.add_metric(["answers"], traffic.answers)
         yield size
         yield CounterMetricFamily(
-            "myview_viewers_lost_gops", "GOPs that viewers lost because they fell behind.", value=traffic.lost
+            "myview_viewers_lost_gops",
+            "GOPs that viewers lost because they fell behind.",
+            value=traffic.lost_gops,
         )
 
     def _viewers(self) -> Iterable[Metric]:
@@ -79,7 +81,7 @@ class HttpCollector(Collector):
         yield family
 
 
-def add_metrics(app: web.Application) -> None:
+def register_metrics(app: web.Application) -> None:
     """Register all metrics with an application, after its other parts."""
     lag, registry = LoopLag(), CollectorRegistry()
     app[METRICS] = registry

@@ -28,7 +28,7 @@ async def get_cameras(request: web.Request) -> web.Response:
 
 
 @_status_routes.get(f"{OPERATOR_PATH}/pulses")
-async def get_pulses(request: web.Request) -> web.Response:
+async def get_pulse_clients(request: web.Request) -> web.Response:
     """Query the pulse server for its clients."""
     return json_response(await request.app[SERVICE].operations.list_pulse_clients())
 

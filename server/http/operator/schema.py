@@ -6,7 +6,7 @@ import msgspec
 
 from server.service.facade.calibration import WalkStatus
 from server.service.facade.cameras import CameraDiagnostics, Floor
-from server.service.facade.operations import Pulses
+from server.service.facade.operations import PulseClients
 
 
 class CameraDiagnosticsList(msgspec.Struct, frozen=True):
@@ -33,7 +33,7 @@ class Settings(msgspec.Struct, frozen=True):
     settings: list[Setting]
     error: str
     """Why the configuration file on the disk is invalid; empty: it is valid."""
-    pending_restart: list[str]
+    changed_keys: list[str]
     """Keys in which the file differs from the configuration in force."""
 
 
@@ -83,7 +83,7 @@ class CorrectionStatus(msgspec.Struct, frozen=True):
 
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/cameras": CameraDiagnosticsList,
-    "/api/operator/pulses": Pulses,
+    "/api/operator/pulses": PulseClients,
     "/api/operator/floor": Floor,
     "/api/operator/walk": WalkStatus,
     "/api/operator/people": IdentityOverrides,

@@ -35,7 +35,7 @@ async def get_config(request: web.Request) -> web.Response:
     """Return the configuration in force and how it differs from the defaults; passwords are hidden."""
     on_disk = request.app[ON_DISK]()
     settings = list(settings_of(request.app[SERVICE].config))
-    return json_response(Settings(settings, on_disk.error, list(on_disk.pending_restart)))
+    return json_response(Settings(settings, on_disk.error, list(on_disk.changed_keys)))
 
 
 @routes.get(f"{OPERATOR_PATH}/view_selection")

@@ -13,7 +13,7 @@ from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.containers import MP4
 from server.http.streams.sending import send_stream, send_viewer
-from server.http.viewers.viewer_limits import refuse_viewer, viewer_slot
+from server.http.viewers.viewer_limits import evict_or_refuse_viewer, viewer_slot
 from server.service.facade.rendering import (
     CONTENT_TYPE,
     FIRST_BOUNDARY,
@@ -82,7 +82,7 @@ def wants_boxes(request: web.Request) -> bool:
 
 
 @_rendering
-async def best_with_boxes(request: web.Request) -> web.StreamResponse:
+async def stream_boxed_mp4(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4 with the boxes burnt in."""
     headers = {"Content-Type": "video/mp4"}
     subject = _person(request)
@@ -187,6 +187,6 @@ def _slot_name(subject: Subject) -> str:
 def _check_slot(request: web.Request, subject: Subject) -> None:
     source = request.app[SERVICE].rendering.streams.get(subject)
     viewers = 0 if source is None else source.viewers
-    refused = refuse_viewer(request, viewers, (_slot_name(subject),))
+    refused = evict_or_refuse_viewer(request, viewers, (_slot_name(subject),))
     if refused is not None:
         raise _ResponseError(refused)

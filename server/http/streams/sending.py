@@ -57,7 +57,7 @@ async def send_viewer(
 ) -> web.StreamResponse:
     """Send ``head`` and the chunks of a viewer; the caller subscribes and unsubscribes the viewer."""
 
-    def ready(response: web.StreamResponse) -> None:
+    def on_head_sent(response: web.StreamResponse) -> None:
         if request.transport is not None:
             chunked = response.headers.get("Transfer-Encoding") == "chunked"
             viewer.direct_send = _direct_writer(request.transport, write_chunk, traffic, chunked=chunked)
@@ -66,7 +66,7 @@ async def send_viewer(
     traffic.join(viewer)
     chunks = (write_chunk(chunk) async for chunk in viewer.chunks())
     try:
-        return await send_bytes(request, chunks, head, headers, ready)
+        return await send_bytes(request, chunks, head, headers, on_head_sent)
     finally:
         viewer.direct_send = None
         traffic.leave(viewer)
@@ -103,9 +103,9 @@ async def send_bytes(
     data: AsyncIterable[bytes],
     head: bytes,
     headers: Mapping[str, str],
-    ready: Callable[[web.StreamResponse], None] = lambda _: None,
+    on_head_sent: Callable[[web.StreamResponse], None] = lambda _: None,
 ) -> web.StreamResponse:
-    """Send ``head`` and ``data``, or only headers to HEAD; call ``ready`` once ``head`` is written."""
+    """Send ``head`` and ``data``, or only headers to HEAD; call ``on_head_sent`` once ``head`` is."""
     response = web.StreamResponse(headers={**_STREAM_HEADERS, **headers})
     await response.prepare(request)
     if request.method == "HEAD":
@@ -116,7 +116,7 @@ async def send_bytes(
         if head:
             await response.write(head)
             traffic.streams += len(head)
-        ready(response)
+        on_head_sent(response)
         async for chunk in data:
             await response.write(chunk)
             traffic.streams += len(chunk)

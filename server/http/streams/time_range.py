@@ -55,7 +55,7 @@ def parse_time_range(
     return PlaybackRange(start, end)
 
 
-async def refuse_unreadable(
+async def forget_missing_or_refuse(
     stream: RecordedStream, start: int, end: int | None = None
 ) -> web.Response | None:
     """Drop index entries of deleted files at both ends of a range; return 503 if the disk is unreadable."""
@@ -68,7 +68,7 @@ async def refuse_unreadable(
 
 async def refuse_unrecorded(stream: RecordedStream, playback: PlaybackRange) -> web.Response | None:
     """Return 416 with the recorded ranges if nothing of this range is recorded; None: some of it is."""
-    if (unreadable := await refuse_unreadable(stream, playback.start, playback.end)) is not None:
+    if (unreadable := await forget_missing_or_refuse(stream, playback.start, playback.end)) is not None:
         return unreadable
     first = stream.available_from(playback.start)
     if first is not None and (playback.end is None or first < playback.end):

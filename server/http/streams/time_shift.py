@@ -12,9 +12,13 @@ from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.containers import Container
 from server.http.streams.sending import send_bytes
-from server.http.streams.time_range import parse_time_range, refuse_unreadable, refuse_unrecorded
-from server.http.viewers.hls_sessions import of_live, of_person
-from server.http.viewers.viewer_limits import refuse_viewer, viewer_slot
+from server.http.streams.time_range import forget_missing_or_refuse, parse_time_range, refuse_unrecorded
+from server.http.viewers.viewer_limits import (
+    evict_or_refuse_viewer,
+    live_camera_slot_name,
+    person_slot_name,
+    viewer_slot,
+)
 from server.service.facade.recordings import RecordedStream, TimeReferenceError
 from server.service.facade.streams import Broadcaster
 
@@ -29,13 +33,13 @@ async def time_shifted_best(request: web.Request, container: Container) -> web.S
         return service.streams.of_person(service.people.current_number(number), scoped_to_person=scoped)
 
     if live() is None:
-        if (unreadable := await refuse_unreadable(recorded, 0)) is not None:
+        if (unreadable := await forget_missing_or_refuse(recorded, 0)) is not None:
             return unreadable
         if recorded.available_from(0) is None:
             raise service.people.unknown(number)
 
     def name() -> str:
-        return of_person(service.people.current_number(number))
+        return person_slot_name(service.people.current_number(number))
 
     return await _stream(request, container, recorded, live, name)
 
@@ -48,7 +52,7 @@ async def time_shifted_camera(request: web.Request, container: Container) -> web
     def live() -> Broadcaster | None:
         return service.streams.of_camera(camera)
 
-    return await _stream(request, container, recorded, live, lambda: of_live(camera))
+    return await _stream(request, container, recorded, live, lambda: live_camera_slot_name(camera))
 
 
 async def _stream(
@@ -72,7 +76,7 @@ async def _stream(
     missing = await refuse_unrecorded(recorded, playback)
     if missing is not None:
         return missing
-    refused = refuse_viewer(request)
+    refused = evict_or_refuse_viewer(request)
     if refused is not None:
         return refused
     is_past = True

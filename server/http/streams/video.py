@@ -8,12 +8,19 @@ from server.http.access.authorization import is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import unavailable
 from server.http.streams.containers import MP4, TS, WEBM, Container
-from server.http.streams.jpeg import best_with_boxes, wants_boxes
+from server.http.streams.jpeg import stream_boxed_mp4, wants_boxes
 from server.http.streams.sending import send_stream
 from server.http.streams.time_range import is_time_shifted
 from server.http.streams.time_shift import time_shifted_best, time_shifted_camera
-from server.http.viewers.hls_sessions import HLS_SESSIONS, of_camera, of_decided, of_live, of_person
-from server.http.viewers.viewer_limits import refuse_viewer, viewer_slot
+from server.http.viewers.hls_sessions import HLS_SESSIONS
+from server.http.viewers.viewer_limits import (
+    evict_or_refuse_viewer,
+    fixed_view_slot_name,
+    hls_camera_slot_name,
+    live_camera_slot_name,
+    person_slot_name,
+    viewer_slot,
+)
 from server.service.facade.streams import Broadcaster
 
 routes = web.RouteTableDef()
@@ -23,7 +30,7 @@ routes = web.RouteTableDef()
 async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4, without a break at cuts."""
     if wants_boxes(request) and not is_time_shifted(request):
-        return await best_with_boxes(request)
+        return await stream_boxed_mp4(request)
     return await _best(request, MP4)
 
 
@@ -71,13 +78,13 @@ async def _best(request: web.Request, container: Container) -> web.StreamRespons
         if camera is not None:
             service.cameras.require(camera)
     slot_name, other_viewers = (
-        of_person(person),
+        person_slot_name(person),
         streams.connected_viewers_of_person(person) - channel.viewers,
     )
     hls_name: str | None = slot_name
     if fixed is not None:
         channel = streams.of_camera_decided(fixed)
-        slot_name, hls_name, other_viewers = of_decided(fixed), of_camera(fixed), 0
+        slot_name, hls_name, other_viewers = fixed_view_slot_name(fixed), hls_camera_slot_name(fixed), 0
     elif preferred is not None:
         channel = streams.of_person_preferring(person, preferred, scoped_to_person=scoped)
         slot_name, hls_name, other_viewers = f"object {person} preferring {preferred}", None, 0
@@ -90,7 +97,9 @@ async def _live(request: web.Request, container: Container) -> web.StreamRespons
     service, camera = request.app[SERVICE], request.match_info["camera"]
     service.cameras.require(camera)
     channel = service.streams.of_camera(camera)
-    return await _send(request, channel, of_live(camera), of_camera(camera), container)
+    return await _send(
+        request, channel, live_camera_slot_name(camera), hls_camera_slot_name(camera), container
+    )
 
 
 async def _send(
@@ -111,7 +120,7 @@ async def _send(
         return unavailable("no camera has delivered a picture yet")
     players = 0 if hls_name is None else request.app[HLS_SESSIONS].of(hls_name)
     viewers = channel.viewers + other_viewers + players
-    refused = refuse_viewer(request, viewers, (slot_name, hls_name or slot_name))
+    refused = evict_or_refuse_viewer(request, viewers, (slot_name, hls_name or slot_name))
     if refused is not None:
         return refused
     headers = {"Content-Type": container.content_type}

@@ -18,26 +18,6 @@ _TIMEOUT_TARGETS = 3
 """Target durations without a request after which a player has left; it should fetch once in each."""
 
 
-def of_person(number: int) -> str:
-    """Return the slot name of a person's stream."""
-    return f"object {number}"
-
-
-def of_camera(name: str) -> str:
-    """Return the slot name of a camera's HLS stream."""
-    return f"camera {name}"
-
-
-def of_live(camera: str) -> str:
-    """Return the slot name of a camera's live stream outside HLS."""
-    return f"live {camera}"
-
-
-def of_decided(camera: str) -> str:
-    """Return the slot name of a person's stream that is fixed to a camera."""
-    return f"decided {camera}"
-
-
 class HlsClient(NamedTuple):
     """The identity of a player that fetches a stream."""
 
@@ -64,7 +44,11 @@ class _Session:
 
 
 class HlsSessions:
-    """Counts HLS players and holds their slots; ``clock`` is monotonic, in seconds."""
+    """Counts HLS players and holds their slots; ``clock`` is monotonic, in seconds.
+
+    ``blocking_kind`` is the kind of data that a blocking request waits for; None: it does not block. More
+    requests of one kind than before mean another player behind the same client.
+    """
 
     def __init__(
         self, target_s: float, slots: FairShare, clock: Callable[[], float] = time.monotonic
@@ -85,28 +69,30 @@ class HlsSessions:
         self._expire()
         return self._by_stream[stream]
 
-    def is_new_viewer(self, client: HlsClient, awaits: str | None) -> bool:
-        """Return whether a request adds a viewer; ``awaits`` is the kind of data that it may wait for."""
+    def is_new_viewer(self, client: HlsClient, blocking_kind: str | None) -> bool:
+        """Return whether a request adds a viewer."""
         self._expire()
         known = self._sessions.get(client)
-        return known is None or (awaits is not None and known.waiting[awaits] >= known.weight)
+        return known is None or (blocking_kind is not None and known.waiting[blocking_kind] >= known.weight)
 
     @contextmanager
-    def request(self, client: HlsClient, awaits: str | None) -> Iterator[None]:
+    def request(self, client: HlsClient, blocking_kind: str | None) -> Iterator[None]:
         """Count a player while a request is answered, and until its timeout afterwards."""
-        session = self._change(client, self._sessions.get(client), awaits, 1)
+        session = self._change(client, self._sessions.get(client), blocking_kind, 1)
         try:
             yield
         finally:
             if not session.evicted:
-                self._change(client, session, awaits, -1)
+                self._change(client, session, blocking_kind, -1)
 
-    def _change(self, client: HlsClient, known: _Session | None, awaits: str | None, by: int) -> _Session:
+    def _change(
+        self, client: HlsClient, known: _Session | None, blocking_kind: str | None, by: int
+    ) -> _Session:
         previous = self._sessions.pop(client, None)
         before = 0 if previous is None else previous.weight
         session = previous or known or self._new(client)
-        if awaits is not None:
-            session.waiting[awaits] += by
+        if blocking_kind is not None:
+            session.waiting[blocking_kind] += by
         session.until = self._clock() + self._timeout_s
         session.slot.weight = session.weight
         self._slots.take(session.slot)

@@ -18,7 +18,7 @@ class Traffic:
     def __init__(self) -> None:
         self.streams = self.answers = 0
         self._viewers: set[Subscriber] = set()
-        self._lost = 0
+        self._lost_gops = 0
         """GOPs lost by viewers who have left."""
 
     def join(self, viewer: Subscriber) -> None:
@@ -28,20 +28,20 @@ class Traffic:
     def leave(self, viewer: Subscriber) -> None:
         """Remove a viewer, and keep the count of its lost GOPs."""
         self._viewers.discard(viewer)
-        self._lost += viewer.lost_gops
+        self._lost_gops += viewer.lost_gops
 
     @property
-    def lost(self) -> int:
+    def lost_gops(self) -> int:
         """The number of GOPs that viewers have lost because they fell behind."""
-        return self._lost + sum(viewer.lost_gops for viewer in self._viewers)
+        return self._lost_gops + sum(viewer.lost_gops for viewer in self._viewers)
 
     @property
     def longest_queue(self) -> int:
         """The number of chunks queued for the viewer that is furthest behind."""
         return max((viewer.queued for viewer in self._viewers), default=0)
 
-    async def count(self, request: web.Request, response: web.StreamResponse) -> None:
-        """Count the body of a response; streams are counted as they are sent."""
+    async def count_body(self, request: web.Request, response: web.StreamResponse) -> None:
+        """Add the bytes of a response's body to ``answers``; streams are counted as they are sent."""
         if isinstance(response, web.Response) and request.method != "HEAD":
             self.answers += response.content_length or 0
 

@@ -1,4 +1,4 @@
-"""Viewer limits: of one stream, of all streams together, and of event streams."""
+"""Viewer limits: of one stream, of all streams together, and of event streams; names of viewer slots."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EVENT_SLOTS = web.AppKey("event slots", FairShare)
 """Slots of clients that receive events or recorded decisions."""
 
 
-def refuse_viewer(
+def evict_or_refuse_viewer(
     request: web.Request, viewers: int = 0, streams: tuple[str, ...] = ()
 ) -> web.Response | None:
     """Return 503 if no slot is free for another viewer of a stream; None: one is free, or has been evicted.
@@ -48,7 +48,7 @@ def viewer_slot(request: web.Request, stream: str) -> Iterator[Slot]:
         yield slot
 
 
-def refuse_event_listener(request: web.Request) -> web.Response | None:
+def evict_or_refuse_listener(request: web.Request) -> web.Response | None:
     """Return 503 if no event slot is free; None: one is free, or has been evicted."""
     slots, most = request.app[EVENT_SLOTS], request.app[SERVICE].config.http.viewers_max
     if slots.all < most or _evict(request, slots):
@@ -76,3 +76,23 @@ def _slot(request: web.Request, slots: FairShare, stream: str) -> Iterator[Slot]
         yield slot
     finally:
         slots.release(slot)
+
+
+def person_slot_name(number: int) -> str:
+    """Return the slot name of a person's stream, in HLS and outside."""
+    return f"object {number}"
+
+
+def hls_camera_slot_name(name: str) -> str:
+    """Return the slot name of a camera's HLS stream."""
+    return f"camera {name}"
+
+
+def live_camera_slot_name(camera: str) -> str:
+    """Return the slot name of a camera's live stream outside HLS."""
+    return f"live {camera}"
+
+
+def fixed_view_slot_name(camera: str) -> str:
+    """Return the slot name of a person's stream that always shows one camera, outside HLS."""
+    return f"decided {camera}"

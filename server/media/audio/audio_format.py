@@ -42,8 +42,8 @@ class AudioFormat:
         return AAC_SAMPLES if self.coding == "aac" else _OPUS_SAMPLES
 
     @property
-    def config(self) -> bytes:
-        """AudioSpecificConfig of AAC."""
+    def aac_config(self) -> bytes:
+        """AudioSpecificConfig of AAC; meaningless for Opus."""
         return audio_specific_config(self.rate, self.channels)
 
     @property
@@ -55,10 +55,10 @@ class AudioFormat:
         """Return the number of the frame that plays at a pulse."""
         return round(pulse * self.rate / fps) // self.samples
 
-    def pulses(self, begin: int, end: int, fps: float) -> tuple[int, int]:
-        """Return the pulses ``(first, until)`` that cover the frames ``begin … end - 1``."""
-        first = begin * self.samples * fps / self.rate
-        return max(0, int(first) - 1), int((end + 1) * self.samples * fps / self.rate) + 2
+    def pulses_of_frames(self, first_frame: int, until_frame: int, fps: float) -> tuple[int, int]:
+        """Return the pulses ``(first, until)`` that cover the frames ``first_frame … until_frame - 1``."""
+        first = first_frame * self.samples * fps / self.rate
+        return max(0, int(first) - 1), int((until_frame + 1) * self.samples * fps / self.rate) + 2
 
     def adts(self, size: int) -> bytes:
         """Return the ADTS header of an AAC frame of ``size`` bytes."""

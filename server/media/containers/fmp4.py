@@ -13,7 +13,7 @@ from itertools import accumulate
 
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.mp4_audio import AUDIO_TRACK, audio_track
-from server.media.containers.mp4_boxes import box, full_box, moof_mdat, movie_head, track, track_defaults
+from server.media.containers.mp4_boxes import box, full_box, moof_mdat, movie_header, track, track_defaults
 from server.media.h264.annexb import ParameterSets
 from server.media.rendering_messages import TIMESCALE
 
@@ -49,7 +49,7 @@ def init_segment(
     last = _TRACK if audio is None else AUDIO_TRACK
     return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
         "moov",
-        movie_head(last),
+        movie_header(last),
         track(
             _TRACK,
             TIMESCALE,
@@ -105,13 +105,13 @@ def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
     )  # fmt: skip
 
 
-def shift_fragment(frame: bytes, by: int) -> bytes:
-    """Return a fragment of :func:`fragment` moved in time by ``by`` ticks."""
-    (time,) = struct.unpack_from(">Q", frame, _TFDT_AT)
-    return frame[:_TFDT_AT] + struct.pack(">Q", time + by) + frame[_TFDT_AT + 8 :]
+def shift_fragment(fragment: bytes, by_ticks: int) -> bytes:
+    """Return a fragment of :func:`fragment` moved in time."""
+    (time,) = struct.unpack_from(">Q", fragment, _TFDT_AT)
+    return fragment[:_TFDT_AT] + struct.pack(">Q", time + by_ticks) + fragment[_TFDT_AT + 8 :]
 
 
-def sample_of(frame: bytes) -> bytes:
+def sample_of(fragment: bytes) -> bytes:
     """Return the sample of a single-sample fragment of :func:`fragment`."""
-    (moof_bytes,) = struct.unpack_from(">I", frame)
-    return frame[moof_bytes + 8 :]
+    (moof_bytes,) = struct.unpack_from(">I", fragment)
+    return fragment[moof_bytes + 8 :]

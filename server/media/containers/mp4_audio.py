@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 
 from server.media.audio.audio_format import AudioFormat
-from server.media.containers.mp4_boxes import box, full_box, moof_mdat, movie_head, track, track_defaults
+from server.media.containers.mp4_boxes import box, full_box, moof_mdat, movie_header, track, track_defaults
 
 AUDIO_TRACK = 2
 """Track 1 is the video."""
@@ -16,7 +16,7 @@ _FULL_VOLUME = 0x100
 def audio_init_segment(audio: AudioFormat) -> bytes:
     """Return the init segment, ``ftyp`` and ``moov``, of an audio stream without video."""
     return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6mp41") + box(
-        "moov", movie_head(AUDIO_TRACK), audio_track(audio), box("mvex", track_defaults(AUDIO_TRACK))
+        "moov", movie_header(AUDIO_TRACK), audio_track(audio), box("mvex", track_defaults(AUDIO_TRACK))
     )
 
 
@@ -44,7 +44,7 @@ def _dops(audio: AudioFormat) -> bytes:
 
 def _esds(audio: AudioFormat) -> bytes:
     """Return ESDBox with the descriptors of AAC (ISO/IEC 14496-1, 7.2.6)."""
-    decoder = b"\x40\x15" + bytes(11) + _descriptor(5, audio.config)
+    decoder = b"\x40\x15" + bytes(11) + _descriptor(5, audio.aac_config)
     stream = struct.pack(">HB", AUDIO_TRACK, 0) + _descriptor(4, decoder) + _descriptor(6, b"\x02")
     return full_box("esds", 0, 0, _descriptor(3, stream))
 

@@ -20,10 +20,10 @@ def full_box(kind: str, version: int, flags: int, body: bytes) -> bytes:
     return box(kind, struct.pack(">I", version << 24 | flags), body)
 
 
-def movie_head(last: int) -> bytes:
-    """Return ``mvhd`` of a movie whose tracks are numbered up to ``last``."""
+def movie_header(last_track: int) -> bytes:
+    """Return ``mvhd`` of a movie whose tracks are numbered up to ``last_track``."""
     head = struct.pack(">5I", 0, 0, 1000, 0, 0x10000) + struct.pack(">H", 0x100) + bytes(10)
-    return full_box("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last + 1))
+    return full_box("mvhd", 0, 0, head + _MATRIX + bytes(24) + struct.pack(">I", last_track + 1))
 
 
 def track_defaults(track: int) -> bytes:

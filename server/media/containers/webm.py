@@ -72,16 +72,16 @@ def cluster(frame: bytes, pulse: int, fps: float, *, key: bool, duration: int = 
     return CLUSTER + _size(8 + 2 + len(block)) + _TIMESTAMP + b"\x88" + struct.pack(">Q", time) + block
 
 
-def pulse_of(frame: bytes, fps: float) -> int:
+def pulse_of(cluster: bytes, fps: float) -> int:
     """Return the pulse of a cluster of :func:`cluster`."""
-    (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
+    (time,) = struct.unpack_from(">Q", cluster, _TIME_AT)
     return round(int(time) * fps / TICKS)
 
 
-def shift_cluster(frame: bytes, by: int) -> bytes:
-    """Return a cluster of :func:`cluster` moved in time by ``by`` ticks."""
-    (time,) = struct.unpack_from(">Q", frame, _TIME_AT)
-    return frame[:_TIME_AT] + struct.pack(">Q", time + by) + frame[_TIME_AT + 8 :]
+def shift_cluster(cluster: bytes, by_ticks: int) -> bytes:
+    """Return a cluster of :func:`cluster` moved in time."""
+    (time,) = struct.unpack_from(">Q", cluster, _TIME_AT)
+    return cluster[:_TIME_AT] + struct.pack(">Q", time + by_ticks) + cluster[_TIME_AT + 8 :]
 
 
 def _element(name: bytes, content: bytes) -> bytes:

@@ -65,7 +65,7 @@ def skipped_slice(macroblocks: int) -> str:
 
 
 @lru_cache(maxsize=4)
-def gray_slice(width: int, height: int) -> str:
+def gray_slice(width_mbs: int, height_mbs: int) -> str:
     """Return the slice data of an I slice of a mid-gray picture; sides in macroblocks.
 
     Every macroblock is I_16x16 with DC prediction and no residual: mid-gray where there are no neighbors, and
@@ -76,8 +76,8 @@ def gray_slice(width: int, height: int) -> str:
     mb_types, luma_dc = _contexts(_MB_TYPE), _contexts(_LUMA_DC)
     luma_ac, chroma, high, low = _contexts((_LUMA_AC, _CHROMA, _MODE_HIGH, _MODE_LOW))
     chroma_mode, delta = _contexts((_CHROMA_MODE, _QP_DELTA))
-    for row in range(height):
-        for column in range(width):
+    for row in range(height_mbs):
+        for column in range(width_mbs):
             coder.put(1, mb_types[(row > 0) + (column > 0)])
             coder.terminate(end=False)  # it is not I_PCM
             coder.put(0, luma_ac)
@@ -87,7 +87,7 @@ def gray_slice(width: int, height: int) -> str:
             coder.put(0, chroma_mode)
             coder.put(0, delta)
             coder.put(0, luma_dc[(column == 0) + 2 * (row == 0)])
-            coder.terminate(end=row == height - 1 and column == width - 1)
+            coder.terminate(end=row == height_mbs - 1 and column == width_mbs - 1)
     return bits.text
 
 

@@ -49,7 +49,7 @@ def gray_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
         bits.ue(1)
     if head.cabac:
         bits.align(1)
-        bits.copy(cabac.gray_slice(head.width, head.height))
+        bits.copy(cabac.gray_slice(head.width_mbs, head.height_mbs))
     else:
         bits.copy(_GRAY_MACROBLOCK * head.macroblocks)
         bits.u(1, 1)

@@ -37,15 +37,15 @@ class SliceHeaderFormat:
     """The fields of slice headers, according to the parameter sets.
 
     Attributes:
-        width, height: of a picture, in macroblocks.
+        width_mbs, height_mbs: of a picture, in macroblocks.
         order_bits: bits of pic_order_cnt_lsb; 0: the output order is the decoding order.
         order_of_fields: bottom_field_pic_order_in_frame_present_flag.
     """
 
     pps_id: int
     frame_num_bits: int
-    width: int
-    height: int
+    width_mbs: int
+    height_mbs: int
     order_bits: int
     order_of_fields: bool
     cabac: bool
@@ -57,7 +57,7 @@ class SliceHeaderFormat:
     @property
     def macroblocks(self) -> int:
         """The number of macroblocks of a picture."""
-        return self.width * self.height
+        return self.width_mbs * self.height_mbs
 
     def frame_num(self, sample: bytes) -> int:
         """Return frame_num of a sample, length-prefixed NAL units.
@@ -149,8 +149,8 @@ class _SequenceParameters:
     """Fields of the sequence parameter set, as in :class:`SliceHeaderFormat`."""
 
     frame_num_bits: int
-    width: int
-    height: int
+    width_mbs: int
+    height_mbs: int
     order_bits: int
 
 
@@ -172,12 +172,12 @@ def _read_sps(bits: BitReader) -> _SequenceParameters:
     order_bits = bits.ue() + 4 if order == _ORDER_BY_NUMBERS else 0
     bits.ue()
     bits.u(1)
-    width, height = bits.ue() + 1, bits.ue() + 1
+    width_mbs, height_mbs = bits.ue() + 1, bits.ue() + 1
     if not bits.u(1):
         raise ValueError("interlaced")
-    if width * height > _MAX_MACROBLOCKS or max(frame_num_bits, order_bits) > _MAX_FRAME_NUM_BITS:
+    if width_mbs * height_mbs > _MAX_MACROBLOCKS or max(frame_num_bits, order_bits) > _MAX_FRAME_NUM_BITS:
         raise ValueError("beyond the highest level")
-    return _SequenceParameters(frame_num_bits, width, height, order_bits)
+    return _SequenceParameters(frame_num_bits, width_mbs, height_mbs, order_bits)
 
 
 def _read_pps(bits: BitReader, sps: _SequenceParameters) -> SliceHeaderFormat:
@@ -200,8 +200,8 @@ def _read_pps(bits: BitReader, sps: _SequenceParameters) -> SliceHeaderFormat:
     return SliceHeaderFormat(
         pps_id=pps_id,
         frame_num_bits=sps.frame_num_bits,
-        width=sps.width,
-        height=sps.height,
+        width_mbs=sps.width_mbs,
+        height_mbs=sps.height_mbs,
         order_bits=sps.order_bits,
         order_of_fields=order_of_fields,
         cabac=arithmetic,

@@ -34,13 +34,13 @@ class Vp8StreamFormat(StreamFormat):
         """The codec string of browsers."""
         return "vp8"
 
-    def accept(self, key: bytes) -> None:
+    def accept(self, access_unit: bytes) -> None:
         """Check a keyframe.
 
         Raises:
             ParameterMismatchError: it is not VP8 of the site's size.
         """
-        if keyframe_size(key) != self._size:
+        if keyframe_size(access_unit) != self._size:
             raise ParameterMismatchError("its frames are not VP8 of the site's size")
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
@@ -76,7 +76,7 @@ class Vp8StreamFormat(StreamFormat):
         packed = cluster(gray_frame(*self._size), first, fps, key=True)
         key = EncodedPicture(first, key=True, fragment=packed, boot=NO_BOOT)
         spans = [(pulse, 1) for pulse in range(first + 1, first + frames)]
-        return [key, *Vp8GapFiller(repeat_frame(*self._size), fps).after(key, spans)]
+        return [key, *Vp8GapFiller(repeat_frame(*self._size), fps).repeat_until_keyframe(key, spans)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,24 +86,24 @@ class Vp8GapFiller:
     data: bytes
     fps: float
 
-    def can_follow(self, picture: EncodedPicture) -> bool:
+    def can_read(self, picture: EncodedPicture) -> bool:
         """Return True: nothing is read from the picture."""
         del picture
         return True
 
-    def after(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
+    def repeat_until_keyframe(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
         """Return a picture for each span."""
         del newest
         return [self._picture(span) for span in spans]
 
-    def before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
+    def repeat_before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
         """Return one picture, which does not affect decoding of the next one."""
         del picture
         return [self._picture(span)]
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
         """Return whether frames were lost between two pictures, by the reference that the camera reports."""
-        return missing > 0 and picture.after != newest.pulse
+        return missing > 0 and picture.reference_pulse != newest.pulse
 
     def _picture(self, span: Span) -> EncodedPicture:
         pulse, duration = span

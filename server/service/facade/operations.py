@@ -34,7 +34,7 @@ class PulseListener(msgspec.Struct, frozen=True):
     """Pulses that it recently lost because it read too slowly."""
 
 
-class Pulses(msgspec.Struct, frozen=True):
+class PulseClients(msgspec.Struct, frozen=True):
     """The pulse server's clients."""
 
     server: str
@@ -58,7 +58,7 @@ class OperationsService:
         live = sum(state.label == "live" for state in states)
         return Readiness(why_not_ready(self._pipeline), live, len(states))
 
-    async def list_pulse_clients(self) -> Pulses:
+    async def list_pulse_clients(self) -> PulseClients:
         """Query the pulse server's clients."""
         config = self._pipeline.config
         sync, expected = config.sync, pulse_clients(config)
@@ -71,10 +71,10 @@ class OperationsService:
                 tls=self._pipeline.pulses.tls,
             )
         except SyncError as error:
-            return Pulses(address, str(error), [], [])
+            return PulseClients(address, str(error), [], [])
         listeners = [PulseListener(client.name, client.name in expected, client.behind) for client in clients]
         connected = {client.name for client in clients}
-        return Pulses(address, "", listeners, [name for name in expected if name not in connected])
+        return PulseClients(address, "", listeners, [name for name in expected if name not in connected])
 
     @property
     def view_settings(self) -> ViewSettings:

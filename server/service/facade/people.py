@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.messaging.identity_snapshot import NAME_LENGTH_MAX
+from server.messaging.camera_identity_snapshot import NAME_LENGTH_MAX
 from server.messaging.messages import GopChoices
 from server.service.facade.errors import (
     ConflictError,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import chain
 from math import inf
 
-from server.messaging.identity_snapshot import (
+from server.messaging.camera_identity_snapshot import (
     ALIASES_MAX,
     PERSON_NUMBER_MAX,
-    IdentitySnapshot,
+    CameraIdentitySnapshot,
     PersonSnapshot,
 )
 from server.service.identity.local_numbers import TrackName
@@ -26,7 +26,7 @@ MAX_DOWNTIME_S = 30.0
 
 def state_for_cameras(
     people: PersonTracker, cameras: Iterable[str], pulse: int, recent: int, since: float
-) -> dict[str, IdentitySnapshot]:
+) -> dict[str, CameraIdentitySnapshot]:
     """Build the snapshot for each camera: the people it tracked recently, and the first free number."""
     tracks_by_number = people.tracks_of(people.registry.all_numbers, pulse - recent)
     boots: dict[str, int] = {}
@@ -57,7 +57,7 @@ def state_for_cameras(
             )
     next_number = min(people.next_number, PERSON_NUMBER_MAX + 1)
     return {
-        camera: IdentitySnapshot(
+        camera: CameraIdentitySnapshot(
             pulse=pulse,
             boot=boots.get(camera, 0),
             next_number=next_number,
@@ -88,7 +88,7 @@ class StateRecovery:
         max_downtime: the longest downtime, in frames.
     """
 
-    def __init__(self, snapshots: dict[str, IdentitySnapshot], pulse: int, max_downtime: int) -> None:
+    def __init__(self, snapshots: dict[str, CameraIdentitySnapshot], pulse: int, max_downtime: int) -> None:
         self._until = -1
         self._has_ended = False
         self._tracks: dict[TrackName, int] = {}
@@ -160,7 +160,7 @@ class StateRecovery:
         return None if first is None else people.person_of(track.camera, track.boot, track.track, first)
 
 
-def first_free_number(snapshot: IdentitySnapshot) -> int:
+def first_free_number(snapshot: CameraIdentitySnapshot) -> int:
     """Return the first unused number of a snapshot, which may contradict itself."""
     return max(
         [
@@ -182,7 +182,7 @@ def trusted_first_free(firsts: Iterable[int]) -> int:
     return max(other + _NUMBER_SLACK, SINGLE_CAMERA_NUMBER_MAX)
 
 
-def _combine_snapshots(snapshots: dict[str, IdentitySnapshot]) -> list[_PendingPerson]:
+def _combine_snapshots(snapshots: dict[str, CameraIdentitySnapshot]) -> list[_PendingPerson]:
     """Combine the cameras' snapshots; of a person, the newest counts."""
     newest: dict[int, PersonSnapshot] = {}
     tracks: dict[int, set[TrackName]] = {}

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from server.messaging.identity_snapshot import SNAPSHOT_BYTES_MAX, IdentitySnapshot
+from server.messaging.camera_identity_snapshot import SNAPSHOT_BYTES_MAX, CameraIdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import camera_of_key
 from server.service.identity.people import PersonTracker
@@ -60,7 +60,7 @@ class StateReplication:
         self._connected_at: dict[str, float] = {}
         """When each camera without a received snapshot first connected."""
         self._present: set[str] = set()
-        self._snapshots: dict[str, IdentitySnapshot] = {}
+        self._snapshots: dict[str, CameraIdentitySnapshot] = {}
         self._first_free: dict[str, int] = {}
         """By camera, the first free number of its last snapshot."""
         self._recoveries: list[StateRecovery] = []
@@ -71,7 +71,7 @@ class StateReplication:
         """The first number that this run assigns; infinite before the start."""
         self._reported: set[str] = set()
         """Cameras whose snapshot was received; sending earlier would overwrite theirs."""
-        self._sent: dict[str, IdentitySnapshot] = {}
+        self._sent: dict[str, CameraIdentitySnapshot] = {}
         self._since = time.time()
 
     def alive(self, key: str, is_present: bool) -> None:
@@ -101,7 +101,7 @@ class StateReplication:
         self._reported.add(camera)
         if not message.payload:
             return
-        snapshot = msgspec.json.decode(message.payload, type=IdentitySnapshot)
+        snapshot = msgspec.json.decode(message.payload, type=CameraIdentitySnapshot)
         self._first_free[camera] = first_free_number(snapshot)
         if is_repeated:
             self._people.reserve_numbers_below(
@@ -187,11 +187,11 @@ class StateReplication:
                 self._send(camera, payload)
 
 
-def _below(free: float, snapshot: IdentitySnapshot) -> IdentitySnapshot:
+def _below(free: float, snapshot: CameraIdentitySnapshot) -> CameraIdentitySnapshot:
     """Remove people whose number this run may have assigned to another person."""
     known = [person for person in snapshot.people if max([person.number, *person.aliases]) < free]
     return msgspec.structs.replace(snapshot, people=known)
 
 
-def _same(one: IdentitySnapshot, other: IdentitySnapshot) -> bool:
+def _same(one: CameraIdentitySnapshot, other: CameraIdentitySnapshot) -> bool:
     return msgspec.structs.replace(one, pulse=other.pulse) == other

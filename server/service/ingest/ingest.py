@@ -171,7 +171,9 @@ class Ingest:
             if state.refused or self._is_far_ahead(state, head.pulse):
                 return
             frame_buffer = self._frame_buffers[camera]
-            frame = frame_buffer.put(head.pulse, head.boot, message.payload, key=head.key, after=head.after)
+            frame = frame_buffer.put(
+                head.pulse, head.boot, message.payload, key=head.key, reference_pulse=head.reference_pulse
+            )
         except (*DECODE_ERRORS, DamagedFrameError) as error:
             state.count_bad_message(error)
         except ParameterMismatchError as error:

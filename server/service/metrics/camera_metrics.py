@@ -67,8 +67,8 @@ class StageTotals:
 
     def frame(self, head: FrameHeader) -> None:
         """Count a frame."""
-        self.take.observe(head.taken - head.due)
-        self.encode.observe(head.encoded - head.taken)
+        self.take.observe(head.captured_at - head.due)
+        self.encode.observe(head.encoded - head.captured_at)
 
     def window(self, tracks: CameraTracks, due: float | None, *, optimal: bool) -> None:
         """Count a window; ``due`` is when its last frame was due, None: unknown."""
@@ -116,7 +116,7 @@ class CameraMetrics:
     def frame(self, head: FrameHeader) -> None:
         """Measure a frame by its header."""
         self.totals.frame(head)
-        self._errors.append(head.taken - head.due)
+        self._errors.append(head.captured_at - head.due)
         self._due[head.pulse] = head.due
         while len(self._due) > _FRAMES:
             self._due.popitem(last=False)

@@ -58,7 +58,7 @@ class RecordedGop:
 
 def pictures_of_gop(gop: RecordedGop, stream_format: StreamFormat) -> list[EncodedPicture]:
     """Return a GOP's pictures for the site's streams."""
-    parameters = stream_format.parameters_of(gop.fragments[0])
+    parameters = stream_format.camera_parameters(gop.fragments[0])
     return [
         EncodedPicture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=parameters)
         for place, fragment in enumerate(gop.fragments)

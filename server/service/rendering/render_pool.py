@@ -68,7 +68,7 @@ class RenderPool:
         self._queue_gops = config.http.viewer_queue_gops
         self._max_streams = config.http.pictures_max
         self._settings = RenderSettings(
-            codec=config.encode.codec,
+            input_codec=config.encode.codec,
             width=config.site.width,
             height=config.site.height,
             fps=config.site.fps,

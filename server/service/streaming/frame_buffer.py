@@ -26,9 +26,9 @@ class FrameBuffer:
         self.newest = -1
 
     def put(
-        self, pulse: int, boot: int, access_unit: bytes, *, key: bool, after: int | None = None
+        self, pulse: int, boot: int, access_unit: bytes, *, key: bool, reference_pulse: int | None = None
     ) -> EncodedPicture:
-        """Store an access unit; ``after`` is the pulse of its reference frame, if known.
+        """Store an access unit; ``reference_pulse`` is that of the picture that it references, if known.
 
         Raises:
             ParameterMismatchError: its parameter sets are not the site's, and the camera must be refused.
@@ -37,9 +37,11 @@ class FrameBuffer:
         if key:
             self._parameters = self._stream_format.accept(access_unit)
         fragment = self._stream_format.pack(access_unit, pulse, self._fps, key=key)
-        picture = EncodedPicture(pulse, key, fragment, boot, parameters=self._parameters, after=after)
+        picture = EncodedPicture(
+            pulse, key, fragment, boot, parameters=self._parameters, reference_pulse=reference_pulse
+        )
         gap_filler = self._stream_format.gap_filler(picture, self._fps)
-        if gap_filler is not None and not gap_filler.can_follow(picture):
+        if gap_filler is not None and not gap_filler.can_read(picture):
             raise DamagedFrameError(f"no picture can be read in the access unit of pulse {pulse}")
         self._pictures[pulse] = picture
         self.newest = max(self.newest, pulse)

@@ -66,7 +66,9 @@ class GaplessTimeline:
         if gap_filler is None or self._newest is None or not 0 < missing <= LONGEST_GAP_S * self._fps:
             return []
         each = 1 if missing <= _PER_PULSE_S * self._fps else missing
-        filler = gap_filler.after(self._newest, [(pulse, each) for pulse in range(self._until, until, each)])
+        filler = gap_filler.repeat_until_keyframe(
+            self._newest, [(pulse, each) for pulse in range(self._until, until, each)]
+        )
         self._newest, self._until, self._is_broken = filler[-1], until, True
         return filler
 
@@ -84,7 +86,7 @@ class GaplessTimeline:
         return (
             []
             if gap_filler is None
-            else gap_filler.before(picture, (self._until, picture.pulse - self._until))
+            else gap_filler.repeat_before(picture, (self._until, picture.pulse - self._until))
         )
 
     def _reference_is_lost(self, picture: EncodedPicture) -> bool:

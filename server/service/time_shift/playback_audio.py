@@ -68,7 +68,7 @@ class PlaybackAudio:
         audio_format, fps = self._buffer.format, self._buffer.fps
         frames: dict[int, bytes] = {}
         for recording in recorded:
-            for entry in recording.index.between(*audio_format.pulses(begin, end, fps)):
+            for entry in recording.index.between(*audio_format.pulses_of_frames(begin, end, fps)):
                 frames |= _frames_of(recording, entry, begin, end, audio_format)
         return frames
 

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from fakes.service.fed_site import ServedSite, serve_site
-from server.config.tokens_file import token_digest
+from server.config.tokens_file import secret_digest
 
 IN_FUTURE = "2100-01-01T00:00:00Z"
 """Creation time of a token that is newer than any service of a test."""
@@ -33,7 +33,7 @@ def bearer(name: str) -> dict[str, str]:
 
 def token_entry(name: str, **fields: Any) -> dict[str, Any]:
     """Return an entry of the token file."""
-    return {"name": name, "sha256": token_digest(token_of(name)), **(fields or TOKEN_ENTRIES[name])}
+    return {"name": name, "sha256": secret_digest(token_of(name)), **(fields or TOKEN_ENTRIES[name])}
 
 
 def write_tokens(path: Path, *lines: dict[str, Any]) -> Path:

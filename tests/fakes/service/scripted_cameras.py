@@ -128,7 +128,7 @@ def epoch_of(number: int, *words: CameraTracks) -> Epoch:
 
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
     """Return a frame as received from the bus."""
-    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, taken=0.0, encoded=0.0)
+    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, captured_at=0.0, encoded=0.0)
     return Message(ZenohKeys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
 
 

@@ -129,7 +129,7 @@ async def test_recordings_run_to_their_end_without_losses(
 
     frames = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     assert [frame.pulse for frame in frames] == list(range(FRAMES))
-    assert all(frame.due <= frame.encoded and frame.taken <= frame.encoded for frame in frames)
+    assert all(frame.due <= frame.encoded and frame.captured_at <= frame.encoded for frame in frames)
     messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
     assert [message.epoch for message in messages] == list(range(FRAMES // 5 + 1))
     assert messages[-1].ended
@@ -280,7 +280,7 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
     frames = [head.pulse for head in heads]
     assert frames[:6] == [0, 2, 4, 6, 8, 9]
     assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.encode.gop))
-    pairs = [(before.pulse, head.after) for before, head in pairwise(heads) if not head.key]
+    pairs = [(before.pulse, head.reference_pulse) for before, head in pairwise(heads) if not head.key]
     assert all(before == after for before, after in pairs), "a frame that was not captured affects no other"
     messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
     assert [message.epoch for message in messages] == list(range(FRAMES // 5 + 1))

@@ -9,10 +9,10 @@ import pytest
 
 from fakes.cli.command_line import RunCommand, input_error
 from fakes.http.tokens import IN_FUTURE, token_entry, write_tokens
-from server.config.tokens_file import read_tokens, token_digest
+from server.config.tokens_file import read_tokens, secret_digest
 from server.system.errors import UserError
 
-SUM = token_digest("x")
+SUM = secret_digest("x")
 
 
 def test_tokens_are_read_in_the_order_of_the_file(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_new_token_is_printed_with_its_line_for_the_file(
     path = tmp_path / "tokens.yaml"
     path.write_text(f"tokens:\n{line}\n", encoding="utf-8")
     [read] = read_tokens(path)
-    assert (read.name, read.sha256) == ("Ann's parents", token_digest(token))
+    assert (read.name, read.sha256) == ("Ann's parents", secret_digest(token))
     assert (read.role, read.object, read.camera) == limits
     assert myview("token", "a").out.splitlines()[1].strip() != token
 

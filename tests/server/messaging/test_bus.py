@@ -147,10 +147,10 @@ async def test_two_clients_exchange_messages_through_the_router_until_one_unsubs
     settings: ZenohSettings,
 ) -> None:
     router = Bus.router(settings)
-    one, two = Bus.listener(settings), Bus.listener(settings)
+    one, two = Bus.peer_listener(settings), Bus.peer_listener(settings)
     received, second_received, present = ReceivedItems(), ReceivedItems(), Presence()
     two.subscribe("found/*", received.queue.put_nowait)
-    end = two.listen("found/one", second_received.queue.put_nowait)
+    end = two.subscribe_temporarily("found/one", second_received.queue.put_nowait)
     one.watch_alive("ready", present.note)
     two.declare_alive("ready")
     await present.until("ready")
@@ -170,7 +170,7 @@ async def test_a_listener_session_needs_the_router(
 ) -> None:
     monkeypatch.setattr("server.messaging.bus._OPEN_WITHIN_MS", 100)
     with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at tcp/127"):
-        Bus.listener(settings)
+        Bus.peer_listener(settings)
 
 
 async def test_liveliness_tokens_of_present_and_closed_sessions_are_reported(

@@ -163,7 +163,7 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
         ]  # they receive their own
         for stranger in strangers:
             with pytest.raises(UserError, match=r"zenoh\.connect: no router responds at"):
-                await asyncio.to_thread(Bus.listener, stranger, "c0")
+                await asyncio.to_thread(Bus.peer_listener, stranger, "c0")
 
 
 def _publish_from_all(buses: Sequence[Bus], number: int) -> None:
@@ -182,7 +182,7 @@ async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
         lambda: Bus.client(settings, "c1"),
-        lambda: Bus.listener(settings, "auditor"),
+        lambda: Bus.peer_listener(settings, "auditor"),
     ) as (bestview, c0, c1, auditor):
         c0.subscribe(SITE.camera("c0", topic), received)
         c1.subscribe(SITE.camera("c0", topic), received_by_other)
@@ -212,8 +212,8 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
     with open_sessions(
         lambda: router(settings),
         lambda: Bus.client(settings, "c0"),
-        lambda: Bus.listener(settings, "c1"),
-        lambda: Bus.listener(settings, "auditor"),
+        lambda: Bus.peer_listener(settings, "c1"),
+        lambda: Bus.peer_listener(settings, "auditor"),
     ) as (_, c0, c1, auditor):
         for key in (SITE.camera("c0", "*"), SITE.camera("c0", "detections"), SITE.camera("c1", "detections")):
             c1.subscribe(key, received)

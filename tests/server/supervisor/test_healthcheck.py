@@ -24,7 +24,7 @@ from fakes.paths import ROOT
 from fakes.programs import needs_openssl
 from server.cli.generated_config import free_port
 from server.config.password_file import read_users
-from server.config.tokens_file import read_tokens, token_digest
+from server.config.tokens_file import read_tokens, secret_digest
 from server.supervisor.healthcheck import main
 
 LIVE = {"camera": "c0", "state": "live", "fps": 25.0, "message": ""}
@@ -178,7 +178,7 @@ def test_generated_secrets_make_a_working_site(secrets: Path) -> None:
     assert (operator.role, operator.camera) == ("operate", None)
     assert (health.role, health.camera) == ("watch", "c0")
     token = (secrets / "cameras" / "c0" / "token").read_text("ascii").strip()
-    assert health.sha256 == token_digest(token)
+    assert health.sha256 == secret_digest(token)
     c0 = secrets / "cameras" / "c0"
     assert users(secrets / "bus") == users(c0 / "bus")
     assert users(secrets / "pulses") == users(secrets / "web" / "pulses") | users(c0 / "pulses")

@@ -147,9 +147,9 @@ def test_the_difference_to_an_invalid_changed_or_repaired_file_is_known(tmp_path
     with pytest.raises(UserError, match=r"view\.lookahead"):
         running.wanted()
     write(path, view={"lookahead": 40}, site={"fps": 12.5})
-    assert running.on_disk().pending_restart == ("site.fps", "view.lookahead")
+    assert running.on_disk().changed_keys == ("site.fps", "view.lookahead")
     running.now = plan_reload(running.now, running.wanted()).now
-    assert running.on_disk().pending_restart == ("site.fps",)
+    assert running.on_disk().changed_keys == ("site.fps",)
     write(path, view={"lookahead": 40})
     assert not running.on_disk().differs
 
@@ -163,7 +163,7 @@ def test_a_changed_ground_file_is_a_difference(tmp_path: Path) -> None:
     ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "c1": [[1]]}}')
     assert "ground.json" in running.on_disk().error
     ground.write_text('{"homography": {"c0": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}}')
-    assert running.on_disk().pending_restart == ("cameras.c0.ground",)
+    assert running.on_disk().changed_keys == ("cameras.c0.ground",)
 
 
 def test_processes_use_the_supervisors_active_configuration(
@@ -210,7 +210,7 @@ async def test_the_operators_page_and_metrics_show_the_difference(found: ConfigF
         response = await (await session.get("/api/operator/config")).json()
         metrics = await (await session.get("/metrics")).text()
     service.close()
-    assert (response["error"], response["pending_restart"]) == (found.error, list(found.pending_restart))
+    assert (response["error"], response["changed_keys"]) == (found.error, list(found.changed_keys))
     assert f"myview_config_differs {float(found.differs)}" in metrics
 
 

@@ -58,7 +58,7 @@ class StreamRenderer:
 
     def __init__(self, settings: RenderSettings) -> None:
         self._settings = settings
-        self._decoder = _decoder(settings.codec)
+        self._decoder = _decoder(settings.input_codec)
         self._is_decodable = False
         """Whether no frame has been damaged since the last keyframe."""
         self._has_warned = False

@@ -15,7 +15,7 @@ from aiohttp.test_utils import make_mocked_request
 
 from fakes.http.tokens import bearer, serve_with_tokens, token_entry, token_of, write_tokens
 from fakes.service.fed_site import ServedSite, serve_site
-from server.config.tokens_file import token_digest
+from server.config.tokens_file import secret_digest
 from server.http.access.authentication import COOKIE_PREFIX, Authenticator, Credential
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.local_requests import is_local_request
@@ -246,15 +246,15 @@ async def test_signing_in_to_another_service_of_the_machine_keeps_this_session(
 def test_a_session_expires_and_a_token_has_a_limited_number_of_sessions() -> None:
     now = [0.0]
     sessions = Sessions(lambda: now[0])
-    keys = [token_digest(sessions.open("a")) for _ in range(1024)]
-    other = token_digest(sessions.open("b"))
-    assert [sessions.token(key) for key in (keys[0], keys[-1], other)] == ["a", "a", "b"]
+    keys = [secret_digest(sessions.open("a")) for _ in range(1024)]
+    other = secret_digest(sessions.open("b"))
+    assert [sessions.token_digest_of(key) for key in (keys[0], keys[-1], other)] == ["a", "a", "b"]
     now[0] = 1.0
-    new = token_digest(sessions.open("a"))
-    assert [sessions.token(key) for key in (keys[0], keys[1], new, other)] == [None, "a", "a", "b"]
+    new = secret_digest(sessions.open("a"))
+    assert [sessions.token_digest_of(key) for key in (keys[0], keys[1], new, other)] == [None, "a", "a", "b"]
     now[0] = 12 * 3600.0
-    assert [sessions.token(key) for key in (keys[1], new)] == [None, "a"]
-    assert sessions.token("") is None
+    assert [sessions.token_digest_of(key) for key in (keys[1], new)] == [None, "a"]
+    assert sessions.token_digest_of("") is None
 
 
 @pytest.mark.parametrize(
@@ -297,7 +297,7 @@ def test_retry_after_is_never_zero(tmp_path: Path) -> None:
     assert isinstance(answer, web.Response)
     assert loads(answer.text or "")["error"].endswith("try again in 1 s")
     now[0] = 12.0
-    assert authenticator.check_token(request, token_of("desk")) == Credential(token_digest(token_of("desk")))
+    assert authenticator.check_token(request, token_of("desk")) == Credential(secret_digest(token_of("desk")))
 
 
 async def test_an_expired_cookie_does_not_count_as_a_wrong_token(site: ServedSite) -> None:

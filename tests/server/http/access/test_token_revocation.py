@@ -17,10 +17,10 @@ import pytest
 from fakes.http.tokens import IN_FUTURE, bearer, serve_with_tokens, token_entry, token_of, write_tokens
 from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import CAMERAS, SMALL
-from server.config.tokens_file import token_digest
+from server.config.tokens_file import secret_digest
 from server.http.access.csrf import CSRF_HEADER
 from server.http.access.token_store import TokenStore
-from server.messaging.identity_snapshot import IdentitySnapshot
+from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 
@@ -181,7 +181,9 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
         )
         served.service.connect_cameras(*CAMERAS)
         if remembered is not None:
-            snapshot = IdentitySnapshot(pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[])
+            snapshot = CameraIdentitySnapshot(
+                pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[]
+            )
             key = ZenohKeys("hall").camera("c0", "retained_identities")
             served.service.state_replication.snapshot_received(
                 Message(key, msgspec.json.encode(snapshot), b"")
@@ -209,7 +211,7 @@ class TokenFileCheck:
         self.file = TokenStore(write_tokens(path, token_entry("desk")))
 
     def has(self, name: str) -> bool:
-        return self.file.find(token_digest(token_of(name))) is not None
+        return self.file.find_in_constant_time(secret_digest(token_of(name))) is not None
 
 
 @pytest.fixture

@@ -45,7 +45,7 @@ async def samples(served: ServedSite) -> dict[tuple[str, ...], float]:
 async def test_a_cameras_stages_are_measured_by_its_reported_times(served: ServedSite) -> None:
     show_people(served)
     unit = encoded(0)[15]
-    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, taken=100.03, encoded=100.04)
+    head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, captured_at=100.03, encoded=100.04)
     served.service.ingest.video(
         Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
     )
@@ -143,9 +143,9 @@ async def test_gops_lost_by_slow_viewers_stay_counted_after_they_leave() -> None
     for number in range(4):
         slow.put(BytesChunk(b"gop", random_access=True))
         assert sent.longest_queue == (number % 2) + 1
-    assert sent.lost == 2
+    assert sent.lost_gops == 2
     sent.leave(slow)
-    assert (sent.lost, sent.longest_queue) == (2, 0)
+    assert (sent.lost_gops, sent.longest_queue) == (2, 0)
 
 
 def measured(lag: LoopLag, name_end: str) -> float:

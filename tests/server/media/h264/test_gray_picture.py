@@ -134,7 +134,7 @@ def test_one_gray_picture_lasts_for_the_gop_where_none_can_be_repeated() -> None
     parameters = parameter_sets(nal_units(encoded((WIDTH, HEIGHT), "ultrafast", 1)[0].data))
     assert parameters is not None
     stream_format = StreamFormat()
-    stream_format.check(with_explicit_order(parameters))
+    stream_format.adopt_or_check(with_explicit_order(parameters))
     [gray] = stream_format.blank(None, 10, 5, FPS)
     assert (gray.pulse, gray.until, gray.key) == (10, 15, True)
     assert all(map(is_gray, decoded([gray.sample, stream_format.blank(gray, 15, 5, FPS)[0].sample])))
@@ -143,7 +143,7 @@ def test_one_gray_picture_lasts_for_the_gop_where_none_can_be_repeated() -> None
 def test_an_unsupported_format_has_no_gray_picture() -> None:
     stream_format = StreamFormat()
     assert stream_format.blank(None, 0, 5, FPS) == []
-    stream_format.check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
+    stream_format.adopt_or_check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
     assert stream_format.blank(None, 0, 5, FPS) == []
 
 

@@ -125,9 +125,9 @@ def test_a_stream_has_a_picture_for_every_pulse_despite_losses(
     for pulse in range(FRAMES):
         unit = None if pulse in lost else units.get(pulse)
         if unit is not None:
-            after = None if unit.after is None else first + unit.after
-            shown += time.push(on.put(first + pulse, 1, unit.data, key=unit.key, after=after))
-        if unit is not None and (unit.key or unit.after in shown_at):
+            reference = None if unit.reference_pulse is None else first + unit.reference_pulse
+            shown += time.push(on.put(first + pulse, 1, unit.data, key=unit.key, reference_pulse=reference))
+        if unit is not None and (unit.key or unit.reference_pulse in shown_at):
             shown_at.append(pulse)
         elif shown_at:
             shown_at.append(shown_at[-1])

@@ -25,13 +25,13 @@ from fakes.service.scripted_cameras import (
 )
 from server.camera.retained_identity_snapshot import RetainedIdentitySnapshot
 from server.http.app import make_app
-from server.messaging.epochs import end_of_epoch
-from server.messaging.identity_snapshot import (
+from server.messaging.camera_identity_snapshot import (
     PERSON_NUMBER_MAX,
     SNAPSHOT_BYTES_MAX,
-    IdentitySnapshot,
+    CameraIdentitySnapshot,
     PersonSnapshot,
 )
+from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.service.identity.state_recovery import (
@@ -378,7 +378,7 @@ person_snapshots = st.builds(
     manual=st.booleans(),
 )
 identity_snapshots = st.builds(
-    IdentitySnapshot,
+    CameraIdentitySnapshot,
     pulse=st.integers(0, 60),
     boot=st.integers(1, 2),
     next_number=st.integers(1, 12),
@@ -390,7 +390,7 @@ identity_snapshots = st.builds(
 @settings(max_examples=40)
 @given(identity_snapshots, identity_snapshots)
 def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
-    one: IdentitySnapshot, other: IdentitySnapshot
+    one: CameraIdentitySnapshot, other: CameraIdentitySnapshot
 ) -> None:
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
@@ -404,7 +404,9 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
 
 @settings(max_examples=40)
 @given(identity_snapshots, identity_snapshots)
-def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, other: IdentitySnapshot) -> None:
+def test_arbitrary_snapshots_do_not_stop_the_service(
+    one: CameraIdentitySnapshot, other: CameraIdentitySnapshot
+) -> None:
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
         site.cameras[camera].replace(Message("", msgspec.json.encode(retained), b""))
@@ -417,7 +419,7 @@ def test_arbitrary_snapshots_do_not_stop_the_service(one: IdentitySnapshot, othe
 
 def falsify_snapshot(site: Site, camera: str, **changes: object) -> None:
     """Change the snapshot that a camera retains."""
-    snapshot = msgspec.json.decode(site.cameras[camera]._snapshot, type=IdentitySnapshot)
+    snapshot = msgspec.json.decode(site.cameras[camera]._snapshot, type=CameraIdentitySnapshot)
     site.cameras[camera].replace(
         Message("", msgspec.json.encode(msgspec.structs.replace(snapshot, **changes)), b"")
     )
@@ -466,8 +468,8 @@ def test_a_single_cameras_first_free_number_is_bounded_by_the_others(
     assert trusted_first_free([*other_numbers, lie]) <= max(most, max(other_numbers, default=0) + 10_000)
 
 
-def snapshot_since(since: float, pulse: int = 90) -> IdentitySnapshot:
-    return IdentitySnapshot(pulse=pulse, boot=1, next_number=5, numbered_since=since, people=[])
+def snapshot_since(since: float, pulse: int = 90) -> CameraIdentitySnapshot:
+    return CameraIdentitySnapshot(pulse=pulse, boot=1, next_number=5, numbered_since=since, people=[])
 
 
 @pytest.mark.parametrize("lie", [0.0, 1e12])

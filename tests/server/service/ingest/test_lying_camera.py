@@ -91,8 +91,8 @@ REFUSED: dict[str, LyingMessages] = {
     "frames far ahead": lambda epoch: frames(epoch, pulse=FAR + epoch),
     "frames of 2^53": lambda epoch: frames(epoch, pulse=2**53 + epoch),
     "frames of 2^63": lambda epoch: frames(epoch, pulse=2**63 + epoch),
-    "reference to an impossible frame": lambda epoch: frames(epoch, after=2**63),
-    "impossible capture time": lambda epoch: frames(epoch, due=-1e308, taken=1e308),
+    "reference to an impossible frame": lambda epoch: frames(epoch, reference_pulse=2**63),
+    "impossible capture time": lambda epoch: frames(epoch, due=-1e308, captured_at=1e308),
     "windows far ahead": lambda epoch: altered_tracks(
         epoch, epoch=FAR, first=FAR * STRIDE, last=FAR * STRIDE - 1, final_to=FAR * STRIDE - 1, tracks=[]
     ),

@@ -13,7 +13,7 @@ from server.service.metrics.camera_metrics import CameraMetrics, RecentSeconds
 
 
 def head(pulse: int, late: float, due: float = 100.0) -> FrameHeader:
-    return FrameHeader(pulse=pulse, key=False, boot=1, due=due, taken=due + late, encoded=due + late)
+    return FrameHeader(pulse=pulse, key=False, boot=1, due=due, captured_at=due + late, encoded=due + late)
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=600))

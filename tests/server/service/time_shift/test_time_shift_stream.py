@@ -34,7 +34,7 @@ from fakes.service.scripted_recordings import (
 from server.media.containers.mpegts import ContinuityCounters
 from server.media.picture import EncodedPicture as Shown
 from server.media.stream_format import StreamFormat
-from server.messaging.identity_snapshot import IdentitySnapshot
+from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.service.recording.media_files import pulse_of
@@ -470,7 +470,7 @@ async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbe
         served.service.pulses.pulse0 = PULSE0 + 0.01
         served.service.recorder.open()
         served.service.connect_cameras(*CAMERAS)
-        snapshot = IdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
+        snapshot = CameraIdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
         key = ZenohKeys("hall").camera(A, "retained_identities")
         served.service.state_replication.snapshot_received(Message(key, msgspec.json.encode(snapshot), b""))
         for epoch in range(5, 8):

@@ -40,7 +40,7 @@ class PersonSnapshot(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
     """Whether the operator has merged numbers into this one."""
 
 
-class IdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
+class CameraIdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
     """The people that one camera tracks at a pulse."""
 
     pulse: Pulse
