@@ -72,7 +72,7 @@ class OverlayVideo:
     def _picture(self, frame: EncodedFrame) -> EncodedPicture:
         units, settings = nal_units(frame.data), self._settings
         if frame.key:
-            self._stream_format.check(parameter_sets(units))
+            self._stream_format.adopt_or_check(parameter_sets(units))
         if self.head is None and self._stream_format.parameters is not None:
             self.head = init_segment(
                 self._stream_format.parameters, settings.width, settings.height, self._audio_format

@@ -90,7 +90,7 @@ class StreamRenderer:
         return self._jpeg(self._last.pulse, image)
 
     def _decode(self, request: RenderRequest) -> Iterator[DecodedFrame]:
-        demux = demux_webm if self._settings.codec == "vp8" else demux_mp4
+        demux = demux_webm if self._settings.input_codec == "vp8" else demux_mp4
         for demuxed in demux(request.fragments, self._settings.fps):
             is_valid = bool(demuxed.data) and demuxed.pulse <= PULSE_MAX  # an empty packet would flush
             self._is_decodable = (self._is_decodable or demuxed.key) and is_valid
@@ -105,7 +105,7 @@ class StreamRenderer:
                     text = "frame %d cannot be decoded: %s; further ones are not logged"
                     log.warning(text, demuxed.pulse, error)
                 self._has_warned = True
-                self._decoder, self._is_decodable = _decoder(self._settings.codec), False
+                self._decoder, self._is_decodable = _decoder(self._settings.input_codec), False
                 continue
             for frame in pictures:
                 pulse = demuxed.pulse if frame.pts is None else frame.pts
