@@ -4,9 +4,9 @@ Everything but pictures and audio is JSON, so that any zenoh subscriber can read
 H.264 (or VP8 frames) with a small JSON header in zenoh's attachment. JSON floats are written with as many
 digits as they need to be read back exactly.
 
-===============================================  ===================================  ==========================
+===============================================  ===================================  =======================
 key                                              payload                              attachment
-===============================================  ===================================  ==========================
+===============================================  ===================================  =======================
 ``myview/SITE/camera/ID/video``                  one access unit, Annex B or VP8      :class:`FrameHeader`
 ``myview/SITE/camera/ID/tracks``                 :class:`CameraTracks`
 ``myview/SITE/camera/ID/status``                 :class:`CameraStatus`
@@ -22,7 +22,7 @@ key                                              payload                        
 ``myview/SITE/bestview/INDEX/choices``           of a further service that shares the site
 ``myview/SITE/bestview/alive``                   liveliness token
 ``myview/SITE/bestview/INDEX/alive``             of a further service
-===============================================  ===================================  ==========================
+===============================================  ===================================  =======================
 """
 
 from __future__ import annotations

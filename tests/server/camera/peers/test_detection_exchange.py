@@ -205,7 +205,7 @@ async def test_an_unexpected_error_on_joining_ends_the_camera(
     def fail(*_: object) -> Bus:
         raise MemoryError("no memory")
 
-    monkeypatch.setattr(Bus, "listener", fail)
+    monkeypatch.setattr(Bus, "peer_listener", fail)
     config = config_of(recording, wait=WAIT)
     exchange = PeerDetectionExchange(config, "c0", CrossViewScorer(config, "c0", (192, 108), 1), 100)
     await exchange.join()

@@ -153,7 +153,7 @@ async def test_a_session_expires_in_time_while_the_token_file_is_blocked(
     try:
         await asyncio.to_thread(token_file.wait, 10.0)
         monkeypatch.setattr(
-            "server.http.access.sessions.Sessions.token", lambda *_: None
+            "server.http.access.sessions.Sessions.token_digest_of", lambda *_: None
         )  # 12 hours are over
         await asyncio.wait_for(wait_for_end(answer), 10.0)
     finally:

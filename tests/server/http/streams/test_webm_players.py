@@ -160,7 +160,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_sit
         await page.wait_for_function("myview.state === 'playing' && myview.camera === 'c1'")
         await page.keyboard.press(",")
         results = await page.locator("#notice").text_content()
-        assert results == "Nothing is recorded of that time: this is live."
+        assert results == "There is no recording of that time. This is live."
         feeding.cancel()
     assert errors == []
 
