@@ -99,7 +99,7 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
             rows.append(
                 [
                     f"{people} walking, {name}",
-                    f"{found.heights.median:.2f}",
+                    f"{found.floor_error.median:.2f}",
                     f"{np.median(errors):.2f}",
                     f"{np.quantile(errors, 0.9):.2f}",
                     *(

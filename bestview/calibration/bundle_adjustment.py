@@ -70,7 +70,7 @@ def adjust_bundle(
     matches: Sequence[Correspondences],
     settings: WalkSettings,
     *,
-    sharpness: float = 1.0,
+    foot_precision: float = 1.0,
     fixed_offsets: bool = False,
 ) -> CameraRig:
     """Optimize the cameras and their offsets; the pose and offset of the first camera are fixed.
@@ -80,7 +80,7 @@ def adjust_bundle(
         samples: of each camera.
         matches: correspondences.
         settings: weights and priors.
-        sharpness: how much more precise foot points are than the settings assume.
+        foot_precision: how much more precise foot points are than the settings assume.
         fixed_offsets: offsets are known and not optimized.
     """
     count = len(rig.cameras)
@@ -107,7 +107,8 @@ def adjust_bundle(
         for camera, (where, height, weight) in zip(cameras, heights, strict=True):
             parts += [prior_errors(camera, settings), height_errors(camera, where, height, weight, settings)]
         parts += [
-            _match_errors(cameras, offset_changes, samples, match, settings, sharpness) for match in thinned
+            _match_errors(cameras, offset_changes, samples, match, settings, foot_precision)
+            for match in thinned
         ]
         return np.concatenate(parts)
 
@@ -146,9 +147,9 @@ def _match_errors(
     samples: Sequence[WalkSamples],
     match: Correspondences,
     settings: WalkSettings,
-    sharpness: float,
+    foot_precision: float,
 ) -> Floats:
-    residuals = floor_residuals(cameras, offset_changes, samples, match, settings) * sharpness
+    residuals = floor_residuals(cameras, offset_changes, samples, match, settings) * foot_precision
     distance = np.hypot(*residuals.T)
     valid = np.isfinite(distance)
     distance = np.where(valid, distance, _OFF_FLOOR_ERROR)
@@ -164,7 +165,7 @@ def _cameras(rig: CameraRig, values: Floats) -> list[Pinhole]:
     ]
 
 
-def estimate_sharpness(residuals: Floats) -> float:
+def estimate_foot_precision(residuals: Floats) -> float:
     """Estimate how much more precise foot points are than the settings assume, from residuals (M, 2)."""
     typical = float(np.median(np.hypot(*residuals.T))) / 1.18 if len(residuals) else 1.0  # Rayleigh's median
     return 1.0 / min(max(typical, _MIN_FOOT_ERROR), 1.0)

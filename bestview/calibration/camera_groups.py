@@ -12,7 +12,7 @@ from bestview.calibration.bundle_adjustment import (
     CameraRig,
     Correspondences,
     adjust_bundle,
-    estimate_sharpness,
+    estimate_foot_precision,
 )
 from bestview.calibration.camera_pairs import (
     CameraHypotheses,
@@ -144,12 +144,17 @@ def _build_group(
     numbers = [
         (members.index(pair.one), members.index(pair.other)) for pair in accepted if pair.one in members
     ]
-    samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
+    samples, matches, foot_precision = _match_people(walks, members, rig, pulses, numbers, settings)
     for _ in range(_ROUNDS):
         rig = adjust_bundle(
-            rig, samples, matches, settings, sharpness=sharpness, fixed_offsets=settings.maximum_offset == 0
+            rig,
+            samples,
+            matches,
+            settings,
+            foot_precision=foot_precision,
+            fixed_offsets=settings.maximum_offset == 0,
         )
-        samples, matches, sharpness = _match_people(walks, members, rig, pulses, numbers, settings)
+        samples, matches, foot_precision = _match_people(walks, members, rig, pulses, numbers, settings)
     return CameraGroup(members, rig, tuple(samples), tuple(matches))
 
 
@@ -161,7 +166,11 @@ def _match_people(
     numbers: Sequence[tuple[int, int]],
     settings: WalkSettings,
 ) -> tuple[list[WalkSamples], list[Correspondences], float]:
-    """Match the samples of all aligned pairs of cameras; return samples, matches and sharpness."""
+    """Match the samples of all aligned pairs of cameras.
+
+    Returns:
+        Samples, matches, and the precision of the foot points.
+    """
     samples = [
         sample_walk(walks[number], pulses, float(offset), settings.step, settings.stride)
         for number, offset in zip(members, rig.offsets, strict=True)
@@ -170,17 +179,17 @@ def _match_people(
     for a, b in numbers:
         candidates = candidate_matches(samples[a], samples[b])
         cameras = (rig.cameras[a], rig.cameras[b])
-        distances, places = compare_samples(
+        distances, pair_agreement = compare_samples(
             cameras, (samples[a], samples[b]), candidates, settings, settings.gate
         )
-        matched = mutual_matches(distances, places, samples[a], samples[b], candidates, settings.gate)
+        matched = mutual_matches(distances, pair_agreement, samples[a], samples[b], candidates, settings.gate)
         residuals.append(distances[matched])
         matches.append(
             Correspondences(
                 a, b, candidates.here[matched], candidates.there[matched], candidates.weight[matched]
             )
         )
-    return samples, matches, estimate_sharpness(np.concatenate(residuals))
+    return samples, matches, estimate_foot_precision(np.concatenate(residuals))
 
 
 def _chain_poses(members: tuple[int, ...], tree: Sequence[CameraPair]) -> CameraRig:

@@ -11,15 +11,15 @@ from bestview.calibration.bundle_adjustment import (
     CameraRig,
     Correspondences,
     adjust_bundle,
-    estimate_sharpness,
+    estimate_foot_precision,
 )
 from bestview.calibration.floor_agreement import (
     covisible_agreement,
     mutual_matches,
-    pair_agreement,
     project_to_floor,
     select_positions,
     total_agreement,
+    track_pair_agreement,
     whitened_differences,
 )
 from bestview.calibration.homography import Floats
@@ -128,12 +128,12 @@ def _best_alignment(
 
 def _subset(candidates: CandidateMatches, chosen: np.ndarray) -> CandidateMatches:
     some = np.flatnonzero(chosen)
-    numbers, pair = np.unique(candidates.pair[some], return_inverse=True)
+    numbers, track_pair = np.unique(candidates.track_pair[some], return_inverse=True)
     scale = len(candidates.here) / max(1, len(some))
     return CandidateMatches(
         candidates.here[some],
         candidates.there[some],
-        pair.reshape(-1),
+        track_pair.reshape(-1),
         candidates.tracks[numbers],
         candidates.weight[some] * scale,
     )
@@ -159,7 +159,7 @@ def _score_poses(
             settings,
         )
         scored.append(
-            (total_agreement(pair_agreement(distances, candidates, settings.gate), candidates), pose)
+            (total_agreement(track_pair_agreement(distances, candidates, settings.gate), candidates), pose)
         )
     scored.sort(key=lambda entry: -entry[0])
     return scored[:_MAX_REFINED]
@@ -189,8 +189,8 @@ def _refine_alignment(
     for gate in (*([settings.gate] * _ROUNDS), settings.final_gate):
         there = sample_walk(other.walk, pulses, float(rig.offsets[1]), settings.step, settings.stride)
         candidates = candidate_matches(here, there)
-        distances, places = compare_samples(rig.cameras, (here, there), candidates, settings, gate)
-        matched = mutual_matches(distances, places, here, there, candidates, gate)
+        distances, pair_agreement = compare_samples(rig.cameras, (here, there), candidates, settings, gate)
+        matched = mutual_matches(distances, pair_agreement, here, there, candidates, gate)
         if gate == settings.final_gate or len(matched) < _MIN_MATCHES:
             break
         matches = Correspondences(
@@ -201,7 +201,7 @@ def _refine_alignment(
             (here, there),
             [matches],
             settings,
-            sharpness=estimate_sharpness(distances[matched]),
+            foot_precision=estimate_foot_precision(distances[matched]),
             fixed_offsets=settings.maximum_offset == 0,
         )
     floor = rig.cameras[0].floor(here.feet[candidates.here[matched]])
@@ -212,7 +212,7 @@ def _refine_alignment(
     )
     return PairAlignment(
         rig,
-        total_agreement(places, candidates),
+        total_agreement(pair_agreement, candidates),
         share,
         walk_breadth(floor, candidates.weight[matched]),
         error,
@@ -234,7 +234,7 @@ def compare_samples(
     distances = whitened_differences(
         select_positions(first, candidates.here), select_positions(second, candidates.there), settings
     )
-    return distances, pair_agreement(distances, candidates, gate)
+    return distances, track_pair_agreement(distances, candidates, gate)
 
 
 def walk_breadth(floor: Floats, weight: Floats) -> float:

@@ -82,16 +82,19 @@ def select_positions(positions: FloorPositions, index: NDArray[np.intp]) -> Floo
     return FloorPositions(positions.position[index], positions.covariance[index])
 
 
-def pair_agreement(distances: Floats, candidates: CandidateMatches, gate: float) -> Floats:
+def track_pair_agreement(distances: Floats, candidates: CandidateMatches, gate: float) -> Floats:
     """Count places at which each pair of tracks agrees, minus those at which it does not: (P, 2) -> (K,)."""
     closeness = 1.0 - (distances**2).sum(axis=1) / gate**2
     votes = np.clip(np.nan_to_num(closeness, nan=-1.0), -1.0, 1.0) * candidates.weight
-    return np.asarray(np.bincount(candidates.pair, votes, len(candidates.tracks)))
+    return np.asarray(np.bincount(candidates.track_pair, votes, len(candidates.tracks)))
 
 
-def total_agreement(places: Floats, candidates: CandidateMatches) -> float:
-    """Count places at which the cameras agree in total; each track has one partner."""
-    agreement = np.maximum(places, 0.0)
+def total_agreement(pair_agreement: Floats, candidates: CandidateMatches) -> float:
+    """Count places at which the cameras agree in total, from the agreement of each pair of tracks, (K,).
+
+    A track counts with its best partner only.
+    """
+    agreement = np.maximum(pair_agreement, 0.0)
     totals = []
     for side in candidates.tracks.T:
         best = np.zeros(int(side.max(initial=0)) + 1)
@@ -102,7 +105,7 @@ def total_agreement(places: Floats, candidates: CandidateMatches) -> float:
 
 def mutual_matches(
     distances: Floats,
-    places: Floats,
+    pair_agreement: Floats,
     first: WalkSamples,
     second: WalkSamples,
     candidates: CandidateMatches,
@@ -113,7 +116,7 @@ def mutual_matches(
     Two samples are matched if they are near each other, and if their tracks agree more than either does with
     any other track that is present at that pulse.
     """
-    agreement = places[candidates.pair]
+    agreement = pair_agreement[candidates.track_pair]
     best_here, best_there = np.zeros(len(first.times)), np.zeros(len(second.times))
     np.maximum.at(best_here, candidates.here, agreement)
     np.maximum.at(best_there, candidates.there, agreement)

@@ -64,15 +64,15 @@ def _poses_of_views(
 
     def total(values: np.ndarray) -> np.ndarray:
         real, imaginary = (
-            np.bincount(candidates.pair, weight * part, size) for part in (values.real, values.imag)
+            np.bincount(candidates.track_pair, weight * part, size) for part in (values.real, values.imag)
         )
         return np.asarray(real + 1j * imaginary)
 
     count = total(np.ones(len(x))).real
-    pulse_count = np.bincount(candidates.pair, weight > 0, size)
+    pulse_count = np.bincount(candidates.track_pair, weight > 0, size)
     safe_count = np.maximum(count, 1e-9)
     x_mean, y_mean = total(x) / safe_count, total(y) / safe_count
-    x, y = x - x_mean[candidates.pair], y - y_mean[candidates.pair]
+    x, y = x - x_mean[candidates.track_pair], y - y_mean[candidates.track_pair]
     x_spread, y_spread = (total(np.abs(positions) ** 2).real / safe_count for positions in (x, y))
     cross_spread = total(np.conj(x) * y) / safe_count
     residual = x_spread + y_spread - 2 * np.abs(cross_spread)

@@ -90,14 +90,14 @@ class CandidateMatches:
     Attributes:
         here: (P,) sample of the first camera.
         there: (P,) sample of the second.
-        pair: (P,) index of the pair of tracks, 0 to K - 1.
+        track_pair: (P,) index of the pair of tracks, 0 to K - 1.
         tracks: (K, 2) the two tracks of each pair.
         weight: (P,) the larger of both samples' weights.
     """
 
     here: Indices
     there: Indices
-    pair: Indices
+    track_pair: Indices
     tracks: Indices
     weight: Floats
 
@@ -112,9 +112,9 @@ def candidate_matches(one: WalkSamples, other: WalkSamples) -> CandidateMatches:
     within = np.arange(len(here)) - np.repeat(np.cumsum(count) - count, count)
     there = order[np.repeat(low, count) + within]
     both = np.column_stack([one.track[here], other.track[there]])
-    tracks, pair = np.unique(both, axis=0, return_inverse=True)
+    tracks, track_pair = np.unique(both, axis=0, return_inverse=True)
     weight = np.maximum(one.weight[here], other.weight[there])
-    return CandidateMatches(here, there, pair.reshape(-1), tracks.reshape(-1, 2), weight)
+    return CandidateMatches(here, there, track_pair.reshape(-1), tracks.reshape(-1, 2), weight)
 
 
 def select_moving_samples(samples: WalkSamples, maximum: int) -> Indices:

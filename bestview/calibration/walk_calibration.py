@@ -33,13 +33,13 @@ class CameraCalibration:
     Attributes:
         camera: its name.
         floor: number of its floor, shared by the cameras of one group.
-        homography: (3, 3) from its pixels to the floor, in the unit of `person`.
+        homography: (3, 3) from its pixels to the floor, in the unit of the person height.
         offset: pulse of its frame 0, relative to the first camera of its floor, frames.
         offset_error: standard error of the offset, frames.
         image: (N, 2) foot points that were matched with another camera, pixels.
         position: (N, 2) mean of both cameras' positions of them on the floor.
-        heights: distance between both positions on the floor, in person heights.
-        picture: distance of the other's position, projected into this picture, as a share of its diagonal.
+        floor_error: distance between both positions on the floor, in person heights.
+        image_error: distance of the other's position in this picture, as a share of the diagonal.
         thirds: (3,) share of these foot points in the left, middle and right third of the picture.
         depth_ratio: apparent height of the nearest of them over that of the farthest.
     """
@@ -51,8 +51,8 @@ class CameraCalibration:
     offset_error: float
     image: Floats
     position: Floats
-    heights: ErrorSummary
-    picture: ErrorSummary
+    floor_error: ErrorSummary
+    image_error: ErrorSummary
     thirds: tuple[float, float, float]
     depth_ratio: float
 
@@ -72,25 +72,25 @@ class WalkCalibration:
     Attributes:
         cameras: those that could be placed, in the order given.
         uncalibrated: the others.
-        heights: distance between two cameras' positions of the same foot points, in person heights.
-        picture: the same in the pictures, as a share of the diagonal.
+        floor_error: distance between two cameras' positions of the same foot points, in person heights.
+        image_error: the same in the pictures, as a share of the diagonal.
     """
 
     cameras: tuple[CameraCalibration, ...]
     uncalibrated: tuple[UncalibratedCamera, ...]
-    heights: ErrorSummary
-    picture: ErrorSummary
+    floor_error: ErrorSummary
+    image_error: ErrorSummary
 
 
 def calibrate_from_walks(
-    walks: Sequence[Walk], settings: WalkSettings | None = None, person: float = 1.75
+    walks: Sequence[Walk], settings: WalkSettings | None = None, person_height: float = 1.75
 ) -> WalkCalibration:
     """Calibrate cameras on common floors from the tracks of people who walked through their views.
 
     Args:
         walks: of each camera, at least two.
         settings: of the comparison.
-        person: how tall people are in the unit of the floor.
+        person_height: how tall people are, in the unit of the floor to be.
 
     Raises:
         CalibrationError: no two cameras could be placed on one floor, or one agrees with none of its floor.
@@ -111,7 +111,7 @@ def calibrate_from_walks(
         offset_standard_errors(group.rig, group.samples, group.matches, settings) for group in groups
     ]
     calibrated = [
-        _camera(walks[number].camera, floor, group, place, errors, person)
+        _camera(walks[number].camera, floor, group, place, errors, person_height)
         for floor, (group, errors) in enumerate(zip(groups, offset_errors, strict=True))
         for place, number in enumerate(group.members)
     ]
@@ -120,8 +120,8 @@ def calibrate_from_walks(
     return WalkCalibration(
         tuple(sorted(calibrated, key=lambda calibration: order[calibration.camera])),
         tuple(left_out),
-        _summarize([pair_errors.heights for pair_errors in off]),
-        _summarize([pair_errors.picture for pair_errors in off]),
+        _summarize([pair_errors.floor_error for pair_errors in off]),
+        _summarize([pair_errors.image_error for pair_errors in off]),
     )
 
 
@@ -129,8 +129,8 @@ def calibrate_from_walks(
 class _CorrespondenceErrors:
     """Errors of one camera's correspondences with another, (M,) each, and where they are."""
 
-    heights: Floats
-    picture: Floats
+    floor_error: Floats
+    image_error: Floats
     image: Floats
     position: Floats
 
@@ -144,14 +144,14 @@ def _correspondence_errors(group: CameraGroup, match: Correspondences, own: int)
     image = group.samples[own].feet[index]
     position = camera.floor(image)
     other_position = group.rig.cameras[across].floor(group.samples[across].feet[there])
-    picture_error = np.hypot(*(camera.picture(other_position) - image).T) / np.hypot(*camera.size)
+    image_error = np.hypot(*(camera.picture(other_position) - image).T) / np.hypot(*camera.size)
     return _CorrespondenceErrors(
-        np.hypot(*(position - other_position).T), picture_error, image, (position + other_position) / 2
+        np.hypot(*(position - other_position).T), image_error, image, (position + other_position) / 2
     )
 
 
 def _camera(
-    name: str, floor: int, group: CameraGroup, own: int, errors: Floats, person: float
+    name: str, floor: int, group: CameraGroup, own: int, errors: Floats, person_height: float
 ) -> CameraCalibration:
     off = [
         _correspondence_errors(group, match, own)
@@ -169,8 +169,8 @@ def _camera(
     left, middle, right = (float(share) for share in np.bincount(third, minlength=3) / max(1, len(third)))
     shift = np.array([floor * _FLOOR_DISTANCE, 0.0])
     moved = np.eye(3)
-    moved[:2, 2] = shift * person
-    homography = moved @ group.rig.cameras[own].floor_homography(person)
+    moved[:2, 2] = shift * person_height
+    homography = moved @ group.rig.cameras[own].floor_homography(person_height)
     return CameraCalibration(
         camera=name,
         floor=floor,
@@ -178,9 +178,9 @@ def _camera(
         offset=float(group.rig.offsets[own]),
         offset_error=float(errors[own]),
         image=image,
-        position=(place + shift) * person,
-        heights=_summarize([pair.heights for pair in off]),
-        picture=_summarize([pair.picture for pair in off]),
+        position=(place + shift) * person_height,
+        floor_error=_summarize([pair.floor_error for pair in off]),
+        image_error=_summarize([pair.image_error for pair in off]),
         thirds=(left, middle, right),
         depth_ratio=float(np.nanquantile(tall, 0.95) / np.nanquantile(tall, 0.05)),
     )

@@ -67,11 +67,11 @@ def build_walk(
     frames: Sequence[int],
     ids: Sequence[int],
     boxes: Floats,
-    step: int = 5,
+    averaging_frames: int = 5,
 ) -> Walk:
     """Build the walk of a camera from rows of detections, without boxes that the picture's edge cuts off.
 
-    Boxes are averaged over about a step, so that lifted feet do not count as movement.
+    Boxes are averaged over some frames, so that lifted feet do not count as movement.
 
     Args:
         camera: its name.
@@ -79,8 +79,8 @@ def build_walk(
         frames: (N,) the frame of each row.
         ids: (N,) the track of each row.
         boxes: (N, 4) left, top, right, bottom of each row in pixels.
-        step: frames over which boxes are averaged, as in `WalkSettings`. Longer gaps split a track; the boxes
-            of shorter ones are interpolated.
+        averaging_frames: frames over which boxes are averaged, the `step` of `WalkSettings`. Longer gaps
+            split a track; the boxes of shorter ones are interpolated.
     """
     frame, track_id = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
     inside = ~boxes_at_edge(boxes, size)
@@ -89,8 +89,8 @@ def build_walk(
         rows = np.flatnonzero((track_id == number) & inside)
         rows = rows[np.argsort(frame[rows], kind="stable")]
         # Across a long gap the tracker may have confused people.
-        parts = np.split(rows, np.flatnonzero(np.diff(frame[rows]) > step) + 1)
-        tracks += [_track(frame[part], boxes[part], step) for part in parts if len(part) > 1]
+        parts = np.split(rows, np.flatnonzero(np.diff(frame[rows]) > averaging_frames) + 1)
+        tracks += [_track(frame[part], boxes[part], averaging_frames) for part in parts if len(part) > 1]
     return Walk(camera, size, tuple(sorted(tracks, key=lambda track: (track.first_frame, track.end_frame))))
 
 
@@ -107,10 +107,10 @@ def boxes_at_edge(boxes: Floats, size: tuple[int, int]) -> np.ndarray:
     )
 
 
-def _track(frames: np.ndarray, boxes: Floats, step: int) -> WalkTrack:
+def _track(frames: np.ndarray, boxes: Floats, averaging_frames: int) -> WalkTrack:
     every = np.arange(frames[0], frames[-1] + 1)
     filled = np.column_stack([np.interp(every, frames, side) for side in boxes.T])
-    return WalkTrack(int(frames[0]), _moving_average(filled, step // 2))
+    return WalkTrack(int(frames[0]), _moving_average(filled, averaging_frames // 2))
 
 
 def _moving_average(boxes: Floats, half: int) -> Floats:

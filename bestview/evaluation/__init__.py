@@ -3,7 +3,7 @@
 from bestview.evaluation.ground_truth import (
     NO_PERSON,
     ViewGroundTruth,
-    match_objects_to_people,
+    assign_objects_to_people,
     optimal_views,
     view_ground_truth,
 )
@@ -13,8 +13,8 @@ __all__ = [
     "NO_PERSON",
     "ViewGroundTruth",
     "ViewScore",
+    "assign_objects_to_people",
     "cut_frames",
-    "match_objects_to_people",
     "optimal_views",
     "score_views",
     "view_ground_truth",

@@ -35,7 +35,7 @@ class ViewGroundTruth:
 
 def view_ground_truth(
     boxes: NDArray[np.float64],
-    shown: NDArray[np.float64],
+    visible_share: NDArray[np.float64],
     sizes: NDArray[np.float64],
     minimum_visible_share: float,
 ) -> ViewGroundTruth:
@@ -46,7 +46,7 @@ def view_ground_truth(
 
     Args:
         boxes: (K, N, C, 4) left, top, right, bottom in pixels of the camera's picture; NaN: no box.
-        shown: (K, N, C) the share of each person that shows, in [0, 1]; negative where it is not known,
+        visible_share: (K, N, C) of each person, in [0, 1]; negative where it is not known,
             which counts as all of it.
         sizes: (C, 2) width and height of each camera's picture, pixels.
         minimum_visible_share: in [0, 1]; 0: everyone with a box is visible.
@@ -54,12 +54,14 @@ def view_ground_truth(
     Raises:
         ValueError: shapes that do not fit, or a picture without area.
     """
-    if boxes.ndim != 4 or shown.shape != boxes.shape[:3] or sizes.shape != (boxes.shape[2], 2):  # noqa: PLR2004
-        raise ValueError(f"shapes do not fit: boxes {boxes.shape}, shown {shown.shape}, sizes {sizes.shape}")
-    quality = np.zeros(shown.shape)
+    if boxes.ndim != 4 or visible_share.shape != boxes.shape[:3] or sizes.shape != (boxes.shape[2], 2):  # noqa: PLR2004
+        raise ValueError(
+            f"shapes do not fit: boxes {boxes.shape}, shares {visible_share.shape}, sizes {sizes.shape}"
+        )
+    quality = np.zeros(visible_share.shape)
     for camera, (width, height) in enumerate(sizes.tolist()):
         quality[:, :, camera] = size_quality(boxes[:, :, camera], width, height)
-    visible = (quality > 0.0) & ((shown < 0.0) | (shown >= minimum_visible_share))
+    visible = (quality > 0.0) & ((visible_share < 0.0) | (visible_share >= minimum_visible_share))
     return ViewGroundTruth(view_cost(relative_quality(np.where(visible, quality, 0.0), axis=2)), visible)
 
 
@@ -87,7 +89,7 @@ def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int6
 _NO_PREVIOUS_VIEW = np.array([NO_CAMERA])
 
 
-def match_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
+def assign_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
     """Assign each object to one person and each person to one object, with the largest total of matches.
 
     As for IDF1 (Ristani et al., 2016), over all cameras together.

@@ -88,8 +88,8 @@ class DetectionProbabilityMap:
         """Return the probability that cameras (V,) detect people at (V, 2) pixels of their pictures."""
         return self._cell_rate.reshape(-1)[self._cells(camera, feet)]
 
-    def trust(self, camera: Ints, feet: Floats) -> Floats:
-        """Return the probability that cameras (V,) show undetected people at (V, 2) pixels: (V,) in [0, 1].
+    def undetected_view_probability(self, camera: Ints, feet: Floats) -> Floats:
+        """Return the probability that cameras (V,) show people whom they miss at (V, 2) pixels: (V,), 0 to 1.
 
         ``min(p / max(c, 0.5), 1) · min(max((1 - c - 0.04) / 0.02, 0), 1)``, with `p` the probability at the
         place and `c` that of the whole camera. A camera that detects almost everyone misses only people who

@@ -89,17 +89,19 @@ def project_feet(bodies: BodyEstimates, homographies: Floats) -> Floats:
     return from_ground(homographies, bodies.ground_point[:, None])
 
 
-def project_boxes(bodies: BodyEstimates, moment: Ints, foot: Floats, homographies: Floats) -> Floats:
-    """Project (V,) bodies into pictures in which their feet are at (V, 2) pixels: (V, 4) boxes.
+def project_boxes(
+    bodies: BodyEstimates, moment: Ints, view_feet: Floats, view_homographies: Floats
+) -> Floats:
+    """Project one body into each of V views, in which its feet are already known: (V, 4) boxes.
 
     Args:
         bodies: M of them.
         moment: (V,) index of the body of each view.
-        foot: (V, 2) pixels.
-        homographies: (V, 3, 3) pixels -> ground, of each view's camera.
+        view_feet: (V, 2) its foot point in the view's picture, pixels.
+        view_homographies: (V, 3, 3) pixels -> ground, of the view's camera.
     """
-    x, y = foot[:, 0], foot[:, 1]
-    pixel = person_heights(homographies, np.stack([x, y - 1.0, x, y], axis=1))
+    x, y = view_feet[:, 0], view_feet[:, 1]
+    pixel = person_heights(view_homographies, np.stack([x, y - 1.0, x, y], axis=1))
     height = bodies.height[moment] / pixel
     half_width = height * bodies.aspect_ratio[moment] / 2.0
     return np.stack([x - half_width, y - height, x + half_width, y], axis=1)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.quality.facing import NEUTRAL, facing_score
-from bestview.quality.framing import Floats, centering_score, size_quality, visible_share
-from bestview.quality.occlusion import unoccluded_share
+from bestview.quality.framing import Floats, centering_score, size_quality, untruncated_share
+from bestview.quality.occlusion import occlusion_score
 
 _SIDES = 4
 
@@ -57,13 +57,13 @@ class CameraLayout:
     """The cameras of a site, as far as view quality needs them. All pixels are those of the boxes.
 
     Attributes:
-        size: width and height of the picture that viewers are shown, pixels.
+        site_size: width and height of the picture that viewers are shown, pixels.
         picture_boxes: (C, 4) where each camera's own picture lies in it: left, top, right, bottom.
         homographies: from those pixels to the ground, None: not calibrated; C of them.
         fps: frames per second.
     """
 
-    size: tuple[float, float]
+    site_size: tuple[float, float]
     picture_boxes: Floats
     homographies: Sequence[Floats | None]
     fps: float
@@ -153,9 +153,9 @@ def _facing(inputs: _TermInputs) -> Floats:
 
 
 TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
-    "size": lambda inputs: size_quality(inputs.boxes, *inputs.layout.size),
-    "truncation": lambda inputs: visible_share(inputs.boxes, inputs.picture_boxes),
-    "occlusion": lambda inputs: unoccluded_share(inputs.boxes, inputs.tracks.camera),
+    "size": lambda inputs: size_quality(inputs.boxes, *inputs.layout.site_size),
+    "truncation": lambda inputs: untruncated_share(inputs.boxes, inputs.picture_boxes),
+    "occlusion": lambda inputs: occlusion_score(inputs.boxes, inputs.tracks.camera),
     "centering": lambda inputs: centering_score(inputs.boxes, inputs.picture_boxes),
     "sharpness": lambda inputs: np.nan_to_num(inputs.tracks.sharpness, nan=1.0)[:, None],
     "facing": _facing,

@@ -16,10 +16,14 @@ _UPRIGHT_ASPECT_RATIO = 0.37
 """Width over height of the box of an upright person: a slimmer one at a side edge is truncated."""
 
 
-def areas_inside_picture(boxes: Floats, pictures: Floats) -> Floats:
+def areas_inside_picture(boxes: Floats, picture_boxes: Floats) -> Floats:
     """Return the area of the part of each box inside its picture: two (..., 4), broadcast to (...)."""
-    width = np.minimum(boxes[..., 2], pictures[..., 2]) - np.maximum(boxes[..., 0], pictures[..., 0])
-    height = np.minimum(boxes[..., 3], pictures[..., 3]) - np.maximum(boxes[..., 1], pictures[..., 1])
+    width = np.minimum(boxes[..., 2], picture_boxes[..., 2]) - np.maximum(
+        boxes[..., 0], picture_boxes[..., 0]
+    )
+    height = np.minimum(boxes[..., 3], picture_boxes[..., 3]) - np.maximum(
+        boxes[..., 1], picture_boxes[..., 1]
+    )
     return np.asarray(np.maximum(width, 0.0) * np.maximum(height, 0.0))
 
 
@@ -59,25 +63,25 @@ def size_quality(boxes: Floats, width: float, height: float) -> NDArray[np.float
     return np.asarray(np.sqrt(np.nan_to_num(area) / (width * height)))
 
 
-def centering_score(boxes: Floats, pictures: Floats) -> Floats:
+def centering_score(boxes: Floats, picture_boxes: Floats) -> Floats:
     """Return the centering score: 1 in the middle of the picture, 0 in its corners.
 
     ``1 - distance of the middles / half the diagonal``
 
     Args:
         boxes: (..., 4) pixels, without hidden ones.
-        pictures: (..., 4) each camera's own picture, pixels; broadcast to `boxes`.
+        picture_boxes: (..., 4) each camera's own picture, pixels; broadcast to `boxes`.
 
     Returns:
         (...) values in [0, 1].
     """
-    offset = (boxes[..., :2] + boxes[..., 2:] - pictures[..., :2] - pictures[..., 2:]) / 2.0
-    diagonal = pictures[..., 2:] - pictures[..., :2]
+    offset = (boxes[..., :2] + boxes[..., 2:] - picture_boxes[..., :2] - picture_boxes[..., 2:]) / 2.0
+    diagonal = picture_boxes[..., 2:] - picture_boxes[..., :2]
     half = np.hypot(diagonal[..., 0], diagonal[..., 1]) / 2.0
     return np.asarray(np.clip(1.0 - np.hypot(offset[..., 0], offset[..., 1]) / half, 0.0, 1.0))
 
 
-def visible_share(boxes: Floats, pictures: Floats) -> Floats:
+def untruncated_share(boxes: Floats, picture_boxes: Floats) -> Floats:
     """Estimate the share of the person inside the picture from the box.
 
     ``area(box in picture) / area(box)``, times ``1 - 0.05 n`` for the nearer of the upper and lower edge,
@@ -88,13 +92,13 @@ def visible_share(boxes: Floats, pictures: Floats) -> Floats:
 
     Args:
         boxes: (..., 4) pixels, without hidden ones.
-        pictures: (..., 4) each camera's own picture, pixels; broadcast to `boxes`.
+        picture_boxes: (..., 4) each camera's own picture, pixels; broadcast to `boxes`.
 
     Returns:
         (...) values in [0, 1].
     """
-    inside = area_shares(areas_inside_picture(boxes, pictures), areas(boxes))
-    left, top, right, bottom = np.moveaxis((boxes - pictures) * np.array([1.0, 1.0, -1.0, -1.0]), -1, 0)
+    inside = area_shares(areas_inside_picture(boxes, picture_boxes), areas(boxes))
+    left, top, right, bottom = np.moveaxis((boxes - picture_boxes) * np.array([1.0, 1.0, -1.0, -1.0]), -1, 0)
     height = boxes[..., 3] - boxes[..., 1]
     at_top_or_bottom = _edge_proximity(np.minimum(top, bottom), height)
     at_side = np.minimum(left, right)

@@ -16,8 +16,8 @@ _FULLY_VISIBLE_SHARE = 0.5
 """Uncovered share of a box from which a person counts as fully visible: people do not fill their boxes."""
 
 
-def unoccluded_share(boxes: Floats, cameras: Ints) -> Floats:
-    """Return twice the share of each box that no nearer person covers, at most 1.
+def occlusion_score(boxes: Floats, cameras: Ints) -> Floats:
+    """Return the occlusion score: twice the share of each box that no nearer person covers, at most 1.
 
     Lower feet in the picture are nearer. With *a* the covered share of the box and *p*, in [0, 1], the
     certainty that the other person is nearer, the share left is the product of ``1 - p a`` over all others,

@@ -44,7 +44,7 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
 
 
 def calibrate_from_walks(
-    walk: RecordedWalk, out: Path, plan: Path, settings: WalkSettings, person: float, *, force: bool
+    walk: RecordedWalk, out: Path, plan: Path, settings: WalkSettings, person_height: float, *, force: bool
 ) -> list[str]:
     """Calibrate from walks, and write the ground file and the floor plan.
 
@@ -55,7 +55,7 @@ def calibrate_from_walks(
         UserError: the walk covered too little.
     """
     with refusing("calibrate"):
-        outcome = calibrate_walk(walk, settings, person)
+        outcome = calibrate_walk(walk, settings, person_height)
     if outcome.insufficient and not force:
         raise UserError(
             f"calibrate: the walk covered too little: {outcome.insufficient} (--force writes it anyway)"

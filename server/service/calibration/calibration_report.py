@@ -80,13 +80,13 @@ class CalibrationReport:
     ground: str
 
 
-def calibrate_walk(recorded: RecordedWalk, settings: WalkSettings, person: float) -> CalibrationReport:
-    """Calibrate the cameras on a common floor, in meters; the walking person is `person` meters tall.
+def calibrate_walk(recorded: RecordedWalk, settings: WalkSettings, person_height: float) -> CalibrationReport:
+    """Calibrate the cameras on a common floor, in meters; `person_height` is that of the walking person.
 
     Raises:
         CalibrationError: the walk is insufficient.
     """
-    calibration = calibrate_from_walks(recorded.walks, settings, person)
+    calibration = calibrate_from_walks(recorded.walks, settings, person_height)
     missing = [
         line
         for camera in calibration.cameras
@@ -98,7 +98,7 @@ def calibrate_walk(recorded: RecordedWalk, settings: WalkSettings, person: float
         (*report_lines(recorded, calibration, settings), *(gap.text for gap in missing)),
         next((gap.text for gap in missing if gap.serious), ""),
         offset_lines(recorded, calibration) if settings.maximum_offset else "",
-        ground_file_text("m", homographies, details(recorded, calibration, person)),
+        ground_file_text("m", homographies, details(recorded, calibration, person_height)),
     )
 
 
@@ -137,12 +137,12 @@ def coverage_gaps(camera: str, thirds: Sequence[float], depth_ratio: float) -> I
 
 def report_lines(recorded: RecordedWalk, calibration: WalkCalibration, settings: WalkSettings) -> list[str]:
     """Return the lines about errors, coverage and offsets."""
-    on_floor, in_pictures = _heights(calibration.heights), _shares(calibration.picture)
+    on_floor, in_pictures = _heights(calibration.floor_error), _shares(calibration.image_error)
     lines = [f"feet that two cameras see are {on_floor} apart, in the pictures {in_pictures} of the diagonal"]
     for camera in calibration.cameras:
         left, middle, right = (f"{100 * share:.0f}" for share in camera.thirds)
         lines.append(
-            f"{camera.camera}: {_heights(camera.heights)}, {_shares(camera.picture)}; "
+            f"{camera.camera}: {_heights(camera.floor_error)}, {_shares(camera.image_error)}; "
             f"of the walk {left} % in the left, {middle} % in the middle and {right} % in the right third, "
             f"the nearest {camera.depth_ratio:.1f} times as tall as the farthest"
         )
@@ -158,14 +158,14 @@ def report_lines(recorded: RecordedWalk, calibration: WalkCalibration, settings:
     return lines
 
 
-def details(recorded: RecordedWalk, calibration: WalkCalibration, person: float) -> dict[str, Any]:
+def details(recorded: RecordedWalk, calibration: WalkCalibration, person_height: float) -> dict[str, Any]:
     """Return the content of the ground file besides the homographies."""
     return {
-        "person": person,
+        "person": person_height,
         "offset": {camera.camera: _offset(recorded, camera) for camera in calibration.cameras},
         "floor": {camera.camera: camera.floor for camera in calibration.cameras},
         "residuals": {
-            camera.camera: {"heights": _numbers(camera.heights), "picture": _numbers(camera.picture)}
+            camera.camera: {"heights": _numbers(camera.floor_error), "picture": _numbers(camera.image_error)}
             for camera in calibration.cameras
         },
         "left_out": {camera.camera: camera.reason for camera in calibration.uncalibrated},

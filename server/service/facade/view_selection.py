@@ -29,7 +29,7 @@ class ViewSelection(msgspec.Struct, frozen=True):
     undetected: dict[str, float]
     """Share of the look-ahead in which each camera misses the person, whom others locate in its view."""
     undetected_quality: dict[str, float | None]
-    """Mean quality of these inferred views, times the trust in them; null: there are none."""
+    """Mean quality of these inferred views, times the probability of each; null: there are none."""
     weights: dict[str, float]
     """By term: the share of a view's quality that is lost where the term is 0."""
     before: str | None

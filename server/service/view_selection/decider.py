@@ -14,11 +14,11 @@ from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.view_selection.cross_view_inference import CrossViewInference
 from server.service.view_selection.current_shots import CurrentShots
 from server.service.view_selection.explanation import SelectionReasons
 from server.service.view_selection.lookahead_window import LookaheadWindow
 from server.service.view_selection.recent_views import RecentViews
+from server.service.view_selection.undetected_view_inference import UndetectedViewInference
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 Floats = NDArray[np.float64]
@@ -98,7 +98,7 @@ class ViewDecider:
         self._max_gops_per_epoch = -(-stride // gop) + 1
         """One more than an epoch completes, so that a backlog after a shorter look-ahead shrinks."""
         self._quality_buffer = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
-        self._cross_view_inference = CrossViewInference(config, self._quality_buffer)
+        self._undetected_view_inference = UndetectedViewInference(config, self._quality_buffer)
         self._shots = CurrentShots()
         self._recent_views = RecentViews()
         self._next_gop: int | None = None
@@ -149,7 +149,7 @@ class ViewDecider:
         gop_starts = range(self._next_gop, last + 1, gop)[: self._max_gops_per_epoch]
         decided = [self._decide(window, first, gop, weight) for first in gop_starts]
         self._recent_views = window.recent_views(self._next_gop)
-        self._cross_view_inference.learn(window.inferred_views, self._next_gop - window.first)
+        self._undetected_view_inference.learn(window.inferred_views, self._next_gop - window.first)
         return decided
 
     def finish(self, last: int) -> list[GopDecision]:
@@ -175,7 +175,9 @@ class ViewDecider:
             relative=self._config.view.quality.relative,
             recent_views=self._recent_views,
             decay_frames=self._config.view.presence_decay_s * self._config.site.fps,
-            cross_view_inference=self._cross_view_inference if self._config.view.undetected_weight else None,
+            undetected_view_inference=self._undetected_view_inference
+            if self._config.view.undetected_weight
+            else None,
             undetected_weight=self._config.view.undetected_weight,
         )
 

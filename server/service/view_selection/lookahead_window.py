@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from bestview import NO_VIEW_COST, GopCosts, VisibleViews, add_inferred_views, add_missed_detections
 from bestview.quality import relative_view_quality
 from server.service.identity.people import PersonTracker
-from server.service.view_selection.cross_view_inference import CrossViewInference
 from server.service.view_selection.recent_views import RecentViews
+from server.service.view_selection.undetected_view_inference import UndetectedViewInference
 from server.service.view_selection.undetected_views import UndetectedViews
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 from server.service.view_selection.window_tracks import WindowTracks, find_indices
@@ -44,7 +44,7 @@ class LookaheadWindow:
         relative: bool,
         recent_views: RecentViews = NO_RECENT_VIEWS,
         decay_frames: float = 0.0,
-        cross_view_inference: CrossViewInference | None = None,
+        undetected_view_inference: UndetectedViewInference | None = None,
         undetected_weight: float = 0.0,
     ) -> None:
         self.cameras, self.first = cameras, first
@@ -63,8 +63,8 @@ class LookaheadWindow:
         )
         self.inferred_views = (
             UndetectedViews.empty()
-            if cross_view_inference is None
-            else cross_view_inference.infer(tracks, everyone, len(pulses))
+            if undetected_view_inference is None
+            else undetected_view_inference.infer(tracks, everyone, len(pulses))
         )
         """For the people of all shards."""
         person = np.append(own_indices, -1)[everyone]

@@ -37,7 +37,7 @@ class UndetectedViews:
         frame: (V,) counted from the window's first.
         camera: (V,) by index.
         person: (V,) by index.
-        quality: (V,) as of detected people, times the trust that they are visible.
+        quality: (V,) as of detected people, times the probability that the camera shows the person.
         tested: the tests to learn from.
     """
 

@@ -13,9 +13,9 @@ from bestview.calibration.bundle_adjustment import CameraRig, Correspondences, o
 from bestview.calibration.camera_pairs import walk_breadth
 from bestview.calibration.floor_agreement import (
     mutual_matches,
-    pair_agreement,
     project_to_floor,
     total_agreement,
+    track_pair_agreement,
     whitened_differences,
 )
 from bestview.calibration.pair_hypotheses import propose_relative_poses
@@ -108,7 +108,7 @@ def test_candidate_matches_pair_samples_of_the_same_pulse(random: np.random.Gene
     assert set(zip(candidates.here.tolist(), candidates.there.tolist(), strict=True)) == expected
     for index in range(len(candidates.here)):
         pair = (here.track[candidates.here[index]], there.track[candidates.there[index]])
-        assert tuple(candidates.tracks[candidates.pair[index]]) == pair
+        assert tuple(candidates.tracks[candidates.track_pair[index]]) == pair
 
 
 @settings(deadline=None, max_examples=30)
@@ -148,15 +148,15 @@ def test_matches_are_one_to_one_at_each_pulse_and_near(random: np.random.Generat
     here, there = (sample_walk(walk, pulses, 0.0, 3, 0.15) for walk in (one, other))
     candidates = candidate_matches(here, there)
     off = random.normal(0, 1.0, (len(candidates.here), 2))
-    places = pair_agreement(off, candidates, 2.0)
+    pair_agreement = track_pair_agreement(off, candidates, 2.0)
     for pair in range(len(candidates.tracks)):
-        own_rows = candidates.pair == pair
+        own_rows = candidates.track_pair == pair
         counted = np.clip(1 - (off[own_rows] ** 2).sum(axis=1) / 4, -1, 1) * candidates.weight[own_rows]
-        assert places[pair] == pytest.approx(counted.sum())
-    chosen = mutual_matches(off, places, here, there, candidates, 2.0)
+        assert pair_agreement[pair] == pytest.approx(counted.sum())
+    chosen = mutual_matches(off, pair_agreement, here, there, candidates, 2.0)
     assert len(set(candidates.here[chosen])) == len(set(candidates.there[chosen])) == len(chosen)
     assert (np.hypot(*off[chosen].T) < 2.0).all()
-    assert total_agreement(places, candidates) <= np.maximum(places, 0).sum() + 1e-9
+    assert total_agreement(pair_agreement, candidates) <= np.maximum(pair_agreement, 0).sum() + 1e-9
 
 
 @settings(deadline=None, max_examples=20)

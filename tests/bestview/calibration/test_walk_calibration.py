@@ -38,7 +38,7 @@ def test_one_walking_person_calibrates_two_cameras_and_their_offset(seed: int, o
     assert errors.max() < 0.4
     assert found.cameras[0].offset == 0.0
     assert found.cameras[1].offset == pytest.approx(offset, abs=1.5)
-    assert found.heights.median < 0.15
+    assert found.floor_error.median < 0.15
 
 
 def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:

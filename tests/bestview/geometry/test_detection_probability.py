@@ -93,31 +93,33 @@ def test_trials_can_have_weights() -> None:
     )
 
 
-def trust(probabilities: DetectionProbabilityMap, place: np.ndarray, camera: int = 0) -> float:
-    return float(probabilities.trust(np.array([camera]), place[None])[0])
+def view_probability(probabilities: DetectionProbabilityMap, place: np.ndarray, camera: int = 0) -> float:
+    return float(probabilities.undetected_view_probability(np.array([camera]), place[None])[0])
 
 
-def test_trust_is_the_local_detection_rate_relative_to_the_cameras() -> None:
+def test_a_view_is_as_probable_as_the_local_detection_rate_relative_to_the_cameras() -> None:
     probabilities = new_map(prior=0.6, few=10.0, many=50.0)
     learn_trials(probabilities, FAR, found=True, times=150)
     learn_trials(probabilities, HERE, found=False, times=30)
     learn_trials(probabilities, HERE, found=True, times=20)
     camera_rate = (170 + 30) / (200 + 50)
-    assert trust(probabilities, HERE) == pytest.approx((20 + 10 * camera_rate) / (50 + 10) / camera_rate)
-    assert trust(probabilities, FAR) == 1.0
-    assert trust(probabilities, HERE, camera=1) == 1.0, "nothing is known of this camera"
+    assert view_probability(probabilities, HERE) == pytest.approx(
+        (20 + 10 * camera_rate) / (50 + 10) / camera_rate
+    )
+    assert view_probability(probabilities, FAR) == 1.0
+    assert view_probability(probabilities, HERE, camera=1) == 1.0, "nothing is known of this camera"
 
 
-def test_a_camera_with_few_detections_does_not_raise_trust() -> None:
+def test_a_camera_with_few_detections_does_not_make_views_probable() -> None:
     probabilities = new_map()
     learn_trials(probabilities, HERE, found=False, times=450)
-    assert trust(probabilities, FAR) == pytest.approx(0.06 / 0.5)
+    assert view_probability(probabilities, FAR) == pytest.approx(0.06 / 0.5)
 
 
 def test_a_person_missed_by_a_camera_that_detects_all_others_is_occluded() -> None:
     probabilities = new_map(prior=0.93, few=30.0, many=100.0)
-    assert trust(probabilities, HERE) == 1.0
+    assert view_probability(probabilities, HERE) == 1.0
     learn_trials(probabilities, FAR, found=True, times=45)
-    assert 0.0 < trust(probabilities, HERE) < 1.0
+    assert 0.0 < view_probability(probabilities, HERE) < 1.0
     learn_trials(probabilities, FAR, found=True, times=60)
-    assert trust(probabilities, HERE) == 0.0
+    assert view_probability(probabilities, HERE) == 0.0

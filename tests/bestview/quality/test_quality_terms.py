@@ -18,8 +18,8 @@ from bestview.quality import (
     view_cost,
 )
 from bestview.quality.facing import facing_score
-from bestview.quality.framing import centering_score, visible_share
-from bestview.quality.occlusion import unoccluded_share
+from bestview.quality.framing import centering_score, untruncated_share
+from bestview.quality.occlusion import occlusion_score
 
 WIDTH, HEIGHT, FPS = 100.0, 80.0, 25.0
 PICTURE = np.array([0.0, 0.0, WIDTH, HEIGHT])
@@ -57,24 +57,26 @@ def only(**weights: float) -> QualitySettings:
 
 def test_a_box_clear_of_all_edges_is_not_truncated() -> None:
     boxes = np.array([box(20, 20), box(-5, 20), box(20, 40), box(20, 0), box(20, 60), box(200, 20)])
-    assert visible_share(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.95, 0.95, 0.475, 0.0])
+    assert untruncated_share(boxes, PICTURE) == pytest.approx([1.0, 0.5, 0.95, 0.95, 0.475, 0.0])
 
 
 def test_truncation_grows_gradually_towards_an_edge() -> None:
-    values = visible_share(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
+    values = untruncated_share(np.array([box(20, 40 - gap) for gap in (0.0, 0.3, 0.6, 1.2, 5.0)]), PICTURE)
     assert values == pytest.approx([0.95, 0.9625, 0.975, 1.0, 1.0])
 
 
 def test_a_slim_box_at_a_side_edge_is_truncated_by_its_width() -> None:
     slim, wide = 0.37 * 40.0 / 2.0, 0.37 * 40.0
     boxes = np.array([box(0, 20, slim), box(WIDTH - slim, 20, slim), box(0, 20, wide), box(0, 20, 2 * wide)])
-    assert visible_share(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
+    assert untruncated_share(boxes, PICTURE) == pytest.approx([0.5, 0.5, 1.0, 1.0])
     away = np.array([box(gap, 20, slim) for gap in (0.0, 0.6, 1.2, 30.0)])
-    assert visible_share(away, PICTURE) == pytest.approx([0.5, 0.75, 1.0, 1.0]), (
+    assert untruncated_share(away, PICTURE) == pytest.approx([0.5, 0.75, 1.0, 1.0]), (
         "away from the edge a slim box is complete"
     )
     beyond = np.array([box(-slim / 2, 20, slim), box(WIDTH - slim / 2, 20, slim)])
-    assert visible_share(beyond, PICTURE) == pytest.approx([0.5, 0.5]), "the area outside counts only once"
+    assert untruncated_share(beyond, PICTURE) == pytest.approx([0.5, 0.5]), (
+        "the area outside counts only once"
+    )
 
 
 def test_centering_is_one_in_the_middle() -> None:
@@ -85,7 +87,7 @@ def test_centering_is_one_in_the_middle() -> None:
 def unoccluded(*boxes: list[float], cameras: tuple[int, ...] | None = None) -> list[float]:
     """Return the visible share of each box in one frame, by default all in one picture."""
     camera_of = np.array(cameras or [0] * len(boxes), dtype=np.int64)
-    return [float(share) for share in unoccluded_share(np.array(boxes)[:, None], camera_of)[:, 0]]
+    return [float(share) for share in occlusion_score(np.array(boxes)[:, None], camera_of)[:, 0]]
 
 
 def test_the_person_with_lower_feet_occludes_the_other() -> None:
@@ -140,7 +142,7 @@ def test_occlusion_equals_the_reference(
 ) -> None:
     cameras = np.array([camera for camera, _ in tracks], dtype=np.int64)
     boxes = np.array([boxes for _, boxes in tracks]).reshape(-1, 3, 4)
-    assert unoccluded_share(boxes, cameras).tolist() == reference_occlusion(boxes, cameras).tolist(), (
+    assert occlusion_score(boxes, cameras).tolist() == reference_occlusion(boxes, cameras).tolist(), (
         "to the bit"
     )
 

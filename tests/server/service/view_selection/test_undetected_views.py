@@ -21,8 +21,8 @@ from fakes.service.scripted_cameras import (
 )
 from server.messaging.messages import Box
 from server.service.decision_state import reason
-from server.service.view_selection.cross_view_inference import CrossViewInference
 from server.service.view_selection.decider import GopDecision, ViewDecider
+from server.service.view_selection.undetected_view_inference import UndetectedViewInference
 from server.service.view_selection.undetected_views import TestedViews as Looked
 from server.service.view_selection.undetected_views import UndetectedViews
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
@@ -97,13 +97,13 @@ def test_no_view_is_inferred_where_a_camera_never_detects() -> None:
 def test_nothing_is_learned_about_a_disconnected_camera(reports: bool) -> None:
     view_decider = decider()
     decide(view_decider, [FOUND] * 20)
-    trust = view_decider._cross_view_inference._detection_probability._cell_rate.copy()
+    rates = view_decider._undetected_view_inference._detection_probability._cell_rate.copy()
     for number in range(20, 40):
         empty = camera_tracks(
             B, number, {}, without_detection=[*range(number * STRIDE, (number + 1) * STRIDE)]
         )
         view_decider.step(epoch_of(number, camera_tracks(A, number, FOUND[A]), *([empty] if reports else [])))
-    changed = np.abs(view_decider._cross_view_inference._detection_probability._cell_rate - trust)
+    changed = np.abs(view_decider._undetected_view_inference._detection_probability._cell_rate - rates)
     assert changed.max() < 0.05, "only forgetting changes it"
 
 
@@ -135,7 +135,7 @@ def test_the_explanation_includes_undetected_views_and_their_quality() -> None:
 def test_an_observation_counts_for_the_frames_up_to_the_next_one(
     frames: int,
 ) -> None:
-    inference = CrossViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
+    inference = UndetectedViewInference(small_config(), ViewQualityBuffer(small_config(), GROUND, {}))
     frames_tested = np.array([0, 10, 20])
     cameras, feet = np.zeros(3, int), np.full((3, 2), 20.0)
     tested = Looked(frames_tested, cameras, feet, np.ones(3, dtype=np.bool_))

@@ -32,12 +32,12 @@ _PRIOR, _FEW_S, _MANY_S = 0.93, 1.5, 4.0
 _MEMORY_S = 600.0
 """Time constant of forgetting, in seconds: furniture is moved."""
 _NO_BOX_FACTOR = 0.4
-"""Factor on trust where the camera has no box at all there: not even part of the person seems visible."""
-_MIN_TRUST = 0.25
-"""Below this trust no view is inferred."""
+"""Factor on the quality where the camera has no box at all: not even part of the person seems visible."""
+_MIN_VIEW_PROBABILITY = 0.25
+"""Least probability that the camera shows the person: below it no view is inferred."""
 
 
-class CrossViewInference:
+class UndetectedViewInference:
     """Infers views of people whom a camera does not detect, and learns each camera's detection probability.
 
     It uses the cameras' messages alone, and all people of all shards, so that all services of a site agree.
@@ -83,9 +83,11 @@ class CrossViewInference:
             tests[1] * self._interval, floor.cameras[tests[2]], feet[tests], samples.detected[tests]
         )
         view = np.nonzero(inside & ~samples.detected)
-        trust = self._detection_probability.trust(floor.cameras[view[2]], feet[view])
-        is_trusted = trust >= _MIN_TRUST
-        of, time, camera = (side[is_trusted] for side in view)
+        probability = self._detection_probability.undetected_view_probability(
+            floor.cameras[view[2]], feet[view]
+        )
+        is_probable = probability >= _MIN_VIEW_PROBABILITY
+        of, time, camera = (side[is_probable] for side in view)
         expected = project_boxes(
             body, of * shape[1] + time, feet[of, time, camera], floor.homographies[camera]
         )
@@ -94,7 +96,7 @@ class CrossViewInference:
             expected, picture, samples.boxes, sample_picture, shape[1] * shape[2], self._size
         )
         quality = _quality(expected, camera, floor.layout, self._quality_buffer.settings)
-        quality *= trust[is_trusted] * np.where(touched, 1.0, _NO_BOX_FACTOR)
+        quality *= probability[is_probable] * np.where(touched, 1.0, _NO_BOX_FACTOR)
         # Each view holds for the frames up to the next inference.
         frame = time * self._interval + np.arange(self._interval)[:, None]
         is_inside = frame < frames
