@@ -116,8 +116,8 @@ class PulseClient:
         """Pulses missed since the first one."""
         return self._missed
 
-    def now(self) -> float:
-        """Return the time on the clock of ``Pulse.due`` and ``Pulse.received``, in unix seconds."""
+    def client_now(self) -> float:
+        """Return the time on the client's own clock, that of ``Pulse.due``, in unix seconds."""
         return self._clock()
 
     def status(self) -> SyncStatus:
@@ -213,7 +213,7 @@ class PulseClient:
         self._offset.greeted(greeting.now, now)
         self._fps = greeting.fps
         self._counter.set_rate(greeting.fps)
-        self._server.accept_greeting(greeting.fps)
+        self._server.record_greeting(greeting.fps)
 
     def _accept_pulse(self, number: int, due: float, now: float) -> None:
         self._waiting_for = ()

@@ -45,7 +45,7 @@ class ClientInfo:
     """Pulses handed to its connection."""
     dropped: int
     """Pulses dropped because it did not read."""
-    behind: int
+    dropped_in_a_row: int
     """Pulses dropped since the last one sent: 0 for a client that keeps up."""
     errors: int
     """Lines received from it that could not be parsed."""
@@ -92,7 +92,7 @@ class ClientConnection(asyncio.Protocol):
         self._last_sent_at = self._joined_at
         self._transport: asyncio.Transport | None = None
         self._handshake: asyncio.Task[None] | None = None
-        self._sent = self._dropped = self._behind = self._errors = 0
+        self._sent = self._dropped = self._dropped_in_a_row = self._errors = 0
         self._is_registered = False
         self._early_lines: list[bytes] = []
         """Lines that arrived with the end of the TLS handshake."""
@@ -102,14 +102,20 @@ class ClientConnection(asyncio.Protocol):
         """The user that has logged in; None where no login is needed."""
 
     @property
-    def origin(self) -> str:
+    def user_or_host(self) -> str:
         """The user that has logged in, or else the host."""
         return self.user or self._host
 
     def info(self) -> ClientInfo:
         """Return the state of this client now."""
         return ClientInfo(
-            self.name, self.address, self._joined_at, self._sent, self._dropped, self._behind, self._errors
+            self.name,
+            self.address,
+            self._joined_at,
+            self._sent,
+            self._dropped,
+            self._dropped_in_a_row,
+            self._errors,
         )
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -121,7 +127,7 @@ class ClientConnection(asyncio.Protocol):
         if self._gate is None:
             self._register()
             return
-        self._gate.admit(self)
+        self._gate.hold(self)
         if self._tls is None:
             self._request_login(self._gate)
         else:
@@ -177,15 +183,15 @@ class ClientConnection(asyncio.Protocol):
         now = self._clock()
         if self.send(line):
             self._sent += 1
-            self._behind = 0
+            self._dropped_in_a_row = 0
             self._last_sent_at = now
             return
         if self._is_closing:
             return
-        if self._behind == 0:
+        if self._dropped_in_a_row == 0:
             self._last_sent_at = now
         self._dropped += 1
-        self._behind += 1
+        self._dropped_in_a_row += 1
         if now - self._last_sent_at > self._limits.cut_off:
             _log.warning("client %s (%s) does not read its pulses: disconnected", self.name, self.address)
             self.end("slow", "pulses were not read")
@@ -243,7 +249,7 @@ class ClientConnection(asyncio.Protocol):
             self._early_lines.append(line)
             return
         if not self._is_registered:
-            if self._gate is not None and (user := self._gate.check(self, line)) is not None:
+            if self._gate is not None and (user := self._gate.log_in(self, line)) is not None:
                 self.user = user
                 self._register()
             return
@@ -264,7 +270,7 @@ class ClientConnection(asyncio.Protocol):
     def _send_clients(self) -> None:
         """Send the list of the other clients: a long line, so only to a client that has read everything."""
         listed = tuple(
-            ListedClient(client.name, client.behind)
+            ListedClient(client.name, client.dropped_in_a_row)
             for client in self._owner.clients()
             if client.address != self.address
         )

@@ -84,7 +84,7 @@ class ClientRegistry:
             client.end("stopped", "the server stops")
 
     def joined(self, client: ClientConnection) -> None:
-        """Greet a new connection; if there are too many, close the oldest of the origin that has the most."""
+        """Greet a new connection; of too many, close the oldest of the user or host that has the most."""
         if self._closed:
             client.end("stopped", "the server stops")
             return
@@ -120,18 +120,18 @@ class ClientRegistry:
 
     def _make_room(self, newcomer: ClientConnection) -> None:
         candidates = [client for client in self._connections.values() if client.name not in self._reserved]
-        same_origin = [client for client in candidates if client.origin == newcomer.origin]
-        if newcomer.user is not None and len(same_origin) >= self._limits.login_places:
-            candidates = same_origin
+        same_user_or_host = [client for client in candidates if client.user_or_host == newcomer.user_or_host]
+        if newcomer.user is not None and len(same_user_or_host) >= self._limits.login_places:
+            candidates = same_user_or_host
         elif len(candidates) < self._limits.clients:
             return
         evicted = select_evicted(candidates)
-        if (more := self._evictions.record(evicted.origin)) is not None:
+        if (more := self._evictions.record(evicted.user_or_host)) is not None:
             message = "%s has %d connections: the oldest is closed for a new one%s"
-            count = sum(client.origin == evicted.origin for client in candidates)
-            _log.warning(message, evicted.origin, count, more)
+            count = sum(client.user_or_host == evicted.user_or_host for client in candidates)
+            _log.warning(message, evicted.user_or_host, count, more)
         self.left(evicted)
-        evicted.end("full", f"too many connections of {evicted.origin}")
+        evicted.end("full", f"too many connections of {evicted.user_or_host}")
 
     def _log_arrival(self, client: ClientConnection, name: str) -> None:
         """Log an arrival, throttled: two clients of one name may replace each other endlessly."""

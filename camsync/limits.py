@@ -43,23 +43,23 @@ class ServerLimits:
     """Lines per second that a client may send in the long run; beyond that, its connection is closed."""
 
 
-class HasOrigin(Protocol):
+class LimitedConnection(Protocol):
     """A connection that counts against a limit."""
 
     @property
-    def origin(self) -> str:
-        """The user that has logged in, or else the address."""
+    def user_or_host(self) -> str:
+        """The user that has logged in, or else the host."""
 
 
-Connection = TypeVar("Connection", bound=HasOrigin)
+Connection = TypeVar("Connection", bound=LimitedConnection)
 
 
 def select_evicted(connections: Sequence[Connection]) -> Connection:
-    """Return the oldest connection of the origin that has the most; ``connections`` are oldest first.
+    """Return the oldest connection of the user or host with the most; ``connections`` are oldest first.
 
-    A client that opens very many connections evicts its own. Of equal origins the one of the oldest
-    connection counts.
+    A client that opens very many connections evicts its own. Of equal ones that of the oldest connection
+    counts.
     """
-    counts = Counter(connection.origin for connection in connections)
+    counts = Counter(connection.user_or_host for connection in connections)
     most = max(counts.values())
-    return next(connection for connection in connections if counts[connection.origin] == most)
+    return next(connection for connection in connections if counts[connection.user_or_host] == most)

@@ -40,8 +40,8 @@ class PendingConnection(Protocol):
         """``host:port`` of the client."""
 
     @property
-    def origin(self) -> str:
-        """The host of the client."""
+    def user_or_host(self) -> str:
+        """The host of the client, who has not logged in."""
 
     def send(self, line: bytes) -> bool:
         """Send a line; return whether it was sent."""
@@ -77,7 +77,7 @@ class LoginGate:
         """Connections that were refused."""
         return self._refused
 
-    def admit(self, connection: PendingConnection) -> None:
+    def hold(self, connection: PendingConnection) -> None:
         """Hold a new connection for at most ``limits.login_within`` seconds."""
         if len(self._pending) >= self._limits.pending_logins:
             evicted = select_evicted([pending.connection for pending in self._pending.values()])
@@ -95,8 +95,8 @@ class LoginGate:
         connection.send(encode(LoginRequest(self._clock())))
         return True
 
-    def check(self, connection: PendingConnection, line: bytes) -> str | None:
-        """Check the login line of a connection; return the user's name, or None if it was refused."""
+    def log_in(self, connection: PendingConnection, line: bytes) -> str | None:
+        """Log in a connection by its first line and return the user; else refuse it and return None."""
         try:
             message = parse_client_line(line)
         except ProtocolError as error:

@@ -89,10 +89,10 @@ class Pong:
 
 @dataclass(frozen=True, slots=True)
 class ListedClient:
-    """A client of the server: ``name`` is None before HELLO; ``behind`` counts its last dropped pulses."""
+    """A client of the server: ``name`` is None before HELLO; the pulses dropped since the last one sent."""
 
     name: str | None
-    behind: int
+    dropped_in_a_row: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,7 +74,7 @@ class PersistentConnection:
             self._on_lost()
             await asyncio.sleep(backoff.next())
 
-    def accept_greeting(self, fps: float) -> None:
+    def record_greeting(self, fps: float) -> None:
         """Count a greeting, and log the server's rate after an absence and at the first one."""
         self.greetings += 1
         if (ended := self._absences.end()) or self.greetings == 1:

@@ -11,7 +11,7 @@ A client may send, and the server answers::
     HELLO 1 c0                                             ready for pulse 0, under this name
     HELLO 1 c0 last=123 ago=0.52                           has counted to pulse 123, due 0.52 seconds ago
     PING 1732159201.5      PONG 1732159201.500000 1732159201.502000      the time sent, the server clock
-    WHO                    CLIENTS c0:0,-:7       the other clients, and how many pulses each is behind
+    WHO                    CLIENTS c0:0,-:7       the other clients, and the pulses dropped in a row for each
     anything else          ERROR malformed ...                           a code, then a sentence
 
 A server with users requires a login first, over TLS (``login``), and then sends the greeting::
@@ -120,7 +120,10 @@ def _server_text(message: ServerLine) -> str:  # noqa: PLR0911 — one return pe
             return f"PONG {sent:.6f} {now:.6f}"
         case ClientList(clients):
             return " ".join(
-                ["CLIENTS", ",".join(f"{client.name or _UNNAMED}:{client.behind}" for client in clients)]
+                [
+                    "CLIENTS",
+                    ",".join(f"{client.name or _UNNAMED}:{client.dropped_in_a_row}" for client in clients),
+                ]
             )
         case ErrorMessage(code, text):
             return f"ERROR {code} {text}"
@@ -206,8 +209,8 @@ def _clients(words: list[str]) -> ClientList:
 
 
 def _listed_client(text: str) -> ListedClient:
-    name, _, behind = text.partition(":")
-    return ListedClient(None if name == _UNNAMED else _match(_NAME, name, "name"), _number(behind))
+    name, _, dropped = text.partition(":")
+    return ListedClient(None if name == _UNNAMED else _match(_NAME, name, "name"), _number(dropped))
 
 
 def _error(words: list[str]) -> ErrorMessage:

@@ -37,10 +37,10 @@ class ScheduleClaims:
         self._epochs: dict[str, float] = {}
         """By client name: when pulse 0 was due on the claimed schedule."""
         self._connected: frozenset[str] = frozenset()
-        self._implausible, self._minorities = LogThrottle(clock), LogThrottle(clock)
+        self._implausible, self._claims_ahead = LogThrottle(clock), LogThrottle(clock)
 
     def record(self, hello: Hello) -> bool:
-        """Record a client's claim; return whether it is plausible."""
+        """Record a client's claim, if it has a plausible one and its claims count; return whether it does."""
         self._epochs.pop(hello.name, None)
         if hello.known is None or (self._expect and hello.name not in self._expect):
             return False
@@ -59,7 +59,7 @@ class ScheduleClaims:
         self._connected = self._expect.intersection(connected) if self._expect else frozenset(connected)
         self._epochs = {name: epoch for name, epoch in self._epochs.items() if name in self._connected}
 
-    def agreed_schedule(self, current: PulseSchedule | None = None) -> PulseSchedule | None:
+    def median_schedule(self, current: PulseSchedule | None = None) -> PulseSchedule | None:
         """Return the schedule of the median claim; None: too few claims.
 
         Connected clients without a claim count for the server's ``current`` schedule, if there is one.
@@ -71,7 +71,7 @@ class ScheduleClaims:
             epochs += [current.epoch] * (len(self._connected) - len(epochs))
         return PulseSchedule(sorted(epochs)[len(epochs) // 2], self._fps)
 
-    def log_minority(self, schedule: PulseSchedule) -> None:
+    def log_claims_ahead(self, schedule: PulseSchedule) -> None:
         """Log the clients that claim to have counted further than ``schedule``."""
         now = self._clock()
         number = schedule.number_at(now)
@@ -80,6 +80,6 @@ class ScheduleClaims:
             for name, epoch in self._epochs.items()
             if PulseSchedule(epoch, self._fps).number_at(now) > number + MEASUREMENT_ERROR
         ]
-        if ahead and (more := self._minorities.record()) is not None:
+        if ahead and (more := self._claims_ahead.record()) is not None:
             text = "%s: claimed to have counted further than %d, but too few other clients do%s"
             _log.warning(text, ", ".join(sorted(ahead)), number, more)

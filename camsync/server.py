@@ -95,7 +95,7 @@ class PulseServer:
         self._pulse: int | None = None
         self._skipped = 0
         self._stalls = LogThrottle(self._clock)
-        self._begun = asyncio.Event()
+        self._scheduled = asyncio.Event()
         self._ended = asyncio.Event()
 
     @property
@@ -168,9 +168,9 @@ class PulseServer:
         await self._server.wait_closed()
         self._server = None
 
-    async def wait_begun(self) -> None:
+    async def wait_scheduled(self) -> None:
         """Return once the first pulse is scheduled."""
-        await self._begun.wait()
+        await self._scheduled.wait()
 
     async def wait_ended(self) -> None:
         """Return once ``max_pulses`` is reached or the server was stopped."""
@@ -200,7 +200,7 @@ class PulseServer:
         self._claims.keep_only(self._registry.names())
         if self._schedule is not None:
             self._move_forward(self._schedule)
-        elif self._claims_timer is None and self._claims.agreed_schedule() is not None:
+        elif self._claims_timer is None and self._claims.median_schedule() is not None:
             loop = asyncio.get_running_loop()
             self._claims_timer = loop.call_later(self._limits.claims_for, self._end_claims)
 
@@ -208,20 +208,20 @@ class PulseServer:
         now = self._clock()
         if now - self._started_at > self._limits.adopt_for:
             return
-        schedule = self._claims.agreed_schedule(before) or before
+        schedule = self._claims.median_schedule(before) or before
         first = schedule.number_at(now) + 1
         if first > before.number_at(now) + MEASUREMENT_ERROR:
             _log.warning("clients have counted to %d: moving forward to that pulse", first - 1)
             self._skipped += max(0, first - self._next)
             self._schedule, self._next = schedule, first
             self._set_timer()
-        self._claims.log_minority(self._schedule or before)
+        self._claims.log_claims_ahead(self._schedule or before)
 
     def _end_claims(self) -> None:
         """Begin with the clients' count, if they are still connected."""
         self._claims_timer = None
         self._claims.keep_only(self._registry.names())
-        if self._claims.agreed_schedule() is not None:
+        if self._claims.median_schedule() is not None:
             self._begin()
 
     def _on_change(self) -> None:
@@ -243,13 +243,13 @@ class PulseServer:
         self._cancel_claims_timer()
         self._started_at = now = self._clock()
         self._claims.keep_only(self._registry.names())
-        agreed = self._claims.agreed_schedule()
+        agreed = self._claims.median_schedule()
         self._schedule = agreed or PulseSchedule(now, self._fps)
         if agreed is not None:
             self._next = agreed.number_at(now) + 1
             _log.info("clients have counted to %d: continuing from there", self._next - 1)
-        self._claims.log_minority(self._schedule)
-        self._begun.set()
+        self._claims.log_claims_ahead(self._schedule)
+        self._scheduled.set()
         self._set_timer()
 
     def _cancel_claims_timer(self) -> None:

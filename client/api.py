@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 
-from client.http import ContractError, HttpSettings, decoded, get, get_json, read_lines, server_url
+from client.http import ContractError, HttpSettings, decode_json, get, get_json, read_lines, server_url
 from client.model import Camera, Cameras, Choice, Gop, Objects, Past, SeenObject, Site, Span
 from client.sse_parser import MAX_EVENT
 
@@ -67,6 +67,6 @@ async def past(
     ) as answer:
         async for line in read_lines(answer, MAX_EVENT):
             try:
-                yield decoded(line, Gop)
+                yield decode_json(line, Gop)
             except ValueError as error:
                 raise ContractError(f"/api/past is not understood: {error}") from error

@@ -7,9 +7,9 @@ from collections.abc import AsyncIterator
 
 from yarl import URL
 
-from client.http import AwayError, ContractError, HttpSettings, decoded, get, server_url
+from client.http import AwayError, ContractError, HttpSettings, decode_json, get, server_url
 from client.model import EVENTS, Event
-from client.sse_parser import EventStreamError, SentEvent, SseParser
+from client.sse_parser import OverlongEventError, SentEvent, SseParser
 
 _DEFAULT = HttpSettings()
 
@@ -22,7 +22,7 @@ async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[E
 
     Raises:
         ValueError: ``url`` is no address.
-        AwayError: ``settings.retries`` attempts in a row brought no event.
+        AwayError: ``settings.stream_retries`` attempts in a row brought no event.
         ClientError: the server refuses the request, or an event is invalid.
     """
     address = server_url(url) / "api/events"
@@ -36,7 +36,7 @@ async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[E
             problem = error
         else:
             problem = AwayError(f"{address.origin()}: the stream of events has ended")
-        if backoff.failures >= settings.retries:
+        if backoff.failures >= settings.stream_retries:
             raise problem
         await asyncio.sleep(backoff.next())
 
@@ -47,7 +47,7 @@ async def _once(address: URL, settings: HttpSettings) -> AsyncIterator[Event]:
         async for data in answer.content.iter_any():
             try:
                 sent_events = parser.feed(data)
-            except EventStreamError as error:
+            except OverlongEventError as error:
                 raise ContractError(f"{address.origin()}: {error}") from error
             for sent_event in sent_events:
                 event = _decode(sent_event)
@@ -60,6 +60,6 @@ def _decode(sent: SentEvent) -> Event | None:
     if kind is None:
         return None
     try:
-        return decoded(sent.data, kind)
+        return decode_json(sent.data, kind)
     except ValueError as error:
         raise ContractError(f"event {sent.name}: {error}") from error

@@ -49,7 +49,7 @@ class ContractError(ClientError):
 
 @dataclass(frozen=True, slots=True)
 class HttpSettings:
-    """Timeouts, retries and the token of the client."""
+    """Timeouts, retries of streams, and the token of the client."""
 
     connect_timeout: float = 5.0
     """Seconds to connect."""
@@ -57,7 +57,7 @@ class HttpSettings:
     """Seconds without a byte until the connection counts as lost."""
     answer_timeout: float = 60.0
     """Seconds until a response must have begun, and until one that is read whole must be complete."""
-    retries: int = 26
+    stream_retries: int = 26
     """Retries in a row before a stream is abandoned; 0: none."""
     backoff_first: float = 0.25
     """Seconds before the first retry; doubled each time."""
@@ -67,7 +67,7 @@ class HttpSettings:
     """Bearer token, for a server that requires one."""
 
     def backoff(self) -> Backoff:
-        """Return the delays between attempts of a request."""
+        """Return the delays between attempts of a stream."""
         return Backoff(self.backoff_first, self.backoff_most)
 
 
@@ -95,7 +95,7 @@ def server_url(text: str) -> URL:
 
 @asynccontextmanager
 async def get(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[aiohttp.ClientResponse]:
-    """Open a response for reading; a network error inside the block is an AwayError too.
+    """Open a response for reading, in one attempt; a network error inside the block is an AwayError too.
 
     Raises:
         NotFoundError, RefusedError, AwayError: with the server's error text if it sent one.
@@ -180,12 +180,12 @@ async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _AN
     """
     body = await get_body(url, settings, "application/json")
     try:
-        return decoded(body, kind)
+        return decode_json(body, kind)
     except ValueError as error:
         raise ContractError(f"{url.origin()} does not answer like MyView: {error}") from error
 
 
-def decoded(text: bytes | str, kind: type[_ANSWER]) -> _ANSWER:
+def decode_json(text: bytes | str, kind: type[_ANSWER]) -> _ANSWER:
     """Decode JSON.
 
     Raises:
@@ -224,7 +224,7 @@ class _ErrorBody(msgspec.Struct):
 def _error_text(body: bytes) -> str | None:
     """Return the first line of the server's error text; None without one."""
     try:
-        message = decoded(body, _ErrorBody).error
+        message = decode_json(body, _ErrorBody).error
     except ValueError:
         return None
     return message.splitlines()[0] if message.strip() else None

@@ -111,4 +111,4 @@ def _write_sidecars(out: Path | None, record: Recording, history: ViewHistory) -
     if out is None or site is None or record.begin is None or record.media_time is None:
         return
     first, last = round(record.begin * site.fps), round(record.media_time * site.fps)
-    write_sidecars(out, history.frames(first, last), first, history.number, site)
+    write_sidecars(out, history.stored_frames(first, last), first, history.number, site)

@@ -50,22 +50,22 @@ class Recording:
         """Media time of the last picture in seconds: pulse / fps; None before the first."""
         return None if self._first is None else self._last / self._timescale
 
-    def connection(self) -> Callable[[bytes], Iterator[bool]]:
-        """Return a function that takes the bytes of a new connection; it yields the results of :meth:`take`.
+    def new_connection_writer(self) -> Callable[[bytes], Iterator[bool]]:
+        """Return a function that writes the bytes of a new connection; it yields the results of `accept`.
 
         An incomplete part at the end of a connection is dropped.
         """
         reader = _READERS[self.container]()
-        return lambda data: map(self.take, reader.feed(data))
+        return lambda data: map(self.accept, reader.feed(data))
 
-    def take(self, part: InitSegment | Fragment) -> bool:
-        """Take the next part; return False, without taking it, when ``seconds`` are full.
+    def accept(self, part: InitSegment | Fragment) -> bool:
+        """Write the next part; return False, without writing it, when ``seconds`` are full.
 
         Raises:
             FormatChangedError: the format has changed.
         """
         if isinstance(part, InitSegment):
-            self._take_init_segment(part)
+            self._accept_init_segment(part)
         elif part.is_sound:
             if part.time > self._last_sound:  # otherwise it is repeated after a reconnection
                 self._last_sound = part.time
@@ -84,7 +84,7 @@ class Recording:
             return False
         return time - self._first >= self._limit * self._timescale
 
-    def _take_init_segment(self, init_segment: InitSegment) -> None:
+    def _accept_init_segment(self, init_segment: InitSegment) -> None:
         if self._init_segment is None:
             self._init_segment, self._timescale = init_segment, init_segment.timescale
             self._write(init_segment.data)

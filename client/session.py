@@ -71,7 +71,7 @@ class Session:
                 failure = AwayError(str(error))
             if self._record.fragments > before:
                 backoff.reset()
-            if backoff.failures >= settings.retries:
+            if backoff.failures >= settings.stream_retries:
                 if self._record.fragments:
                     return False
                 raise failure
@@ -90,11 +90,11 @@ class Session:
 
     async def _connection(self, address: URL, settings: HttpSettings) -> bool:
         """Stream over one connection; return True when complete, False when the connection has ended."""
-        take = self._record.connection()
+        write = self._record.new_connection_writer()
         async with get(address, settings, f"video/{self._record.container}") as answer:
             async for data in answer.content.iter_any():
                 try:
-                    if not self._take(take(data)):
+                    if not self._accept_parts(write(data)):
                         return True
                 except FormatChangedError:
                     raise
@@ -104,10 +104,10 @@ class Session:
                     raise ContractError(f"{where} is not a {container}: {error}") from error
         return False
 
-    def _take(self, parts: Iterator[bool]) -> bool:
+    def _accept_parts(self, accepted: Iterator[bool]) -> bool:
         before = noted = self._record.fragments
         more = True
-        for more in parts:
+        for more in accepted:
             if not more:
                 break
             if self._record.fragments > noted:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 MAX_EVENT = 4_000_000  # bytes: a gop event with the boxes of a crowd has some hundred thousand
 
 
-class EventStreamError(ValueError):
+class OverlongEventError(ValueError):
     """An event or a line is too large."""
 
 
@@ -35,7 +35,7 @@ class SseParser:
         """Return the events that ``data`` completes.
 
         Raises:
-            EventStreamError: an event is larger than MAX_EVENT.
+            OverlongEventError: an event is larger than MAX_EVENT.
         """
         buffer = self._rest + data
         # A CR at the end may be half of a CR LF: it waits for the next byte.
@@ -44,7 +44,7 @@ class SseParser:
         *lines, rest = whole.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
         self._rest = rest + last_cr
         if len(self._rest) > MAX_EVENT:
-            raise EventStreamError(f"a line is larger than {MAX_EVENT} bytes")
+            raise OverlongEventError(f"a line is larger than {MAX_EVENT} bytes")
         events = (self._line(line.decode("utf-8", "replace")) for line in lines)
         return [event for event in events if event is not None]
 
@@ -63,7 +63,7 @@ class SseParser:
         elif field == "data":
             self._size += len(value) + 1  # with the line end: empty lines take memory too
             if self._size > MAX_EVENT:
-                raise EventStreamError(f"an event is larger than {MAX_EVENT} bytes")
+                raise OverlongEventError(f"an event is larger than {MAX_EVENT} bytes")
             self._data.append(value)
         return None
 

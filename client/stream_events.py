@@ -85,8 +85,8 @@ class ViewHistory:
                     self._updated.clear()
                     await self._updated.wait()
 
-    def frames(self, first: int, last: int) -> Iterator[Frame]:
-        """Yield the known frames from one pulse to another, both included, in order.
+    def stored_frames(self, first: int, last: int) -> Iterator[Frame]:
+        """Yield the frames from one pulse to another, both included, in order, as far as the spool has them.
 
         Raises:
             OSError: the spool cannot be read.

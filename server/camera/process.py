@@ -183,7 +183,7 @@ class CameraProcess:
             self._meter.set_client(pulses)
             async for pulse in pulses:
                 try:
-                    await self._on_pulse(pulse, pulses.now() - pulse.due)
+                    await self._on_pulse(pulse, pulses.client_now() - pulse.due)
                 except SourceEndedError:
                     log.info("camera %s: the recording has ended", self._id)
                     self._state, self._end = "ended", pulse.number

@@ -48,7 +48,7 @@ class PulseFollower:
             credentials=self.credentials,
             tls=self.tls,
         ) as pulses:
-            self._clock = pulses.now
+            self._clock = pulses.client_now
             async for pulse in pulses:
                 self.newest = pulse.number
                 self.pulse0 = pulse.due - pulse.number / self._fps

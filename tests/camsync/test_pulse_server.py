@@ -40,9 +40,9 @@ async def test_a_pulse_is_due_at_epoch_plus_number_over_rate(connect: Connect) -
 
 async def test_without_expected_clients_the_server_begins_at_once() -> None:
     async with PulseServer(FPS, start_timeout=1000.0) as server:
-        await server.wait_begun()
+        await server.wait_scheduled()
     async with PulseServer(FPS, expect={"c0"}, start_timeout=0.0) as server:
-        await server.wait_begun()
+        await server.wait_scheduled()
 
 
 async def test_the_server_begins_when_all_expected_clients_sent_hello(connect: Connect) -> None:

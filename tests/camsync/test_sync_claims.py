@@ -102,7 +102,7 @@ async def test_a_restarted_server_continues_the_count_of_all_but_one_client(conn
     ) as again:
         lying = await log_in(connect, port, "c0")
         await lying.send(f"HELLO 1 c0 last={FAR}")
-        await again.wait_begun()
+        await again.wait_scheduled()
         assert again.epoch == pytest.approx(epoch, abs=CLOCK_TOLERANCE)
         await lying.send(f"HELLO 1 c0 last={FAR}")
         assert again.epoch == pytest.approx(epoch, abs=CLOCK_TOLERANCE)
@@ -124,7 +124,7 @@ async def test_a_client_far_ahead_of_all_others_has_to_restart() -> None:
     """The server cannot know whether it lies; the client gets an error and can restart."""
     settings = ClientSettings(backoff_first=0.01, backoff_most=0.05, ahead_most=0.1, settle=0.05)
     alone = PulseClient(LOCALHOST, 1, "c0", settings=settings, credentials=Credentials("c0", USERS["c0"]))
-    alone._counter.accept(10**6, alone.now())
+    alone._counter.accept(10**6, alone.client_now())
     async with PulseServer(FPS, expect=NAMES, start_timeout=0.0, users=USERS) as server:
         alone._server._port = server.port
         with pytest.raises(SyncError, match="the server is at pulse"):
@@ -143,7 +143,7 @@ def agreed(counts: Sequence[int | None], expect: int, *, at: int | None = None) 
     for name, count in zip(names, counts, strict=True):
         claims.record(Hello(name, None if count is None else CountedPulse(count, 0.0)))
     claims.keep_only(names)
-    schedule = claims.agreed_schedule(None if at is None else PulseSchedule.through(at, 0.0, 1.0))
+    schedule = claims.median_schedule(None if at is None else PulseSchedule.through(at, 0.0, 1.0))
     return None if schedule is None else schedule.number_at(0.0)
 
 

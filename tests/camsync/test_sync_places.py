@@ -166,15 +166,15 @@ async def test_many_pending_logins_evict_none_of_another_address(
         assert isinstance(await slow.message(), Greeting)
 
 
-class OriginOnly:
-    """A connection that has only an origin."""
+class StubConnection:
+    """A connection that has only a user."""
 
-    def __init__(self, origin: str) -> None:
-        self.origin = origin
+    def __init__(self, user: str) -> None:
+        self.user_or_host = user
 
 
-def test_the_oldest_of_the_busiest_origin_is_evicted() -> None:
-    connections = [OriginOnly(origin) for origin in "abbcbaa"]
+def test_the_oldest_of_the_busiest_user_is_evicted() -> None:
+    connections = [StubConnection(user) for user in "abbcbaa"]
     assert select_evicted(connections) is connections[0]
     assert select_evicted(connections[:-1]) is connections[1]
     assert select_evicted(connections[3:4]) is connections[3]
@@ -202,7 +202,7 @@ async def test_every_arrival_of_an_expected_name_is_a_log_line(
     async with PulseServer(FPS, expect=names, start_timeout=1000.0) as server:
         for name in names:
             (await connect(server.port)).send(f"HELLO 1 {name}\n".encode())
-        await server.wait_begun()
+        await server.wait_scheduled()
     assert sorted(caplog.messages) == sorted(f"{name} connected" for name in names)
 
 

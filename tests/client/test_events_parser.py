@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import client
-from client.sse_parser import MAX_EVENT, EventStreamError, SentEvent, SseParser
+from client.sse_parser import MAX_EVENT, OverlongEventError, SentEvent, SseParser
 from fakes.http.scripted_server import CAMERAS, OBJECTS, SITE, ScriptedSite, gop, send_nothing, sse_event
 from fakes.timeouts import PATIENCE
 
@@ -20,7 +20,7 @@ FLAG = {"id": 1, "objects": [7, 9], "cameras": ["c0"], "reason": "crossing", "pu
     "risk": 0.5,
     "state": "raised",
 }
-HASTY = client.HttpSettings(retries=2, backoff_first=0.01, backoff_most=0.01)
+HASTY = client.HttpSettings(stream_retries=2, backoff_first=0.01, backoff_most=0.01)
 
 
 def test_an_event_has_a_name_data_and_the_last_id() -> None:
@@ -61,7 +61,7 @@ def test_any_bytes_are_parsed_without_a_crash(pieces: list[bytes]) -> None:
 @pytest.mark.parametrize("piece", [b"x" * 1_000_000, b"data: " + b"x" * 1_000_000 + b"\n"])
 def test_an_endless_event_is_refused_before_it_fills_memory(piece: bytes) -> None:
     parser = SseParser()
-    with pytest.raises(EventStreamError):
+    with pytest.raises(OverlongEventError):
         feed_often(parser, piece)
 
 

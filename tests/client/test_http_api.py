@@ -11,7 +11,7 @@ from aiohttp.test_utils import TestServer
 import client
 from client.http import server_url
 
-HASTY = client.HttpSettings(retries=1, backoff_first=0.01, backoff_most=0.01)
+HASTY = client.HttpSettings(stream_retries=1, backoff_first=0.01, backoff_most=0.01)
 
 
 async def test_the_site_is_fetched(site_url: str) -> None:

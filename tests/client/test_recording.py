@@ -28,7 +28,7 @@ from fakes.http.scripted_server import (
 )
 from fakes.timeouts import PATIENCE
 
-HASTY = client.HttpSettings(retries=2, backoff_first=0.01, backoff_most=0.01)
+HASTY = client.HttpSettings(stream_retries=2, backoff_first=0.01, backoff_most=0.01)
 
 
 def plays(*pieces: bytes, stays: bool = False, step: int = 1000) -> StreamScript:
@@ -121,7 +121,7 @@ async def test_a_server_that_stays_away_leaves_the_recording_so_far(
     result = await client.watch(site_url, 1, tmp_path / "one.mp4", 60.0, settings=HASTY)
     assert not result.complete
     assert (tmp_path / "one.mp4").read_bytes() == header() + frames(100, 10)
-    assert scripted_site.opened == 1 + HASTY.retries
+    assert scripted_site.opened == 1 + HASTY.stream_retries
 
 
 async def test_a_stream_of_another_format_ends_the_recording(

@@ -15,14 +15,14 @@ from aiohttp.test_utils import TestServer
 import client
 from client.fmp4 import MAX_BOX, BoxReader, Mp4Reader
 from client.media_stream import MediaStreamError
-from client.sse_parser import EventStreamError, SseParser
+from client.sse_parser import OverlongEventError, SseParser
 from client.webm import MAX_ELEMENT, WebmReader
 from fakes.http.scripted_server import OBJECTS, box, fragment, header
 from fakes.timeouts import PATIENCE
 
 PIECE = bytes(1 << 16)
-ONCE = client.HttpSettings(retries=0)
-HASTY = client.HttpSettings(retries=0, answer_timeout=0.2)
+ONCE = client.HttpSettings(stream_retries=0)
+HASTY = client.HttpSettings(stream_retries=0, answer_timeout=0.2)
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
@@ -249,7 +249,7 @@ def feed_often(reader: Mp4Reader | WebmReader, data: bytes) -> None:
 def test_empty_lines_count_towards_the_event_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("client.sse_parser.MAX_EVENT", 1000)
     SseParser().feed(b"data:\n" * 900)
-    with pytest.raises(EventStreamError):
+    with pytest.raises(OverlongEventError):
         SseParser().feed(b"data:\n" * 1100)
 
 

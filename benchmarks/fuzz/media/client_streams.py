@@ -13,7 +13,7 @@ from benchmarks.fuzz.media.damaged_media import damage_media, stream
 from client.media_stream import MediaStreamError
 from client.recording import Recording
 from client.remux import remux
-from client.sse_parser import EventStreamError, SseParser
+from client.sse_parser import OverlongEventError, SseParser
 
 
 class _ClientStream(Target):
@@ -36,9 +36,9 @@ class _ClientStream(Target):
         part = self._path / "film.part"
         try:
             with part.open("wb") as file:
-                take = Recording(file, 10.0, self.container).connection()
+                write = Recording(file, 10.0, self.container).new_connection_writer()
                 for at in range(0, len(data), 1500):
-                    deque(take(data[at : at + 1500]), maxlen=0)
+                    deque(write(data[at : at + 1500]), maxlen=0)
         except MediaStreamError as error:
             refused(error)
         try:
@@ -89,7 +89,7 @@ class ClientEvents(Target):
                 for at in range(0, len(data), step)
                 for event in piecewise_parser.feed(data[at : at + step])
             ]
-        except EventStreamError as error:
+        except OverlongEventError as error:
             return refused(error)
         assert piecewise == events, "the result depends on the pieces"
         return True

@@ -99,7 +99,7 @@ async def _is_this_site(config: Config, check: str) -> bool:
     host = _connect_host(config.http.host)
     url = f"{scheme}://[{host}]" if ":" in host else f"{scheme}://{host}"
     token = os.environ.get("MYVIEW_TOKEN") or None
-    settings = client.HttpSettings(connect_timeout=2.0, read_timeout=3.0, retries=0, token=token)
+    settings = client.HttpSettings(connect_timeout=2.0, read_timeout=3.0, stream_retries=0, token=token)
     try:
         site = await client.site(f"{url}:{config.http.port}", settings)
     except (client.ClientError, ValueError):

@@ -72,7 +72,9 @@ class OperationsService:
             )
         except SyncError as error:
             return PulseClients(address, str(error), [], [])
-        listeners = [PulseListener(client.name, client.name in expected, client.behind) for client in clients]
+        listeners = [
+            PulseListener(client.name, client.name in expected, client.dropped_in_a_row) for client in clients
+        ]
         connected = {client.name for client in clients}
         return PulseClients(address, "", listeners, [name for name in expected if name not in connected])
 

@@ -104,7 +104,7 @@ class RunningSite:
 
     async def listen(self) -> None:
         """Collect events while the site runs, reconnecting after a restart of the service."""
-        async for event in events(self.url, HttpSettings(retries=int(PATIENCE))):
+        async for event in events(self.url, HttpSettings(stream_retries=int(PATIENCE))):
             async with self.received:
                 match event:
                     case Gop():

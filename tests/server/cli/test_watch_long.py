@@ -89,7 +89,7 @@ def memory_in_use(folder: Path, gops: int) -> int:
         kept = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
-    assert sum(1 for _ in history.frames(0, gops * GOP)) == gops * GOP
+    assert sum(1 for _ in history.stored_frames(0, gops * GOP)) == gops * GOP
     spool.close()
     return kept
 
@@ -107,7 +107,7 @@ def test_repeated_events_replace_earlier_ones_and_late_ones_are_sorted(tmp_path:
         history.take(gop_event(gop))
     repeated = tuple((BOX,) for _ in range(GOP))
     history.take(Gop(first=GOP, frames=GOP, choices={1: "c1"}, boxes={"c1": repeated}, cuts=()))
-    frames = list(history.frames(0, 3 * GOP))
+    frames = list(history.stored_frames(0, 3 * GOP))
     assert [frame.pulse for frame in frames] == list(range(3 * GOP))
     assert [len(frame.boxes) for frame in frames] == [5] * GOP + [1] * GOP + [5] * GOP
     assert frames[GOP].camera == "c1"
@@ -119,7 +119,7 @@ def test_without_disk_space_choices_are_kept_without_boxes(tmp_path: Path) -> No
     history.take(SITE)
     history.take(gop_event(0))
     assert history.camera_at(0.1) == "c0"
-    assert list(history.frames(0, GOP)) == []
+    assert list(history.stored_frames(0, GOP)) == []
 
 
 @pytest.fixture

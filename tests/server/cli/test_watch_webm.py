@@ -82,8 +82,8 @@ def stream(first: int, until: int) -> bytes:
 
 def take(record: Recording, data: bytes, step: int) -> bool:
     """Take a connection's bytes, as the network cuts them."""
-    connection = record.connection()
-    return all(more for at in range(0, len(data), step) for more in connection(data[at : at + step]))
+    write = record.new_connection_writer()
+    return all(more for at in range(0, len(data), step) for more in write(data[at : at + step]))
 
 
 @settings(max_examples=15, deadline=None)
