@@ -95,14 +95,14 @@ async def test_messages_that_a_camera_cannot_parse_are_in_its_status(monkeypatch
         camera.model_copy(update={"source": "scene:room?camera=0&objects=1"}) for camera in config.cameras
     ]
     camera = CameraProcess(config.model_copy(update={"cameras": cameras}), "c0")
-    payloads: list[bytes] = []
-    monkeypatch.setattr(camera, "_publish", lambda _, payload: payloads.append(payload))
+    published: list[CameraStatus] = []
+    monkeypatch.setattr(camera._publisher, "publish_status", published.append)
     camera._exchange._decode(Message(KEYS.camera("c1", "detections"), b"{", b""))
     for _ in range(2):
         camera._corrections.put(Message(KEYS.camera("c0", "position_corrections"), b"{", b""))
-    camera._send_status()
+    camera._publish_status()
     camera._pipeline.close()
-    [status] = [msgspec.json.decode(payload, type=CameraStatus) for payload in payloads]
+    [status] = published
     assert status.bad_messages == 3
 
 

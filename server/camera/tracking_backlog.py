@@ -1,0 +1,63 @@
+"""The frames of a camera that wait for detection and tracking, which may be slower than the video."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from server.camera.sources import Image
+
+_FRAMES_PER_IMAGE = 10
+"""Frames that may wait per image that may wait; further ones count as missed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class QueuedFrame:
+    """A frame that waits for tracking.
+
+    Attributes:
+        pulse: its pulse.
+        image: None: there was none, or it was shed.
+        captured: when it was captured, by the loop's clock.
+        due: when its pulse was due, likewise.
+        skipped: whether load shedding left it out.
+    """
+
+    pulse: int
+    image: Image | None
+    captured: float
+    due: float
+    skipped: bool = False
+
+
+class TrackingBacklog:
+    """A queue of frames; those far ahead of tracking lose their image, and the furthest are left out.
+
+    Args:
+        images_max: images that may wait.
+    """
+
+    def __init__(self, images_max: int) -> None:
+        self._images_max = images_max
+        self.frames_max = _FRAMES_PER_IMAGE * images_max
+        """Frames that may wait."""
+        self._frames: asyncio.Queue[QueuedFrame | None] = asyncio.Queue(maxsize=self.frames_max)
+
+    def __len__(self) -> int:
+        return self._frames.qsize()
+
+    def put(self, pulse: int, image: Image | None, due: float, *, skipped: bool = False) -> bool:
+        """Add a frame captured now, due at ``due`` by the loop's clock; return whether its image was shed."""
+        shed = image is not None and self._frames.qsize() >= self._images_max
+        if not self._frames.full():
+            now = asyncio.get_running_loop().time()
+            self._frames.put_nowait(QueuedFrame(pulse, None if shed else image, now, due, skipped))
+        return shed
+
+    async def end(self) -> None:
+        """Add the end of the recording, once there is room."""
+        await self._frames.put(None)
+
+    async def get(self) -> QueuedFrame | None:
+        """Wait for the next frame, and remove it; None: the recording has ended."""
+        return await self._frames.get()
