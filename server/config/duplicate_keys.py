@@ -12,8 +12,7 @@ from typing import Any
 
 import yaml
 
-from server.config.values import abbreviate
-from server.system.address_redaction import redact_to_host
+from server.config.values import redact_and_abbreviate
 
 _NO_VALUES = frozenset({"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"})
 """Tags of the keys ``<<`` and ``=``, which have no value."""
@@ -27,8 +26,7 @@ class DuplicateKeyError(ValueError):
     def __init__(self, key: str, first: int, second: int) -> None:
         lines = f"lines {first} and {second}" if first != second else f"line {first}"
         super().__init__(
-            f"{abbreviate(redact_to_host(key))!a} occurs twice, in {lines}; only the last would "
-            "count: merge them"
+            f"{redact_and_abbreviate(key)!a} occurs twice, in {lines}; only the last would count: merge them"
         )
 
 

@@ -17,7 +17,7 @@ _MIN_SIMILARITY = 0.8
 """Similarity (difflib's ratio) from which a word counts as a misspelled unit."""
 
 
-def check_unit(unit: object) -> str:
+def check_unit_spelling(unit: object) -> str:
     """Validate a unit; any word is accepted, except a misspelling of a metric unit.
 
     Raises:

@@ -16,7 +16,7 @@ from pydantic_settings import SettingsError
 from bestview import ground_handedness, validate_homography
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
 from server.config.environment import check_environment
-from server.config.ground_unit import check_unit
+from server.config.ground_unit import check_unit_spelling
 from server.config.sections import (
     CameraSettings,
     ProcessTlsSettings,
@@ -27,7 +27,12 @@ from server.config.sections import (
 from server.config.site_config import Config
 from server.config.source_address import resolve_source
 from server.config.unknown_keys import did_you_mean
-from server.config.values import abbreviate, check_camera_name, check_numbers, check_values
+from server.config.values import (
+    check_depth_and_texts,
+    check_numbers,
+    check_printable_name,
+    redact_and_abbreviate,
+)
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
 
@@ -62,7 +67,7 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
         UserError: something is wrong; the text begins with ``where``.
     """
     check_environment(where)
-    check_values(content, where)
+    check_depth_and_texts(content, where)
     try:
         config = Config(**content)
     except ValidationError as error:
@@ -70,10 +75,10 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)
-    return resolve_paths(config, where=where, folder=folder)
+    return resolve_ground_and_paths(config, where=where, folder=folder)
 
 
-def resolve_paths(config: Config, *, where: str, folder: Path) -> Config:
+def resolve_ground_and_paths(config: Config, *, where: str, folder: Path) -> Config:
     """Read the ground that a configuration names, and resolve all its paths.
 
     Raises:
@@ -131,7 +136,7 @@ def change_view_settings(view: ViewSettings, changes: Mapping[str, Any], where: 
     Raises:
         UserError: something is wrong; the text begins with ``where``.
     """
-    check_values(changes, where)
+    check_depth_and_texts(changes, where)
     try:
         return ViewSettings.model_validate(_merged(view.model_dump(), changes))
     except ValidationError as error:
@@ -203,13 +208,13 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
     except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         raise UserError(f'{where}: ground: {path} has no {{"homography": {{camera: 3x3}}}}') from error
     for camera_id, matrix in matrices.items():
-        check_camera_name(camera_id, f"{where}: ground: {path}")
+        check_printable_name(camera_id, f"{where}: ground: {path}")
         try:
             validate_homography(matrix, f"camera {camera_id}")
         except ValueError as error:
             raise UserError(f"{where}: ground: {path}: {error}") from error
     try:
-        return matrices, None if content.get("unit") is None else check_unit(content["unit"])
+        return matrices, None if content.get("unit") is None else check_unit_spelling(content["unit"])
     except ValueError as error:
         raise UserError(f"{where}: ground: {path}: unit: {error}") from error
 
@@ -228,7 +233,7 @@ def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) 
 
 def _plain(detail: ErrorDetails, within: tuple[str, ...]) -> str:
     loc = (*within, *detail["loc"])
-    place = ".".join(abbreviate(str(part)) for part in loc)
+    place = ".".join(redact_and_abbreviate(str(part)) for part in loc)
     message = detail["msg"].removeprefix("Value error, ")
     if detail["type"] == "extra_forbidden":
         message = "; ".join(filter(None, ("unknown key", did_you_mean(str(loc[-1]), _known_keys(loc[:-1])))))

@@ -46,11 +46,11 @@ class ActiveConfig:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.now = self.wanted()
+        self.now = self.read_config_to_activate()
         self._seen: tuple[FileState | None, ...] = ()
         self._file: Config | UserError = self.now
 
-    def wanted(self) -> Config:
+    def read_config_to_activate(self) -> Config:
         """Read the configuration to activate: the supervisor's active one if there is one, else the file.
 
         Raises:
@@ -89,7 +89,7 @@ def is_owned_by_this_user(path: Path) -> bool:
     return status.st_uid == os.geteuid() and not stat.S_ISLNK(status.st_mode)
 
 
-def serialize_config(config: Config, folder: Path) -> str:
+def serialize_with_absolute_paths(config: Config, folder: Path) -> str:
     """Return a configuration as YAML with absolute paths; ``folder`` is that of its file."""
     content = config.model_dump(mode="json", exclude={"ground"})  # each camera has its homography
     absolute = build_config(content, where="the configuration in force", folder=folder.absolute())

@@ -137,7 +137,7 @@ class Config(BaseSettings):
         return self
 
     @property
-    def audio_camera(self) -> str | None:
+    def audio_sender(self) -> str | None:
         """The camera whose process sends the sound: its source, or the first for a file; None: no sound."""
         source = self.sound.source
         return source if source is None or source in self.camera_ids else self.camera_ids[0]

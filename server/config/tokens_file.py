@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
 from server.config.sections.base import Identifier, Section
-from server.config.values import abbreviate, check_values
+from server.config.values import check_depth_and_texts, redact_and_abbreviate
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
 
@@ -62,7 +62,7 @@ def read_tokens(path: Path) -> tuple[Token, ...]:
         UserError: it cannot be read or is invalid.
     """
     content = read_yaml(path, "the tokens")
-    check_values(content, str(path))
+    check_depth_and_texts(content, str(path))
     listed = content.get("tokens") if isinstance(content, dict) and len(content) == 1 else None
     if not isinstance(listed, list):
         raise UserError(f"{path}: is not a list of tokens: it begins with 'tokens:', one token per line")
@@ -82,7 +82,9 @@ def _token(path: Path, number: int, content: Any) -> Token:
         return Token.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(["tokens", str(number), *(abbreviate(str(part)) for part in first["loc"])])
+        place = ".".join(
+            ["tokens", str(number), *(redact_and_abbreviate(str(part)) for part in first["loc"])]
+        )
         reason = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         line = f"{path}: {place}: {reason.removeprefix('Value error, ')}"
         raise UserError(" ".join(line.split())) from None

@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from server.config.values import abbreviate
+from server.config.values import redact_and_abbreviate
 
 
 def no_unknown_keys(settings: type) -> BeforeValidator:
@@ -46,7 +46,7 @@ def _check(settings: type, value: Any, place: str) -> None:
             raise PydanticCustomError(
                 "unknown_key",
                 "{place}unknown key '{key}'; {hint}",
-                {"place": place, "key": abbreviate(str(key)), "hint": hint},
+                {"place": place, "key": redact_and_abbreviate(str(key)), "hint": hint},
             )
         if dataclasses.is_dataclass(types[key]):
             _check(types[key], inner, f"{place}{key}: ")

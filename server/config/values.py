@@ -18,13 +18,13 @@ _MAX_NAME = 64
 _CONTAINERS = (dict, list, tuple, set)
 
 
-def abbreviate(key: str) -> str:
+def redact_and_abbreviate(key: str) -> str:
     """Return a key, shortened and redacted for an error line: it may be long, or an address by mistake."""
     key = redact_to_host(key)
     return key if len(key) <= _MAX_SHOWN else f"{key[:_MAX_SHOWN]}…"
 
 
-def check_camera_name(name: str, where: str) -> None:
+def check_printable_name(name: str, where: str) -> None:
     """Check that a camera's name in a file is short and printable; the site need not have this camera.
 
     Raises:
@@ -34,7 +34,7 @@ def check_camera_name(name: str, where: str) -> None:
         raise UserError(f"{where}: camera {name[:_MAX_SHOWN]!a}: not a printable name")
 
 
-def check_values(content: Any, where: str) -> None:
+def check_depth_and_texts(content: Any, where: str) -> None:
     """Check depth and size of nested values, and that all texts are one printable line.
 
     Raises:
@@ -65,13 +65,15 @@ def check_numbers(content: Any, where: str) -> None:
 
 def _prefix(place: tuple[Any, ...]) -> str:
     """Return the path of a value as the start of an error line."""
-    words = (abbreviate(" ".join(key.split())) if isinstance(key, str) else _short(key) for key in place)
+    words = (
+        redact_and_abbreviate(" ".join(key.split())) if isinstance(key, str) else _short(key) for key in place
+    )
     return f"{'.'.join(words)}: " if place else ""
 
 
 def _short(key: Any) -> str:
     """Return a key that is not a string; Python refuses to write huge integers in decimal."""
-    return "…" if isinstance(key, int) and abs(key) > _MAX_NUMBER else abbreviate(str(key))
+    return "…" if isinstance(key, int) and abs(key) > _MAX_NUMBER else redact_and_abbreviate(str(key))
 
 
 def _inside(content: Any, where: str) -> Iterator[tuple[tuple[Any, ...], Any]]:

@@ -30,11 +30,11 @@ def access_control_of(config: Config) -> dict[str, Any] | None:
     if config.zenoh.users is None:
         return None
     users = list(read_users(config.zenoh.users, SETTING))
-    return build_access_control(config.site.name, config.camera_ids, config.audio_camera, users)
+    return build_access_control(config.site.name, config.camera_ids, config.audio_sender, users)
 
 
 def build_access_control(
-    site: str, cameras: Sequence[str], audio_camera: str | None, users: Sequence[str]
+    site: str, cameras: Sequence[str], audio_sender: str | None, users: Sequence[str]
 ) -> dict[str, Any]:
     """Build zenoh's ``access_control``; everything not allowed is denied.
 
@@ -72,7 +72,7 @@ def build_access_control(
         subjects.append({"id": "listeners", "usernames": listeners})
         policies.append({"rules": ["may subscribe to all", "receives all"], "subjects": ["listeners"]})
     for camera in cameras:
-        publish_keys = [keys.camera(camera, "**"), *([keys.sound] if camera == audio_camera else [])]
+        publish_keys = [keys.camera(camera, "**"), *([keys.sound] if camera == audio_sender else [])]
         rules.append(_rule(f"camera {camera}", "ingress", _SEND, publish_keys))
         commands = [keys.camera(camera, command) for command in _COMMANDS]
         rules.append(

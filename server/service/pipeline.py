@@ -83,7 +83,7 @@ class BestViewPipeline:
             self.aligner,
             self.splicer.publish_frame,
             self.audio_buffer,
-            audio_camera=config.audio_camera,
+            audio_sender=config.audio_sender,
             current_pulse=lambda: self.pulses.newest,
             max_ahead=max_ahead,
         )

@@ -70,7 +70,7 @@ async def reloads(running: ActiveConfig, check: Check = lambda *_: None) -> Asyn
 
 
 def _read(running: ActiveConfig, check: Check) -> ReloadPlan:
-    wanted = running.wanted()
+    wanted = running.read_config_to_activate()
     reload = plan_reload(running.now, wanted)
     check(wanted, reload)
     return reload

@@ -14,7 +14,7 @@ from server.config.running_config import (
     ACTIVE_CONFIG_VARIABLE,
     ActiveConfig,
     is_owned_by_this_user,
-    serialize_config,
+    serialize_with_absolute_paths,
 )
 from server.config.site_config import Config
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
@@ -106,7 +106,7 @@ def _write_active_config(running: ActiveConfig, path: Path, failures: LogThrottl
         path.parent.mkdir(mode=0o700, exist_ok=True)
         if not is_owned_by_this_user(path.parent):  # it was deleted, and another user has created it
             raise PermissionError(errno.EACCES, "its folder belongs to another user")
-        new.write_text(serialize_config(running.now, running.path.parent), encoding="utf-8")
+        new.write_text(serialize_with_absolute_paths(running.now, running.path.parent), encoding="utf-8")
         new.replace(path)
     except OSError as error:
         if (more := failures.record(str(error.strerror))) is not None:

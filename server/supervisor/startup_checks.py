@@ -45,8 +45,8 @@ def check_sources_open(config: Config) -> None:
     Raises:
         UserError: a recording, a scene, a file of detections or the sound cannot be opened.
     """
-    if config.audio_camera is not None:
-        open_site_audio(config, config.audio_camera)
+    if config.audio_sender is not None:
+        open_site_audio(config, config.audio_sender)
     for camera in config.camera_ids:
         check_source_opens(config, camera)
 

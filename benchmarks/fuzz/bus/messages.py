@@ -87,7 +87,7 @@ class IngestMessages(Target):
         frame_buffers = {camera: FrameBuffer(FPS, 50, stream_format) for camera in CAMERAS}
         aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
         audio_buffer = AudioBuffer(self._form, FPS, 10.0)
-        ingest = Ingest(frame_buffers, aligner, lambda *_: None, audio_buffer, audio_camera=CAMERAS[0])
+        ingest = Ingest(frame_buffers, aligner, lambda *_: None, audio_buffer, audio_sender=CAMERAS[0])
         handlers = (ingest.video, ingest.tracks, ingest.status, ingest.thumbnail)
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)

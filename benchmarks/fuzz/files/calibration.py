@@ -19,7 +19,7 @@ from benchmarks.fuzz.engine.target import Target, folder, refused
 from bestview.calibration import CalibrationError, fit_cameras
 from server.cli.calibrate import calibration
 from server.cli.calibrate.points_file import COLUMNS, read_points
-from server.config.loader import build_config, resolve_paths
+from server.config.loader import build_config, resolve_ground_and_paths
 from server.service.calibration import floor_plan
 from server.service.calibration.floor_map import floor_coverage
 from server.service.calibration.floor_plan import FloorPlanCamera
@@ -77,7 +77,7 @@ class _GroundFiles(Target):
 
     def lay_out(self) -> None:
         """Read ground.json as a site does, and lay out its floor plan."""
-        for camera in resolve_paths(self._site, where="site", folder=self._path).cameras:
+        for camera in resolve_ground_and_paths(self._site, where="site", folder=self._path).cameras:
             if camera.ground is not None:
                 floor_coverage(np.array(camera.ground, dtype=np.float64), (640, 360), (640, 360))
 

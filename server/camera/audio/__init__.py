@@ -26,7 +26,7 @@ def open_site_audio(config: Config, camera_id: str) -> RecordedAudioSource | Liv
         UserError: it cannot be opened.
     """
     settings, fps = config.sound, config.site.fps
-    if settings.source is None or config.audio_camera != camera_id:
+    if settings.source is None or config.audio_sender != camera_id:
         return None
     path, offset, at_end = settings.source, settings.offset, settings.at_end
     if settings.source in config.camera_ids:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bestview.calibration import CalibrationError, MarkedPoints, PointFit, WalkSettings, fit_cameras
 from server.cli.calibrate.points_file import read_points
-from server.config.ground_unit import check_unit
+from server.config.ground_unit import check_unit_spelling
 from server.service.calibration.calibration_report import RecordedWalk, calibrate_walk, ground_file_text
 from server.service.calibration.floor_plan import FloorPlanCamera, floor_plan_cameras, plot_floor_plan
 from server.system.errors import UserError
@@ -77,7 +77,7 @@ def refusing(source: Path | str) -> Iterator[None]:
 
 def _checked(where: str, unit: str) -> str:
     try:
-        return check_unit(unit)
+        return check_unit_spelling(unit)
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from bestview.calibration import MarkedPoints
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
-from server.config.values import check_camera_name
+from server.config.values import check_printable_name
 from server.system.errors import UserError
 
 COLUMNS = ("camera", "image_x", "image_y", "floor_x", "floor_y")
@@ -90,7 +90,7 @@ def _from_rows(rows: csv.DictReader[str], name: str) -> Iterator[_Pair]:
         camera = (row["camera"] or "").strip()
         if not camera:
             raise UserError(f"{where}: names no camera")
-        check_camera_name(camera, where)
+        check_printable_name(camera, where)
         yield _Pair(camera, _four([row[column] for column in COLUMNS[1:]], where))
 
 
@@ -119,7 +119,7 @@ def _unit(content: dict[str, Any], name: str) -> str | None:
 
 def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
     for camera, pairs in content["cameras"].items():
-        check_camera_name(camera, name)
+        check_printable_name(camera, name)
         if not isinstance(pairs, list):
             raise UserError(f"{name}: camera {camera}: is a list of pairs")
         for number, pair in enumerate(pairs, start=1):

@@ -26,7 +26,7 @@ _SAME_RATE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class VideoFormat:
-    """Size and frame rate inputs by the options; None: not inputs."""
+    """Size and frame rate of all inputs, as the options give them; None: not given."""
 
     size: Size | None
     fps: float | None

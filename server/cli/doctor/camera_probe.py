@@ -83,7 +83,7 @@ def _run_frames(
         if live:
             time.sleep(1 / fps)
     cpu_s = time.thread_time() - began
-    decoding = sent.cpu_s if sent is not None else 0.0
+    decoding = sent.cpu_s_per_picture if sent is not None else 0.0
     per_frame = 1 / max(1, frames)
     return CameraProbe(
         problem="" if frames else "no picture arrived in time",

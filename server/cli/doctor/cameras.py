@@ -54,10 +54,10 @@ def _while_busy() -> str:
 
 def sound_findings(config: Config) -> list[Finding]:
     """Check that the site's sound can be opened, if it has one."""
-    if config.audio_camera is None:
+    if config.audio_sender is None:
         return []
     try:
-        open_site_audio(config, config.audio_camera)
+        open_site_audio(config, config.audio_sender)
     except UserError as error:
         return [
             bad("sound", str(error).removeprefix("sound: "), "use another file, or a camera that has sound")
@@ -149,11 +149,12 @@ def _quality_findings(config: Config, check: str, probe: CameraProbe) -> list[Fi
                 "set site.fps to that of most of the recordings",
             )
         )
-    if probe.sent is not None and probe.sent.damaged:
+    if probe.sent is not None and probe.sent.damaged_packets:
         findings.append(
             warning(
                 check,
-                f"{probe.sent.damaged} packets could not be decoded, {probe.sent.pictures} pictures could",
+                f"{probe.sent.damaged_packets} packets could not be decoded, "
+                f"{probe.sent.pictures} pictures could",
                 "options: {rtsp_transport: tcp}, or a better network",
             )
         )

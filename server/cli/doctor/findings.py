@@ -91,11 +91,11 @@ def describe_bug(error: Exception) -> str:
 _COLORS = {Level.OK: "green", Level.WARNING: "yellow", Level.BAD: "red"}
 
 
-def show(finding: Finding, width: int, console: Console) -> None:
-    """Print a finding in one line, with the remedy behind an arrow; ``width`` is that of the first column."""
+def show(finding: Finding, check_width: int, console: Console) -> None:
+    """Print a finding in one line, with the remedy behind an arrow; ``check_width`` is the first column's."""
     color = _COLORS[finding.level]
     remedy = f" → {finding.remedy}" if finding.remedy else ""
-    head = f"[{color}]{finding.level.value:7}[/{color}] {escape(f'{finding.check:{width}}')}"
+    head = f"[{color}]{finding.level.value:7}[/{color}] {escape(f'{finding.check:{check_width}}')}"
     text = escape(printable(f"{finding.text}{remedy}"))
     console.print(f"{head}  {text}", soft_wrap=True, highlight=False)
 

@@ -23,15 +23,15 @@ class StreamStats:
         size: width and height in pixels.
         fps: frames per second, by timestamps if there are any; None: too few frames.
         pictures: the number of decoded pictures.
-        damaged: the number of packets that could not be decoded.
-        cpu_s: processor seconds for decoding a picture.
+        damaged_packets: the number of packets that could not be decoded.
+        cpu_s_per_picture: processor seconds for decoding a picture.
     """
 
     size: tuple[int, int]
     fps: float | None
     pictures: int
-    damaged: int
-    cpu_s: float
+    damaged_packets: int
+    cpu_s_per_picture: float
 
 
 def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> StreamStats:

@@ -120,7 +120,9 @@ def _plot(
             mark = ", cut" if shown.frame == strip.cut else ""
             axis.set_title(f"{truth.cameras[shown.camera]}, frame {shown.frame + 1}{mark}", fontsize="small")
     person = truth.people[row]
-    figure.suptitle(f"Person {person}, object {evaluation.objects.get(person, '-')}: frames around each cut")
+    figure.suptitle(
+        f"Person {person}, object {evaluation.object_of.get(person, '-')}: frames around each cut"
+    )
     save_figure(figure, folder / f"person-{person}.png")
 
 

@@ -44,7 +44,7 @@ def plot_views(
         )
         axis.set_yticks(range(len(truth.cameras)), truth.cameras)
         axis.set_ylim(-0.5, len(truth.cameras) - 0.5)
-        axis.set_ylabel(f"person {person}\nobject {evaluation.objects.get(person, '-')}")
+        axis.set_ylabel(f"person {person}\nobject {evaluation.object_of.get(person, '-')}")
     axes[-1].set_xlabel("seconds")
     axes[-1].set_xlim(0.0, evaluation.views.shape[1] / site_info.fps)
     lines = [Line2D([], [], color=color, linewidth=4) for color in (_CHOSEN, _BEST, _SEEN)]

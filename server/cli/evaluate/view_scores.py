@@ -22,7 +22,7 @@ class ViewEvaluation:
     """Scores of view choices against the optimum.
 
     Attributes:
-        objects: by person, the matched object.
+        object_of: by person, the matched object.
         views: (K, N) indices of the cameras chosen for each person and frame; -1: none.
         best: (K, N) indices of the optimum; -1: no camera sees the person.
         people: scores of each person who is visible in some frame, by number.
@@ -30,7 +30,7 @@ class ViewEvaluation:
         unmatched: objects that match no person.
     """
 
-    objects: Mapping[int, int]
+    object_of: Mapping[int, int]
     views: NDArray[np.int64]
     best: NDArray[np.int64]
     people: Mapping[int, ViewScore]
@@ -54,7 +54,7 @@ def evaluate_views(
         return score_views(cost[rows], visible[rows], views[rows], site_info.switch_cost, site_info.fps)
 
     return ViewEvaluation(
-        objects={person: number for number, person in person_of.items()},
+        object_of={person: number for number, person in person_of.items()},
         views=views,
         best=optimal_views(truth.views, site_info.switch_cost),
         people={
@@ -87,7 +87,7 @@ def print_views(evaluation: ViewEvaluation) -> None:
     for column, heading in enumerate(HEADINGS):
         table.add_column(heading, justify="right" if column else "left", no_wrap=True)
     for person, score in evaluation.people.items():
-        table.add_row(str(person), str(evaluation.objects.get(person, "-")), *score_cells(score))
+        table.add_row(str(person), str(evaluation.object_of.get(person, "-")), *score_cells(score))
     table.add_row("all", "", *score_cells(evaluation.total))
     console = Console(highlight=False)
     console.print(table, width=max(console.width, console.measure(table).maximum))
@@ -118,7 +118,7 @@ def content_of_views(evaluation: ViewEvaluation, site_info: SiteInfo) -> dict[st
         "fps": site_info.fps,
         "switch_cost_s": site_info.switch_cost_s,
         "people": {
-            str(person): {"object": evaluation.objects.get(person), **content(score)}
+            str(person): {"object": evaluation.object_of.get(person), **content(score)}
             for person, score in evaluation.people.items()
         },
         "all": content(evaluation.total),

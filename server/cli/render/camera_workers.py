@@ -68,7 +68,7 @@ class CameraWorkers:
         with defer_termination():
             for camera in self._config.camera_ids:
                 outbox: Outbox = SPAWN.Queue(_QUEUE_BATCHES)
-                with pipe_factory.of(camera) as pipes:
+                with pipe_factory.open_while_starting(camera) as pipes:
                     process = start_function(camera, _work, self._config, camera, outbox, pipes)
                 self._outboxes[camera], self._processes[camera] = outbox, process
 
@@ -121,7 +121,7 @@ def run_camera(pipeline: CameraPipeline, camera: str, peers: PeerLink | None = N
     """Run a recording through a camera's pipeline, epoch by epoch, in step with the others."""
     run = CameraRun(pipeline, camera)
     while not run.ended:
-        detections = run.detect()
+        detections = run.detect_for_peers()
         batch = run.track(peers.exchange(detections) if peers is not None and detections is not None else ())
         if batch is not None:
             yield batch
@@ -131,7 +131,7 @@ def run_cameras(pipelines: Mapping[str, CameraPipeline]) -> Iterator[EpochBatch]
     """Run all cameras' recordings in this process, in step."""
     runs = {camera: CameraRun(pipeline, camera) for camera, pipeline in pipelines.items()}
     while runs:
-        detections = {camera: run.detect() for camera, run in runs.items()}
+        detections = {camera: run.detect_for_peers() for camera, run in runs.items()}
         for camera, run in list(runs.items()):
             peer_detections = [
                 found for peer, found in detections.items() if peer != camera and found is not None
@@ -153,7 +153,7 @@ class CameraRun:
         self._frame: DetectedFrame | None = None
         self.ended = False
 
-    def detect(self) -> FrameDetections | None:
+    def detect_for_peers(self) -> FrameDetections | None:
         """Take and encode the next frame and detect people; return the detections for the peers, if any."""
         try:
             image = self._pipeline.take(self._pulse)

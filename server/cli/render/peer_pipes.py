@@ -70,7 +70,7 @@ class PeerPipeFactory:
         self._handed_over: set[str] = set()
 
     @contextmanager
-    def of(self, camera: str) -> Iterator[PeerPipes]:
+    def open_while_starting(self, camera: str) -> Iterator[PeerPipes]:
         """Yield a camera's ends of the pipes while its process starts; they are closed here afterwards."""
         own_pipe = self._pipes[camera]
         for peer_name in self._peers[camera]:

@@ -20,7 +20,7 @@ class Soundtrack:
     """
 
     def __init__(self, config: Config) -> None:
-        camera, form = config.audio_camera, config.sound.format
+        camera, form = config.audio_sender, config.sound.format
         opened = None if camera is None else open_site_audio(config, camera)
         self._sound = opened if isinstance(opened, RecordedAudioSource) else None
         self._fps = config.site.fps

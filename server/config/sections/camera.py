@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
 
 from bestview import CrossViewSettings, validate_homography
-from server.config.ground_unit import check_unit
+from server.config.ground_unit import check_unit_spelling
 from server.config.sections.base import Identifier, Polygon, Section
 from server.config.unknown_keys import no_unknown_keys
 from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
@@ -39,7 +39,7 @@ class CameraSettings(Section):
     """Regions without detection, in pixels of the camera's own picture."""
     ground: list[list[float]] | None = None
     """3x3 homography from the camera's own picture (pixels) to the ground plane."""
-    ground_unit: Annotated[str, AfterValidator(check_unit)] | None = None
+    ground_unit: Annotated[str, AfterValidator(check_unit_spelling)] | None = None
     """The ground plane's unit; m, cm or mm also tell how tall people are in the picture."""
     detections: Path | None = None
     """A MOTChallenge detection file to use instead of a detector."""

@@ -27,7 +27,7 @@ class SiteSettings(Section):
 
 
 class ProcessTlsSettings(Section):
-    """TLS between the processes of a site."""
+    """TLS between the processes of a site; clients have no certificate."""
 
     authority: Path | None = None
     """PEM: the authority that has signed the server's certificate; clients trust it alone."""

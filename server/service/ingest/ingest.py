@@ -104,7 +104,7 @@ class Ingest:
         aligner: receives the tracks, and which cameras are connected.
         on_frame: called with each frame of a camera.
         audio_buffer: receives the site's audio; None if there is none.
-        audio_camera: the camera that sends the audio.
+        audio_sender: the camera that sends the audio.
         current_pulse: returns the newest pulse; below 0: unknown.
         max_ahead: pulses by which a message may be ahead of it. A later one is dropped: the aligner would
             wait until then.
@@ -117,13 +117,13 @@ class Ingest:
         on_frame: Callable[[str, EncodedPicture], None],
         audio_buffer: AudioBuffer | None = None,
         *,
-        audio_camera: str | None = None,
+        audio_sender: str | None = None,
         current_pulse: Callable[[], int] = lambda: -1,
         max_ahead: int = 0,
     ) -> None:
         self._current_pulse, self._max_ahead = current_pulse, max_ahead
         self._frame_buffers, self._aligner, self._on_frame = frame_buffers, aligner, on_frame
-        self._audio_buffer, self._audio_camera = audio_buffer, audio_camera
+        self._audio_buffer, self._audio_camera = audio_buffer, audio_sender
         self._unknown_log = LogThrottle()
         self._presence_log_limits = {
             camera: RateLimit(_PRESENCE_LOG_BURST, _PRESENCE_LOG_RATE, time.monotonic())

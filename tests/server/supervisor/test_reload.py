@@ -27,7 +27,7 @@ from server.config.running_config import (
     ACTIVE_CONFIG_VARIABLE,
     ActiveConfig,
     ConfigFileState,
-    serialize_config,
+    serialize_with_absolute_paths,
 )
 from server.config.sections import HttpSettings
 from server.config.site_config import Config
@@ -103,7 +103,9 @@ def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
         name in reload.line for name in {*reload.live, *reload.cameras, *reload.best_view, *reload.site}
     )
     assert (
-        build_config(yaml.safe_load(serialize_config(reload.now, Path())), where="", folder=Path("/"))
+        build_config(
+            yaml.safe_load(serialize_with_absolute_paths(reload.now, Path())), where="", folder=Path("/")
+        )
         == reload.now
     )
 
@@ -145,10 +147,10 @@ def test_the_difference_to_an_invalid_changed_or_repaired_file_is_known(tmp_path
     assert "view.lookahead" in found.error
     assert found.differs
     with pytest.raises(UserError, match=r"view\.lookahead"):
-        running.wanted()
+        running.read_config_to_activate()
     write(path, view={"lookahead": 40}, site={"fps": 12.5})
     assert running.on_disk().changed_keys == ("site.fps", "view.lookahead")
-    running.now = plan_reload(running.now, running.wanted()).now
+    running.now = plan_reload(running.now, running.read_config_to_activate()).now
     assert running.on_disk().changed_keys == ("site.fps",)
     write(path, view={"lookahead": 40})
     assert not running.on_disk().differs
@@ -173,7 +175,7 @@ def test_processes_use_the_supervisors_active_configuration(
     write(path, record={"folder": "recorded"}, access={"tokens": "tokens.yaml"})
     before = ActiveConfig(path).now
     kept.parent.mkdir()
-    kept.write_text(serialize_config(before, path.parent))
+    kept.write_text(serialize_with_absolute_paths(before, path.parent))
     write(path, site={"fps": "banana"})
     monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(kept))
     running = ActiveConfig(path)
