@@ -33,7 +33,7 @@ def calibrate(
         float,
         typer.Option("--shift", min=0.0, max=60.0, help="Largest time offset between cameras, seconds."),
     ] = 3.0,
-    person: Annotated[
+    person_height: Annotated[
         float, typer.Option("--person", min=0.1, max=1000.0, help="People's height, meters.")
     ] = 1.75,
     force: Annotated[
@@ -64,7 +64,7 @@ def calibrate(
                 inputs, config, picture, lambda name: typer.echo(f"tracking {name}", err=True)
             )
             settings = walk_settings(walked.fps, shift)
-            lines = calibrate_from_walks(walked, ground, drawn, settings, person, force=force)
+            lines = calibrate_from_walks(walked, ground, drawn, settings, person_height, force=force)
     for line in lines:
         typer.echo(line)
     typer.echo(f"{out}: homographies; {plan}: the floor plan")

@@ -30,7 +30,7 @@ def calibrate(task: CalibrationTask) -> CalibrationResult:
     without_offset = tuple(walk.camera for walk in walks if walk.camera not in task.offsets)
     recorded = RecordedWalk(walks, task.fps, offsets=task.offsets, without_offset=without_offset)
     try:
-        report = calibrate_walk(recorded, walk_settings(task.fps, task.max_offset_s), task.person)
+        report = calibrate_walk(recorded, walk_settings(task.fps, task.max_offset_s), task.person_height)
     except CalibrationError as error:
         return CalibrationResult(error=str(error))
     plan = io.BytesIO()

@@ -78,8 +78,8 @@ class WalkSession:
             walk.pause(self._last + 1 - self._start)
         self.result, self.state = None, WalkState.WALKING
 
-    def finish(self, person: float) -> None:
-        """Calibrate from the walk of a person who is `person` meters tall."""
+    def finish(self, person_height: float) -> None:
+        """Calibrate from the walk of a person who is ``person_height`` meters tall."""
         self._cancel_calibration()
         boxes = [walk.boxes for walk in self._walks.values()]
         offsets = {
@@ -91,7 +91,7 @@ class WalkSession:
             [camera_boxes for camera_boxes in boxes if camera_boxes is not None],
             self._fps,
             _SHIFT_S,
-            person,
+            person_height,
             offsets,
         )
         self.result, self.state = None, WalkState.WORKING

@@ -31,8 +31,8 @@ class CalibrationTask(msgspec.Struct, frozen=True):
     fps: float
     max_offset_s: float
     """The largest time offset between cameras, in seconds."""
-    person: float
-    """The person's height, meters."""
+    person_height: float
+    """In meters."""
     offsets: dict[str, int]
     """By camera, the offset that the configuration applies already; only cameras that can have one."""
 

@@ -161,7 +161,7 @@ async def test_every_final_box_is_recorded_once_and_counted_from_the_start_of_th
             active_walk.add(walk_epoch)  # earlier boxes are not counted again
 
     task = await task_of([], config, before_and_on)
-    assert task.person == 1.7
+    assert task.person_height == 1.7
     for camera_boxes in task.cameras:
         frames = np.frombuffer(camera_boxes.frames, dtype=np.int64)
         assert len(set(frames.tolist())) == len(frames)
