@@ -6,7 +6,7 @@ Sub-packages: `association` (one person id across cameras), `geometry` (ground p
 """
 
 from bestview.association import (
-    AppearanceSample,
+    AppearanceHistogram,
     IdentityRegistry,
     IdentitySettings,
     IdentityUpdate,
@@ -67,7 +67,7 @@ __all__ = [
     "NO_CAMERA",
     "NO_PERSON",
     "NO_VIEW_COST",
-    "AppearanceSample",
+    "AppearanceHistogram",
     "BodyEstimates",
     "CameraDetections",
     "CameraGeometry",

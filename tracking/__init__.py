@@ -14,12 +14,12 @@ from tracking.solvers.base import DEFAULT_SOLVER, Solution, Solver, SolveReport,
 from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
 from tracking.types import Detections
-from tracking.window import AppearanceSample, WindowResult, WindowSettings, WindowTrack, merge_results
+from tracking.window import AppearanceHistogram, WindowResult, WindowSettings, WindowTrack, merge_results
 
 __all__ = [
     "DEFAULT_SOLVER",
     "PAPER_COSTS",
-    "AppearanceSample",
+    "AppearanceHistogram",
     "CostSettings",
     "Detections",
     "Network",

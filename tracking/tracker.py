@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.appearance import appearance_distance_matrix
-from tracking.appearance_samples import add_appearance_samples
+from tracking.appearance_histograms import add_appearance_histograms
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.interpolation import interpolate_gaps
@@ -130,11 +130,11 @@ class OnlineTracker:
         ]
         tracks = [self._track(self._objects[n], first, states[n], boxes[n], frames) for n in visible]
         final = frames[: max(final_to - first + 1, 0)]
-        sampled = add_appearance_samples(tracks, [states[n] for n in visible], first, final)
+        with_histograms = add_appearance_histograms(tracks, [states[n] for n in visible], first, final)
         alive = [n for n, item in enumerate(self._objects) if item.id not in ended]
         self._objects = [self._objects[n] for n in alive]
         self._finish(first, final_to, frames, states[alive])
-        return WindowResult(first, end, max(final_to, first - 1), sampled, report)
+        return WindowResult(first, end, max(final_to, first - 1), with_histograms, report)
 
     def _frame(self, number: int) -> Detections:
         return self._detections[number] if number in self._detections else Detections.empty(self._bins())

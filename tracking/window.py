@@ -62,7 +62,7 @@ class WindowSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AppearanceSample:
+class AppearanceHistogram:
     """Mean histogram of an object over consecutive frames without occlusion.
 
     Attributes:
@@ -86,7 +86,7 @@ class WindowTrack:
         interpolated: `(F, 4)` the same, with gaps of up to `max_interpolated_gap` frames interpolated.
         histogram: `(B,)`, its template.
         confidence: mean score of its boxes over the window, 0 where occluded; in [0, 1].
-        appearance_samples: mean histograms over unoccluded frames up to `final_to`, in order.
+        appearance_histograms: mean histograms over unoccluded frames up to `final_to`, in order.
     """
 
     id: int
@@ -94,7 +94,7 @@ class WindowTrack:
     interpolated: Floats
     histogram: Floats
     confidence: float
-    appearance_samples: tuple[AppearanceSample, ...] = ()
+    appearance_histograms: tuple[AppearanceHistogram, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,11 +140,13 @@ def merge_results(results: list[WindowResult]) -> WindowResult | None:
             boxes, interpolated = (known.boxes, known.interpolated) if known else (absent, absent.copy())
             boxes[window] = track.boxes[: kept - result.first + 1]
             interpolated[window] = track.interpolated[: kept - result.first + 1]
-            samples = (
-                (*known.appearance_samples, *track.appearance_samples) if known else track.appearance_samples
+            histograms = (
+                (*known.appearance_histograms, *track.appearance_histograms)
+                if known
+                else track.appearance_histograms
             )
             tracks[track.id] = replace(
-                track, boxes=boxes, interpolated=interpolated, appearance_samples=samples
+                track, boxes=boxes, interpolated=interpolated, appearance_histograms=histograms
             )
     visible = [tracks[id_] for id_ in sorted(tracks) if not np.isnan(tracks[id_].boxes).all()]
     return replace(newest, first=first, tracks=tuple(visible))

@@ -8,11 +8,11 @@ into persons, and `registry` assigns, corrects and remembers person ids.
 from bestview.association.registry.corrections import Merge, Split
 from bestview.association.registry.identity_registry import IdentityRegistry, IdentityUpdate
 from bestview.association.settings import IdentitySettings
-from bestview.association.sightings import AppearanceSample, TrackUpdate
+from bestview.association.sightings import AppearanceHistogram, TrackUpdate
 from bestview.association.tracklet import TrackKey, TrackletKey
 
 __all__ = [
-    "AppearanceSample",
+    "AppearanceHistogram",
     "IdentityRegistry",
     "IdentitySettings",
     "IdentityUpdate",

@@ -21,7 +21,7 @@ from bestview.geometry.ground_plane import (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AppearanceSample:
+class AppearanceHistogram:
     """Mean color histogram of a track over consecutive frames in which no other person is in its box.
 
     Attributes:
@@ -44,7 +44,7 @@ class TrackUpdate:
         local_id: the camera's id of the track, unique in the camera's lifetime.
         first_frame: frame of row 0.
         boxes: (M, 4) left, top, right, bottom in pixels per frame; NaN rows where hidden.
-        appearance: samples of frames in which no other person is in the box.
+        appearance: mean histograms of frames in which no other person is in the box.
         picture_height: of the camera, pixels; feet at the lower edge are cut off.
     """
 
@@ -52,7 +52,7 @@ class TrackUpdate:
     local_id: int
     first_frame: int
     boxes: NDArray[np.float64]
-    appearance: tuple[AppearanceSample, ...] = ()
+    appearance: tuple[AppearanceHistogram, ...] = ()
     picture_height: float = float("inf")
 
     @property
@@ -173,16 +173,16 @@ def _check(track: TrackUpdate, homographies: Mapping[str, NDArray[np.float64] | 
         raise ValueError(f"{name}: the camera is unknown")
     if track.boxes.ndim != 2 or track.boxes.shape[1] != 4:  # noqa: PLR2004 — left, top, right, bottom
         raise ValueError(f"{name}: boxes have shape {track.boxes.shape}, not (M, 4)")
-    for sample in track.appearance:
-        if sample.histogram.ndim != 1:
-            raise ValueError(f"{name}: a histogram has shape {sample.histogram.shape}, not (B,)")
+    for appearance in track.appearance:
+        if appearance.histogram.ndim != 1:
+            raise ValueError(f"{name}: a histogram has shape {appearance.histogram.shape}, not (B,)")
         if (
             not track.first_frame
-            <= sample.first_frame
-            <= sample.last_frame
+            <= appearance.first_frame
+            <= appearance.last_frame
             < track.first_frame + len(track.boxes)
         ):
             raise ValueError(
-                f"{name}: an appearance sample of frames {sample.first_frame} to {sample.last_frame} "
-                "is not within its frames"
+                f"{name}: an appearance histogram of frames {appearance.first_frame} to "
+                f"{appearance.last_frame} is not within its frames"
             )

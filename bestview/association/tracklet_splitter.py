@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bestview.association.appearance.histograms import MeanHistogram
 from bestview.association.settings import IdentitySettings
-from bestview.association.sightings import AppearanceSample, TrackObservations
+from bestview.association.sightings import AppearanceHistogram, TrackObservations
 from bestview.association.tracklet import TrackKey, Tracklet, TrackletEndpoint, TrackletKey
 
 Floats = NDArray[np.float64]
@@ -56,13 +56,13 @@ class TrackletSplitter:
         """Person ids restored from an earlier run, for tracks that are not observed yet."""
 
     def update(
-        self, observations: TrackObservations, appearance: Mapping[TrackKey, Sequence[AppearanceSample]]
+        self, observations: TrackObservations, appearance: Mapping[TrackKey, Sequence[AppearanceHistogram]]
     ) -> ObservedTracklets:
         """Add the observations of an update, and return their tracklets.
 
         Args:
             observations: of all tracks.
-            appearance: samples by track; those in a crowd do not count.
+            appearance: histograms by track; those in a crowd do not count.
         """
         shape = observations.visible.shape
         rows, settled_ids = np.full(shape, -1), np.zeros(shape, dtype=np.int64)

@@ -89,12 +89,15 @@ def _from(result: WindowResult, first: int) -> WindowResult:
 
 
 def _cut(track: WindowTrack, start: int, first: int) -> WindowTrack:
-    samples = tuple(
-        replace(sample, first=max(sample.first, first))
-        for sample in track.appearance_samples
-        if sample.last >= first
+    histograms = tuple(
+        replace(histogram, first=max(histogram.first, first))
+        for histogram in track.appearance_histograms
+        if histogram.last >= first
     )
     rows = slice(first - start, None)
     return replace(
-        track, boxes=track.boxes[rows], interpolated=track.interpolated[rows], appearance_samples=samples
+        track,
+        boxes=track.boxes[rows],
+        interpolated=track.interpolated[rows],
+        appearance_histograms=histograms,
     )

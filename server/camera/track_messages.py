@@ -97,7 +97,7 @@ def _track(track: WindowTrack) -> TrackMessage:
         id=track.id,
         boxes=[_box(row) for row in track.interpolated],
         confidence=float(track.confidence),
-        appearance=[_appearance(sample) for sample in track.appearance_samples],
+        appearance=[_appearance_message(histogram) for histogram in track.appearance_histograms],
     )
 
 
@@ -111,9 +111,9 @@ def _risk_event(event: types.RiskEvent) -> RiskEvent:
     )
 
 
-def _appearance(sample: tracking.AppearanceSample) -> AppearanceHistogram:
-    shares = [round(float(share), _SHARE_DIGITS) for share in sample.histogram]
-    return AppearanceHistogram(first=sample.first, last=sample.last, histogram=shares)
+def _appearance_message(appearance: tracking.AppearanceHistogram) -> AppearanceHistogram:
+    shares = [round(float(share), _SHARE_DIGITS) for share in appearance.histogram]
+    return AppearanceHistogram(first=appearance.first, last=appearance.last, histogram=shares)
 
 
 def _box(row: NDArray[np.float64]) -> Box | None:

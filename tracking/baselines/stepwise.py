@@ -15,7 +15,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.appearance_samples import add_appearance_samples
+from tracking.appearance_histograms import add_appearance_histograms
 from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
@@ -241,7 +241,7 @@ class StepwiseTracker(Generic[S]):
         ]
         report = SolveReport(self._method.name, 0.0, 0.0, integral=False, conflicts=0, rounds=0)
         result = WindowResult(
-            first, last, last, add_appearance_samples(tracks, states, first, detections), report
+            first, last, last, add_appearance_histograms(tracks, states, first, detections), report
         )
         for track in self._all_tracks():
             # An unconfirmed track is published from the window in which it is confirmed.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import AppearanceSample, TrackKey, TrackUpdate
+from bestview import AppearanceHistogram, TrackKey, TrackUpdate
 from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
@@ -56,7 +56,7 @@ class CameraWindow:
                 local_id=key.local_id,
                 first_frame=self.fresh,
                 boxes=boxes,
-                appearance=_appearance_samples(track.appearance, self.fresh),
+                appearance=_appearance_histograms(track.appearance, self.fresh),
                 picture_height=float(height),
             )
             for key, track, boxes, is_hidden in zip(
@@ -76,14 +76,16 @@ class CameraWindow:
         return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _appearance_samples(
+def _appearance_histograms(
     histograms: Sequence[messages.AppearanceHistogram], first: int
-) -> tuple[AppearanceSample, ...]:
-    """Return the samples in the frames from `first` on."""
+) -> tuple[AppearanceHistogram, ...]:
+    """Return the histograms in the frames from `first` on."""
     return tuple(
-        AppearanceSample(max(sample.first, first), sample.last, np.array(sample.histogram, dtype=np.float64))
-        for sample in histograms
-        if sample.last >= first
+        AppearanceHistogram(
+            max(message.first, first), message.last, np.array(message.histogram, dtype=np.float64)
+        )
+        for message in histograms
+        if message.last >= first
     )
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import (
-    AppearanceSample,
+    AppearanceHistogram,
     IdentityRegistry,
     IdentitySettings,
     IdentityUpdate,
@@ -307,7 +307,7 @@ def test_minimal_settings_work_while_cameras_come_and_go(zero_settings: Mapping[
                 left = 100.0 * local + 0.1 * last * (local - 1.5)
                 boxes = np.array([left, 100.0, left + 40.0, 220.0]) + random.normal(0, 4, (STRIDE, 4))
                 histogram = random.random(random.choice([0, 8, 8, 16])) if local else np.zeros(8)
-                sample = AppearanceSample(last - STRIDE + 1, last, histogram)
+                sample = AppearanceHistogram(last - STRIDE + 1, last, histogram)
                 run = 1 + local + 4 * (last // 400)
                 tracks.append(TrackUpdate(camera, run, last - STRIDE + 1, boxes, (sample,)))
         updates.append(identities.update(tracks, last))
@@ -325,8 +325,8 @@ def test_invalid_arguments_are_refused_in_one_line() -> None:
 
     refused("camera is unknown", replace(track, camera="cellar"))
     refused("shape", replace(track, boxes=np.zeros((15, 3))))
-    refused("histogram", replace(track, appearance=(AppearanceSample(0, 3, np.zeros((2, 2))),)))
-    refused("of frames 3 to 20", replace(track, appearance=(AppearanceSample(3, 20, np.zeros(2)),)))
+    refused("histogram", replace(track, appearance=(AppearanceHistogram(0, 3, np.zeros((2, 2))),)))
+    refused("of frames 3 to 20", replace(track, appearance=(AppearanceHistogram(3, 20, np.zeros(2)),)))
     refused("occurs twice", track, track)
     with pytest.raises(ValueError, match="of camera south is not invertible"):
         IdentityRegistry(IdentitySettings(), {"south": np.ones((3, 3))})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bestview import AppearanceSample, IdentityRegistry, IdentitySettings, TrackUpdate
+from bestview import AppearanceHistogram, IdentityRegistry, IdentitySettings, TrackUpdate
 
 STRIDE, UPDATES, PEOPLE = 5, 40, 8
 PIXEL = 0.01
@@ -43,7 +43,7 @@ def tracks(hall: int, update: int, places: NDArray[np.float64]) -> list[TrackUpd
                 continue
             feet = (places[person, first : first + STRIDE] + rng.normal(0, 0.1, (STRIDE, 2))) / PIXEL
             boxes = np.column_stack([feet - np.array([20, 170]), feet + np.array([20, 0])])
-            sample = AppearanceSample(first, first + STRIDE - 1, coats[person] * rng.uniform(0.8, 1.2, 16))
+            sample = AppearanceHistogram(first, first + STRIDE - 1, coats[person] * rng.uniform(0.8, 1.2, 16))
             found.append(TrackUpdate(f"c{camera:03d}", 100 * track_number + person, first, boxes, (sample,)))
     return found
 

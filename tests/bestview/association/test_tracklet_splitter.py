@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import AppearanceSample, IdentitySettings, TrackKey, TrackUpdate
+from bestview import AppearanceHistogram, IdentitySettings, TrackKey, TrackUpdate
 from bestview.association.sightings import FootPointError, align_tracks
 from bestview.association.tracklet_splitter import TrackletSplitter
 
@@ -17,14 +17,14 @@ LEFT, RIGHT, ONTO_LEFT = (0.0, 0.0, 10.0, 20.0), (100.0, 0.0, 110.0, 20.0), (2.0
 
 
 def track(
-    local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *samples: AppearanceSample
+    local: int, first: int, boxes: Sequence[tuple[float, ...] | None], *histograms: AppearanceHistogram
 ) -> TrackUpdate:
     rows = np.array([box or (np.nan,) * 4 for box in boxes])
-    return TrackUpdate("c0", local, first, rows, samples)
+    return TrackUpdate("c0", local, first, rows, histograms)
 
 
-def sample_at(frame: int) -> AppearanceSample:
-    return AppearanceSample(frame, frame, np.array([1.0, 3.0]))
+def histogram_at(frame: int) -> AppearanceHistogram:
+    return AppearanceHistogram(frame, frame, np.array([1.0, 3.0]))
 
 
 def split_tracks(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
@@ -37,9 +37,9 @@ def split_tracks(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
     return tracklets
 
 
-def track_with_samples(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> TrackUpdate:
-    """Return a track whose every sighting has an appearance sample."""
-    return track(local, first, boxes, *(sample_at(first + i) for i, box in enumerate(boxes) if box))
+def track_with_histograms(local: int, first: int, boxes: Sequence[tuple[float, ...] | None]) -> TrackUpdate:
+    """Return a track whose every sighting has an appearance histogram."""
+    return track(local, first, boxes, *(histogram_at(first + i) for i, box in enumerate(boxes) if box))
 
 
 def spans(tracklets: TrackletSplitter, local: int) -> list[tuple[int, int]]:
@@ -51,7 +51,7 @@ def spans(tracklets: TrackletSplitter, local: int) -> list[tuple[int, int]]:
 
 def test_a_track_that_leaves_a_crowd_starts_a_new_tracklet() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 3 + [RIGHT] * 4
-    tracklets = split_tracks([track(1, 0, [LEFT] * 12, sample_at(0)), track(2, 0, met, sample_at(0))])
+    tracklets = split_tracks([track(1, 0, [LEFT] * 12, histogram_at(0)), track(2, 0, met, histogram_at(0))])
     assert spans(tracklets, 1) == spans(tracklets, 2) == [(0, 7), (8, 11)]
     assert [tracklet.crowd_frames_before for tracklet in tracklets.active] == [0, 3, 0, 3]
     assert [tracklet.predecessor for tracklet in tracklets.active] == [
@@ -64,9 +64,9 @@ def test_a_track_that_leaves_a_crowd_starts_a_new_tracklet() -> None:
 
 def test_short_overlaps_and_short_gaps_start_no_tracklet() -> None:
     met = [RIGHT] * 5 + [ONTO_LEFT] * 2 + [RIGHT] * 3 + [None] * 9 + [RIGHT] * 3
-    assert spans(split_tracks([track(1, 0, [LEFT] * 22), track(2, 0, met, sample_at(0))]), 2) == [(0, 21)]
+    assert spans(split_tracks([track(1, 0, [LEFT] * 22), track(2, 0, met, histogram_at(0))]), 2) == [(0, 21)]
     away = [RIGHT] * 5 + [None] * 11 + [RIGHT] * 3
-    assert spans(split_tracks([track(2, 0, away, sample_at(0))]), 2) == [(0, 4), (16, 18)]
+    assert spans(split_tracks([track(2, 0, away, histogram_at(0))]), 2) == [(0, 4), (16, 18)]
 
 
 def test_without_appearance_the_track_is_not_split() -> None:
@@ -74,11 +74,11 @@ def test_without_appearance_the_track_is_not_split() -> None:
     assert spans(split_tracks([track(1, 0, [LEFT] * 12), track(2, 0, met)]), 2) == [(0, 34)]
 
 
-def test_appearance_samples_in_a_crowd_do_not_count() -> None:
+def test_appearance_histograms_in_a_crowd_do_not_count() -> None:
     coat = np.array([1.0, 3.0])
     met = [RIGHT] * 4 + [ONTO_LEFT] * 2
-    crowded = AppearanceSample(3, 4, coat)
-    alone = AppearanceSample(0, 2, coat)
+    crowded = AppearanceHistogram(3, 4, coat)
+    alone = AppearanceHistogram(0, 2, coat)
     tracklets = split_tracks([track(1, 0, [LEFT] * 6), track(2, 0, met, alone, crowded)])
     [histogram] = [
         tracklet.appearance.by_camera["c0"] for tracklet in tracklets.active if tracklet.key.local_id == 2
@@ -132,10 +132,12 @@ def test_tracklets_do_not_depend_on_how_frames_are_grouped_into_updates(data: st
     }
     cuts = sorted(data.draw(st.sets(st.integers(1, frames - 1), max_size=5)))
     updates = [
-        [track_with_samples(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
+        [track_with_histograms(local, a, rows[a:b]) for local, rows in boxes.items() if any(rows[a:b])]
         for a, b in zip([0, *cuts], [*cuts, frames], strict=True)
     ]
-    whole = split_tracks([track_with_samples(local, 0, rows) for local, rows in boxes.items() if any(rows)])
+    whole = split_tracks(
+        [track_with_histograms(local, 0, rows) for local, rows in boxes.items() if any(rows)]
+    )
     parts = split_tracks(*updates)
     for local in (1, 2):
         assert spans(parts, local) == spans(whole, local)

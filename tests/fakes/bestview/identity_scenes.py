@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bestview import (
-    AppearanceSample,
+    AppearanceHistogram,
     IdentityRegistry,
     IdentitySettings,
     IdentityUpdate,
@@ -65,7 +65,7 @@ class StraightTrack:
         for frame in visible:
             boxes[frame - first] = self.box(frame)
         appearance = (
-            (AppearanceSample(visible[0], visible[-1], coat(self.coat)),) if visible and self.coat else ()
+            (AppearanceHistogram(visible[0], visible[-1], coat(self.coat)),) if visible and self.coat else ()
         )
         return TrackUpdate(self.camera, self.local_id, first, boxes, appearance)
 

@@ -153,7 +153,7 @@ def test_without_preparation_the_background_is_learned_online() -> None:
     assert set(boxes[55]) == {1}
 
 
-def test_appearance_samples_come_from_detections_of_single_people() -> None:
+def test_appearance_histograms_come_from_detections_of_single_people() -> None:
     tracker = _tracker()
     pushed = []
     for frame in range(40):
@@ -166,7 +166,7 @@ def test_appearance_samples_come_from_detections_of_single_people() -> None:
         (track.id, sample)
         for result in results
         for track in result.tracks
-        for sample in track.appearance_samples
+        for sample in track.appearance_histograms
     ]
     assert {(number, int(sample.histogram.argmax())) for number, sample in samples} == {(1, 0), (2, 1)}
 

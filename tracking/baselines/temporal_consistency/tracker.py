@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.appearance_samples import add_appearance_samples
+from tracking.appearance_histograms import add_appearance_histograms
 from tracking.baselines.temporal_consistency.blobs import BlobDetector
 from tracking.baselines.temporal_consistency.initiation import PersonLifecycle, initial_people
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
@@ -250,7 +250,7 @@ def build_window_tracks(
         score = float(np.mean(~np.isnan(boxes[:, 0])))
         tracks.append(WindowTrack(number, boxes, boxes, histogram, score))
         states.append(matched)
-    return add_appearance_samples(tracks, states, first, detections[: final - first + 1])
+    return add_appearance_histograms(tracks, states, first, detections[: final - first + 1])
 
 
 def _matched_detections(boxes: Floats, detections: Sequence[Detections]) -> NDArray[np.int64]:
