@@ -20,6 +20,14 @@ def is_out_of_resources(error: object) -> bool:
     return isinstance(error, OSError) and error.errno in _OUT_OF_RESOURCES
 
 
+def _is_accept_after_close(error: object) -> bool:
+    """Return whether asyncio tried to accept on a socket that was closed meanwhile.
+
+    A second after descriptors were exhausted it accepts again, even if the server was closed.
+    """
+    return isinstance(error, ValueError) and str(error) == "Invalid file descriptor: -1"
+
+
 class AcceptErrors:
     """Logs failures to accept connections: the first at once, then rarely, with a count."""
 
@@ -37,5 +45,5 @@ class AcceptErrors:
         error = context.get("exception")
         if "socket" in context and isinstance(error, OSError) and is_out_of_resources(error):
             self.failed(error)
-        else:
+        elif not _is_accept_after_close(error):
             loop.default_exception_handler(context)

@@ -11,7 +11,7 @@ from playwright.async_api import Page
 from client import Gop
 from client.model import Split
 from fakes.programs import needs_chromium
-from fakes.running.assist_page import PERSON_POSITION_JS, assisted_site, every_gop_once, open_page
+from fakes.running.assist_page import PERSON_POSITION_JS, assisted_site, check_every_gop_once, open_page
 from fakes.running.lookalikes import FRAMES, MEETING, STANDING, write_camera
 from fakes.running.site import RunningSite
 from fakes.timeouts import PATIENCE_MS
@@ -80,4 +80,4 @@ async def point(site: RunningSite, page: Page) -> None:
     await page.wait_for_function(f"myview.state === 'playing' && myview.pulse > {gops[corrected].first} + 10")
     assert await page.evaluate(left)
     assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
-    assert every_gop_once(site)
+    check_every_gop_once(site)

@@ -20,10 +20,9 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_JOIN_TIMEOUT_S = 2.0
 _RETRY_S = 1.0
 _LISTENERS_S = 1.0
-"""How long the first message waits for all peers to subscribe."""
+"""How long the first message waits for all peers to subscribe, or half as long as for their detections."""
 _DECODER = msgspec.json.Decoder(FrameDetections)
 
 
@@ -45,6 +44,8 @@ class PeerDetectionExchange:
         self._listening: set[str] = set()
         self._changed = asyncio.Event()
         self._join_task: asyncio.Task[None] | None = None
+        self._is_unreachable = asyncio.Event()
+        """Set once the router did not respond."""
         self._open_task: asyncio.Task[Bus] | None = None
         self._bus: Bus | None = None
         self._has_published = False
@@ -55,14 +56,21 @@ class PeerDetectionExchange:
         """Messages of peers that could not be parsed."""
 
     async def join(self) -> None:
-        """Connect to the peers; without a router, connecting continues in the background.
+        """Connect to the peers; if no router responds, connecting continues in the background.
 
         An error in the background is raised by the next :meth:`exchange`.
         """
         if not self._peers:
             return
         self._join_task = asyncio.create_task(self._join(), name="join")
-        await asyncio.wait({self._join_task}, timeout=_JOIN_TIMEOUT_S)
+        unreachable = asyncio.create_task(self._is_unreachable.wait())
+        # A busy machine may take seconds to connect; peers would miss the first frames' detections.
+        await asyncio.wait(
+            {self._join_task, unreachable},
+            timeout=self._config.sync.start_timeout_s,
+            return_when=asyncio.FIRST_COMPLETED,
+        )
+        unreachable.cancel()
 
     async def leave(self) -> None:
         """Disconnect from the peers."""
@@ -89,6 +97,7 @@ class PeerDetectionExchange:
                     log.info(
                         "camera %s: cannot receive the peers' detections yet: %s%s", self._camera, error, more
                     )
+                self._is_unreachable.set()
                 await asyncio.sleep(_RETRY_S)
         if self._join_log.end():
             log.info("camera %s: receives the peers' detections", self._camera)
@@ -145,7 +154,7 @@ class PeerDetectionExchange:
             return
         if not self._has_published:
             self._has_published = True
-            deadline = asyncio.get_running_loop().time() + _LISTENERS_S
+            deadline = asyncio.get_running_loop().time() + max(_LISTENERS_S, self._wait_s / 2)
             await self._wait_until(lambda: self._listening.issuperset(self._peers), deadline)
         self._bus.publish(self._keys.camera(self._camera, "detections"), msgspec.json.encode(message))
 

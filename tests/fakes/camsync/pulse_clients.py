@@ -74,6 +74,16 @@ class JumpingClock:
         return self._clock() + self.jumped
 
 
+class SteppedClock:
+    """A clock that the test sets: ``now``, in seconds."""
+
+    def __init__(self) -> None:
+        self.now = 1_000_000.25
+
+    def __call__(self) -> float:
+        return self.now
+
+
 Connect = Callable[..., Awaitable[RawConnection]]
 
 

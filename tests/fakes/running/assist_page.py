@@ -66,7 +66,10 @@ async def open_page(site: RunningSite) -> AsyncIterator[Page]:
     assert errors == []
 
 
-def every_gop_once(site: RunningSite) -> bool:
-    """Return whether each GOP was published exactly once."""
+def check_every_gop_once(site: RunningSite) -> None:
+    """Check that each GOP was published exactly once, apart from those that a busy machine skipped."""
     firsts = [gop.first for gop in site.gops]
-    return firsts == list(range(firsts[0], firsts[0] + GOP * len(firsts), GOP))
+    if any("skipping to the present" in line for line in site.lines):
+        assert firsts == sorted(set(firsts)), firsts
+    else:
+        assert firsts == list(range(firsts[0], firsts[0] + GOP * len(firsts), GOP)), "\n".join(site.lines)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+import errno
 import json
 import resource
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -21,6 +24,7 @@ from fakes.timeouts import PATIENCE
 from server.cli.doctor.findings import Level
 from server.cli.doctor.machine import descriptor_findings
 from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
+from server.system.accept_errors import AcceptErrors
 from server.system.descriptors import descriptor_limit, raise_descriptor_limit
 
 
@@ -99,3 +103,35 @@ def test_failures_to_accept_are_logged_once_and_connections_are_accepted_later(t
     log_text = log.read_bytes()
     assert log_text.count(b"cannot be accepted: Too many open files") == 1
     assert b"Traceback" not in log_text
+
+
+class FullListener(socket.socket):
+    """A listening socket of a process without free descriptors."""
+
+    def accept(self) -> NoReturn:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+
+async def test_a_server_closed_while_descriptors_are_exhausted_logs_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("asyncio.constants.ACCEPT_RETRY_DELAY", 0.01)
+    loop, errors, contexts = asyncio.get_running_loop(), AcceptErrors(), asyncio.Queue[dict[str, Any]]()
+
+    def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        errors(loop, context)
+        contexts.put_nowait(context)
+
+    loop.set_exception_handler(handle)
+    listener = FullListener()
+    listener.bind(("127.0.0.1", 0))
+    server = await loop.create_server(asyncio.Protocol, sock=listener)
+    async with asyncio.timeout(PATIENCE):
+        with connect(listener.getsockname()[1]):
+            assert "socket" in await contexts.get()
+            server.close()
+            while not isinstance((await contexts.get())["exception"], ValueError):
+                pass  # asyncio tries as often as the listen backlog, then again on the closed socket
+    assert [record.getMessage() for record in caplog.records] == [
+        "a connection cannot be accepted: Too many open files"
+    ]

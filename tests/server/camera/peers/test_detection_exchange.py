@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from server.cli.generated_config import free_port
 from server.cli.render.camera_workers import CameraWorkers, EpochBatch, run_cameras
 from server.cli.render.renderer import Renderer
 from server.config.loader import build_config
+from server.config.sections.site import ZenohSettings
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections, ZenohKeys
@@ -197,6 +199,41 @@ async def test_detections_are_exchanged_from_the_first_frame(
         first, second = await exchange_both(one, two, pulse)
         assert first.messages == (detections("c1", pulse),)
         assert second.messages == (detections("c0", pulse),)
+
+
+async def test_a_camera_that_connects_slowly_misses_no_detections(
+    recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_connect, listener = threading.Event(), Bus.listener
+
+    def slow_listener(settings: ZenohSettings, user: str | None = None) -> Bus:
+        if user == "c1":
+            may_connect.wait()
+        return listener(settings, user)
+
+    monkeypatch.setattr(Bus, "listener", slow_listener)
+    monkeypatch.setattr("server.camera.peers.detection_exchange._LISTENERS_S", 0.0)
+    config = config_of(recording, 2)
+    router = Bus.router(config.zenoh)
+    cameras = {
+        name: PeerDetectionExchange(config, name, CrossViewScorer(config, name, (192, 108), 1), 100)
+        for name in ("c0", "c1")
+    }
+
+    async def exchange_first_frame(name: str) -> PeerDetections:
+        await cameras[name].join()
+        if name == "c0":
+            asyncio.get_running_loop().call_soon(may_connect.set)  # runs when the exchange waits
+        return await cameras[name].exchange(0, detections(name, 0), now(), needed=True)
+
+    exchanges = [asyncio.create_task(exchange_first_frame(name)) for name in cameras]
+    async with asyncio.timeout(PATIENCE):
+        first, second = await asyncio.gather(*exchanges)
+    assert first.messages == (detections("c1", 0),)
+    assert second.messages == (detections("c0", 0),)
+    for camera in cameras.values():
+        await camera.leave()
+    router.close()
 
 
 async def test_an_unexpected_error_on_joining_ends_the_camera(

@@ -121,7 +121,8 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(vp8_site: ServedSi
     assert played_in_browser["range"] == [0, pytest.approx(GOPS * GOP / FPS)]
     pulses = [time * FPS for time in played_in_browser["shown"]]
     assert pulses == pytest.approx([round(pulse) for pulse in pulses], abs=0.03), "frames are at their pulses"
-    assert pulses[-1] > GOPS * GOP - 3
+    # A busy browser need not show the last frames.
+    assert played_in_browser["end"] == pytest.approx(GOPS * GOP / FPS, abs=0.01)
 
 
 async def feed_in_real_time(served: ServedSite) -> None:
