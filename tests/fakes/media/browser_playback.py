@@ -36,11 +36,12 @@ PLAY_JS = (
   video.playbackRate = rate;
   await video.play();
   await ended;
-  return { ranges: buffer.buffered.length, range, shown, end: video.currentTime, error: video.error?.message ?? '',
+  return { ranges: buffer.buffered.length, range, shown, end: video.currentTime,
+    error: video.error?.message ?? '',
     tracks: [video.webkitAudioDecodedByteCount > 0, video.webkitVideoDecodedByteCount > 0] };
 }"""
 )
-"""Plays a stream to the end; returns buffered ranges, media times of frames, where it ended, and decoded tracks."""
+"""Plays a stream; returns buffered ranges, media times of frames and of the end, and decoded tracks."""
 
 
 async def play_in_chromium(

@@ -204,14 +204,14 @@ async def test_detections_are_exchanged_from_the_first_frame(
 async def test_a_camera_that_connects_slowly_misses_no_detections(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    may_connect, listener = threading.Event(), Bus.listener
+    may_connect, listener = threading.Event(), Bus.peer_listener
 
     def slow_listener(settings: ZenohSettings, user: str | None = None) -> Bus:
         if user == "c1":
             may_connect.wait()
         return listener(settings, user)
 
-    monkeypatch.setattr(Bus, "listener", slow_listener)
+    monkeypatch.setattr(Bus, "peer_listener", slow_listener)
     monkeypatch.setattr("server.camera.peers.detection_exchange._LISTENERS_S", 0.0)
     config = config_of(recording, 2)
     router = Bus.router(config.zenoh)
