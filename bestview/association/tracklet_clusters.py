@@ -42,7 +42,7 @@ class TrackletCluster:
 
     @property
     def last_frame(self) -> int:
-        """Last frame in which the person was seen."""
+        """Last frame in which the person was seen, as a tracklet or as a known person."""
         return max(
             [
                 *(tracklet.end.frame for tracklet in self.tracklets),

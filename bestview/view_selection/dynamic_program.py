@@ -37,7 +37,7 @@ class GopCosts:
 def solve_dynamic_program(
     gops: GopCosts, previous: NDArray[np.int64], switch_cost: float, decided_gops: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the cameras (decided_gops, K) of the first GOPs, -1: none possible, and the total cost (K,).
+    """Return the cameras (decided_gops, K) of the first GOPs, -1: none possible, and the window's cost (K,).
 
     The recursion runs backwards (cost to go), so that the decisions are read forwards and a tie can be given
     to the camera that is being shown, which the paper's forward recursion leaves open.
@@ -88,7 +88,7 @@ def solve_with_minimum_shot(
     minimum_shot_gops: int,
     decided_gops: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the cameras (decided_gops, K) of the first GOPs, -1: none possible, and the total cost (K,).
+    """Return the cameras (decided_gops, K) of the first GOPs, -1: none possible, and the window's cost (K,).
 
     The state before a GOP is the camera shown and the age of the shot in GOPs, up to `minimum_shot_gops`.
     From that age on the camera may be left; before, only in GOPs in which it does not show the object. An

@@ -47,9 +47,9 @@ class DecisionState:
             boxes=decision.boxes,
             cuts=cuts,
             merged=[
-                PersonMerge(kept=split.kept, lost=split.lost)
-                for split in decision.corrections
-                if isinstance(split, Merge)
+                PersonMerge(kept=merge.kept, lost=merge.lost)
+                for merge in decision.corrections
+                if isinstance(merge, Merge)
             ],
             split=[
                 PersonSplit(kept=split.published_id, new_object=split.corrected_id, camera=split.camera)
