@@ -23,7 +23,7 @@ import matplotlib as mpl
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.other_trackers.plots import plot
-from server.cli.track.command import DetectedFrame, config_for_video, detect_frames, final_rows
+from server.cli.track.command import DetectedFrame, config_for_video, detect_frames, newly_final_rows
 from tracking import CostSettings, WindowSettings, create_solver
 from tracking.evaluation import HEADINGS, Scores, evaluate, format_scores, oracle_association
 from tracking.motchallenge import MotRow, read_rows
@@ -93,8 +93,8 @@ def run_tracker(name: str, view: DetectedView) -> tuple[list[MotRow], float]:
     rows: list[MotRow] = []
     began = time.perf_counter()
     for frame in frames:
-        rows += final_rows(tracker.push(frame.number, frame.detections, frame.image))
-    rows += final_rows(tracker.flush())
+        rows += newly_final_rows(tracker.push(frame.number, frame.detections, frame.image))
+    rows += newly_final_rows(tracker.flush())
     return rows, 1e3 * (time.perf_counter() - began) / len(frames)
 
 

@@ -233,7 +233,7 @@ class ClientConnection(asyncio.Protocol):
 
     def _request_login(self, gate: LoginGate) -> None:
         self._handshake = None
-        if not gate.request(self) and not self._is_closing:
+        if not gate.send_login_request(self) and not self._is_closing:
             self._register()
         for line in self._early_lines:
             if not self._is_closing:

@@ -87,7 +87,7 @@ class LoginGate:
         )
         self._pending[id(connection)] = _Pending(connection, timer)
 
-    def request(self, connection: PendingConnection) -> bool:
+    def send_login_request(self, connection: PendingConnection) -> bool:
         """Send the login request, once TLS is ready; return False if no login is needed."""
         if self._users is None:
             self.forget(connection)

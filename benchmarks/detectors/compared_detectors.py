@@ -105,9 +105,9 @@ def run_detector(detector_spec: ComparedDetector, view: ScoredView, frames: int 
         result = tracker.push(number, found)
         detect_s, track_s = detect_s + middle - start, track_s + time.process_time() - middle
         boxes += rows_of(number, found)
-        tracks += final_rows(result)
+        tracks += newly_final_rows(result)
         count += 1
-    tracks += final_rows(tracker.flush())
+    tracks += newly_final_rows(tracker.flush())
     return DetectorRun(boxes, tracks, count, detect_s, track_s)
 
 
@@ -119,7 +119,7 @@ def rows_of(number: int, found: Detections) -> list[MotRow]:
     ]
 
 
-def final_rows(result: WindowResult | None) -> Iterable[MotRow]:
+def newly_final_rows(result: WindowResult | None) -> Iterable[MotRow]:
     """Yield the rows of the frames that a window makes final."""
     if result is None:
         return

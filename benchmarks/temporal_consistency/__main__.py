@@ -31,8 +31,8 @@ from benchmarks.temporal_consistency.plots import PUBLISHED, PUBLISHED_EDGES, pl
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.baselines.temporal_consistency.graph import (
     WindowGraph,
+    count_edges_without_pruning,
     count_joint_edges,
-    count_unpruned_edges,
     prune_links,
 )
 from tracking.baselines.temporal_consistency.joint_path import cheapest_path_by_edges, solve_joint_path
@@ -90,7 +90,7 @@ def track_sequence(
             tracked.append(decision)
         if counts is not None and window.graph is not None:
             counts.edges.append(count_joint_edges(window.links)[-1])
-            counts.unpruned.append(count_unpruned_edges(window.graph)[-1])
+            counts.unpruned.append(count_edges_without_pruning(window.graph)[-1])
             if index % _TIMED_EVERY == 0:
                 _time(window.graph, settings, counts)
     while (decision := window.commit()) is not None:

@@ -20,7 +20,7 @@ _BANDS = 0.5
 """Bands per square root of the number of rectangles."""
 
 
-def simultaneous_pairs(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
+def pairs_in_one_camera_frame(rows: Ints, camera: Ints) -> tuple[Ints, Ints]:
     """Return the pairs of rows that were seen in one frame of one camera, each at least once: (P,) and (P,).
 
     Args:

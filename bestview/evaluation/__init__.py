@@ -3,7 +3,7 @@
 from bestview.evaluation.ground_truth import (
     NO_PERSON,
     ViewGroundTruth,
-    assign_objects_to_people,
+    assign_objects_one_to_one,
     optimal_views,
     view_ground_truth,
 )
@@ -13,7 +13,7 @@ __all__ = [
     "NO_PERSON",
     "ViewGroundTruth",
     "ViewScore",
-    "assign_objects_to_people",
+    "assign_objects_one_to_one",
     "cut_frames",
     "optimal_views",
     "score_views",

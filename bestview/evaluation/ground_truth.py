@@ -89,7 +89,7 @@ def optimal_views(truth: ViewGroundTruth, switch_cost: float) -> NDArray[np.int6
 _NO_PREVIOUS_VIEW = np.array([NO_CAMERA])
 
 
-def assign_objects_to_people(matches: NDArray[np.int64]) -> NDArray[np.int64]:
+def assign_objects_one_to_one(matches: NDArray[np.int64]) -> NDArray[np.int64]:
     """Assign each object to one person and each person to one object, with the largest total of matches.
 
     As for IDF1 (Ristani et al., 2016), over all cameras together.

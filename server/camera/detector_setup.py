@@ -58,7 +58,7 @@ def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) 
         with _as_user_error(f"camera {camera.id}: detections"):
             file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
             return LetterboxedDetections(file, letterbox, config.detect)
-    polygons = [letterbox.to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
+    polygons = [letterbox.camera_to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
     with _as_user_error(f"camera {camera.id}: detect"):
         settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
@@ -101,11 +101,11 @@ def _floor(config: Config, camera: CameraSettings, letterbox: Letterbox) -> Floo
         return None
     homography = np.array(camera.ground, dtype=np.float64)
     width, height = config.site.width, config.site.height
-    middle = float(letterbox.to_camera(np.array([width / 2.0, 0.0]))[0])
+    middle = float(letterbox.site_to_camera(np.array([width / 2.0, 0.0]))[0])
     row = horizon_row(homography, middle)
     if row is None:
         return None
-    horizon = float(letterbox.to_site(np.array([middle, row]))[1])
+    horizon = float(letterbox.camera_to_site(np.array([middle, row]))[1])
     # With a horizon below the middle of the image, the homography hardly constrains people's heights.
     if horizon > height / 2.0:
         return None
@@ -169,5 +169,5 @@ class LetterboxedDetections:
     def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Return the detections of a frame, with appearance histograms from the site's image."""
         from_file = self._file.detect(_NO_IMAGE, None if frame is None else self._frame_number(frame))
-        boxes = self._letterbox.boxes_to_site(from_file.boxes)
+        boxes = self._letterbox.boxes_camera_to_site(from_file.boxes)
         return Detections(boxes, from_file.scores, self._appearance.histograms(image, boxes))

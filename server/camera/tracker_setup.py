@@ -52,7 +52,7 @@ def _with_room_width(
     if camera.ground is None or per_meter is None:
         return settings
     width, height = letterbox.site_size
-    ends = letterbox.to_camera(np.array([[0.0, height / 2.0], [width, height / 2.0]]))
+    ends = letterbox.site_to_camera(np.array([[0.0, height / 2.0], [width, height / 2.0]]))
     left, right = to_ground(np.array(camera.ground, dtype=np.float64), ends)
     width_m = float(np.hypot(*(right - left))) / per_meter
     return replace(settings, room_m=width_m) if np.isfinite(width_m) else settings

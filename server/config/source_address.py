@@ -28,7 +28,7 @@ def source_kind(source: str) -> SourceKind:
     """Return the kind of a source."""
     if source.startswith("scene:"):
         return SourceKind.SCENE
-    if has_protocol(source) or is_device(source):
+    if has_protocol(source) or is_device_path(source):
         return SourceKind.STREAM
     try:
         return SourceKind.FOLDER if Path(source).is_dir() else SourceKind.FILE
@@ -36,7 +36,7 @@ def source_kind(source: str) -> SourceKind:
         return SourceKind.FILE  # no access, or an invalid file name: opening it reports that
 
 
-def is_device(source: str) -> bool:
+def is_device_path(source: str) -> bool:
     """Return whether this is a device of this machine, such as ``/dev/video0``, plugged in or not."""
     path = Path(source)
     if Path("/dev") not in path.parents:

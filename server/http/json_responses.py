@@ -59,7 +59,7 @@ async def read_json(request: web.Request, kind: type[Body]) -> Body:
 
 
 @runtime_checkable
-class TracksBody(Protocol):
+class KnowsBodyProgress(Protocol):
     """A connection's protocol that tracks whether a body is still being received."""
 
     def body_pending(self) -> None:
@@ -73,7 +73,7 @@ class TracksBody(Protocol):
 def _reading_body(request: web.Request) -> Iterator[None]:
     """Report inside that the body is being received, so that the connection may time out."""
     protocol = request.protocol
-    if not isinstance(protocol, TracksBody):
+    if not isinstance(protocol, KnowsBodyProgress):
         yield
         return
     protocol.body_pending()

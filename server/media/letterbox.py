@@ -41,18 +41,18 @@ class Letterbox:
         canvas[self._top : self._top + self._inner[1], self._left : self._left + self._inner[0]] = scaled
         return canvas
 
-    def to_site(self, points: Floats) -> Floats:
+    def camera_to_site(self, points: Floats) -> Floats:
         """Map points ``(…, 2)`` from the camera's image to the site's."""
         return points * self.scale + (self._left, self._top)
 
-    def to_camera(self, points: Floats) -> Floats:
+    def site_to_camera(self, points: Floats) -> Floats:
         """Map points ``(…, 2)`` from the site's image to the camera's."""
         return (points - (self._left, self._top)) / self.scale
 
-    def boxes_to_camera(self, boxes: Floats) -> Floats:
+    def boxes_site_to_camera(self, boxes: Floats) -> Floats:
         """Map boxes ``(N, 4)`` from the site's image to the camera's."""
         return (boxes - (self._left, self._top, self._left, self._top)) / self.scale
 
-    def boxes_to_site(self, boxes: Floats) -> Floats:
+    def boxes_camera_to_site(self, boxes: Floats) -> Floats:
         """Map boxes ``(N, 4)`` from the camera's image to the site's."""
         return boxes * self.scale + (self._left, self._top, self._left, self._top)

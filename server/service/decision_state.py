@@ -5,7 +5,7 @@ from __future__ import annotations
 from bestview import Merge, Split
 from server.messaging.messages import GopChoices, PersonMerge, PersonSplit, ViewCut
 from server.service.view_selection.decider import GopDecision, ObjectChoice
-from server.service.view_selection.explanation import Explanation
+from server.service.view_selection.explanation import ViewCostExplanation
 from server.service.view_selection.queried_reasons import QueriedReasons, SelectedView, SelectionReason
 
 
@@ -95,7 +95,7 @@ def _cut(choice: ObjectChoice, pulse: int) -> ViewCut | None:
     return ViewCut(object=choice.number, pulse=pulse, from_camera=choice.before, to_camera=choice.camera)
 
 
-def reason(choice: ObjectChoice, explanation: Explanation) -> str:
+def reason(choice: ObjectChoice, explanation: ViewCostExplanation) -> str:
     """Return why this view was selected, as one plain sentence."""
     camera = choice.camera
     if camera is None:
@@ -105,7 +105,7 @@ def reason(choice: ObjectChoice, explanation: Explanation) -> str:
     return _compare(camera, explanation)
 
 
-def _compare(camera: str, explanation: Explanation) -> str:
+def _compare(camera: str, explanation: ViewCostExplanation) -> str:
     """Return why this camera was selected among those that see the person, or should."""
     view = explanation.views.get(camera)
     if view is not None and not view.seen and view.undetected:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats, PinholeCamera
-from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
+from synthetic.drawing.ray_casting import FAR, hit_distances_and_normals, may_intersect
 from synthetic.room import house_surfaces
 from synthetic.room.room import Block, Door, Room
 from synthetic.room.surface_styles import surface_color, surface_style
@@ -62,7 +62,7 @@ def _cast(room: Room, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np.
     for index, piece in enumerate(room.furniture):
         for block in piece.blocks:
             near = np.flatnonzero(may_intersect(block, origin, rays))
-            reach, normal = intersect(block, origin, rays[near])
+            reach, normal = hit_distances_and_normals(block, origin, rays[near])
             nearer = reach < distance[near]
             chosen = near[nearer]
             distance[chosen] = reach[nearer]

@@ -53,7 +53,7 @@ def _lid(
     return np.where(inside, top, distance), np.where(inside[:, None], up, normal)
 
 
-def intersect(block: Block, origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
+def hit_distances_and_normals(block: Block, origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
     """Return each ray's distance ``(N,)``, `FAR` if missed, and the outward normal ``(N, 3)`` of its hit."""
     if block.shape == "box":
         return _slabs(np.array(block.low), np.array(block.high), origin, rays)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats, PinholeCamera
-from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
+from synthetic.drawing.ray_casting import FAR, hit_distances_and_normals, may_intersect
 from synthetic.room.house_surfaces import hash_noise
 from synthetic.room.room import Block
 from synthetic.tank.water import (
@@ -123,7 +123,7 @@ def _cast(origin: Floats, rays: Floats) -> _Cast:
     for index, heap in enumerate(ROCKS):
         for block in heap:
             near = np.flatnonzero(may_intersect(block, origin, rays))
-            reach, normal = intersect(block, origin, rays[near])
+            reach, normal = hit_distances_and_normals(block, origin, rays[near])
             nearer = (reach < distance[near]) & (reach < FAR)
             chosen = near[nearer]
             place = origin + rays[chosen] * reach[nearer, None]

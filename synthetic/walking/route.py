@@ -69,7 +69,7 @@ class Meeting:
     end: float
 
 
-def is_walkable(room: Room, start: Point, end: Point) -> bool:
+def is_clear_of_furniture(room: Room, start: Point, end: Point) -> bool:
     """Return whether a straight walk between two points is free of furniture."""
     steps = max(int(math.dist(start, end) / 0.1), 1)
     share = np.linspace(0, 1, steps + 1)
@@ -135,7 +135,7 @@ def _begin_inside(rng: np.random.Generator, room: Room, visit: VisitPlan, home: 
         route = Route(_draw_place(rng, room), visit.pace, visit.camera_positions)
         end = _draw_place(rng, room)
         is_far = math.dist(route.here, end) > visit.no_pause_seconds * visit.pace
-        if is_far and is_walkable(room, route.here, end) and is_walkable(room, end, home):
+        if is_far and is_clear_of_furniture(room, route.here, end) and is_clear_of_furniture(room, end, home):
             route.add(Leg(end))
             break
     return route
@@ -148,7 +148,7 @@ def _choose_leg(rng: np.random.Generator, room: Room, route: Route, home: Point,
         if due and rng.random() < 0.6:  # noqa: PLR2004 — most people join
             x, y = meeting.place
             end = (x + _CIRCLE * math.cos(visit.meeting_angle), y + _CIRCLE * math.sin(visit.meeting_angle))
-            if is_walkable(room, route.here, end) and is_walkable(room, end, home):
+            if is_clear_of_furniture(room, route.here, end) and is_clear_of_furniture(room, end, home):
                 return Leg(end, rng.uniform(1.5, meeting.end - arrival + 1.5), meeting.place)
     end = _choose_place(rng, room, route, home, visit)
     arrival = route.seconds + math.dist(route.here, end) / route.pace
@@ -165,7 +165,11 @@ def _choose_place(rng: np.random.Generator, room: Room, route: Route, home: Poin
         end = _draw_place(rng, room)
         distance = math.dist(route.here, end)
         # No short moves.
-        if distance > _NEAREST and is_walkable(room, route.here, end) and is_walkable(room, end, home):
+        if (
+            distance > _NEAREST
+            and is_clear_of_furniture(room, route.here, end)
+            and is_clear_of_furniture(room, end, home)
+        ):
             penalty = follow_best_view(
                 route.best_view, route.here, end, distance / route.pace, visit.camera_positions
             ).penalty

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from synthetic import Scene
 from synthetic.drawing.clothing import choose_distinct_outfit
-from synthetic.drawing.ray_casting import FAR, intersect, may_intersect
+from synthetic.drawing.ray_casting import FAR, hit_distances_and_normals, may_intersect
 from synthetic.drawing.skeleton import Joint, place_joints
 from synthetic.room.layouts import ROOM
 from synthetic.walking.collision_avoidance import MIN_DISTANCE, sidestep
@@ -166,7 +166,7 @@ def test_a_ray_that_hits_furniture_ends_on_its_surface(
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     start = np.array(origin)
     for block in ROOM.furniture[index].blocks:
-        distance, normal = intersect(block, start, rays)
+        distance, normal = hit_distances_and_normals(block, start, rays)
         found = distance < FAR
         assert (may_intersect(block, start, rays) | ~found).all()
         points = start + rays[found] * distance[found, None]

@@ -98,7 +98,7 @@ def source_costs(
     return costs
 
 
-def pair_costs(motion: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
+def transition_costs(motion: MotionCosts | None, places: ObservationArrays, settings: CostSettings) -> Floats:
     """Return the costs of arcs between two frames without the node, (Q, M - 1, S, S).
 
     Q is the number of sets of observations, or n if the motion of any object is known.

@@ -17,10 +17,10 @@ from tracking.model.conflicts import Bools, clique_rows, conflict_relation, star
 from tracking.model.costs import (
     motion_costs,
     node_costs,
-    pair_costs,
     sink_costs,
     source_costs,
     template_distances,
+    transition_costs,
 )
 from tracking.model.object_state import Template
 from tracking.model.observations import ObservationArrays, stack_observations
@@ -207,7 +207,7 @@ def _build(
         present=places.present,
         source=source_costs(templates, distances, motion, places, settings),
         node=node_costs(distances, places, settings),
-        pair=pair_costs(motion, places, settings),
+        pair=transition_costs(motion, places, settings),
         sink=sink_costs(len(templates), places, settings),
         conflicts=conflict_relation(places, settings),
         conflict_rows=settings.conflict_rows,

@@ -95,7 +95,7 @@ class AffinityFusion:
                 by_camera[name].append((row, histogram))
         appearances = []
         for camera, histograms in by_camera.items():
-            comparable = select_equal_bin_counts(histograms, len(tracklets))
+            comparable = select_with_bins_of_newest(histograms, len(tracklets))
             if len(comparable) > 1:
                 rows = np.array([row for row, _ in comparable], dtype=np.int64)
                 total = np.array([histogram.histogram_sum for _, histogram in comparable])
@@ -104,14 +104,14 @@ class AffinityFusion:
                 appearances.append(CameraAppearances(rows, total, count, scale))
         return appearances
 
-    def remember_distances(
+    def keep_distances_of_settling(
         self, old: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
     ) -> None:
         """Store the appearance distances of tracklets that are about to be settled, given by their rows."""
-        self._scales.remember_distances(old, tracklets, affinity)
+        self._scales.keep_distances_of_settling(old, tracklets, affinity)
 
 
-def select_equal_bin_counts(
+def select_with_bins_of_newest(
     histograms: Sequence[tuple[int, MeanHistogram]], active_rows: int
 ) -> list[tuple[int, MeanHistogram]]:
     """Return the histograms with as many bins as the newest of rows below `active_rows`, or of any."""

@@ -49,7 +49,7 @@ class DistanceScales:
             _extended(self._different_people, camera, different_people),
         )
 
-    def remember_distances(
+    def keep_distances_of_settling(
         self, settled_rows: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
     ) -> None:
         """Store the distances of tracklets that are about to be settled, given by their rows."""

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from bestview.association.affinity.affinity_fusion import AffinityFusion
 from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
-from bestview.association.co_occurrence import GroundTrajectories, score_ground_proximity, simultaneous_pairs
+from bestview.association.co_occurrence import (
+    GroundTrajectories,
+    pairs_in_one_camera_frame,
+    score_ground_proximity,
+)
 from bestview.association.ghost_check import GhostCheck
 from bestview.association.registry.corrections import IdCorrections, Merge, Split, swap_tracks
 from bestview.association.registry.people import PersonStore
@@ -253,7 +257,7 @@ class IdentityRegistry:
             position = np.minimum(np.searchsorted(known_ids, settled), len(known_ids) - 1)
             rows = np.where(np.array(known_ids)[position] == settled, count + position, rows)
         camera = np.array([self._camera_index[key.camera] for key in observations.keys], dtype=np.int64)
-        affinity.add_cannot_links(*simultaneous_pairs(rows, camera))
+        affinity.add_cannot_links(*pairs_in_one_camera_frame(rows, camera))
         if self._gate() > 0:
             trajectories = GroundTrajectories.of(observations, rows, camera)
             proximity = score_ground_proximity(
@@ -287,7 +291,7 @@ class IdentityRegistry:
     def _settle(self, last_frame: int) -> None:
         """Settle old tracklets: from now on they are part of their known person."""
         rows = self._splitter.settleable_rows(last_frame)
-        self._fusion.remember_distances(rows, self._splitter.active, self._affinity)
+        self._fusion.keep_distances_of_settling(rows, self._splitter.active, self._affinity)
         settled = [self._splitter.active[row] for row in rows]
         settled_rows = [(tracklet.main_id, tracklet.key) for tracklet in settled if tracklet.main_id]
         self._affinity.add_rows(person_id for person_id, _ in settled_rows)

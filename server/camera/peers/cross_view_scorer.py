@@ -47,7 +47,7 @@ class CrossViewScorer:
         if detections is not None:
             # The most confident ones, in the detector's order.
             top = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
-            boxes_px = self._letterbox.boxes_to_camera(detections.boxes[top]).round(_PIXEL_DIGITS)
+            boxes_px = self._letterbox.boxes_site_to_camera(detections.boxes[top]).round(_PIXEL_DIGITS)
             scores = detections.scores[top].round(_SCORE_DIGITS)
             rows = np.clip(np.column_stack([boxes_px, scores]), -COORDINATE_MAX, COORDINATE_MAX)
             boxes = [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
@@ -66,7 +66,7 @@ class CrossViewScorer:
             for message in messages
             if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]
-        found = CameraDetections(self._letterbox.boxes_to_camera(detections.boxes), detections.scores)
+        found = CameraDetections(self._letterbox.boxes_site_to_camera(detections.boxes), detections.scores)
         return replace(
             detections, scores=rescore_detections(self._geometry, found, peers, self._config.track.cross_view)
         )
@@ -87,7 +87,7 @@ def _geometry(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGe
     letterbox = Letterbox(size, (site.width, site.height))
     camera_ignore = [np.array(polygon, dtype=np.float64) for polygon in camera.ignore]
     site_ignore = [
-        letterbox.to_camera(np.array(polygon, dtype=np.float64)) for polygon in config.detect.ignore
+        letterbox.site_to_camera(np.array(polygon, dtype=np.float64)) for polygon in config.detect.ignore
     ]
     return CameraGeometry(np.array(camera.ground, dtype=np.float64), size, (*camera_ignore, *site_ignore))
 

@@ -36,15 +36,15 @@ class TimedFrame:
     picture: VideoFrame | None
 
 
-def read_frames(opened: OpenedVideo, *, again: bool = False) -> Iterator[TimedFrame]:
+def read_frames(opened: OpenedVideo, *, quiet: bool = False) -> Iterator[TimedFrame]:
     """Yield the frames in presentation order, including those that cannot be decoded.
 
-    Reading ends at a read error. Warnings are logged unless the file is read ``again``.
+    Reading ends at a read error. Warnings are logged unless ``quiet``, for a file that is read once more.
     """
     timeline: _Timeline | None = None
-    for packet in _packets(opened, again=again):
+    for packet in _packets(opened, quiet=quiet):
         if timeline is None:
-            timeline = _select_timeline(opened, packet, again=again)
+            timeline = _select_timeline(opened, packet, quiet=quiet)
         yield from timeline.decode(packet)
     if timeline is not None:
         yield from timeline.flush()
@@ -60,10 +60,10 @@ class _Timeline(Protocol):
         ...
 
 
-def _select_timeline(opened: OpenedVideo, first: av.Packet[VideoStream], *, again: bool) -> _Timeline:
+def _select_timeline(opened: OpenedVideo, first: av.Packet[VideoStream], *, quiet: bool) -> _Timeline:
     reordered = opened.stream.codec_context.reorder_depth > 0
     if first.pts is None or (opened.container.format.name in _COUNTED_WHEN_REORDERED and reordered):
-        if first.pts is None and not again:
+        if first.pts is None and not quiet:
             log.warning(
                 "%s: no time stamps in this file: frames are counted at %g a second",
                 opened.container.name,
@@ -178,21 +178,21 @@ def _decoded(packet: av.Packet[VideoStream]) -> list[VideoFrame]:
         return []
 
 
-def _packets(opened: OpenedVideo, *, again: bool) -> Iterator[av.Packet[VideoStream]]:
+def _packets(opened: OpenedVideo, *, quiet: bool) -> Iterator[av.Packet[VideoStream]]:
     times = TimestampJumpRepair(opened)
     try:
         for packet in opened.container.demux(opened.stream):
-            if times.repair_jump(packet) and not again:
+            if times.repair_jump(packet) and not quiet:
                 log.warning(
                     "%s: its time stamps jump: playback continues across the jump",
                     redact_to_host(opened.container.name),
                 )
-                again = True  # warn only once
+                quiet = True  # warn only once
             yield packet
     except av.error.FFmpegError as error:
         if error.errno == errno.EINTR:
             raise  # a signal interrupted the read: the file has not ended
-        if not again:
+        if not quiet:
             log.warning(
                 "%s: cannot be read any further: %s", redact_to_host(opened.container.name), error.strerror
             )

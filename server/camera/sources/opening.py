@@ -15,7 +15,7 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.stream import VideoStream
 
 from server.camera.sources.frame_timing import frame_rate
-from server.config.source_address import is_device
+from server.config.source_address import is_device_path
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
@@ -57,7 +57,10 @@ def open_video(
     name = redact_to_host(source)
     try:
         container = av.open(
-            source, format="v4l2" if is_device(source) else None, options=dict(options or {}), timeout=timeout
+            source,
+            format="v4l2" if is_device_path(source) else None,
+            options=dict(options or {}),
+            timeout=timeout,
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
         reason = timeout_message(error, timeout[0]) if timeout else None

@@ -124,7 +124,7 @@ class Recording:
 
     def _begin(self) -> None:
         again = self._quiet or self._length is not None
-        self._pictures = read_frames(self._opened, again=again)
+        self._pictures = read_frames(self._opened, quiet=again)
         self._upcoming: TimedFrame | None = None
         self._newest: VideoFrame | None = None
         self._at = self._number = self._requested = -1

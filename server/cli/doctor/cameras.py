@@ -11,7 +11,7 @@ from server.camera.audio import open_site_audio
 from server.cli.doctor.camera_probe import CameraProbe, probe_camera
 from server.cli.doctor.findings import Finding, bad, describe_bug, ok, reason_of, warning
 from server.config.site_config import Config
-from server.config.source_address import SourceKind, is_device, source_kind
+from server.config.source_address import SourceKind, is_device_path, source_kind
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
@@ -84,7 +84,7 @@ def _shared_devices(config: Config) -> list[Finding]:
     """Report devices that two cameras share."""
     findings, owners = [], dict[str, str]()
     for camera in config.cameras:
-        if is_device(camera.source):
+        if is_device_path(camera.source):
             # A device has several names, in /dev/v4l for example.
             first = owners.setdefault(os.path.realpath(camera.source), camera.id)
             if first != camera.id:
@@ -110,7 +110,7 @@ def _findings_of(config: Config, camera: str, probe: CameraProbe, *, runs: bool)
 
 
 def _remedy(source: str) -> str:
-    if is_device(source):
+    if is_device_path(source):
         return "plug it in, add this user to the group video, end other programs that use it"
     if source_kind(source) is SourceKind.STREAM:
         return "try its source in ffplay; check address, password and cable"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import NO_PERSON, ViewGroundTruth, assign_objects_to_people, view_ground_truth
+from bestview import NO_PERSON, ViewGroundTruth, assign_objects_one_to_one, view_ground_truth
 from server.cli.render.video_info import Size
 from server.system.errors import UserError
 from tracking.evaluation import TruthAndTracks
@@ -87,7 +87,7 @@ def people_of_objects(
             for row, column in zip(*np.nonzero(frame.similarity >= least_iou), strict=True):
                 person, number = int(frame.truth[row]), int(frame.tracks[column])
                 matches[person_at[person], object_at[number]] += 1
-    matched = assign_objects_to_people(matches).tolist()
+    matched = assign_objects_one_to_one(matches).tolist()
     return {
         number: people[person] for number, person in zip(objects, matched, strict=True) if person != NO_PERSON
     }

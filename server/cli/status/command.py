@@ -14,7 +14,7 @@ from rich.text import Text
 
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, RefusedError, SiteNow, status
-from server.cli.status.display import Rates, render_status
+from server.cli.status.display import ServiceRates, render_status
 from server.system.errors import UnavailableError, UserError
 from server.system.printable import printable
 
@@ -43,7 +43,7 @@ async def status_once(url: str, token: str | None, *, as_json: bool) -> bool:
     if as_json:
         typer.echo(msgspec.json.encode(report.now))
     else:
-        Console().print(render_status(report.now, Rates()))
+        Console().print(render_status(report.now, ServiceRates()))
     return report.now.ready
 
 
@@ -67,12 +67,12 @@ async def status_live(url: str, token: str | None, *, as_json: bool) -> None:
                 shown = (
                     Text(printable(notice), style="red")
                     if before is None
-                    else render_status(before, Rates(), notice)
+                    else render_status(before, ServiceRates(), notice)
                 )
             else:
                 if before is not None and _is_another_run(before, report.now):
                     restarted = "the service was restarted"
-                shown = render_status(report.now, Rates.between(before, report.now), restarted)
+                shown = render_status(report.now, ServiceRates.between(before, report.now), restarted)
                 before = report.now
             live.update(shown, refresh=True)
 

@@ -18,14 +18,14 @@ _MEGA = 1e6
 
 
 @dataclass(frozen=True, slots=True)
-class Rates:
-    """Rates between two snapshots; None with only one, or after a restart of the service."""
+class ServiceRates:
+    """ServiceRates between two snapshots; None with only one, or after a restart of the service."""
 
     cores: float | None = None
     bytes_s: float | None = None
 
     @classmethod
-    def between(cls, before: SiteNow | None, after: SiteNow) -> Rates:
+    def between(cls, before: SiteNow | None, after: SiteNow) -> ServiceRates:
         """Compare two snapshots by the server's clock."""
         if before is None or before.service is None or after.service is None:
             return cls()
@@ -36,7 +36,7 @@ class Rates:
         return cls((other.cpu_s - one.cpu_s) / seconds, (other.sent_bytes - one.sent_bytes) / seconds)
 
 
-def render_status(now: SiteNow, rates: Rates, notice: str = "") -> RenderableType:
+def render_status(now: SiteNow, rates: ServiceRates, notice: str = "") -> RenderableType:
     """Render a site's status: headline, service, cameras, people; ``notice`` is about the connection."""
     parts: list[RenderableType] = [_head(now)]
     if now.service is not None:
@@ -56,7 +56,7 @@ def _head(now: SiteNow) -> Text:
     return Text.assemble((printable(now.name), "bold"), f"  {at}  {pulse}  ", ready)
 
 
-def _service(service: ServiceNow, rates: Rates) -> Text:
+def _service(service: ServiceNow, rates: ServiceRates) -> Text:
     kinds = ", ".join(f"{count} {kind}" for kind, count in service.viewers.items() if count)
     waiting = ", ".join(f"{count} {queue}" for queue, count in service.waiting.items() if count)
     parts = [

@@ -59,9 +59,9 @@ def track_one(
     rows: list[MotRow] = []
     with atomic_file(out, video, det) as draft:
         for frame in frames:
-            rows += final_rows(person_tracker.push(frame.number, frame.detections, frame.image))
+            rows += newly_final_rows(person_tracker.push(frame.number, frame.detections, frame.image))
             progress(frame.number + 1)
-        rows += final_rows(person_tracker.flush())
+        rows += newly_final_rows(person_tracker.flush())
         write_rows(draft, rows)
     return len({row.id for row in rows})
 
@@ -123,7 +123,7 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
         if image is not None:
             detections = detector.detect(letterbox.image(image), number)
             yield DetectedFrame(
-                number, replace(detections, boxes=letterbox.boxes_to_camera(detections.boxes)), image
+                number, replace(detections, boxes=letterbox.boxes_site_to_camera(detections.boxes)), image
             )
     source.close()
 
@@ -149,7 +149,7 @@ def _from_detections(path: Path) -> Iterator[DetectedFrame]:
         yield DetectedFrame(number, detector.detect(_NO_PICTURE, number), None)
 
 
-def final_rows(result: WindowResult | None) -> Iterator[MotRow]:
+def newly_final_rows(result: WindowResult | None) -> Iterator[MotRow]:
     """Yield the rows of newly final frames, including interpolated ones."""
     if result is None:
         return

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.camera.sources import SourceEndedError, open_source
-from server.cli.track.command import config_for_video, final_rows, read_frames, solver_for
+from server.cli.track.command import config_for_video, newly_final_rows, read_frames, solver_for
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 from tracking import TemplateTracker
@@ -69,9 +69,9 @@ def track_templates(
         with atomic_file(out, video) as draft:
             for number, picture in read_frames(source, 1):
                 if picture is not None:
-                    rows += final_rows(tracker.push(picture))
+                    rows += newly_final_rows(tracker.push(picture))
                 progress(number + 1)
-            rows += final_rows(tracker.flush())
+            rows += newly_final_rows(tracker.flush())
             write_rows(draft, rows)
     except (SourceEndedError, ValueError) as error:
         raise UserError(f"{video}: {error}") from error

@@ -62,7 +62,7 @@ def _status(service: BestViewService, result: CorrectionResult, too_old: int) ->
     return CorrectionStatus(
         memory_frames=assist.memory_frames,
         max_corrections=CORRECTIONS_MAX,
-        unavailable=assist.unavailable,
+        unavailable=assist.why_unavailable,
         accepted=result.accepted,
         too_old=too_old,
         flags=result.flags,

@@ -25,7 +25,7 @@ from server.service.facade.rendering import (
     RenderPoolFullError,
     StillKind,
     Subject,
-    multipart_part,
+    part_and_boundary,
 )
 
 routes = web.RouteTableDef()
@@ -113,7 +113,7 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
         first = await source.still(_kind(request), pulse)
         viewer = source.mjpeg.subscribe(variant)
         try:
-            return await send_viewer(request, viewer, FIRST_BOUNDARY + multipart_part(first), headers)
+            return await send_viewer(request, viewer, FIRST_BOUNDARY + part_and_boundary(first), headers)
         finally:
             source.mjpeg.unsubscribe(variant, viewer)
 

@@ -38,7 +38,7 @@ def floor_coverage(homography: Floats, size: tuple[int, int], site: tuple[int, i
         site: width and height of the site's image.
     """
     letterbox = Letterbox(size, site)
-    left, top = letterbox.to_site(np.zeros(2)).tolist()
+    left, top = letterbox.camera_to_site(np.zeros(2)).tolist()
     to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, letterbox.scale]]) / letterbox.scale
     width, height = (float(side) for side in size)
     # The floor is below the horizon; if there is one, lower in the image is nearer.

@@ -69,7 +69,7 @@ class CameraWalk:
             self._track_indices.setdefault((message.boot, track.id), len(self._track_indices))
             for track in message.tracks
         ]
-        camera_boxes = Letterbox(message.size, self._site).boxes_to_camera(boxes[track, frame])
+        camera_boxes = Letterbox(message.size, self._site).boxes_site_to_camera(boxes[track, frame])
         self._frames.append(frame + first - start)
         self._track.append(np.array(indices, dtype=np.int64)[track])
         self._boxes.append(camera_boxes)

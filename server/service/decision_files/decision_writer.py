@@ -98,7 +98,7 @@ class DecisionWriter:
         self._files.close()
 
     def _rows(self, camera: str, frame: int, boxes: Sequence[NumberedBox]) -> Iterator[str]:
-        camera_boxes = self._letterboxes[camera].boxes_to_camera(
+        camera_boxes = self._letterboxes[camera].boxes_site_to_camera(
             np.array([box for _, *box in boxes], dtype=np.float64)
         )
         for (number, *_), (left, top, right, bottom) in zip(boxes, camera_boxes.tolist(), strict=True):

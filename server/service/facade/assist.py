@@ -86,7 +86,7 @@ class AssistService:
         return self._pipeline.config.track.assist.memory_frames
 
     @property
-    def unavailable(self) -> str:
+    def why_unavailable(self) -> str:
         """Why positions cannot be corrected here; empty: they can."""
         config = self._pipeline.config
         if config.view.share.of > 1:
@@ -105,8 +105,8 @@ class AssistService:
             InvalidCommandError: a position is outside the image, or its frame is in the future.
         """
         pipeline, camera = self._pipeline, command.camera
-        if self.unavailable:
-            raise ConflictError(self.unavailable)
+        if self.why_unavailable:
+            raise ConflictError(self.why_unavailable)
         if camera not in pipeline.frame_buffers:
             raise UnknownCameraError(camera, pipeline.frame_buffers)
         number = pipeline.decider.people.registry.current(command.number)

@@ -155,5 +155,5 @@ class CameraService:
     def _placement(self, size: tuple[int, int]) -> ImagePlacement:
         site = self._pipeline.config.site
         letterbox = Letterbox(size, (site.width, site.height))
-        left, top = letterbox.to_site(np.zeros(2)).tolist()
+        left, top = letterbox.camera_to_site(np.zeros(2)).tolist()
         return ImagePlacement(width=size[0], height=size[1], scale=letterbox.scale, left=left, top=top)

@@ -136,7 +136,7 @@ class PeopleService:
         share = self._pipeline.config.view.share
         return [
             RemotePerson(number, shard_address(number, share))
-            for number in self._pipeline.decider.people.remote
+            for number in self._pipeline.decider.people.of_other_shards
         ]
 
     def shard_of(self, number: int) -> Shard:

@@ -8,7 +8,7 @@ from server.service.rendering.mjpeg_streams import (
     FIRST_BOUNDARY,
     PULSE_HEADER,
     MjpegVariant,
-    multipart_part,
+    part_and_boundary,
 )
 from server.service.rendering.render_pool import (
     CameraView,
@@ -31,5 +31,5 @@ __all__ = [
     "RenderPoolFullError",
     "StillKind",
     "Subject",
-    "multipart_part",
+    "part_and_boundary",
 ]

@@ -49,7 +49,7 @@ class CameraWindow:
         _, height = self.message.size
         final = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, final, 0])
-        camera_boxes = self.letterbox.boxes_to_camera(self.boxes[:, final])
+        camera_boxes = self.letterbox.boxes_site_to_camera(self.boxes[:, final])
         return [
             TrackUpdate(
                 camera=key.camera,

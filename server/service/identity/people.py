@@ -118,7 +118,7 @@ class PersonTracker:
         return own_numbers(self.registry.all_numbers, self.registry.merged, self._share)
 
     @property
-    def remote(self) -> list[int]:
+    def of_other_shards(self) -> list[int]:
         """The numbers of the other shards' people, in order."""
         known = set(self.known)
         return [number for number in self.registry.all_numbers if number not in known]

@@ -48,14 +48,14 @@ class RecordingPlaylist:
         init_path: str,
         fps: float,
         pulse0: float | None,
-        longest_s: float,
+        longest_segment_s: float,
     ) -> None:
         self.path = path
         self._init_path = init_path
         self._cameras_folder = cameras_folder
         self._fps = fps
         self._pulse0 = pulse0
-        self._longest_s = longest_s
+        self._longest_s = longest_segment_s
         self.index = SegmentIndex()
         self._tail: int | None = None
         """Where EXT-X-ENDLIST begins in the file; None: the file must be rewritten."""

@@ -44,16 +44,16 @@ class RecordingSegment:
 class RecordingSession:
     """The folder of one session, this service's or an earlier one's.
 
-    ``longest_s`` is the longest duration of a segment.
+    ``longest_segment_s`` is the longest duration of a segment.
     """
 
     def __init__(
-        self, folder: Path, info_file: RecordingSessionInfoFile, init: InitSegments, longest_s: float
+        self, folder: Path, info_file: RecordingSessionInfoFile, init: InitSegments, longest_segment_s: float
     ) -> None:
         self.folder, self.init = folder, init
         self._info_file = info_file
         self.paths = SessionPaths(folder, self.info.cameras)
-        self._longest_s = longest_s
+        self._longest_s = longest_segment_s
         self.segments: list[RecordingSegment] = []
         self.objects: dict[int, RecordingPlaylist] = {}
         self.cameras = {
@@ -68,7 +68,7 @@ class RecordingSession:
 
     @classmethod
     def create(
-        cls, folder: Path, info: RecordingSessionInfo, init: InitSegments, longest_s: float
+        cls, folder: Path, info: RecordingSessionInfo, init: InitSegments, longest_segment_s: float
     ) -> RecordingSession:
         """Create the folder of a new session.
 
@@ -82,10 +82,10 @@ class RecordingSession:
         if init.audio:
             (folder / AUDIO).mkdir(mode=FOLDER)
             write_private(folder / AUDIO / INIT_FILE, init.audio)
-        return cls(folder, RecordingSessionInfoFile.create(folder, info), init, longest_s)
+        return cls(folder, RecordingSessionInfoFile.create(folder, info), init, longest_segment_s)
 
     @classmethod
-    def load(cls, folder: Path, longest_s: float) -> RecordingSession:
+    def load(cls, folder: Path, longest_segment_s: float) -> RecordingSession:
         """Read a session that an earlier service left.
 
         Raises:
@@ -93,7 +93,7 @@ class RecordingSession:
         """
         info_file = RecordingSessionInfoFile.load(folder)
         init = SessionPaths(folder, info_file.info.cameras).init_segments()
-        session = cls(folder, info_file, init, longest_s)
+        session = cls(folder, info_file, init, longest_segment_s)
         for playlist in (*session.cameras.values(), session.audio):
             if playlist.path.exists():
                 playlist.read()

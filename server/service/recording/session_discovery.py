@@ -20,11 +20,11 @@ _FOLDER_NAME = re.compile(r"[0-9]{8}T[0-9]{6}Z(-[0-9]+)?")
 
 
 def load_and_clean_sessions(
-    folder: Path, known: Collection[Path], longest_s: float
+    folder: Path, known: Collection[Path], longest_segment_s: float
 ) -> list[RecordingSession]:
     """Return the sessions in a folder that are not known yet; remains of sessions without media are removed.
 
-    ``longest_s`` is the longest duration of a segment.
+    ``longest_segment_s`` is the longest duration of a segment.
 
     Raises:
         OSError: the folder cannot be read.
@@ -33,7 +33,7 @@ def load_and_clean_sessions(
     for inside in sorted(path for path in folder.iterdir() if path not in known):
         try:
             (inside / INFO_FILE).stat()
-            session = RecordingSession.load(inside, longest_s)
+            session = RecordingSession.load(inside, longest_segment_s)
         except MISSING:
             _remove_remains(inside)
             continue

@@ -36,7 +36,7 @@ FIRST_BOUNDARY = b"--picture\r\n"
 PULSE_HEADER = "X-MyView-Pulse"
 
 
-def multipart_part(picture: JpegPicture) -> bytes:
+def part_and_boundary(picture: JpegPicture) -> bytes:
     """Return one picture with the boundary that ends it: browsers display it only after the boundary."""
     head = [
         "Content-Type: image/jpeg",
@@ -120,7 +120,7 @@ class MjpegStreams:
         """Publish the pictures that are due; return when the next one is, None if there is none."""
         while self._scheduled and self._scheduled[0].at <= now:
             due = self._scheduled.popleft()
-            chunk = BytesChunk(multipart_part(due.picture), random_access=True)
+            chunk = BytesChunk(part_and_boundary(due.picture), random_access=True)
             for variant, broadcaster in self._broadcasters.items():
                 if variant.boxed is due.boxed and is_at_rate(due.picture.pulse, variant.rate, self._fps):
                     broadcaster.publish(chunk)

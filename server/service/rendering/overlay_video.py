@@ -17,7 +17,7 @@ from server.service.streaming.gapless_timeline import GaplessTimeline
 from server.service.streaming.media_chunk import TsContinuity
 
 
-class OverlayVideo:
+class OverlayVideoPublisher:
     """Publishes encoded frames without gaps, also when the encoding process is replaced.
 
     ``audio_buffer`` is None if the site has no audio; ``mute_gaps``: the audio is muted while a gap is

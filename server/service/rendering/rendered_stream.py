@@ -14,7 +14,7 @@ from logthrottle import LogThrottle
 from server.media.rendering_messages import JpegPicture, RenderRequest, RenderSettings, StillKind
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
-from server.service.rendering.overlay_video import OverlayVideo
+from server.service.rendering.overlay_video import OverlayVideoPublisher
 from server.service.rendering.worker_process import START_S, RenderWorker, WorkerDiedError
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster
@@ -83,7 +83,7 @@ class RenderedStream:
 
     A slow worker loses whole GOPs, like a slow viewer, and delays nothing else. ``overlay_of`` returns the
     boxes of fragments. ``live`` pictures are shown as they arrive, others in real time. ``audio_buffer`` and
-    ``mute_gaps`` are those of :class:`OverlayVideo`.
+    ``mute_gaps`` are those of :class:`OverlayVideoPublisher`.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class RenderedStream:
 
     def _reset_outputs(self) -> None:
         """Create new outputs: a later viewer must not receive old content."""
-        self.video = OverlayVideo(
+        self.video = OverlayVideoPublisher(
             self._settings, self._queue_gops, self._audio_buffer, mute_gaps=self._mute_gaps
         )
         self.mjpeg = MjpegStreams(self._settings, live=self._live)
@@ -236,7 +236,7 @@ class RenderedStream:
         """Notify requests when the worker is ready, and wait until it dies."""
         await worker.wait_until_ready()
         self._is_ready.set()
-        await worker.watch()
+        await worker.wait_until_dead()
 
     async def _feed(self, worker: RenderWorker) -> None:
         """Render the stream's chunks while there are users, until the stream ends."""

@@ -101,7 +101,7 @@ class RenderWorker:
             except msgspec.DecodeError as error:
                 raise WorkerDiedError(f"sent an invalid answer: {error}") from error
 
-    async def watch(self) -> NoReturn:
+    async def wait_until_dead(self) -> NoReturn:
         """Wait until the worker dies by itself, which may be long before its next request.
 
         Raises:

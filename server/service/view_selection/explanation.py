@@ -34,7 +34,7 @@ class ViewExplanation:
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
+class ViewCostExplanation:
     """The costs of one person's views, in frames without the person."""
 
     frames: int
@@ -70,7 +70,7 @@ class SelectionReasons:
     switch_cost: float
     settings: QualitySettings
 
-    def of(self, number: int) -> Explanation:
+    def of(self, number: int) -> ViewCostExplanation:
         """Explain one person's view.
 
         Raises:
@@ -87,7 +87,7 @@ class SelectionReasons:
         other = np.where(np.arange(len(cost)) == before, np.inf, cost)
         best = int(np.argmin(other))
         cut = other[best] + (0.0 if before == NO_CAMERA else self.switch_cost)
-        return Explanation(
+        return ViewCostExplanation(
             frames=self.part.frames,
             views={
                 name: self._view(

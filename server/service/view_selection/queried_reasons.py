@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from server.service.view_selection.decider import ObjectChoice
-from server.service.view_selection.explanation import Explanation, SelectionReasons
+from server.service.view_selection.explanation import SelectionReasons, ViewCostExplanation
 
 _QUERY_EXPIRY_S = 30.0
 """Reasons are no longer kept for a person not queried for so long."""
@@ -34,7 +34,7 @@ class SelectionReason:
     """One object's view in one GOP, and the costs it was selected by."""
 
     view: SelectedView
-    explanation: Explanation
+    explanation: ViewCostExplanation
 
 
 class QueriedReasons:

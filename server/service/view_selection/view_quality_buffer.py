@@ -111,7 +111,7 @@ class ViewQualityBuffer:
 
     def _picture(self, camera: str) -> tuple[float, float, float, float]:
         """Return the rectangle of a camera's image, centered in the site's."""
-        left, top = (float(side) for side in self.letterboxes[camera].to_site(np.zeros(2)))
+        left, top = (float(side) for side in self.letterboxes[camera].camera_to_site(np.zeros(2)))
         return left, top, self._size[0] - left, self._size[1] - top
 
     def _ground(self, camera: str) -> Floats | None:
@@ -119,7 +119,10 @@ class ViewQualityBuffer:
         homography = self._homographies[camera]
         if homography is None or camera in self._overhead:
             return None
-        (left, top), scale = self.letterboxes[camera].to_site(np.zeros(2)), self.letterboxes[camera].scale
+        (left, top), scale = (
+            self.letterboxes[camera].camera_to_site(np.zeros(2)),
+            self.letterboxes[camera].scale,
+        )
         to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
         return np.asarray(homography @ to_camera)
 

@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from bestview import IdentitySettings
 from bestview.association.affinity.affinity_matrix import AffinityMatrix, RowKey
 from bestview.association.affinity.localized_frames import LocalizedFrames
-from bestview.association.co_occurrence import GroundTrajectories, score_ground_proximity, simultaneous_pairs
+from bestview.association.co_occurrence import (
+    GroundTrajectories,
+    pairs_in_one_camera_frame,
+    score_ground_proximity,
+)
 from bestview.association.sightings import TrackObservations
 from bestview.association.tracklet import TrackKey, TrackletKey
 
@@ -248,5 +252,5 @@ def test_simultaneous_pairs_are_all_pairs_of_a_frame_and_camera(
     }
     assert {
         frozenset(pair)
-        for pair in zip(*(side.tolist() for side in simultaneous_pairs(rows, camera)), strict=True)
+        for pair in zip(*(side.tolist() for side in pairs_in_one_camera_frame(rows, camera)), strict=True)
     } == (expected)

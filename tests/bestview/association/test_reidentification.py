@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview.association.affinity.affinity_fusion import select_equal_bin_counts
+from bestview.association.affinity.affinity_fusion import select_with_bins_of_newest
 from bestview.association.appearance.histograms import HistogramEqualizer, MeanHistogram, PersonAppearance
 from bestview.association.appearance.likelihood import AppearanceWeights, DistanceScale, appearance_evidence
 from bestview.association.registry.reidentification import (
@@ -37,10 +37,10 @@ def people(draw: st.DrawFn) -> list[PersonAppearance]:
 
 def test_histograms_with_other_bins_are_not_compared_with_earlier_ones() -> None:
     old, new = (MeanHistogram.of(np.ones(bins), 30) for bins in (BINS, 2 * BINS))
-    assert select_equal_bin_counts([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
-    assert select_equal_bin_counts([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
-    assert select_equal_bin_counts([(2, old), (3, old)], 2) == [(2, old), (3, old)]
-    assert select_equal_bin_counts([], 2) == []
+    assert select_with_bins_of_newest([(0, new), (1, new), (2, old), (3, old)], 2) == [(0, new), (1, new)]
+    assert select_with_bins_of_newest([(0, old), (1, new), (2, new)], 2) == [(1, new), (2, new)]
+    assert select_with_bins_of_newest([(2, old), (3, old)], 2) == [(2, old), (3, old)]
+    assert select_with_bins_of_newest([], 2) == []
 
 
 @settings(deadline=None, max_examples=200)

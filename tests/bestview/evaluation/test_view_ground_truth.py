@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bestview import NO_PERSON, ViewGroundTruth, assign_objects_to_people, optimal_views, view_ground_truth
+from bestview import NO_PERSON, ViewGroundTruth, assign_objects_one_to_one, optimal_views, view_ground_truth
 
 BOX = [0.0, 0.0, 50.0, 50.0]  # a quarter of a picture of 100 x 100: its size is one half
 NOWHERE = [np.nan] * 4
@@ -81,7 +81,7 @@ def total(cost: np.ndarray, views: tuple[int, ...] | list[int], switch_cost: flo
 @given(st.integers(1, 4), st.integers(1, 4), st.integers(0, 10_000))
 def test_objects_are_matched_to_people_optimally(people: int, objects: int, seed: int) -> None:
     matches = np.random.default_rng(seed).integers(0, 5, (people, objects))
-    found = assign_objects_to_people(matches).tolist()
+    found = assign_objects_one_to_one(matches).tolist()
     matched = [person for person in found if person != NO_PERSON]
     assert len(set(matched)) == len(matched), "one person has one object"
     reached = sum(int(matches[person, item]) for item, person in enumerate(found) if person != NO_PERSON)
@@ -93,5 +93,5 @@ def test_objects_are_matched_to_people_optimally(people: int, objects: int, seed
 
 
 def test_an_object_without_matches_has_no_person() -> None:
-    assert assign_objects_to_people(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NO_PERSON, 0, 1]
-    assert assign_objects_to_people(np.zeros((0, 2), dtype=np.int64)).tolist() == [NO_PERSON, NO_PERSON]
+    assert assign_objects_one_to_one(np.array([[0, 3, 1], [0, 0, 2]])).tolist() == [NO_PERSON, 0, 1]
+    assert assign_objects_one_to_one(np.zeros((0, 2), dtype=np.int64)).tolist() == [NO_PERSON, NO_PERSON]

@@ -20,7 +20,7 @@ def test_boxes_are_the_same_after_mapping_to_the_site_and_back(
 ) -> None:
     letterbox, own_boxes = Letterbox(own, site), np.array(boxes)
     np.testing.assert_allclose(
-        letterbox.boxes_to_camera(letterbox.boxes_to_site(own_boxes)), own_boxes, atol=1e-6
+        letterbox.boxes_site_to_camera(letterbox.boxes_camera_to_site(own_boxes)), own_boxes, atol=1e-6
     )
 
 
@@ -28,7 +28,7 @@ def test_boxes_are_the_same_after_mapping_to_the_site_and_back(
 def test_the_whole_picture_is_visible_undistorted_and_touches_two_sides(
     own: tuple[int, int], site: tuple[int, int]
 ) -> None:
-    left, top, right, bottom = Letterbox(own, site).boxes_to_site(np.array([[0.0, 0.0, *own]]))[0]
+    left, top, right, bottom = Letterbox(own, site).boxes_camera_to_site(np.array([[0.0, 0.0, *own]]))[0]
     assert (right - left) / own[0] == pytest.approx((bottom - top) / own[1])
     assert min(left, top) >= 0
     assert right <= site[0] + 1e-6
@@ -60,11 +60,11 @@ def test_pixels_are_where_their_mapped_coordinates_are() -> None:
     picture = np.zeros((100, 50, 3), dtype=np.uint8)
     picture[60:80, 10:30] = 255
     letterbox = Letterbox((50, 100), (200, 200))
-    left, top, right, bottom = letterbox.boxes_to_site(np.array([[10.0, 60.0, 30.0, 80.0]]))[0]
+    left, top, right, bottom = letterbox.boxes_camera_to_site(np.array([[10.0, 60.0, 30.0, 80.0]]))[0]
     fitted = letterbox.image(picture)
     rows, columns = np.nonzero(fitted[:, :, 0] > 127)
     assert (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1) == (left, top, right, bottom)
-    np.testing.assert_array_equal(letterbox.to_site(np.array([[10.0, 60.0]])), [[left, top]])
+    np.testing.assert_array_equal(letterbox.camera_to_site(np.array([[10.0, 60.0]])), [[left, top]])
 
 
 def test_a_picture_of_an_unexpected_size_is_scaled_to_the_site() -> None:

@@ -8,7 +8,7 @@ from bestview import Merge, Split
 from server.messaging.messages import PersonMerge, PersonSplit, ViewCut
 from server.service.decision_state import DecisionState
 from server.service.view_selection.decider import GopDecision, ObjectChoice
-from server.service.view_selection.explanation import Explanation, SelectionReasons
+from server.service.view_selection.explanation import SelectionReasons, ViewCostExplanation
 
 _UNTOLD = cast("SelectionReasons", None)
 
@@ -19,9 +19,9 @@ class Counted:
     def __init__(self) -> None:
         self.asked: list[int] = []
 
-    def of(self, number: int) -> Explanation:
+    def of(self, number: int) -> ViewCostExplanation:
         self.asked.append(number)
-        return Explanation(25, {}, {}, None, None, None, float(number))
+        return ViewCostExplanation(25, {}, {}, None, None, None, float(number))
 
 
 def test_a_decision_is_published_with_its_cuts_and_corrections() -> None:

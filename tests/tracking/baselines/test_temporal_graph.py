@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tracking.baselines.temporal_consistency.graph import (
     WindowGraph,
+    count_edges_without_pruning,
     count_joint_edges,
-    count_unpruned_edges,
     merge_costs,
     prune_links,
 )
@@ -110,7 +110,7 @@ def test_pruning_keeps_the_best_path_if_all_its_steps_are_short_enough(graph: Wi
     assert solve_joint_path(pruned, links, _MANY).cost == pytest.approx(whole.cost)
     assert all(
         some <= every
-        for some, every in zip(count_joint_edges(links), count_unpruned_edges(graph), strict=True)
+        for some, every in zip(count_joint_edges(links), count_edges_without_pruning(graph), strict=True)
     )
 
 
@@ -124,7 +124,7 @@ def test_without_pruning_the_edges_are_all_pairs_of_nodes() -> None:
         np.inf,
     )
     # 27 nodes, then 8, as in the example of the report; the first stage has one predecessor.
-    assert count_unpruned_edges(graph) == [27, 27 * 8]
+    assert count_edges_without_pruning(graph) == [27, 27 * 8]
 
 
 def test_pruning_leaves_a_chain_where_all_people_are_far_apart() -> None:

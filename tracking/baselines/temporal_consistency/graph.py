@@ -101,7 +101,7 @@ def count_joint_edges(links: Sequence[Sequence[StepLinks]]) -> list[int]:
     return [prod(step.count for step in stage) for stage in zip(*links, strict=True)]
 
 
-def count_unpruned_edges(graph: WindowGraph) -> list[int]:
+def count_edges_without_pruning(graph: WindowGraph) -> list[int]:
     """Count the links between joint nodes in the unpruned graph, stage by stage."""
     return count_joint_edges(prune_links(replace(graph, max_step_cost=np.inf)))
 

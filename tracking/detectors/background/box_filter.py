@@ -121,7 +121,7 @@ class BoxFilter:
         smallest = self._settings.min_height * self._rows
         if height_range is not None:
             smallest = min(smallest, max(height_range.min_height * self._rows, height_range.model.min_height))
-        for height in scan_heights(self._rows, smallest, self._settings).astype(np.int64).tolist():
+        for height in heights_to_scan(self._rows, smallest, self._settings).astype(np.int64).tolist():
             size = max(round(self._settings.aspect_ratio * height), 2), height
             gain_factors = (
                 np.ones(len(foot_rows))
@@ -163,7 +163,7 @@ def _best_first(boxes: Floats, gains: Floats) -> npt.NDArray[np.int64]:
     return np.lexsort((boxes[:, 3], boxes[:, 1], boxes[:, 0], -gains))
 
 
-def scan_heights(rows: int, smallest: float, settings: BoxFilterSettings) -> Floats:
+def heights_to_scan(rows: int, smallest: float, settings: BoxFilterSettings) -> Floats:
     """Return the heights to scan, in cells, `(S,)`, ascending, from `smallest` on."""
     largest = settings.max_height * rows
     steps = int(np.floor(np.log(largest / smallest) / np.log(settings.height_step))) + 1

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tracking.detectors.background.color_gain import apply_gains, gains_over_reference
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
-from tracking.detectors.background.static_foreground import StaticForegroundFilter, StaticForegroundSettings
+from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
 from tracking.detectors.base import Image, Mask, require_at_least_one
 
 
@@ -47,7 +47,7 @@ class MedianBackground:
         self, settings: MedianSettings, static: StaticForegroundSettings, shadows: ShadowSettings
     ) -> None:
         self._settings = settings
-        self._static_filter = StaticForegroundFilter(static)
+        self._static_filter = GhostFinder(static)
         self._shadows = shadows
         self._samples: list[Image] = []
         self._frames = 0

@@ -40,7 +40,7 @@ class StaticForegroundSettings:
         require_at_least_one(self, "check_every")
 
 
-class StaticForegroundFilter:
+class GhostFinder:
     """Distinguishes static foreground (ghosts) from people who stand still, by their outline.
 
     A person's outline is an edge in the frame but not in the background; a ghost's outline is an edge in the

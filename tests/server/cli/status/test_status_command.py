@@ -22,7 +22,7 @@ from fakes.service.scripted_cameras import CAMERAS, FPS, camera_tracks, small_co
 from fakes.timeouts import PATIENCE
 from server.cli.status import command
 from server.cli.status.command import status_live, status_once
-from server.cli.status.display import Rates, render_status
+from server.cli.status.display import ServiceRates, render_status
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.messages import SolverReport
@@ -35,7 +35,7 @@ def url(served: ServedSite) -> str:
     return f"http://127.0.0.1:{served.port}"
 
 
-def printed(now: client.SiteNow, rates: Rates = Rates(), notice: str = "") -> str:  # noqa: B008 — frozen
+def printed(now: client.SiteNow, rates: ServiceRates = ServiceRates(), notice: str = "") -> str:  # noqa: B008 — frozen
     console = Console(width=200, record=True, file=None)
     with console.capture() as output:
         console.print(render_status(now, rates, notice))
@@ -123,12 +123,12 @@ async def test_rates_are_between_two_snapshots_of_one_run(site_with_people: Serv
         one.service, cpu_s=one.service.cpu_s + 1.0, sent_bytes=one.service.sent_bytes + 500
     )
     two = msgspec.structs.replace(one, now=one.now + 2.0, service=later)
-    assert Rates.between(one, two) == Rates(pytest.approx(0.5), pytest.approx(250.0))
-    assert "0.50 cores" in printed(two, Rates.between(one, two))
+    assert ServiceRates.between(one, two) == ServiceRates(pytest.approx(0.5), pytest.approx(250.0))
+    assert "0.50 cores" in printed(two, ServiceRates.between(one, two))
     for other in (None, two, msgspec.structs.replace(one, service=None)):
-        assert Rates.between(other, one) == Rates()
+        assert ServiceRates.between(other, one) == ServiceRates()
     restarted = msgspec.structs.replace(two, service=msgspec.structs.replace(later, began=1.0))
-    assert Rates.between(one, restarted) == Rates()
+    assert ServiceRates.between(one, restarted) == ServiceRates()
 
 
 async def test_an_unreachable_server_is_retried(

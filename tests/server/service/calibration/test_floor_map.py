@@ -40,14 +40,14 @@ def test_a_floor_point_is_covered_if_it_is_in_the_picture_and_not_too_far(
     own = camera(tilt, height) * sign
     part = floor_coverage(own, OWN, SITE)
     on_floor = to_ground(own, np.array([x, y]))
-    site = np.append(Letterbox(OWN, SITE).to_site(np.array([x, y])), 1.0)
+    site = np.append(Letterbox(OWN, SITE).camera_to_site(np.array([x, y])), 1.0)
     mapped = part.site_homography @ site
     assert (mapped[2] > 0) == bool(np.isfinite(on_floor).all())
     if mapped[2] <= 0:
         return
     np.testing.assert_allclose(mapped[:2] / mapped[2], on_floor, rtol=1e-6, atol=1e-9)
     nearest = max(
-        (part.site_homography @ np.append(Letterbox(OWN, SITE).to_site(np.array(edge)), 1.0))[2]
+        (part.site_homography @ np.append(Letterbox(OWN, SITE).camera_to_site(np.array(edge)), 1.0))[2]
         for edge in EDGES
     )
     reach = mapped[2] / nearest * FARTHEST_RATIO

@@ -108,7 +108,7 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
             service.splicer.persons[2].subscribe()
     assert service.decision_state.resolve(2) == 1
     assert list(service.decision_state.selected_views) == [1]
-    assert service.decider.people.remote == []
+    assert service.decider.people.of_other_shards == []
     assert set(service.splicer.persons) == {1, 2}
     service.close()
 

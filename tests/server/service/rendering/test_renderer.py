@@ -20,7 +20,7 @@ from server.media.rendering_messages import EncodedFrame, JpegPicture, RenderRes
 from server.messaging.messages import AudioHeader, GopChoices
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes
 from server.service.rendering.mjpeg_streams import MjpegStreams, MjpegVariant, PicturePacer
-from server.service.rendering.overlay_video import OverlayVideo
+from server.service.rendering.overlay_video import OverlayVideoPublisher
 from server.service.rendering.rendered_stream import StillRequests
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.media_chunk import MediaChunk
@@ -66,7 +66,7 @@ def queued_data(subscriber: Subscriber) -> bytes:
 
 
 def test_a_video_has_no_gap_and_never_goes_back_when_its_worker_is_replaced() -> None:
-    video = OverlayVideo(RENDER_SETTINGS, 8)
+    video = OverlayVideoPublisher(RENDER_SETTINGS, 8)
     assert video.head is None
     viewer = video.broadcaster.subscribe()
     video.put(frames(0, 2 * GOP))
@@ -89,7 +89,7 @@ def test_a_video_is_silent_where_its_pictures_are_muted() -> None:
     form = AudioFormat(48_000, 2)
     audio_buffer = AudioBuffer(form, FPS, 60.0)
     audio_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    video = OverlayVideo(RENDER_SETTINGS, 8, audio_buffer)
+    video = OverlayVideoPublisher(RENDER_SETTINGS, 8, audio_buffer)
     viewer = video.broadcaster.subscribe()
     for gop in range(3):
         video.put(frames(gop * GOP, GOP), is_muted=gop == 1)
@@ -103,7 +103,7 @@ def test_the_gaps_of_a_video_are_muted_on_request(*, is_muted: bool) -> None:
     form = AudioFormat(48_000, 2)
     audio_buffer = AudioBuffer(form, FPS, 60.0)
     audio_buffer.put(AudioHeader(first=0, sizes=[9] * 30), b"not quiet" * 30)
-    video = OverlayVideo(RENDER_SETTINGS, 8, audio_buffer, mute_gaps=is_muted)
+    video = OverlayVideoPublisher(RENDER_SETTINGS, 8, audio_buffer, mute_gaps=is_muted)
     viewer = video.broadcaster.subscribe()
     video.put(frames(0, GOP))
     video.put(frames(2 * GOP, GOP))
@@ -113,7 +113,7 @@ def test_the_gaps_of_a_video_are_muted_on_request(*, is_muted: bool) -> None:
 
 
 def test_a_new_viewer_of_a_video_begins_with_the_newest_gop() -> None:
-    video = OverlayVideo(RENDER_SETTINGS, 8)
+    video = OverlayVideoPublisher(RENDER_SETTINGS, 8)
     video.put(frames(0, 2 * GOP))
     assert queued_data(video.broadcaster.subscribe()) == fragments(GOP, GOP)
 
