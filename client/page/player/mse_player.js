@@ -227,7 +227,7 @@ export class MsePlayer {
     this.#switchTo(download, buffer);
     if (!download.onScreen) return;
     const { ranges } = buffer;
-    if (video.paused) {
+    if (this.#playback.paused) {
       if ((ranges.at(-1)?.[1] ?? 0) - video.currentTime > MAX_PAUSED_S) this.#suspend(download);
       return;
     }

@@ -2,6 +2,7 @@
 
 export class Playback {
   #startedByPage = false;
+  #announced = false; // whether the event `play` has been dispatched, which is some time after the start
 
   /**
    * @param {HTMLVideoElement} video
@@ -12,8 +13,15 @@ export class Playback {
     video.addEventListener('play', () => {
       const startedByPage = this.#startedByPage;
       this.#startedByPage = false;
+      this.#announced = true;
       if (!startedByPage) resumed();
     });
+    video.addEventListener('pause', () => (this.#announced = false));
+  }
+
+  /** @returns {boolean} whether the video is paused, or a start has not been announced yet */
+  get paused() {
+    return this.video.paused || !this.#announced;
   }
 
   /** Start the video at its current position. */

@@ -73,7 +73,7 @@ async def test_a_preferred_camera_is_replaced_while_it_does_not_see_the_person(b
         cuts = await visit.get("myview.cuts.slice(-2)")
         assert [cut["to"] for cut in cuts] == ["c2", "c0"]
         for cut, since in zip(cuts, (first, site.blind_pulses.stop + GOP), strict=True):
-            assert 0 <= cut["pulse"] - since < GOP, "a slow machine may skip the first frame"
+            assert 0 <= cut["pulse"] - since < 3 * GOP, "a slow machine may skip the first frames"
         await visit.page.get_by_role("button", name="Prefer").click()
         await visit.until("new URL(location).searchParams.get('camera') === 'c0'")
         await visit.page.keyboard.press("0")
