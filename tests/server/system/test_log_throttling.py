@@ -124,7 +124,7 @@ def test_damage_of_a_looping_recording_is_logged_once(caplog: pytest.LogCaptureF
     opened: Any = SimpleNamespace(container=container, stream=SimpleNamespace(time_base=None), fps=25.0)
     assert not list(read_frames(opened))
     for _ in range(5):
-        assert not list(read_frames(opened, again=True))
+        assert not list(read_frames(opened, quiet=True))
     assert caplog.messages == ["hall.mp4: cannot be read any further: damaged"]
 
 
@@ -148,7 +148,7 @@ def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pyt
 
     def noted(opened: Any, *, again: bool = False) -> Any:
         reopened.append(again)
-        return read_frames(opened, again=again)
+        return read_frames(opened, quiet=again)
 
     monkeypatch.setattr(recording, "read_frames", noted)
     repeated = Recording(str(write_video(tmp_path / "hall.avi", 3, codec="mjpeg")), 0, "loop")
