@@ -146,9 +146,9 @@ def test_damaged_sound_of_a_looping_recording_is_logged_once(
 def test_a_recording_that_repeats_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     reopened: list[bool] = []
 
-    def noted(opened: Any, *, again: bool = False) -> Any:
-        reopened.append(again)
-        return read_frames(opened, quiet=again)
+    def noted(opened: Any, *, quiet: bool = False) -> Any:
+        reopened.append(quiet)
+        return read_frames(opened, quiet=quiet)
 
     monkeypatch.setattr(recording, "read_frames", noted)
     repeated = Recording(str(write_video(tmp_path / "hall.avi", 3, codec="mjpeg")), 0, "loop")
