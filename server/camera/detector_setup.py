@@ -16,6 +16,7 @@ from server.config.sections import CameraSettings
 from server.config.sections.detect import DetectSettings
 from server.config.site_config import Config
 from server.media.letterbox import Image, Letterbox
+from server.models.installed import check_installed
 from server.system.errors import UserError
 from tracking import Detections
 from tracking.detectors import (
@@ -125,6 +126,8 @@ def _create_detector(settings: DetectSettings, floor: FloorGeometry | None) -> C
         case "hog":
             return HogDetector(settings.hog, appearance, settings.ignore)
         case "onnx":
+            if settings.onnx.model is not None:
+                check_installed(settings.onnx.model)
             return OnnxDetector(settings.onnx, appearance, settings.ignore)
         case "boxes":
             return BackgroundDetector(paper_settings(settings))

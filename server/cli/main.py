@@ -15,6 +15,7 @@ import typer
 
 from server.cli import client_commands, file_commands, site_commands
 from server.cli.calibrate.command import calibrate
+from server.cli.models.command import app as models_app
 from server.supervisor.shutdown import SUPERVISED_VARIABLE
 from server.system.address_redaction import redact_to_host
 from server.system.child_process import terminate_with_parent
@@ -63,6 +64,7 @@ for run in (
     client_commands.token,
 ):
     app.command()(run)
+app.add_typer(models_app, name="models")
 
 _BAD_INPUT = UserError.code
 _INTERRUPTED = 130

@@ -90,7 +90,7 @@ def resolve_ground_and_paths(config: Config, *, where: str, folder: Path) -> Con
         _check_handedness(cameras)
     except ValueError as error:
         raise UserError(f"{where}: {error}") from error
-    onnx = replace(config.detect.onnx, model=config.detect.model_in(folder))
+    onnx = config.detect.onnx_in(folder)
     detect = replace(config.detect, onnx=onnx)
     sound = config.sound
     if sound.source is not None and sound.source not in config.camera_ids:

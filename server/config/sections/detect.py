@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from server.models.catalog import find_model
+from server.models.installed import network_path
 from tracking.detectors import BackgroundSettings, HogSettings, OnnxSettings
 
 DetectorKind = Literal["background", "boxes", "hog", "onnx"]
@@ -22,8 +24,15 @@ class DetectSettings(BackgroundSettings):
     def __post_init__(self) -> None:
         BackgroundSettings.__post_init__(self)
         if self.kind == "onnx" and self.onnx.model is None:
-            raise ValueError("onnx.model: kind onnx needs the path of an ONNX file")
+            raise ValueError(
+                "onnx.model: kind onnx needs the path of an ONNX file, or the name of an installed network"
+            )
 
-    def model_in(self, folder: Path) -> Path | None:
-        """Return the path of the ONNX file, which is relative to the configuration's folder."""
-        return None if self.onnx.model is None else folder / self.onnx.model
+    def onnx_in(self, folder: Path) -> OnnxSettings:
+        """Return the network's settings; its file is relative to ``folder``, or an installed one."""
+        if self.onnx.model is None:
+            return self.onnx
+        installable = find_model(str(self.onnx.model))
+        if installable is None:
+            return replace(self.onnx, model=folder / self.onnx.model)
+        return replace(self.onnx, model=network_path(installable), resize=installable.resize)

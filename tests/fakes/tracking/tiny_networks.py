@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 onnx = pytest.importorskip("onnx", reason="needs onnx to build a network with: pip install 'myview[dev]'")
-pytest.importorskip("onnxruntime", reason="needs onnxruntime: pip install 'myview[onnx]'")
+pytest.importorskip("onnxruntime", reason="needs onnxruntime: pip install 'myview[neural]'")
 
 Table = npt.NDArray[np.float32]
 

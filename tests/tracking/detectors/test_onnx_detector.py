@@ -92,7 +92,7 @@ def test_an_unsupported_model_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_without_onnxruntime_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = save_network(tmp_path / "tiny.onnx", V8)
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
-    with pytest.raises(ImportError, match=r"pip install 'myview\[onnx\]'"):
+    with pytest.raises(ImportError, match=r"pip install 'myview\[neural\]'"):
         detector(path)
 
 
@@ -103,3 +103,13 @@ def test_a_configured_layout_overrides_the_shape() -> None:
     np.testing.assert_allclose(found.scores[0], 0.72)
     by_shape = decode_output(one_class, "auto", (0,))
     np.testing.assert_allclose(by_shape.boxes[0], MIDDLE, err_msg="the shape alone means end to end")
+
+
+def test_boxes_are_mapped_back_from_the_stretched_input(tmp_path: Path) -> None:
+    path = save_network(tmp_path / "tiny.onnx", V8, size=(96, 96))
+    wide = np.full((64, 192, 3), 255, dtype=np.uint8)  # half as wide in the input, and half as high again
+    seen = detector(path, resize="stretch").detect(wide)
+    np.testing.assert_allclose(seen.scores, [0.72], rtol=1e-5)
+    left, top, width, height = MIDDLE[0] - MIDDLE[2] / 2, MIDDLE[1] - MIDDLE[3] / 2, MIDDLE[2], MIDDLE[3]
+    expected = [2 * left, top / 1.5, 2 * (left + width), (top + height) / 1.5]
+    np.testing.assert_allclose(seen.boxes, [expected], atol=1e-4)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -37,6 +37,9 @@ class OnnxSettings:
     classes: tuple[int, ...] = (0,)  # class numbers of people: 0 in COCO
     min_score: float = 0.25  # boxes below this score are dropped
     nms_iou: float = 0.7  # overlap (IoU) above which the box of lower score is dropped
+    resize: Literal["letterbox", "stretch"] = (
+        "letterbox"  # fit images into the input with bars, or stretch them
+    )
     input_size: int = 640  # side of the input in pixels, if the file leaves it open
     threads: int = 1  # threads of the network; each camera has its own process
     max_detections: int = 100  # most boxes per frame
@@ -104,21 +107,27 @@ class OnnxDetector:
         except Exception as error:  # onnxruntime has no common exception class
             raise ValueError(f"the network cannot be run: {_first_line(error)}") from error
 
-    def _letterbox(self, image: Image) -> tuple[npt.NDArray[np.floating], float, Floats]:
-        """Letterbox the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1.
+    def _letterbox(self, image: Image) -> tuple[npt.NDArray[np.floating], Floats, Floats]:
+        """Resize the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1.
 
-        Returns the input, the scale, and the offset of the image, `(4,)` as for a box.
+        Returns the input, and the scale and the offset of the image, both `(4,)` as for a box.
         """
         height, width = self._size
-        scale = min(height / image.shape[0], width / image.shape[1])
-        scaled_width, scaled_height = round(image.shape[1] * scale), round(image.shape[0] * scale)
+        scales = width / image.shape[1], height / image.shape[0]
+        if self.settings.resize == "letterbox":
+            scales = min(scales), min(scales)
+        scaled_width, scaled_height = round(image.shape[1] * scales[0]), round(image.shape[0] * scales[1])
         left, top = (width - scaled_width) // 2, (height - scaled_height) // 2
         canvas = np.full((height, width, 3), _BAR_LEVEL, dtype=np.uint8)
         canvas[top : top + scaled_height, left : left + scaled_width] = cv2.resize(
             image, (scaled_width, scaled_height)
         )
         planes = cv2.dnn.blobFromImage(canvas, scalefactor=1.0 / 255.0, swapRB=True)
-        return planes.astype(self._type, copy=False), scale, np.array([left, top] * 2, dtype=np.float64)
+        return (
+            planes.astype(self._type, copy=False),
+            np.array(scales * 2),
+            np.array([left, top] * 2, dtype=np.float64),
+        )
 
 
 def _open_session(model: Path, threads: int) -> Any:
@@ -126,7 +135,7 @@ def _open_session(model: Path, threads: int) -> Any:
     try:
         import onnxruntime  # noqa: PLC0415
     except ImportError as error:
-        raise ImportError("onnxruntime is not installed: pip install 'myview[onnx]'") from error
+        raise ImportError("onnxruntime is not installed: pip install 'myview[neural]'") from error
     content = model.read_bytes()
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads

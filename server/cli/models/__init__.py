@@ -1,0 +1,1 @@
+"""``myview models``: neural detectors that can be installed."""

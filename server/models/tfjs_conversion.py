@@ -1,0 +1,325 @@
+"""Converts TensorFlow.js graph models (a JSON and a binary file) to ONNX, at any input size.
+
+Covers the operations of the detectors in `server.models.catalog`. TensorFlow's images are (N, H, W, C) and
+ONNX's (N, C, H, W): transpositions enclose operations on images; onnxruntime removes most of them again.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from server.models.onnx_builder import Array, OnnxBuilder
+
+OPSET = 18
+_NCHW, _NHWC = [0, 3, 1, 2], [0, 2, 3, 1]
+_ACTIVATIONS = {"BiasAdd": None, "Relu": "Relu", "Relu6": "Relu6"}
+
+
+@dataclass(frozen=True, slots=True)
+class GraphNode:
+    """A node of a graph model.
+
+    Attributes:
+        name: its name, by which other nodes name its first output.
+        operation: TensorFlow's name of the operation.
+        inputs: names of outputs; `a:1` is the second output of `a`.
+        attributes: attributes as in the JSON.
+    """
+
+    name: str
+    operation: str
+    inputs: tuple[str, ...]
+    attributes: Mapping[str, Any]
+
+    def integers(self, key: str) -> list[int]:
+        """Return a list of integers."""
+        return [int(value) for value in self.attributes[key]["list"].get("i", ())]
+
+    def text(self, key: str) -> str:
+        """Return a text."""
+        return base64.b64decode(self.attributes[key]["s"]).decode()
+
+    def texts(self, key: str) -> list[str]:
+        """Return a list of texts."""
+        return [base64.b64decode(value).decode() for value in self.attributes[key]["list"].get("s", ())]
+
+    def is_set(self, key: str) -> bool:
+        """Return a flag, false if it is missing."""
+        return bool(self.attributes.get(key, {}).get("b", False))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphModel:
+    """A graph model: its nodes by name, and its weights by the name of their constant."""
+
+    nodes: Mapping[str, GraphNode]
+    weights: Mapping[str, Array]
+
+
+def read_graph_model(topology: bytes, weights: bytes) -> GraphModel:
+    """Parse the two files of a graph model.
+
+    Raises:
+        ValueError: they are not a graph model, or the binary file has another length than the JSON states.
+    """
+    try:
+        document = json.loads(topology)
+        nodes = {
+            node["name"]: GraphNode(
+                node["name"], node["op"], tuple(node.get("input", ())), node.get("attr", {})
+            )
+            for node in document["modelTopology"]["node"]
+        }
+        entries = [entry for group in document["weightsManifest"] for entry in group["weights"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"not a TensorFlow.js graph model: {error!r}") from error
+    return GraphModel(nodes, _split_weights(entries, weights))
+
+
+def _split_weights(entries: Iterable[Mapping[str, Any]], content: bytes) -> dict[str, Array]:
+    weights, position = {}, 0
+    for entry in entries:
+        stored = np.dtype(entry.get("quantization", entry)["dtype"])
+        count = int(np.prod(entry["shape"], dtype=np.int64))
+        if position + count * stored.itemsize > len(content):
+            raise ValueError(f"the weights end before {entry['name']}")
+        values = np.frombuffer(content, stored, count, position).reshape(entry["shape"])
+        weights[str(entry["name"])] = values.astype(np.dtype(entry["dtype"]))
+        position += values.nbytes
+    if position != len(content):
+        raise ValueError(f"{len(content) - position} bytes follow the last weight")
+    return weights
+
+
+class GraphConverter:
+    """Converts the part of a graph model that some outputs depend on.
+
+    Args:
+        model: the graph model.
+        scale: height and width of the input as shares of those that the model was exported with; the sizes of
+            resized feature maps scale with it.
+    """
+
+    def __init__(self, model: GraphModel, scale: tuple[float, float] = (1.0, 1.0)) -> None:
+        self._model, self._scale = model, scale
+        self.onnx = OnnxBuilder()
+        """The ONNX graph; a node's output has the name that it has in the graph model."""
+        self._converted: set[str] = set()
+
+    def convert(self, output: str) -> str:
+        """Convert what an output depends on; return its name in the ONNX graph.
+
+        Raises:
+            ValueError: the model has no such node, or uses an operation that is not supported.
+        """
+        pending = [output]
+        while pending:
+            name = _node_name(pending[-1])
+            if name in self._converted:
+                pending.pop()
+                continue
+            node = self._model.nodes.get(name)
+            if node is None:
+                raise ValueError(f"the model has no node {name!r}")
+            missing = [part for part in self._tensor_inputs(node) if _node_name(part) not in self._converted]
+            if missing:
+                pending += missing
+                continue
+            self._convert_node(node)
+            self._converted.add(name)
+            pending.pop()
+        return output
+
+    def _tensor_inputs(self, node: GraphNode) -> list[str]:
+        """Return the inputs that are computed; constants are added where they are used."""
+        return [part for part in node.inputs if _node_name(part) not in self._model.weights]
+
+    def _convert_node(self, node: GraphNode) -> None:
+        if node.operation == "Placeholder":
+            return
+        convert = _CONVERSIONS.get(node.operation)
+        if convert is None:
+            raise ValueError(f"operation {node.operation} of node {node.name} is not supported")
+        convert(self, node)
+
+    def weights(self, name: str) -> Array:
+        """Return the value of a constant input.
+
+        Raises:
+            ValueError: it is not constant.
+        """
+        try:
+            return self._model.weights[_node_name(name)]
+        except KeyError:
+            raise ValueError(f"{name} must be a constant") from None
+
+    def tensor(self, name: str) -> str:
+        """Return the ONNX name of an input; a constant is added to the graph."""
+        value = self._model.weights.get(_node_name(name))
+        return name if value is None else self.onnx.constant(value)
+
+    def scaled(self, height: int, width: int) -> list[int]:
+        """Return the size of a feature map at the input size that is converted for."""
+        return [round(height * self._scale[0]), round(width * self._scale[1])]
+
+
+def _node_name(tensor: str) -> str:
+    """Return the node of a tensor; `^a` is a control dependency on `a`."""
+    return tensor.removeprefix("^").split(":")[0]
+
+
+def _convolution(converter: GraphConverter, node: GraphNode) -> None:
+    weights = converter.weights(node.inputs[1])  # (height, width, in, out)
+    groups = 1
+    if "Depthwise" in node.operation:  # (height, width, channels, multiplier)
+        height, width, groups, multiplier = weights.shape
+        weights = weights.reshape(height, width, 1, groups * multiplier)
+    inputs = [
+        converter.onnx.add("Transpose", [converter.tensor(node.inputs[0])], perm=_NCHW),
+        converter.onnx.constant(weights.transpose(3, 2, 0, 1)),
+    ]
+    fused = node.texts("fused_ops") if "fused_ops" in node.attributes else []
+    unknown = [operation for operation in fused if operation not in _ACTIVATIONS]
+    if unknown:
+        raise ValueError(f"{node.name}: {', '.join(unknown)} inside a convolution is not supported")
+    if "BiasAdd" in fused:
+        inputs.append(converter.onnx.constant(converter.weights(node.inputs[2])))
+    result = converter.onnx.add(
+        "Conv",
+        inputs,
+        strides=node.integers("strides")[1:3],
+        dilations=node.integers("dilations")[1:3] if "dilations" in node.attributes else [1, 1],
+        group=groups,
+        **_padding(node),
+    )
+    for operation in fused:
+        if operation != "BiasAdd":
+            result = _activate(converter, operation, result)
+    converter.onnx.add("Transpose", [result], node.name, perm=_NHWC)
+
+
+def _padding(node: GraphNode) -> dict[str, Any]:
+    return {"auto_pad": "SAME_UPPER"} if node.text("padding") == "SAME" else {"pads": [0, 0, 0, 0]}
+
+
+def _activate(converter: GraphConverter, operation: str, value: str, output: str | None = None) -> str:
+    if operation == "Relu6":
+        bounds = [converter.onnx.constant(np.array(bound, dtype=np.float32)) for bound in (0.0, 6.0)]
+        return converter.onnx.add("Clip", [value, *bounds], output)
+    return converter.onnx.add(operation, [value], output)
+
+
+def _activation(converter: GraphConverter, node: GraphNode) -> None:
+    _activate(converter, node.operation, converter.tensor(node.inputs[0]), node.name)
+
+
+def _leaky_relu(converter: GraphConverter, node: GraphNode) -> None:
+    alpha = float(node.attributes["alpha"]["f"])
+    converter.onnx.add("LeakyRelu", [converter.tensor(node.inputs[0])], node.name, alpha=alpha)
+
+
+def _elementwise(operation: str) -> Callable[[GraphConverter, GraphNode], None]:
+    def convert(converter: GraphConverter, node: GraphNode) -> None:
+        converter.onnx.add(operation, [converter.tensor(part) for part in node.inputs], node.name)
+
+    return convert
+
+
+def _pad(converter: GraphConverter, node: GraphNode) -> None:
+    before, after = converter.weights(node.inputs[1]).astype(np.int64).T
+    value = converter.weights(node.inputs[2]) if len(node.inputs) > 2 else np.zeros((), dtype=np.float32)  # noqa: PLR2004
+    inputs = [
+        converter.tensor(node.inputs[0]),
+        converter.onnx.constant(np.concatenate([before, after])),
+        converter.onnx.constant(value.astype(np.float32)),
+    ]
+    converter.onnx.add("Pad", inputs, node.name)
+
+
+def _transpose(converter: GraphConverter, node: GraphNode) -> None:
+    order = converter.weights(node.inputs[1]).tolist()
+    converter.onnx.add("Transpose", [converter.tensor(node.inputs[0])], node.name, perm=order)
+
+
+def _concatenate(converter: GraphConverter, node: GraphNode) -> None:
+    *parts, axis = node.inputs
+    converter.onnx.add(
+        "Concat",
+        [converter.tensor(part) for part in parts],
+        node.name,
+        axis=int(converter.weights(axis)),
+    )
+
+
+def _mean(converter: GraphConverter, node: GraphNode) -> None:
+    axes = converter.onnx.constant(np.atleast_1d(converter.weights(node.inputs[1])).astype(np.int64))
+    keep = int(node.is_set("keep_dims"))
+    converter.onnx.add("ReduceMean", [converter.tensor(node.inputs[0]), axes], node.name, keepdims=keep)
+
+
+def _max_pool(converter: GraphConverter, node: GraphNode) -> None:
+    images = converter.onnx.add("Transpose", [converter.tensor(node.inputs[0])], perm=_NCHW)
+    pooled = converter.onnx.add(
+        "MaxPool",
+        [images],
+        kernel_shape=node.integers("ksize")[1:3],
+        strides=node.integers("strides")[1:3],
+        **_padding(node),
+    )
+    converter.onnx.add("Transpose", [pooled], node.name, perm=_NHWC)
+
+
+def _resize(converter: GraphConverter, node: GraphNode) -> None:
+    height, width = (int(side) for side in converter.weights(node.inputs[1]))
+    images = converter.tensor(node.inputs[0])
+    sides = converter.onnx.constant(np.array(converter.scaled(height, width), dtype=np.int64))
+    # onnxruntime's optimizer loses the sizes of a `Resize` that names its axes.
+    sizes = converter.onnx.add(
+        "Concat",
+        [
+            converter.onnx.add("Shape", [images], start=0, end=1),
+            sides,
+            converter.onnx.add("Shape", [images], start=3, end=4),
+        ],
+        axis=0,
+    )
+    mode = "half_pixel" if node.is_set("half_pixel_centers") else "asymmetric"
+    if node.is_set("align_corners"):
+        mode = "align_corners"
+    converter.onnx.add(
+        "Resize",
+        [images, "", "", sizes],
+        node.name,
+        mode="linear",
+        coordinate_transformation_mode=mode,
+    )
+
+
+_CONVERSIONS: dict[str, Callable[[GraphConverter, GraphNode], None]] = {
+    "Add": _elementwise("Add"),
+    "AddV2": _elementwise("Add"),
+    "ConcatV2": _concatenate,
+    "Conv2D": _convolution,
+    "DepthwiseConv2dNative": _convolution,
+    "FusedDepthwiseConv2dNative": _convolution,
+    "Identity": _elementwise("Identity"),
+    "LeakyRelu": _leaky_relu,
+    "MaxPool": _max_pool,
+    "Mean": _mean,
+    "Mul": _elementwise("Mul"),
+    "Pad": _pad,
+    "PadV2": _pad,
+    "Relu": _activation,
+    "Relu6": _activation,
+    "ResizeBilinear": _resize,
+    "Sigmoid": _elementwise("Sigmoid"),
+    "Sub": _elementwise("Sub"),
+    "Transpose": _transpose,
+    "_FusedConv2D": _convolution,
+}
