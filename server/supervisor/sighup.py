@@ -47,6 +47,7 @@ async def sighups() -> AsyncGenerator[None, None]:
         await received.wait()
         received.clear()
         if at_terminal and not _has_terminal():
+            _discard_errors()
             os.kill(os.getpid(), signal.SIGTERM)
         else:
             yield
@@ -83,3 +84,8 @@ def _has_terminal() -> bool:
     except (termios.error, OSError, ValueError):
         return False
     return True
+
+
+def _discard_errors() -> None:
+    """Let standard error lead nowhere: lines for a closed terminal would make the exit code 120."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
