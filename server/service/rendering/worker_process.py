@@ -115,7 +115,11 @@ class RenderWorker:
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         self._requests.close()
-        # `wait()` returns only when the pipe is closed, which needs a long answer to be read.
-        while await self._answers.read(_READ_BYTES):
-            pass
-        await self._process.wait()
+        try:
+            # `wait()` returns only when the pipe is closed, which needs a long answer to be read.
+            while await self._answers.read(_READ_BYTES):
+                pass
+            await self._process.wait()
+        except asyncio.CancelledError:  # as the event loop ends: nobody else would close the pipes
+            self._process._transport.close()  # type: ignore[attr-defined]  # noqa: SLF001 — no public way
+            raise

@@ -205,3 +205,16 @@ async def test_a_worker_that_is_ended_while_it_answers_leaves_nothing_open() -> 
         await RenderWorker(process).kill()
         while not before.issuperset(Path("/proc/self/fd").iterdir()):  # noqa: ASYNC110
             await asyncio.sleep(0)
+
+
+async def test_a_worker_whose_killing_is_cancelled_leaves_nothing_open() -> None:
+    worker = await RenderWorker.start(RENDER_SETTINGS)
+    killing = asyncio.create_task(worker.kill())
+    await asyncio.sleep(0)
+    killing.cancel()
+    await asyncio.gather(killing, return_exceptions=True)
+    assert killing.cancelled()
+    transport = worker._process._transport  # type: ignore[attr-defined]
+    assert transport.is_closing(), "it would otherwise be open when the event loop ends"
+    async with asyncio.timeout(PATIENCE):
+        await worker._process.wait()
