@@ -10,6 +10,9 @@ from server.models.catalog import find_model
 from server.models.installed import network_path
 from tracking.detectors import BackgroundSettings, HogSettings, OnnxSettings
 
+_MIN_PROBABILITY = 0.05
+"""The default `onnx.min_score` of installed networks."""
+
 DetectorKind = Literal["background", "boxes", "hog", "onnx"]
 
 
@@ -35,4 +38,9 @@ class DetectSettings(BackgroundSettings):
         installable = find_model(str(self.onnx.model))
         if installable is None:
             return replace(self.onnx, model=folder / self.onnx.model)
-        return replace(self.onnx, model=network_path(installable), resize=installable.resize)
+        # Scores of installed networks are probabilities, and the tracker makes use of doubtful boxes.
+        is_default = self.onnx.min_score == OnnxSettings().min_score
+        min_score = _MIN_PROBABILITY if is_default else self.onnx.min_score
+        return replace(
+            self.onnx, model=network_path(installable), resize=installable.resize, min_score=min_score
+        )

@@ -92,6 +92,7 @@ def test_a_configuration_names_an_installed_network(tmp_path: Path) -> None:
     )
     onnx = load_config(tmp_path / "site.yaml").detect.onnx
     assert (onnx.model, onnx.resize) == (models_folder() / "ssd-mobilenet.onnx", "stretch")
+    assert onnx.min_score == 0.05
     with pytest.raises(
         UserError, match="ssd-mobilenet is not installed: run `myview models install ssd-mobilenet`"
     ):

@@ -9,6 +9,9 @@ import pytest
 
 from fakes.models.graph_models import Floats, centernet_model, nanodet_model
 from server.models.person_networks import (
+    CENTERNET_CALIBRATION,
+    NANODET_CALIBRATION,
+    SSD_CALIBRATION,
     cell_centers,
     centernet_network,
     nanodet_network,
@@ -22,6 +25,10 @@ onnx = pytest.importorskip("onnx", reason="needs onnx: pip install 'myview[neura
 
 SIZE = (32, 64)
 IMAGE = np.random.default_rng(2).random((1, 3, *SIZE), dtype=np.float32)
+
+
+def calibrated(logits: Any, calibration: tuple[float, float]) -> Any:
+    return 1.0 / (1.0 + np.exp(-(calibration[0] * logits + calibration[1])))
 
 
 def run(network: bytes, image: Floats) -> Any:
@@ -44,7 +51,9 @@ def test_centernet_returns_local_maxima_with_their_boxes() -> None:
         for x in range(columns):
             center_x, center_y, width, height, score = people[y * columns + x]
             is_peak = heat[y, x] == padded[y : y + 3, x : x + 3].max()
-            assert score == pytest.approx(heat[y, x] if is_peak else 0.0, abs=1e-4)
+            logit = np.log(heat[y, x] / (1.0 - heat[y, x]))
+            probability = calibrated(logit, CENTERNET_CALIBRATION) if is_peak else 0.0
+            assert score == pytest.approx(probability, abs=1e-3)
             left, top, right, bottom = distances[y, x]
             sides = [4 * x - left, 4 * y - top, 4 * x + right, 4 * y + bottom]
             found = [center_x - width / 2, center_y - height / 2, center_x + width / 2, center_y + height / 2]
@@ -61,7 +70,7 @@ def test_nanodet_returns_expected_distances_around_cell_centers() -> None:
         distances = (shares / shares.sum(axis=2, keepdims=True)) @ np.arange(11) * stride
         centers = cell_centers((SIZE[0] // stride, SIZE[1] // stride), stride)[0]
         before, after = centers - distances[:, :2], centers + distances[:, 2:]
-        scores = 1.0 / (1.0 + np.exp(-maps[:, :1]))
+        scores = calibrated(maps[:, :1], NANODET_CALIBRATION)
         expected.append(np.hstack([(before + after) / 2.0, after - before, scores]))
     np.testing.assert_allclose(people, np.concatenate(expected), atol=1e-2)
 
@@ -83,7 +92,9 @@ def test_ssd_offsets_move_and_scale_the_anchors() -> None:
     sizes = np.exp(offsets[0, :, 2:] / 5.0) * anchors[:, 2:]
     np.testing.assert_allclose(people[:, :2], 300.0 * centers[:, ::-1], rtol=1e-3, atol=1e-2)
     np.testing.assert_allclose(people[:, 2:4], 300.0 * sizes[:, ::-1], rtol=1e-3, atol=1e-2)
-    np.testing.assert_allclose(people[:, 4], 1.0 / (1.0 + np.exp(-scores[0, :, 4])), rtol=1e-4)
+    np.testing.assert_allclose(
+        people[:, 4], calibrated(scores[0, :, 4], SSD_CALIBRATION), rtol=1e-3, atol=1e-6
+    )
 
 
 def raw_ssd(offsets: Floats, scores: Floats) -> Any:
