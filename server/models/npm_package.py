@@ -30,7 +30,7 @@ def fetch_files(package: NpmPackage, names: Collection[str]) -> dict[str, bytes]
     npm = find_npm()
     if npm is None:
         raise UserError("npm is needed to fetch packages: pip install 'myview[neural]', or install Node.js")
-    label = f"{package.name}@{package.version}"
+    label = package.label
     with tempfile.TemporaryDirectory(prefix="myview-npm-") as folder:
         command = [npm, "pack", label, "--pack-destination", folder, "--ignore-scripts", "--silent"]
         try:
@@ -58,7 +58,7 @@ def read_archive(archive: Path, package: NpmPackage, names: Collection[str]) -> 
     Raises:
         UserError: the archive is not the pinned one.
     """
-    label = f"{package.name}@{package.version}"
+    label = package.label
     digest = hashlib.sha512(archive.read_bytes()).digest()
     found = "sha512-" + base64.b64encode(digest).decode()
     if found != package.integrity:

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from server.models.graph_model import GraphModel
 from server.models.onnx_builder import OnnxBuilder
-from server.models.tfjs_conversion import OPSET, GraphConverter, GraphModel
+from server.models.tfjs_conversion import OPSET, GraphConverter
 
 Floats = npt.NDArray[np.float32]
 

@@ -6,95 +6,18 @@ ONNX's (N, C, H, W): transpositions enclose operations on images; onnxruntime re
 
 from __future__ import annotations
 
-import base64
-import json
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from server.models.graph_model import GraphModel, GraphNode
 from server.models.onnx_builder import Array, OnnxBuilder
 
 OPSET = 18
 _NCHW, _NHWC = [0, 3, 1, 2], [0, 2, 3, 1]
-_ACTIVATIONS = {"BiasAdd": None, "Relu": "Relu", "Relu6": "Relu6"}
-
-
-@dataclass(frozen=True, slots=True)
-class GraphNode:
-    """A node of a graph model.
-
-    Attributes:
-        name: its name, by which other nodes name its first output.
-        operation: TensorFlow's name of the operation.
-        inputs: names of outputs; `a:1` is the second output of `a`.
-        attributes: attributes as in the JSON.
-    """
-
-    name: str
-    operation: str
-    inputs: tuple[str, ...]
-    attributes: Mapping[str, Any]
-
-    def integers(self, key: str) -> list[int]:
-        """Return a list of integers."""
-        return [int(value) for value in self.attributes[key]["list"].get("i", ())]
-
-    def text(self, key: str) -> str:
-        """Return a text."""
-        return base64.b64decode(self.attributes[key]["s"]).decode()
-
-    def texts(self, key: str) -> list[str]:
-        """Return a list of texts."""
-        return [base64.b64decode(value).decode() for value in self.attributes[key]["list"].get("s", ())]
-
-    def is_set(self, key: str) -> bool:
-        """Return a flag, false if it is missing."""
-        return bool(self.attributes.get(key, {}).get("b", False))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GraphModel:
-    """A graph model: its nodes by name, and its weights by the name of their constant."""
-
-    nodes: Mapping[str, GraphNode]
-    weights: Mapping[str, Array]
-
-
-def read_graph_model(topology: bytes, weights: bytes) -> GraphModel:
-    """Parse the two files of a graph model.
-
-    Raises:
-        ValueError: they are not a graph model, or the binary file has another length than the JSON states.
-    """
-    try:
-        document = json.loads(topology)
-        nodes = {
-            node["name"]: GraphNode(
-                node["name"], node["op"], tuple(node.get("input", ())), node.get("attr", {})
-            )
-            for node in document["modelTopology"]["node"]
-        }
-        entries = [entry for group in document["weightsManifest"] for entry in group["weights"]]
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"not a TensorFlow.js graph model: {error!r}") from error
-    return GraphModel(nodes, _split_weights(entries, weights))
-
-
-def _split_weights(entries: Iterable[Mapping[str, Any]], content: bytes) -> dict[str, Array]:
-    weights, position = {}, 0
-    for entry in entries:
-        stored = np.dtype(entry.get("quantization", entry)["dtype"])
-        count = int(np.prod(entry["shape"], dtype=np.int64))
-        if position + count * stored.itemsize > len(content):
-            raise ValueError(f"the weights end before {entry['name']}")
-        values = np.frombuffer(content, stored, count, position).reshape(entry["shape"])
-        weights[str(entry["name"])] = values.astype(np.dtype(entry["dtype"]))
-        position += values.nbytes
-    if position != len(content):
-        raise ValueError(f"{len(content) - position} bytes follow the last weight")
-    return weights
+_FUSED = frozenset({"BiasAdd", "Relu", "Relu6"})
+"""Operations that may be part of a convolution."""
 
 
 class GraphConverter:
@@ -185,7 +108,7 @@ def _convolution(converter: GraphConverter, node: GraphNode) -> None:
         converter.onnx.constant(weights.transpose(3, 2, 0, 1)),
     ]
     fused = node.texts("fused_ops") if "fused_ops" in node.attributes else []
-    unknown = [operation for operation in fused if operation not in _ACTIVATIONS]
+    unknown = [operation for operation in fused if operation not in _FUSED]
     if unknown:
         raise ValueError(f"{node.name}: {', '.join(unknown)} inside a convolution is not supported")
     if "BiasAdd" in fused:

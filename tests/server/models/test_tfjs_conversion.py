@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.models.graph_models import Floats, GraphModelFile
-from server.models.tfjs_conversion import OPSET, GraphConverter, read_graph_model
+from server.models.graph_model import read_graph_model
+from server.models.tfjs_conversion import OPSET, GraphConverter
 
 onnxruntime = pytest.importorskip("onnxruntime", reason="needs onnxruntime: pip install 'myview[neural]'")
 pytest.importorskip("onnx", reason="needs onnx: pip install 'myview[neural]'")

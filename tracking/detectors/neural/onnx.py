@@ -92,7 +92,7 @@ class OnnxDetector:
             ValueError: not an `(H, W, 3)` uint8 image, or the network's output is not a YOLO output.
         """
         validate_image(image)
-        planes, scale, offset = self._letterbox(image)
+        planes, scale, offset = self._fit_to_input(image)
         found = decode_output(self._run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
         boxes = np.clip((found.boxes - offset) / scale, 0.0, limits)
@@ -107,7 +107,7 @@ class OnnxDetector:
         except Exception as error:  # onnxruntime has no common exception class
             raise ValueError(f"the network cannot be run: {_first_line(error)}") from error
 
-    def _letterbox(self, image: Image) -> tuple[npt.NDArray[np.floating], Floats, Floats]:
+    def _fit_to_input(self, image: Image) -> tuple[npt.NDArray[np.floating], Floats, Floats]:
         """Resize the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1.
 
         Returns the input, and the scale and the offset of the image, both `(4,)` as for a box.
