@@ -16,6 +16,7 @@ import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
 from server.camera.audio import LiveAudioSource, open_site_audio
+from server.camera.end_confirmation import EndConfirmation
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_exchange import PeerDetectionExchange
@@ -37,6 +38,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _STATUS_EVERY_S = 1.0
+_END_CONFIRMED_WITHIN_S = 10.0
 
 
 class CameraProcess:
@@ -85,6 +87,8 @@ class CameraProcess:
         try:
             if self._config.track.assist.enabled:
                 bus.subscribe(self._keys.camera(self._id, "position_corrections"), self._corrections.put)
+            end = EndConfirmation(self._id, self._boot)
+            end.listen(bus, self._keys)
             retained = RetainedIdentitySnapshot(self._publisher.publish_retained_identities)
             bus.subscribe(self._keys.camera(self._id, "identities"), retained.replace)
             bus.watch_alive(self._keys.bestview("**"), lambda _, is_present: retained.on_service(is_present))
@@ -98,6 +102,8 @@ class CameraProcess:
             try:
                 await self._wait_until_done(video, tracking, status)
                 self._publish_status()
+                if not await end.wait(_END_CONFIRMED_WITHIN_S):
+                    log.warning("camera %s: a best-view service did not confirm the last tracks", self._id)
             finally:
                 for task in tasks:
                     task.cancel()

@@ -15,7 +15,7 @@ _SEND = ["put", "delete", "liveliness_token"]
 _SUBSCRIBE = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _FORWARD = [*_SEND, "declare_subscriber"]
 """What the router forwards: messages, liveliness tokens, and subscriptions."""
-_COMMANDS = ("position_corrections", "identities")
+_COMMANDS = ("position_corrections", "identities", "end_received")
 """Messages of best-view services to a camera, under its key."""
 _MAX_SERVICES = 64
 """Best-view services of a site, at most."""
@@ -39,7 +39,7 @@ def build_access_control(
     """Build zenoh's ``access_control``; everything not allowed is denied.
 
     A camera publishes under its own key, and the site's audio if it is the audio camera. It receives the
-    other cameras' detections, and the best-view services' messages to it (operator points and identities).
+    other cameras' detections, and the best-view services' messages to it.
     Further best-view services may do everything. Any other user may subscribe to everything and send nothing.
     """
     keys = ZenohKeys(site)

@@ -259,6 +259,15 @@ class GopChoices(msgspec.Struct, frozen=True, kw_only=True):
     split: list[PersonSplit] = []
 
 
+class EndReceived(msgspec.Struct, frozen=True, kw_only=True):
+    """A best-view service's confirmation that it has received the end of a camera's recording."""
+
+    service: str
+    """The key of the service's liveliness token."""
+    boot: Number
+    """The camera's run whose end it was."""
+
+
 _CAMERA_PART = 3
 
 

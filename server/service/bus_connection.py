@@ -11,7 +11,7 @@ from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
 from server.messaging.inbox import Inbox, Message
-from server.messaging.messages import GopChoices, ZenohKeys
+from server.messaging.messages import EndReceived, GopChoices, ZenohKeys
 
 MessageHandler = Callable[[Message], None]
 
@@ -65,6 +65,11 @@ class BusConnection:
         """Send a camera a message under the key that ends with ``topic``."""
         if self._bus is not None:
             self._bus.publish(self._keys.camera(camera, topic), payload)
+
+    def confirm_end(self, camera: str, boot: int) -> None:
+        """Confirm to a camera that the last tracks of its recording have been received."""
+        received = EndReceived(service=self._keys.bestview("alive", self._index), boot=boot)
+        self.send_to_camera("end_received", camera, msgspec.json.encode(received))
 
     def publish_choices(self, choices: GopChoices) -> None:
         """Publish the choices of a GOP."""

@@ -78,6 +78,7 @@ class BestViewPipeline:
         """Epochs that were not decided because decisions had fallen too far behind."""
         self._skip_log = LogThrottle()
         self.splicer = Splicer(self.frame_buffers, self.stream_format, config, self.audio_buffer)
+        self.bus = BusConnection(config)
         self.ingest = Ingest(
             self.frame_buffers,
             self.aligner,
@@ -86,12 +87,12 @@ class BestViewPipeline:
             audio_sender=config.audio_sender,
             current_pulse=lambda: self.pulses.newest,
             max_ahead=max_ahead,
+            on_ended=self.bus.confirm_end,
         )
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
         self.decision_state = DecisionState(config.site.fps)
-        self.bus = BusConnection(config)
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
         )

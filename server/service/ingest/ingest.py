@@ -106,6 +106,7 @@ class Ingest:
         audio_buffer: receives the site's audio; None if there is none.
         audio_sender: the camera that sends the audio.
         current_pulse: returns the newest pulse; below 0: unknown.
+        on_ended: called with a camera and its boot when its last tracks have been received.
         max_ahead: pulses by which a message may be ahead of it. A later one is dropped: the aligner would
             wait until then.
     """
@@ -120,9 +121,11 @@ class Ingest:
         audio_sender: str | None = None,
         current_pulse: Callable[[], int] = lambda: -1,
         max_ahead: int = 0,
+        on_ended: Callable[[str, int], None] = lambda _, __: None,
     ) -> None:
         self._current_pulse, self._max_ahead = current_pulse, max_ahead
         self._frame_buffers, self._aligner, self._on_frame = frame_buffers, aligner, on_frame
+        self._on_ended = on_ended
         self._audio_buffer, self._audio_camera = audio_buffer, audio_sender
         self._unknown_log = LogThrottle()
         self._presence_log_limits = {
@@ -213,6 +216,8 @@ class Ingest:
         state.metrics.window(tracks)
         state.ended = tracks.ended
         self._aligner.add_tracks(tracks)
+        if tracks.ended:
+            self._on_ended(camera, tracks.boot)
 
     def retained_identities(self, message: Message, handler: Callable[[Message], None]) -> None:
         """Pass the identities that a camera has retained to a handler, which may raise a decode error."""

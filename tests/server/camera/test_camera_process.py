@@ -25,6 +25,7 @@ from server.cli.render.renderer import Renderer
 from server.config.loader import build_config
 from server.config.site_config import Config
 from server.messaging.messages import CameraStatus, CameraTracks, FrameHeader, GopChoices
+from server.service.bus_connection import BusConnection
 from synthetic import Scene, write_recording
 
 FRAMES = 60
@@ -141,6 +142,37 @@ async def test_recordings_run_to_their_end_without_losses(
     statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
     assert statuses[-1].state == "ended"
     assert statuses[-1].missed == 0
+
+
+@pytest.mark.parametrize("confirms", [True, False])
+async def test_a_camera_stays_connected_until_the_service_has_its_last_tracks(
+    recording: Path,
+    tmp_path: Path,
+    running: list[SiteInOneLoop],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    *,
+    confirms: bool,
+) -> None:
+    """zenoh sends that a session ends ahead of tracks that wait, and nobody waits for a lost camera's."""
+    config = site(recording, c0="c0.mp4")
+    whole_site = SiteInOneLoop(config, tmp_path / "out")
+    running.append(whole_site)
+    connected: list[bool] = []
+    confirm = BusConnection.confirm_end
+
+    def confirm_or_not(bus: BusConnection, camera: str, boot: int) -> None:
+        connected.append(whole_site.service.ingest.states[camera].alive)
+        if confirms:
+            confirm(bus, camera, boot)
+
+    monkeypatch.setattr(BusConnection, "confirm_end", confirm_or_not)
+    monkeypatch.setattr("server.camera.process._END_CONFIRMED_WITHIN_S", PATIENCE if confirms else 0.0)
+    over = await whole_site.start()
+    async with asyncio.timeout(PATIENCE):
+        await asyncio.gather(over, whole_site.camera("c0"))
+    assert connected == [True]
+    assert ("did not confirm the last tracks" in caplog.text) is not confirms
 
 
 async def test_a_disconnected_camera_is_detected_and_others_continue(

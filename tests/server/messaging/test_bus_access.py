@@ -173,7 +173,7 @@ def _publish_from_all(buses: Sequence[Bus], number: int) -> None:
     c1.publish(SITE.camera("c1", "video"), str(number).encode())
 
 
-@pytest.mark.parametrize("topic", ["position_corrections", "identities"])
+@pytest.mark.parametrize("topic", ["position_corrections", "identities", "end_received"])
 async def test_camera_commands_come_from_the_service_and_reach_that_camera_only(
     settings: ZenohSettings, topic: str
 ) -> None:
