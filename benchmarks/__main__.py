@@ -36,6 +36,7 @@ BENCHMARKS = (
     Benchmark("render", "rendering speed of recordings, and processor time by stage"),
     Benchmark("latency", "delay from the pulse to the browser, by stage; 2 minutes"),
     Benchmark("detectors", "recall and precision of detectors, and the tracks made of them; 10 minutes"),
+    Benchmark("robustness", "26 disturbances of the pictures, and the time to recover from them; 3 hours"),
     Benchmark("other_trackers", "MyView and trackers from PyPI on public detections; 5 minutes"),
     Benchmark("baselines", "the survey's trackers beside the network program; 7 minutes"),
     Benchmark("temporal_consistency", "overhead view: identity errors after merges, pruning; 6 minutes"),

@@ -86,16 +86,22 @@ class BenchmarkScene:
         return SceneDetections(frames, {camera: confident_rows(frame) for camera, frame in frames.items()})
 
 
+def recorded(data: Path, name: str) -> BenchmarkScene:
+    """Return a recording of the data folder, with detection in its pictures.
+
+    Raises:
+        CannotRunError: the recordings are missing.
+    """
+    return _pictured(find_views(data, name), "recorded")
+
+
 def terrace(data: Path) -> BenchmarkScene:
     """Return two views, with detection by background subtraction and a masked watermark.
 
     Raises:
         CannotRunError: the recordings are missing.
     """
-    views = find_views(data, "terrace")
-    folder = data / "terrace"
-    gt = {video.stem: read_rows(folder / "gt" / f"{video.stem}.txt") for video in views.videos}
-    return BenchmarkScene("terrace", "two views, background subtraction", _content(views), gt, 0.25)
+    return replace(recorded(data, "terrace"), about="two views, background subtraction")
 
 
 def auditorium(data: Path) -> BenchmarkScene:
@@ -136,14 +142,9 @@ def gallery(folder: Path, people: int, seconds: float) -> BenchmarkScene:
 def _drawn(folder: Path, scene: Scene, seconds: float) -> BenchmarkScene:
     name = f"{scene.name}-{scene.cameras}-{scene.objects}"
     write_recording(scene, folder / name, seconds)
-    views = find_views(folder, name)
-    gt = {video.stem: read_rows(folder / name / "gt" / f"{video.stem}.txt") for video in views.videos}
     about = f"synthetic, {scene.cameras} cameras, {scene.objects} people, {seconds:g} s"
-    return BenchmarkScene(name, about, _content(views), gt, 0.25)
+    return _pictured(find_views(folder, name), about)
 
 
-def _content(views: RecordedViews) -> dict[str, Any]:
-    content = {"site": views.site, "cameras": views.cameras}
-    if views.ground is not None:
-        content["ground"] = str(views.ground.absolute())
-    return content
+def _pictured(views: RecordedViews, about: str) -> BenchmarkScene:
+    return BenchmarkScene(views.name, about, views.content, views.truth, 0.25)

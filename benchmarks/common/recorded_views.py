@@ -10,6 +10,7 @@ from benchmarks.common.environment import CannotRunError
 from server.camera.sources.opening import open_video
 from server.cli.render.video_info import read_video_info
 from synthetic import Scene, write_recording
+from tracking.motchallenge import MotRow, read_rows
 
 ROOM = "room"
 _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_SEED = 3, 4, 1
@@ -17,7 +18,7 @@ _ROOM_WIDTH, _ROOM_HEIGHT, _ROOM_FPS = 640, 360, 25.0
 
 _WATERMARK = [[130, 232], [355, 232], [355, 283], [130, 283]]
 """The polygon of a translucent watermark, which hides the background."""
-_WATERMARKED = ("campus4", "terrace")
+_WATERMARKED = ("campus4", "terrace", "terrace2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,18 @@ class RecordedViews:
         return {"name": "bench", "fps": first.fps, "width": first.size[0], "height": first.size[1]}
 
     @property
+    def content(self) -> dict[str, Any]:
+        """The configuration."""
+        ground = {} if self.ground is None else {"ground": str(self.ground.absolute())}
+        return {"site": self.site, "cameras": self.cameras, **ground}
+
+    @property
+    def truth(self) -> dict[str, list[MotRow]]:
+        """The ground truth of each view that has some."""
+        files = {video.stem: video.parent / "gt" / f"{video.stem}.txt" for video in self.videos}
+        return {name: read_rows(file) for name, file in files.items() if file.exists()}
+
+    @property
     def frames(self) -> int:
         """The total number of frames of all views, by their metadata."""
         total = 0
@@ -59,10 +72,10 @@ def find_views(data: Path, name: str) -> RecordedViews:
         CannotRunError: they are missing.
     """
     folder = data / name
-    videos = tuple(sorted(folder.glob("c*.mp4")))
+    videos = tuple(sorted(folder.glob("*.mp4")))
     if not videos:
         raise CannotRunError(
-            f"needs the recordings {folder}/c*.mp4; --data or MYVIEW_TEST_DATA give the folder"
+            f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA give the folder"
         )
     ground = folder / "ground.json"
     return RecordedViews(name, videos, ground if ground.exists() else None)

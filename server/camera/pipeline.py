@@ -74,6 +74,7 @@ class CameraPipeline:
     no state.
 
     ``warm_up``: prepare for the first frame, which takes seconds; otherwise only check that everything opens.
+    ``source``: its frames instead of those that the configuration names.
 
     Raises:
         UserError: the source or the detections cannot be opened, or the homography does not match the image.
@@ -87,6 +88,7 @@ class CameraPipeline:
         listener: LiveAudioSource | None = None,
         *,
         warm_up: bool = True,
+        source: FrameSource | None = None,
     ) -> None:
         camera, site = config.camera(camera_id), config.site
         passthrough = open_passthrough(config, camera, listener)
@@ -94,7 +96,9 @@ class CameraPipeline:
         """Whether the source's own H.264 is passed through."""
         self.why_encoded = passthrough.reason
         """Why it cannot be passed through; empty: that was not requested."""
-        self.source: FrameSource = passthrough.source or open_source(camera, site, listener, warm_up=warm_up)
+        self.source: FrameSource = (
+            passthrough.source or source or open_source(camera, site, listener, warm_up=warm_up)
+        )
         self._letterbox = Letterbox(self.source.size, (site.width, site.height))
         _check_homography(camera, self.source.size)
         self._encoder = (

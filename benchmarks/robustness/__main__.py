@@ -1,0 +1,176 @@
+"""What disturbances of the picture cost, and when all is as before.
+
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.robustness --data ../shared/data --out out/bench
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.robustness --scene terrace --disturbance gamma
+
+A disturbance begins in the middle of a recording (`--start`). The pictures are disturbed one by one on their
+way into the cameras' pipelines, and the true boxes move with them; people who can no longer be seen in a
+camera do not count there.
+
+*rec.*, *prec.*, *AP* are of all cameras' detections since the disturbance began, the first two of confident
+ones; *HOTA* and *IDF1* are means over the cameras, *joint* is the IDF1 over all cameras, of the whole
+recording. *cost* is the loss of joint IDF1 in points, *worst* the largest of all seeds. *later* is the joint
+IDF1 of what follows 10 seconds after the beginning, scored as a recording of its own, with its loss. *seen*
+is the share of the frames since the beginning in which a person's chosen view shows them. *recovery* is the
+time after the beginning from which the F1 score of the tracks' boxes over 2 seconds stays within .1 of the
+undisturbed run's.
+
+Scenes without ground truth are compared with the tracks of their undisturbed run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from benchmarks.bestview.scenes import BenchmarkScene, recorded, room
+from benchmarks.common.environment import CannotRunError, finish, parser
+from benchmarks.common.report import Report
+from benchmarks.common.scene_runs import detector_settings, length_in_frames
+from benchmarks.robustness.cases import CaseScores, DisturbedScene, Undisturbed
+from benchmarks.robustness.disturbances.catalog import CATALOG, STRENGTHS
+from benchmarks.robustness.plots import plot_costs
+
+RECORDED = ("terrace", "terrace2", "pets09", "campus4", "lab4")
+DRAWN = "room"
+_ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_S = 3, 5, 40.0
+COLUMNS = (
+    *("", "rec.", "prec.", "AP", "HOTA", "IDF1", "joint", "cost", "worst", "later", "cost", "seen"),
+    "recovery",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """The scores of a disturbance of one strength, for all seeds."""
+
+    name: str
+    strength: str
+    scores: Sequence[CaseScores]
+    recovery_s: float
+    """The longest of all seeds."""
+
+    @property
+    def joint(self) -> list[float]:
+        """The joint IDF1 of each seed, percent."""
+        return [100.0 * score.whole.tracks.joint.idf1 for score in self.scores]
+
+    @property
+    def later(self) -> float:
+        """The mean joint IDF1 of what follows later, percent; NaN: nothing does."""
+        return float(np.mean([_later(score) for score in self.scores]))
+
+    def cells(self, undisturbed: Row) -> list[str]:
+        """Return the row's cells."""
+        mean = [
+            np.mean([getattr(score.whole.tracks.mean, name) for score in self.scores])
+            for name in ("hota", "idf1")
+        ]
+        since = [score.since for score in self.scores]
+        shares = (
+            np.mean([score.recall for score in since]),
+            np.mean([score.precision for score in since]),
+            np.mean([score.boxes.average_precision for score in since]),
+        )
+        joint, later = float(np.mean(self.joint)), self.later
+        return [
+            f"{self.name} {self.strength}".strip(),
+            *(f"{share:.2f}" for share in shares),
+            *(f"{100 * share:.1f}" for share in mean),
+            f"{joint:.1f}",
+            f"{np.mean(undisturbed.joint) - joint:.1f}",
+            f"{np.mean(undisturbed.joint) - min(self.joint):.1f}",
+            *((f"{later:.1f}", f"{undisturbed.later - later:.1f}") if np.isfinite(later) else ("", "")),
+            f"{100 * np.mean([score.visible for score in since]):.1f}",
+            "never" if np.isinf(self.recovery_s) else f"{self.recovery_s:.1f} s",
+        ]
+
+
+def _later(score: CaseScores) -> float:
+    return float("nan") if score.later is None else 100.0 * score.later.tracks.joint.idf1
+
+
+def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[BenchmarkScene]:
+    """Yield the scenes one after the other; report those whose recordings are missing."""
+    for name in options.scene or (*RECORDED, DRAWN):
+        try:
+            yield (
+                room(folder, _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_S)
+                if name == DRAWN
+                else recorded(options.data, name)
+            )
+        except CannotRunError as problem:
+            report.line(f"{name}: skipped: {problem}")
+
+
+def measure_scene(
+    report: Report, scene: BenchmarkScene, detector: str, options: argparse.Namespace
+) -> list[Row]:
+    """Measure one scene with one detector, and print its table."""
+    config = scene.config(detect=detector_settings(detector))
+    frames = min(length_in_frames(config), options.frames or 10**9)
+    start = frames // 2 if options.start is None else options.start
+    disturbed_scene = DisturbedScene(scene, config, start, frames)
+    undisturbed = disturbed_scene.run(Undisturbed(), 0)
+    truth = scene.gt or undisturbed.rendering.tracks
+    reference = disturbed_scene.score(undisturbed, truth, Undisturbed(), 0)
+    rows = [Row("undisturbed", "", [reference], 0.0)]
+    for name in options.disturbance or CATALOG:
+        for strength in options.strength or STRENGTHS:
+            disturbance = CATALOG[name][strength]
+            scores = [
+                disturbed_scene.score(disturbed_scene.run(disturbance, seed), truth, disturbance, seed)
+                for seed in options.seed or [1]
+            ]
+            recovery = max(disturbed_scene.recovery_s(score, reference) for score in scores)
+            rows.append(Row(name, strength, scores, recovery))
+            print(" ".join(rows[-1].cells(rows[0])), flush=True)
+    against = "" if scene.gt else ", against the tracks of the undisturbed run"
+    title = f"{scene.name}, {detector}: {frames} frames, disturbed from {start} on{against}"
+    report.table(title, COLUMNS, [row.cells(rows[0]) for row in rows])
+    return rows
+
+
+def measure(options: argparse.Namespace) -> None:
+    """Measure all scenes; print and save tables and plot."""
+    cv2.setNumThreads(1)
+    report = Report()
+    costs: dict[str, Mapping[tuple[str, str], float]] = {}
+    with tempfile.TemporaryDirectory(prefix="myview-robustness-") as folder:
+        for scene in scenes(options, Path(folder), report):
+            for detector in options.detector or ["background"]:
+                rows = measure_scene(report, scene, detector, options)
+                costs[f"{scene.name}, {detector}"] = {
+                    (row.name, row.strength): float(np.mean(rows[0].joint) - np.mean(row.joint))
+                    for row in rows[1:]
+                }
+    report.save(options.out / "robustness.txt")
+    plot_costs(costs, options.out / "robustness.png")
+
+
+def main() -> None:
+    """Run the benchmark."""
+    options = parser(__doc__, "robustness")
+    options.add_argument("--scene", action="append", choices=(*RECORDED, DRAWN), help="may be repeated")
+    options.add_argument("--disturbance", action="append", choices=tuple(CATALOG), help="may be repeated")
+    options.add_argument("--strength", action="append", choices=STRENGTHS, help="may be repeated")
+    options.add_argument("--seed", action="append", type=int, help="may be repeated; 1 if not given")
+    options.add_argument(
+        "--detector", action="append", help="detect.kind, or an installed network; may be repeated"
+    )
+    options.add_argument("--frames", type=int, help="maximum of each camera")
+    options.add_argument("--start", type=int, help="first disturbed frame, from 0; the middle if not given")
+    try:
+        measure(options.parse_args())
+    except CannotRunError as problem:
+        finish(problem, "robustness")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Seeded disturbances of a camera's pictures; `catalog.py` lists them with three strengths each."""

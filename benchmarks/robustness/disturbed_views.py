@@ -1,0 +1,107 @@
+"""A camera's recording with a disturbance from a frame on, and the truth of what can then be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.robustness.disturbances.base import Affine, Disturbance, Floats, Moment
+from server.camera.sources import FrameSource, Image
+from tracking.motchallenge import MotRow
+
+_MIN_SEEN = 0.5
+"""Share of a box that must be in the picture and uncovered for its person to count."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbed:
+    """A disturbance of one camera.
+
+    Attributes:
+        disturbance: what happens.
+        start: its first frame, from 0.
+        fps: frames a second.
+        seed: of what is random.
+        camera: the camera's index.
+    """
+
+    disturbance: Disturbance
+    start: int
+    fps: float
+    seed: int
+    camera: int
+
+    def moment(self, frame: int) -> Moment | None:
+        """Return the moment of a frame, from 0; None: the frame is undisturbed."""
+        seconds = (frame - self.start) / self.fps
+        over = self.disturbance.lasts_s is not None and seconds >= self.disturbance.lasts_s
+        if frame < self.start or over or (self.disturbance.one_camera and self.camera > 0):
+            return None
+        return Moment(frame - self.start, seconds, self.seed, self.camera)
+
+    def truth(self, rows: Sequence[MotRow], size: tuple[int, int]) -> list[MotRow]:
+        """Return the true boxes, moved with the picture; people who are not seen get the confidence 0."""
+        by_frame: dict[int, list[MotRow]] = {}
+        for row in rows:
+            by_frame.setdefault(row.frame, []).append(row)
+        return [row for frame, people in by_frame.items() for row in self._truth_of(frame, people, size)]
+
+    def _truth_of(self, frame: int, people: list[MotRow], size: tuple[int, int]) -> list[MotRow]:
+        moment = self.moment(frame - 1)
+        if moment is None:
+            return people
+        matrix, cover = self.disturbance.motion(moment, size), self.disturbance.cover(moment, size)
+        if matrix is not None:
+            people = [_moved(row, matrix, size) for row in people]
+        return people if cover is None else [_uncovered(row, cover) for row in people]
+
+
+class DisturbedSource:
+    """The frames of a source with a disturbance."""
+
+    def __init__(self, source: FrameSource, disturbed: Disturbed) -> None:
+        self._source, self._disturbed = source, disturbed
+        self._effect = disturbed.disturbance.begin()
+        self.size, self.recorded = source.size, source.recorded
+
+    def take(self, pulse: int) -> Image | None:
+        """Return the disturbed picture of a pulse; None: there is none.
+
+        Raises:
+            SourceEndedError: the recording is over.
+        """
+        image = self._source.take(pulse)
+        moment = self._disturbed.moment(pulse)
+        return image if moment is None or image is None else self._effect(image, moment)
+
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
+        """Return the pictures from before the disturbance."""
+        return self._source.prescan_images([index for index in indices if index < self._disturbed.start])
+
+    def close(self) -> None:
+        """Close the source."""
+        self._source.close()
+
+
+def _moved(row: MotRow, matrix: Affine, size: tuple[int, int]) -> MotRow:
+    """Return a box moved with its center and clipped to the picture; a person stays upright."""
+    center = matrix @ np.array([row.left + row.width / 2.0, row.top + row.height / 2.0, 1.0])
+    half = np.array([row.width, row.height]) / 2.0
+    (left, top), (right, bottom) = np.clip([center - half, center + half], 0.0, size).tolist()
+    inside = (right - left) * (bottom - top) / max(row.width * row.height, 1e-9)
+    return _seen(replace(row, left=left, top=top, width=right - left, height=bottom - top), inside)
+
+
+def _uncovered(row: MotRow, cover: Floats) -> MotRow:
+    """Return a box with what a cover (H, W) leaves of its visible share."""
+    left, top, right, bottom = (max(round(side), 0) for side in row.box)
+    part = cover[top:bottom, left:right]
+    return _seen(row, 1.0 - float(part.mean()) if part.size else 0.0)
+
+
+def _seen(row: MotRow, share: float) -> MotRow:
+    """Return a row of which only a share can be seen."""
+    visible = row.visible * share if row.visible >= 0.0 else row.visible
+    return replace(row, visible=visible, confidence=row.confidence if share >= _MIN_SEEN else 0.0)
