@@ -32,10 +32,10 @@ import numpy as np
 from benchmarks.bestview.scenes import BenchmarkScene, recorded, room
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
-from benchmarks.common.scene_runs import detector_settings, length_in_frames
 from benchmarks.robustness.cases import CaseScores, DisturbedScene, Undisturbed
 from benchmarks.robustness.disturbances.catalog import CATALOG, STRENGTHS
 from benchmarks.robustness.plots import plot_costs
+from benchmarks.scene_runs.pipeline_run import detector_settings, length_in_frames
 
 RECORDED = ("terrace", "terrace2", "pets09", "campus4", "lab4")
 DRAWN = "room"

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.bestview.scenes import BenchmarkScene
-from benchmarks.common.scene_runs import SceneRun, open_sources, run_scene
-from benchmarks.common.scene_scores import Rows, SceneScores, rolling_f1, score_run
 from benchmarks.robustness.disturbances.base import Disturbance, Effect
 from benchmarks.robustness.disturbed_views import Disturbed, DisturbedSource
+from benchmarks.scene_runs.pipeline_run import SceneRun, open_sources, run_scene
+from benchmarks.scene_runs.scores import Rows, SceneScores, rolling_f1, score_run
 from server.config.site_config import Config
 
 WINDOW_S = 2.0

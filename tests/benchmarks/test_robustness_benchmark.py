@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from benchmarks.common.detection_scores import ScoredBoxes
-from benchmarks.common.scene_scores import rolling_f1
 from benchmarks.robustness import __main__ as robustness
 from benchmarks.robustness.cases import Undisturbed, recovery_s
 from benchmarks.robustness.disturbances.base import Disturbance
@@ -20,6 +19,7 @@ from benchmarks.robustness.disturbances.light import Gain
 from benchmarks.robustness.disturbances.motion import Knock, Sway
 from benchmarks.robustness.disturbances.transmission import Frozen
 from benchmarks.robustness.disturbed_views import Disturbed, DisturbedSource
+from benchmarks.scene_runs.scores import rolling_f1
 from fakes.media.videos import write_timed
 from server.camera.sources import Image
 from tracking.motchallenge import MotRow, format_rows

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.detection_scores import ScoredBoxes
-from benchmarks.common.scene_runs import SceneRun
 from benchmarks.detectors.compared_detectors import CONFIDENT
+from benchmarks.scene_runs.pipeline_run import SceneRun
 from server.cli.evaluate.ground_truth import build_truth, people_of_objects
 from server.cli.evaluate.view_scores import evaluate_views
 from server.cli.render.site_file import SiteInfo

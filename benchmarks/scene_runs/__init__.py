@@ -1,0 +1,1 @@
+"""A scene through the whole program: the run, and its scores against the truth."""
