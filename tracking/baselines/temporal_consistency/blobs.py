@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from tracking.baselines.temporal_consistency.color_gain import apply_gains, gains_over_reference
 from tracking.baselines.temporal_consistency.regional_appearance import uv_histogram
 from tracking.baselines.temporal_consistency.settings import BlobSettings
 from tracking.boxes import Floats
-from tracking.detectors.background.color_gain import apply_gains, gains_over_reference
 from tracking.detectors.base import Image, Mask, Plane
 
 _INLIERS = 3.0

@@ -27,6 +27,7 @@ from tracking.detectors.background.height_model import (
 )
 from tracking.detectors.background.median import MedianBackground, MedianSettings
 from tracking.detectors.background.mog2 import Mog2Background, Mog2Settings
+from tracking.detectors.background.motion import STILL
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
 from tracking.detectors.base import Image, Mask, require_at_least_one, validate_image
@@ -175,9 +176,10 @@ class BackgroundDetector:
         found = self._fit(mask, segmentation.shadow & grid.visible & ~mask, grid)
         boxes = grid.cells_to_work(found.boxes)
         self._background.learn(mask, _occupied_mask(boxes[: found.person_count], mask.shape))
-        return Detections(
-            grid.work_to_image(boxes), found.scores, self._appearance.histograms(work_image, boxes, mask)
-        )
+        histograms = self._appearance.histograms(segmentation.image, boxes, mask)
+        if segmentation.motion != STILL:
+            boxes = segmentation.motion.move_boxes(boxes, (mask.shape[1], mask.shape[0]))
+        return Detections(grid.work_to_image(boxes), found.scores, histograms)
 
     @property
     def appearance_bins(self) -> int:

@@ -9,9 +9,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detectors.background.color_gain import apply_gains, gains_over_reference
+from tracking.detectors.background.motion import STILL, Motion
+from tracking.detectors.background.registration import Registration
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
+from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves, fit_tone_curves
 from tracking.detectors.base import Image, Mask, require_at_least_one
 
 
@@ -40,7 +42,8 @@ class MedianSettings:
 class MedianBackground:
     """Background model of one camera: the median of the first frames, updated where no people are.
 
-    It is usable after half of the bootstrap; the median is computed again at its end.
+    It is usable after half of the bootstrap; the median is computed again at its end. Frames are compared at
+    their light (`tone_curve`) and where the camera has moved to (`registration`).
     """
 
     def __init__(
@@ -49,13 +52,16 @@ class MedianBackground:
         self._settings = settings
         self._static_filter = GhostFinder(static)
         self._shadows = shadows
+        self._registration = Registration()
         self._samples: list[Image] = []
         self._frames = 0
         self._flooded = 0
         self._exact: npt.NDArray[np.float32] | None = None
         self._rounded: Image | None = None
-        self._last: tuple[Image, npt.NDArray[np.float64]] | None = None
-        """The last frame and its gains."""
+        self._curves: ToneCurves | None = None
+        self._unlikely: Mask | None = None
+        self._last: Image | None = None
+        """The last frame, where the background is."""
 
     def prepare(self, images: Sequence[Image]) -> None:
         """Learn the background from images before the first frame; without any, learn it live."""
@@ -67,16 +73,25 @@ class MedianBackground:
 
     def segment_still(self, image: Image) -> Segmentation | None:
         """Segment an image that is not the next frame."""
-        return None if self._rounded is None else self._compare(image, self._rounded)[0]
+        if self._rounded is None:
+            return None
+        motion = self._registration.find_still(image)
+        aligned = _aligned(image, motion, self._rounded)
+        return self._compare(aligned, motion, self._rounded, fit_tone_curves(aligned, self._rounded))
 
     def segment(self, image: Image) -> Segmentation | None:
         """Segment the next frame; `None` while the background is unknown."""
         self._bootstrap(image)
         self._frames += 1
-        if self._rounded is None:
+        background = self._rounded
+        if background is None:
             return None
-        segmentation, gains = self._compare(image, self._rounded)
-        self._last = image, gains
+        before, looks = self._curves, self._registration.is_due()
+        aligned, motion, curves = self._align(image, background, before, looks=looks)
+        if not looks and before is not None and curves.agreement < before.agreement - _MOVED:
+            aligned, motion, curves = self._align(image, background, before, looks=True)
+        self._last, self._curves = aligned, curves
+        segmentation = self._compare(aligned, motion, background, curves)
         self._relearn_on_light_change(segmentation.foreground | segmentation.shadow)
         return segmentation
 
@@ -87,13 +102,15 @@ class MedianBackground:
             foreground: `(H, W)`, the cleaned foreground of that frame.
             occupied: `(H, W)`, 255 where a person is.
         """
-        if self._exact is None or self._rounded is None or self._last is None:
+        self._unlikely = occupied | foreground
+        if 2 * cv2.countNonZero(self._unlikely) > self._unlikely.size:
+            self._unlikely = None
+        if self._exact is None or self._rounded is None or self._last is None or self._curves is None:
             return
         checks_static, updates = self._static_filter.is_due(), self._frames % self._settings.learn_every == 0
         if not (checks_static or updates):
             return
-        # The frame at the background's gain.
-        leveled = apply_gains(self._last[0], 1.0 / self._last[1])
+        leveled = self._curves.invert(self._last, self._rounded)
         static = self._static_filter.find(leveled, self._rounded, foreground) if checks_static else None
         if static is not None:
             self._exact[static > 0] = leveled[static > 0]
@@ -103,17 +120,34 @@ class MedianBackground:
         elif static is None:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)
+        if self._frames % (_POINTS_EVERY * self._settings.learn_every) == 0:
+            self._registration.set_background(self._rounded)
 
-    def _compare(self, image: Image, background: Image) -> tuple[Segmentation, npt.NDArray[np.float64]]:
-        """Return the segmentation against the background at the image's gains, and the gains."""
-        gains = gains_over_reference(image, background)
-        expected = apply_gains(background, gains)
+    def _align(
+        self, image: Image, background: Image, before: ToneCurves | None, *, looks: bool
+    ) -> tuple[Image, Motion, ToneCurves]:
+        """Return a frame where the background is, its motion and its tone curves.
+
+        Without `looks` the camera is taken to rest.
+        """
+        motion = self._registration.rest
+        if looks:
+            motion = self._registration.find(image, before or IDENTITY, self._unlikely)
+        outside = background if motion == STILL or before is None else before.apply(background)
+        aligned = _aligned(image, motion, outside)
+        return aligned, motion, fit_tone_curves(aligned, background, self._unlikely, before)
+
+    def _compare(self, image: Image, motion: Motion, background: Image, curves: ToneCurves) -> Segmentation:
+        """Return the segmentation of an aligned image against the background at the image's light."""
+        expected = curves.apply(background)
+        if curves.noise > _NOISY:
+            image, expected = _smoothed(image), _smoothed(expected)
         blue, green, red = cv2.split(cv2.absdiff(image, expected))
         difference = cv2.max(cv2.max(blue, green), red)
         _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
         mask = np.asarray(binary, dtype=np.uint8)
         shadow = shadow_mask(image, expected, mask, self._shadows)
-        return Segmentation(mask & ~shadow, shadow), gains
+        return Segmentation(mask & ~shadow, shadow, image, motion)
 
     def _bootstrap(self, image: Image) -> None:
         settings = self._settings
@@ -130,13 +164,23 @@ class MedianBackground:
             self._samples = []
 
     def _sample(self, image: Image) -> None:
-        first = self._samples[0] if self._samples else image
-        self._samples.append(apply_gains(image, 1.0 / gains_over_reference(image, first)))
+        """Add an image to the samples, at the light and the place of the first."""
+        if not self._samples:
+            self._samples.append(image)
+            self._sampling = Registration()
+            self._sampling.set_background(image)
+            return
+        first = self._samples[0]
+        aligned = _aligned(image, self._sampling.find_still(image), first)
+        self._samples.append(fit_tone_curves(aligned, first).invert(aligned, first))
 
     def _take_median(self) -> None:
         ordered = np.sort(np.stack(self._samples), axis=0)
         self._rounded = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
         self._exact = self._rounded.astype(np.float32)
+        self._registration = Registration()
+        self._registration.set_background(self._rounded)
+        self._curves = None
 
     def _relearn_on_light_change(self, mask: Mask) -> None:
         flooded = cv2.countNonZero(mask) > self._settings.relearn_share * mask.size
@@ -145,3 +189,33 @@ class MedianBackground:
             self._frames = 0
             self._flooded = 0
             self._samples = []
+
+
+# Updates of the background until its edges are sought again.
+_POINTS_EVERY = 10
+# Drop of the share of pixels that follow the tone curves at which a camera at rest may have moved.
+_MOVED = 0.03
+# Noise, in gray levels, from which frames are smoothed.
+_NOISY = 6.0
+
+
+def _smoothed(image: Image) -> Image:
+    return np.asarray(cv2.GaussianBlur(image, (5, 5), 0.0), dtype=np.uint8)
+
+
+def _aligned(image: Image, motion: Motion, outside: Image) -> Image:
+    """Return the image moved to where the background is, with `outside` where it shows nothing."""
+    if motion == STILL:
+        return image
+    size = (image.shape[1], image.shape[0])
+    return np.asarray(
+        cv2.warpAffine(
+            image,
+            motion.matrix(size),
+            size,
+            dst=outside.copy(),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_TRANSPARENT,
+        ),
+        dtype=np.uint8,
+    )

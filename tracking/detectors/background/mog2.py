@@ -40,7 +40,9 @@ class Mog2Background:
         if self._frames <= self._settings.warm_up_frames:
             return None
         full, none = np.uint8(255), np.uint8(0)
-        return Segmentation(np.where(mask > _SHADOW, full, none), np.where(mask == _SHADOW, full, none))
+        return Segmentation(
+            np.where(mask > _SHADOW, full, none), np.where(mask == _SHADOW, full, none), image
+        )
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Do nothing: `segment` has updated the mixture."""

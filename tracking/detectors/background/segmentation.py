@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.base import Image, Mask
 
 
@@ -20,10 +21,14 @@ class Segmentation:
     Attributes:
         foreground: pixels that differ clearly from the background.
         shadow: pixels that look like a shadow: shadows, or gray clothing.
+        image: `(H, W, 3)`, the frame, moved to where the background is.
+        motion: where the background is in the frame.
     """
 
     foreground: Mask
     shadow: Mask
+    image: Image
+    motion: Motion = STILL
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,56 @@
+"""The motion of a camera's picture: a similarity of a few pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where the background lies in a frame: a shift, a scale and a turn around the picture's center.
+
+    Attributes:
+        x: shift, pixels.
+        y: shift, pixels.
+        grow: the scale less 1.
+        turn: the angle, radians (its sine), clockwise in the picture.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    grow: float = 0.0
+    turn: float = 0.0
+
+    def matrix(self, size: tuple[int, int]) -> Floats:
+        """Return the matrix `(2, 3)` from pixels of the background to pixels of a frame of `size` (w, h)."""
+        x, y = size[0] / 2.0, size[1] / 2.0
+        grow, turn = self.grow, self.turn
+        return np.array(
+            [
+                [1.0 + grow, -turn, self.x - grow * x + turn * y],
+                [turn, 1.0 + grow, self.y - turn * x - grow * y],
+            ]
+        )
+
+    def distance(self, other: Motion, size: tuple[int, int]) -> float:
+        """Return the root mean square difference over a picture of `size` (w, h), pixels."""
+        shift = (self.x - other.x) ** 2 + (self.y - other.y) ** 2
+        radius = (size[0] ** 2 + size[1] ** 2) / 12.0
+        return float(
+            np.sqrt(shift + radius * ((self.grow - other.grow) ** 2 + (self.turn - other.turn) ** 2))
+        )
+
+    def move_boxes(self, boxes: Floats, size: tuple[int, int]) -> Floats:
+        """Move boxes `(K, 4)` of the background, in pixels, to where they are in the frame, still upright."""
+        matrix = self.matrix(size)
+        centers = (boxes[:, :2] + boxes[:, 2:]) / 2.0
+        moved = centers @ matrix[:, :2].T + matrix[:, 2]
+        half = (boxes[:, 2:] - boxes[:, :2]) / 2.0 * (1.0 + self.grow)
+        return np.concatenate([moved - half, moved + half], axis=1)
+
+
+STILL = Motion()
