@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.bestview.scenes import BenchmarkScene
+from benchmarks.common.forked import in_copy
 from benchmarks.robustness.disturbances.base import Disturbance, Effect
 from benchmarks.robustness.disturbed_views import Disturbed, DisturbedSource
-from benchmarks.scene_runs.pipeline_run import SceneRun, open_sources, run_scene
+from benchmarks.scene_runs.pipeline_run import SceneRun, SceneRunner, open_frames
 from benchmarks.scene_runs.scores import Rows, SceneScores, rolling_f1, score_run
 from server.config.site_config import Config
 
@@ -47,30 +49,36 @@ class CaseScores:
     rolling_f1: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class DisturbedScene:
-    """A scene that is disturbed from a frame on.
+    """A scene that is disturbed from a frame on. All runs have the frames before in common.
 
-    Attributes:
-        scene: recordings and truth; without truth, the tracks of the undisturbed run stand for it.
+    Args:
+        scene: recordings and truth.
         config: of the site.
         start: the first disturbed frame, from 0.
         frames: number of frames.
     """
 
-    scene: BenchmarkScene
-    config: Config
-    start: int
-    frames: int
+    def __init__(self, scene: BenchmarkScene, config: Config, start: int, frames: int) -> None:
+        self.scene, self.config, self.start, self.frames = scene, config, start, frames
+        undisturbed = self._disturbed(Undisturbed(), 0)
+        self._sources = {
+            camera: DisturbedSource(partial(open_frames, config, camera, frames), undisturbed[camera])
+            for camera in config.camera_ids
+        }
+        self._runner = SceneRunner(config, self._sources)
+        self._runner.run_before(start)
 
     def run(self, disturbance: Disturbance, seed: int) -> SceneRun:
         """Run the cameras on the disturbed pictures."""
-        sources = open_sources(self.config, self.frames)
         disturbed = self._disturbed(disturbance, seed)
-        return run_scene(
-            self.config,
-            {camera: DisturbedSource(source, disturbed[camera]) for camera, source in sources.items()},
-        )
+
+        def run() -> SceneRun:
+            for camera, source in self._sources.items():
+                source.change(disturbed[camera])
+            return self._runner.finish()
+
+        return in_copy(run)
 
     def score(self, run: SceneRun, truth: Rows, disturbance: Disturbance, seed: int) -> CaseScores:
         """Score a run against the truth of the undisturbed pictures."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,12 +59,23 @@ class Disturbed:
 
 
 class DisturbedSource:
-    """The frames of a source with a disturbance."""
+    """The frames of a source with a disturbance.
 
-    def __init__(self, source: FrameSource, disturbed: Disturbed) -> None:
-        self._source, self._disturbed = source, disturbed
-        self._effect = disturbed.disturbance.begin()
-        self.size, self.recorded = source.size, source.recorded
+    Args:
+        open_source: opens the source.
+        disturbed: what happens, and when.
+    """
+
+    def __init__(self, open_source: Callable[[], FrameSource], disturbed: Disturbed) -> None:
+        self._open = open_source
+        self._source = open_source()
+        self.size, self.recorded = self._source.size, self._source.recorded
+        self._disturbed, self._effect = disturbed, disturbed.disturbance.begin()
+
+    def change(self, disturbed: Disturbed) -> None:
+        """Let something else happen, in a copy of the process that has opened the source."""
+        self._source = self._open()  # copies of a process share the position in an open file
+        self._disturbed, self._effect = disturbed, disturbed.disturbance.begin()
 
     def take(self, pulse: int) -> Image | None:
         """Return the disturbed picture of a pulse; None: there is none.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,31 +84,54 @@ class _ObservedPipeline(CameraPipeline):
         return frame
 
 
-def open_sources(config: Config, frames: int | None = None) -> dict[str, FrameSource]:
-    """Open the frames of all cameras; `frames`: at most so many of each."""
-    sources: dict[str, FrameSource] = {
-        camera.id: open_source(camera, config.site) for camera in config.cameras
-    }
-    if frames is None:
-        return sources
-    return {camera: LimitedSource(source, frames) for camera, source in sources.items()}
+def open_frames(config: Config, camera: str, frames: int | None = None) -> FrameSource:
+    """Open the frames of a camera; `frames`: at most so many."""
+    source = open_source(config.camera(camera), config.site)
+    return source if frames is None else LimitedSource(source, frames)
+
+
+class SceneRunner:
+    """All cameras of a scene in step, each with its frames, and then the decision of the views."""
+
+    def __init__(self, config: Config, sources: Mapping[str, FrameSource]) -> None:
+        start = time.process_time()
+        self._config = config
+        self._pipelines = {
+            camera: _ObservedPipeline(config, camera, source) for camera, source in sources.items()
+        }
+        self._messages: dict[str, list[CameraTracks]] = {camera: [] for camera in self._pipelines}
+        self._batches = run_cameras(self._pipelines)
+        self._camera_s = time.process_time() - start
+
+    def run_before(self, frame: int) -> None:
+        """Run to the last end of an epoch before a frame; that frame is not taken."""
+        last_epoch = frame - self._config.track.window.stride
+        if all(pipeline.frames <= last_epoch for pipeline in self._pipelines.values()):
+            self._run(lambda: min(pipeline.frames for pipeline in self._pipelines.values()) > last_epoch)
+
+    def finish(self) -> SceneRun:
+        """Run to the end."""
+        self._run(lambda: False)
+        return SceneRun(
+            {camera: pipeline.detections for camera, pipeline in self._pipelines.items()},
+            decide(self._config, self._messages),
+            sum(pipeline.frames for pipeline in self._pipelines.values()),
+            self._camera_s,
+        )
+
+    def _run(self, is_enough: Callable[[], bool]) -> None:
+        start = time.process_time()
+        for batch in self._batches:
+            if batch.tracks is not None:
+                self._messages[batch.camera].append(batch.tracks)
+            if is_enough():
+                break
+        self._camera_s += time.process_time() - start
 
 
 def run_scene(config: Config, sources: Mapping[str, FrameSource]) -> SceneRun:
-    """Run all cameras in step, each with its frames, then decide the views."""
-    start = time.process_time()
-    pipelines = {camera: _ObservedPipeline(config, camera, source) for camera, source in sources.items()}
-    messages: dict[str, list[CameraTracks]] = {camera: [] for camera in pipelines}
-    for batch in run_cameras(pipelines):
-        if batch.tracks is not None:
-            messages[batch.camera].append(batch.tracks)
-    camera_s = time.process_time() - start
-    return SceneRun(
-        {camera: pipeline.detections for camera, pipeline in pipelines.items()},
-        decide(config, messages),
-        sum(pipeline.frames for pipeline in pipelines.values()),
-        camera_s,
-    )
+    """Run a scene from beginning to end."""
+    return SceneRunner(config, sources).finish()
 
 
 def length_in_frames(config: Config) -> int:

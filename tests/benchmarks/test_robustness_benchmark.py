@@ -50,7 +50,7 @@ class Corridor:
 
 
 def frames_of(disturbance: Disturbance, camera: int = 0, seed: int = 1) -> list[Image | None]:
-    source = DisturbedSource(Corridor(), Disturbed(disturbance, START, FPS, seed, camera))
+    source = DisturbedSource(Corridor, Disturbed(disturbance, START, FPS, seed, camera))
     return [source.take(pulse) for pulse in range(FRAMES)]
 
 
@@ -98,7 +98,7 @@ def test_a_disturbance_of_some_seconds_ends_and_one_of_one_camera_spares_the_oth
 
 
 def test_the_background_is_learned_before_the_disturbance() -> None:
-    source = DisturbedSource(Corridor(), Disturbed(Gain(factor=0.5), START, FPS, 1, 0))
+    source = DisturbedSource(Corridor, Disturbed(Gain(factor=0.5), START, FPS, 1, 0))
     learned = list(source.prescan_images([0, 5, 15, 30]))
     assert len(learned) == 2
     assert np.array_equal(learned[1], UNDISTURBED[5])
