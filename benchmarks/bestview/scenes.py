@@ -128,9 +128,9 @@ def auditorium(data: Path) -> BenchmarkScene:
     )
 
 
-def room(folder: Path, cameras: int, people: int, seconds: float) -> BenchmarkScene:
+def room(folder: Path, cameras: int, people: int, seconds: float, fps: float = _ROOM_FPS) -> BenchmarkScene:
     """Draw the synthetic room into a new folder."""
-    return _drawn(folder, Scene("room", cameras, people, _ROOM_SEED, *_ROOM_SIZE, _ROOM_FPS), seconds)
+    return _drawn(folder, Scene("room", cameras, people, _ROOM_SEED, *_ROOM_SIZE, fps), seconds)
 
 
 def gallery(folder: Path, people: int, seconds: float) -> BenchmarkScene:

@@ -4,6 +4,10 @@
 
 On recordings with ground truth, at an overlap (IoU) of one half. *Oracle* is the joint IDF1 over the cameras
 of a scene if every box has the true identity and false positives are dropped: the upper bound of association.
+*AP* is the average precision, *cal.* the expected calibration error of the scores as probabilities that a box
+is right; only scores of installed networks are meant as such (`benchmarks.detectors.score_calibration` fits
+them).
+
 Below each detector are the network program's tracks of its hypotheses. For scenes without ground truth,
 pictures with drawn boxes are saved. Times are processor time.
 
@@ -21,14 +25,16 @@ from pathlib import Path
 
 import cv2
 
+from benchmarks.common.detection_scores import ScoredBoxes
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.detectors.annotated_pictures import save_pictures
 from benchmarks.detectors.compared_detectors import (
     CONFIDENT,
-    DETECTORS,
+    MYVIEW,
     ComparedDetector,
     DetectorRun,
+    compared_detectors,
     run_detector,
 )
 from benchmarks.detectors.scored_views import (
@@ -50,7 +56,7 @@ from benchmarks.other_trackers.virtual_environment import (
 from tracking.motchallenge import MotRow, format_rows
 
 TRACKERS = ("SORT", "ByteTrack", "C-BIoU")
-SCENES = ("terrace", "pets09")
+SCENES = ("terrace", "pets09", "terrace2")
 INSPECTED = "campus4"
 
 
@@ -77,7 +83,7 @@ def rows_of(
     """
     hypotheses = {name: run.hypotheses for name, run in runs.items()}
     yield ScoreRow(detector_spec.name, hypotheses, tracks=False)
-    if detector_spec is DETECTORS[0]:
+    if detector_spec.name == MYVIEW:
         confident = {
             name: [row for row in rows if row.confidence >= CONFIDENT] for name, rows in hypotheses.items()
         }
@@ -116,7 +122,7 @@ def measure_scene(
     views = [view for view in views_of(options.data, scene) if view.truth]
     truths = {view.name: view.people(options.frames) for view in views}
     table: list[list[str]] = []
-    for detector_spec in DETECTORS:
+    for detector_spec in compared_detectors():
         if options.detector and not any(word in detector_spec.name for word in options.detector):
             continue
         runs = {view.name: run_detector(detector_spec, view, options.frames) for view in views}
@@ -124,7 +130,7 @@ def measure_scene(
             _cells(row, truths, list(runs.values())) for row in rows_of(detector_spec, runs, other_trackers)
         ]
     names = [f"{score} {view.name}" for view in views for score in ("rec.", "prec.")]
-    columns = ["boxes", *names, "IDF1", "oracle", "ms", "frames/s"]
+    columns = ["boxes", *names, "AP", "cal.", "IDF1", "oracle", "ms", "frames/s"]
     rows, width, _ = next(views[0].images(1)).shape
     report.table(f"{scene}: {width}x{rows}, {_frames(views, options)} frames", columns, table)
 
@@ -143,7 +149,9 @@ def _cells(row: ScoreRow, truths: dict[str, list[MotRow]], runs: list[DetectorRu
     ]
     joint = f"{100 * oracle(truths, row.boxes):.0f}"
     times = [f"{1e3 * seconds / frames:.1f}", f"{frames / seconds:.0f}"] if row.timed else ["", ""]
-    return [row.name, *shares, idf1, joint, *times]
+    boxes = ScoredBoxes.joined([ScoredBoxes.of(truth, row.boxes[name]) for name, truth in truths.items()])
+    of_scores = [f"{boxes.average_precision:.2f}", f"{boxes.calibration_error:.3f}"]
+    return [row.name, *shares, *(["", ""] if row.tracks else of_scores), idf1, joint, *times]
 
 
 def _frames(views: list[ScoredView], options: argparse.Namespace) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.detectors.compared_detectors import DETECTORS, run_detector
+from benchmarks.detectors.compared_detectors import compared_detectors, run_detector
 from benchmarks.detectors.scored_views import ScoredView
 from tracking.detectors import Image
 from tracking.motchallenge import MotRow
@@ -25,7 +25,7 @@ def save_pictures(views: list[ScoredView], folder: Path) -> Iterator[Path]:
     for view in views:
         images = [image for frame, image in enumerate(view.images(_FRAMES)) if frame % _EVERY == _EVERY - 1]
         rows = []
-        for detector_spec in DETECTORS[:3]:
+        for detector_spec in compared_detectors()[:3]:
             run = run_detector(detector_spec, view, _FRAMES)
             drawn = []
             for index, image in enumerate(images):

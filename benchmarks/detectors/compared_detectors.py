@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any, get_args
 
 import cv2
 import numpy as np
 
 from benchmarks.detectors.scored_views import ScoredView
+from server.config.sections.detect import DetectorKind
+from server.models.catalog import MODELS
+from server.models.installed import is_installed
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
-from tracking.detectors import (
-    BackgroundDetector,
-    BackgroundSettings,
-    Detector,
-    HogDetector,
-    HogSettings,
-    Image,
-    paper_settings,
-)
-from tracking.detectors.ignore_mask import visible_mask
+from tracking.detectors import Detector, Image
+from tracking.detectors.ignore_mask import Polygons, visible_mask
 from tracking.motchallenge import MotRow
 
 CONFIDENT = 0.4
@@ -32,8 +28,8 @@ class BlobDetector:
 
     MIN_HEIGHT = 0.1  # in picture heights
 
-    def __init__(self, view: ScoredView) -> None:
-        self._view = view
+    def __init__(self, ignore: Polygons) -> None:
+        self._ignore = ignore
         self._model = cv2.createBackgroundSubtractorMOG2(500, 16.0, True)  # noqa: FBT003 — detectShadows
         self._visible: Image | None = None
 
@@ -41,7 +37,7 @@ class BlobDetector:
         """Return the boxes of connected components that are tall enough."""
         rows, columns = image.shape[:2]
         if self._visible is None:
-            self._visible = visible_mask(rows, columns, self._view.ignore)
+            self._visible = visible_mask(rows, columns, self._ignore)
         mask = (self._model.apply(image) == 255).astype(np.uint8) & self._visible
         mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
         mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((9, 5), dtype=np.uint8))
@@ -51,32 +47,51 @@ class BlobDetector:
         return Detections(boxes, np.ones(len(boxes)), np.empty((len(boxes), 0)))
 
 
+MYVIEW = "MyView"
+
+
 @dataclass(frozen=True, slots=True)
 class ComparedDetector:
-    """A detector in the comparison."""
+    """A detector in the comparison.
+
+    Attributes:
+        name: in the table.
+        detect: the section `detect` that names it; None: connected components, which MyView does not have.
+        with_other_trackers: whether other trackers also get its boxes.
+    """
 
     name: str
-    make: Callable[[ScoredView], Detector]
+    detect: Mapping[str, Any] | None
     with_other_trackers: bool = True
-    """Whether other trackers also get its boxes."""
+
+    def make(self, view: ScoredView, size: tuple[int, int]) -> Detector:
+        """Return the detector for images of `size` = (width, height)."""
+        if self.detect is None:
+            return BlobDetector(view.ignore)
+        if self.detect["kind"] == "hog":
+            return view.make_detector({**self.detect, "hog": {"min_height": view.min_height}}, size)
+        return view.make_detector(self.detect, size)
 
 
-def _background(view: ScoredView) -> BackgroundSettings:
-    return BackgroundSettings(ignore=view.ignore)
+_TITLES = {"background": MYVIEW, "boxes": "the paper's box filters", "hog": "OpenCV's HOG"}
+"""Titles of kinds of detectors."""
 
 
-DETECTORS = (
-    ComparedDetector("MyView", lambda view: BackgroundDetector(_background(view))),
-    ComparedDetector(
-        "the paper's box filters",
-        lambda view: BackgroundDetector(paper_settings(_background(view))),
-        with_other_trackers=False,
-    ),
-    ComparedDetector("MOG2 + connected components", BlobDetector),
-    ComparedDetector(
-        "OpenCV's HOG", lambda view: HogDetector(HogSettings(min_height=view.min_height), ignore=view.ignore)
-    ),
-)
+def compared_detectors() -> list[ComparedDetector]:
+    """Return all kinds of detectors, connected components, and the networks that are installed."""
+    kinds = [kind for kind in get_args(DetectorKind) if kind != "onnx"]
+    return [
+        *(
+            ComparedDetector(_TITLES.get(kind, kind), {"kind": kind}, with_other_trackers=kind != "boxes")
+            for kind in kinds
+        ),
+        ComparedDetector("MOG2 + connected components", None),
+        *(
+            ComparedDetector(model.name, {"kind": "onnx", "onnx": {"model": model.name}})
+            for model in MODELS
+            if is_installed(model)
+        ),
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +108,8 @@ class DetectorRun:
 
 def run_detector(detector_spec: ComparedDetector, view: ScoredView, frames: int | None) -> DetectorRun:
     """Run a detector on a view, and the tracker on its detections."""
-    detector = detector_spec.make(view)
+    height, width = next(view.images(1)).shape[:2]
+    detector = detector_spec.make(view, (width, height))
     tracker = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"))
     boxes: list[MotRow] = []
     tracks: list[MotRow] = []

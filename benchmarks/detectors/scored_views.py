@@ -2,45 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 
-from benchmarks.common.environment import CannotRunError
-from tracking.detectors import Image
+from benchmarks.common.recorded_views import find_views
+from server.camera.detector_setup import make_detector
+from server.config.loader import build_config
+from server.media.letterbox import Letterbox
+from tracking.detectors import Detector, Image
+from tracking.detectors.ignore_mask import Polygons
 from tracking.evaluation import TruthAndTracks, evaluate, evaluate_cameras, oracle_association
 from tracking.motchallenge import MotRow, read_rows
-
-WATERMARK = ((130.0, 232.0), (354.0, 232.0), (354.0, 282.0), (130.0, 282.0))
-"""The polygon of a translucent watermark, which hides the background."""
 
 _SMALLEST = {"pets09": 0.12}
 
 
 @dataclass(frozen=True, slots=True)
 class ScoredView:
-    """One camera's recording."""
+    """One camera's recording.
 
-    name: str
-    video: Path
+    Attributes:
+        camera: its section of the configuration: name, recording, ignored polygons.
+        truth: the file of its ground truth; None: there is none.
+        min_height: height of the smallest people, in picture heights, for HOG, whose time depends on it.
+    """
+
+    camera: Mapping[str, Any]
     truth: Path | None
-    watermark: bool
     min_height: float
-    """Height of the smallest people, in picture heights, for HOG, whose time depends on it."""
 
     @property
-    def ignore(self) -> tuple[tuple[tuple[float, float], ...], ...]:
-        """The ignored polygons."""
-        return (WATERMARK,) if self.watermark else ()
+    def name(self) -> str:
+        """The name of the view."""
+        return str(self.camera["id"])
 
-    def images(self, max_frames: int | None = None) -> Iterator[Image]:
-        """Yield the first `max_frames` frames as BGR images."""
-        with av.open(str(self.video)) as container:
-            for frame in islice(container.decode(video=0), max_frames):
+    @property
+    def ignore(self) -> Polygons:
+        """The ignored polygons."""
+        return tuple(
+            tuple((float(x), float(y)) for x, y in polygon) for polygon in self.camera.get("ignore", ())
+        )
+
+    def make_detector(self, detect: Mapping[str, Any], size: tuple[int, int]) -> Detector:
+        """Return the detector that a section `detect` names, for images of `size` = (width, height).
+
+        It knows nothing about the recording in advance: neither its background nor its floor.
+        """
+        site = {"name": "bench", "width": size[0], "height": size[1]}
+        content = {"site": site, "cameras": [dict(self.camera)], "detect": dict(detect)}
+        config = build_config(content, where=self.name, folder=Path())
+        return make_detector(config, config.camera(self.name), Letterbox(size, size))
+
+    def images(self, max_frames: int | None = None, every: int = 1) -> Iterator[Image]:
+        """Yield every n-th of the first `max_frames` frames as BGR images."""
+        with av.open(self.camera["source"]) as container:
+            for frame in islice(container.decode(video=0), 0, max_frames, every):
                 yield np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
 
     def people(self, frames: int | None) -> list[MotRow]:
@@ -56,16 +78,10 @@ def views_of(data: Path, scene: str) -> list[ScoredView]:
     Raises:
         CannotRunError: its recordings are missing.
     """
-    folder = data / scene
     views = []
-    for video in sorted(folder.glob("*.mp4")):
-        truth = folder / "gt" / f"{video.stem}.txt"
-        watermark, min_height = scene in {"terrace", "campus4"}, _SMALLEST.get(scene, 0.25)
-        views.append(ScoredView(video.stem, video, truth if truth.exists() else None, watermark, min_height))
-    if not views:
-        raise CannotRunError(
-            f"needs the recordings {folder}/*.mp4; --data or MYVIEW_TEST_DATA give the folder"
-        )
+    for camera in find_views(data, scene).cameras:
+        truth = data / scene / "gt" / f"{camera['id']}.txt"
+        views.append(ScoredView(camera, truth if truth.exists() else None, _SMALLEST.get(scene, 0.25)))
     return views
 
 

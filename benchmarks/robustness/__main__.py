@@ -22,28 +22,31 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from benchmarks.bestview.scenes import BenchmarkScene, recorded, room
+from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.robustness.cases import CaseScores, DisturbedScene, Undisturbed
 from benchmarks.robustness.disturbances.catalog import CATALOG, STRENGTHS
 from benchmarks.robustness.plots import plot_costs
+from benchmarks.scene_runs.options import (
+    DETECTION_COLUMNS,
+    TRACK_COLUMNS,
+    add_options,
+    detection_cells,
+    selected_detectors,
+    selected_scenes,
+    track_cells,
+)
 from benchmarks.scene_runs.pipeline_run import detector_settings, length_in_frames
 
-RECORDED = ("terrace", "terrace2", "pets09", "campus4", "lab4")
-DRAWN = "room"
-_ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_S = 3, 5, 40.0
-COLUMNS = (
-    *("", "rec.", "prec.", "AP", "HOTA", "IDF1", "joint", "cost", "worst", "later", "cost", "seen"),
-    "recovery",
-)
+COLUMNS = (*("", *DETECTION_COLUMNS, *TRACK_COLUMNS, "cost", "worst", "later", "cost", "seen", "recovery"),)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,24 +71,15 @@ class Row:
 
     def cells(self, undisturbed: Row) -> list[str]:
         """Return the row's cells."""
-        mean = [
-            np.mean([getattr(score.whole.tracks.mean, name) for score in self.scores])
-            for name in ("hota", "idf1")
-        ]
         since = [score.since for score in self.scores]
-        shares = (
-            np.mean([score.recall for score in since]),
-            np.mean([score.precision for score in since]),
-            np.mean([score.boxes.average_precision for score in since]),
-        )
-        joint, later = float(np.mean(self.joint)), self.later
+        cost, worst = (np.mean(undisturbed.joint) - value for value in (np.mean(self.joint), min(self.joint)))
+        later = self.later
         return [
             f"{self.name} {self.strength}".strip(),
-            *(f"{share:.2f}" for share in shares),
-            *(f"{100 * share:.1f}" for share in mean),
-            f"{joint:.1f}",
-            f"{np.mean(undisturbed.joint) - joint:.1f}",
-            f"{np.mean(undisturbed.joint) - min(self.joint):.1f}",
+            *detection_cells(since),
+            *track_cells([score.whole for score in self.scores]),
+            f"{cost:.1f}",
+            f"{worst:.1f}",
             *((f"{later:.1f}", f"{undisturbed.later - later:.1f}") if np.isfinite(later) else ("", "")),
             f"{100 * np.mean([score.visible for score in since]):.1f}",
             "never" if np.isinf(self.recovery_s) else f"{self.recovery_s:.1f} s",
@@ -96,25 +90,12 @@ def _later(score: CaseScores) -> float:
     return float("nan") if score.later is None else 100.0 * score.later.tracks.joint.idf1
 
 
-def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterator[BenchmarkScene]:
-    """Yield the scenes one after the other; report those whose recordings are missing."""
-    for name in options.scene or (*RECORDED, DRAWN):
-        try:
-            yield (
-                room(folder, _ROOM_CAMERAS, _ROOM_PEOPLE, _ROOM_S)
-                if name == DRAWN
-                else recorded(options.data, name)
-            )
-        except CannotRunError as problem:
-            report.line(f"{name}: skipped: {problem}")
-
-
 def measure_scene(
     report: Report, scene: BenchmarkScene, detector: str, options: argparse.Namespace
 ) -> list[Row]:
     """Measure one scene with one detector, and print its table."""
     config = scene.config(detect=detector_settings(detector))
-    frames = min(length_in_frames(config), options.frames or 10**9)
+    frames = min(length_in_frames(config), options.frames)
     start = frames // 2 if options.start is None else options.start
     disturbed_scene = DisturbedScene(scene, config, start, frames)
     undisturbed = disturbed_scene.run(Undisturbed(), 0)
@@ -143,8 +124,8 @@ def measure(options: argparse.Namespace) -> None:
     report = Report()
     costs: dict[str, Mapping[tuple[str, str], float]] = {}
     with tempfile.TemporaryDirectory(prefix="myview-robustness-") as folder:
-        for scene in scenes(options, Path(folder), report):
-            for detector in options.detector or ["background"]:
+        for scene in selected_scenes(options, Path(folder), report):
+            for detector in selected_detectors(options):
                 rows = measure_scene(report, scene, detector, options)
                 costs[f"{scene.name}, {detector}"] = {
                     (row.name, row.strength): float(np.mean(rows[0].joint) - np.mean(row.joint))
@@ -157,14 +138,10 @@ def measure(options: argparse.Namespace) -> None:
 def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "robustness")
-    options.add_argument("--scene", action="append", choices=(*RECORDED, DRAWN), help="may be repeated")
+    add_options(options)
     options.add_argument("--disturbance", action="append", choices=tuple(CATALOG), help="may be repeated")
     options.add_argument("--strength", action="append", choices=STRENGTHS, help="may be repeated")
     options.add_argument("--seed", action="append", type=int, help="may be repeated; 1 if not given")
-    options.add_argument(
-        "--detector", action="append", help="detect.kind, or an installed network; may be repeated"
-    )
-    options.add_argument("--frames", type=int, help="maximum of each camera")
     options.add_argument("--start", type=int, help="first disturbed frame, from 0; the middle if not given")
     try:
         measure(options.parse_args())

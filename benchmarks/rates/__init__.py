@@ -1,0 +1,1 @@
+"""What lower and higher frame rates cost."""
