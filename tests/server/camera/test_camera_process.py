@@ -155,9 +155,6 @@ async def test_a_camera_stays_connected_until_the_service_has_its_last_tracks(
     confirms: bool,
 ) -> None:
     """zenoh sends that a session ends ahead of tracks that wait, and nobody waits for a lost camera's."""
-    config = site(recording, c0="c0.mp4")
-    whole_site = SiteInOneLoop(config, tmp_path / "out")
-    running.append(whole_site)
     connected: list[bool] = []
     confirm = BusConnection.confirm_end
 
@@ -168,6 +165,8 @@ async def test_a_camera_stays_connected_until_the_service_has_its_last_tracks(
 
     monkeypatch.setattr(BusConnection, "confirm_end", confirm_or_not)
     monkeypatch.setattr("server.camera.process._END_CONFIRMED_WITHIN_S", PATIENCE if confirms else 0.0)
+    whole_site = SiteInOneLoop(site(recording, c0="c0.mp4"), tmp_path / "out")
+    running.append(whole_site)
     over = await whole_site.start()
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(over, whole_site.camera("c0"))
