@@ -24,6 +24,7 @@ from tracking.detectors import (
     BackgroundDetector,
     Detector,
     FloorGeometry,
+    FusedDetector,
     HogDetector,
     MotFileDetector,
     MotFileSettings,
@@ -81,7 +82,7 @@ def make_prescanned_detector(
     detector, settings = make_detector(config, camera, letterbox), config.detect
     if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
         detector.number_frames_by(source.pulse_by_frame_count)
-    if isinstance(detector, BackgroundDetector):
+    if isinstance(detector, BackgroundDetector | FusedDetector):
         indices = range(0, settings.prescan_frames, settings.prescan_every)
         detector.prepare(
             (letterbox.image(image) for image in source.prescan_images(indices)), settings.prescan_every
@@ -126,13 +127,21 @@ def _create_detector(settings: DetectSettings, floor: FloorGeometry | None) -> C
         case "hog":
             return HogDetector(settings.hog, appearance, settings.ignore)
         case "onnx":
-            if settings.onnx.model is not None:
-                check_installed(settings.onnx.model)
-            return OnnxDetector(settings.onnx, appearance, settings.ignore)
+            return _open_network(settings, appearance)
+        case "fused":
+            return FusedDetector(
+                BackgroundDetector(settings, floor), _open_network(settings, appearance), settings.fused
+            )
         case "boxes":
             return BackgroundDetector(paper_settings(settings))
         case "background":
             return BackgroundDetector(settings, floor)
+
+
+def _open_network(settings: DetectSettings, appearance: AppearanceExtractor) -> OnnxDetector:
+    if settings.onnx.model is not None:
+        check_installed(settings.onnx.model)
+    return OnnxDetector(settings.onnx, appearance, settings.ignore)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from tracking.detectors.background.mog2 import Mog2Settings
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
 from tracking.detectors.base import Detector, Image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings, color_histograms
+from tracking.detectors.fused.detector import FusedDetector, FusedSettings
 from tracking.detectors.hog import HogDetector, HogSettings
 from tracking.detectors.mot_file import MotFileDetector, MotFileSettings
 from tracking.detectors.neural.onnx import OnnxDetector, OnnxSettings
@@ -30,6 +31,8 @@ __all__ = [
     "Detector",
     "FloorGeometry",
     "ForegroundFitSettings",
+    "FusedDetector",
+    "FusedSettings",
     "HeightModelSettings",
     "HogDetector",
     "HogSettings",

@@ -15,9 +15,9 @@ from server.config.site_config import Config
 from tracking.boxes import Floats
 from tracking.detectors import BackgroundDetector
 from tracking.detectors.background.cell_grid import CellGrid
-from tracking.detectors.background.foreground_fit import PersonHypotheses
+from tracking.detectors.background.detector import ForegroundScan
 from tracking.detectors.background.height_model import HeightModel
-from tracking.detectors.base import Mask
+from tracking.detectors.base import Image, Mask
 
 CELL = 2
 """Pixels of the detector's working picture per cell, on each axis."""
@@ -57,7 +57,7 @@ def compute_masks(config: Config, camera: str) -> ForegroundMasks:
     if not isinstance(detector, BackgroundDetector):
         raise CannotMapError(f"camera {camera} has no background detector")
     recorder = _MaskRecorder(detector)
-    detector._fit = recorder  # type: ignore[method-assign]  # noqa: SLF001
+    detector._scan_mask = recorder  # type: ignore[method-assign]  # noqa: SLF001
     foreground: list[Mask | None] = []
     shadow: list[Mask | None] = []
     for pulse in count():
@@ -79,18 +79,18 @@ def compute_masks(config: Config, camera: str) -> ForegroundMasks:
 
 
 class _MaskRecorder:
-    """Wraps a detector's fit of people to the foreground, and keeps its masks."""
+    """Wraps a detector's scan of the foreground, and keeps its masks."""
 
     def __init__(self, detector: BackgroundDetector) -> None:
-        self._search = detector._fit  # noqa: SLF001
+        self._search = detector._scan_mask  # noqa: SLF001
         self._last: tuple[Mask | None, Mask | None] = (None, None)
         self.grid: CellGrid | None = None
 
-    def __call__(self, mask: Mask, shadow: Mask, grid: CellGrid) -> PersonHypotheses:
-        """Fit people to the foreground."""
+    def __call__(self, work_image: Image, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundScan:
+        """Scan the foreground for people."""
         self.grid = grid
         self._last = _cells(mask), _cells(shadow)
-        return self._search(mask, shadow, grid)
+        return self._search(work_image, mask, shadow, grid)
 
     def last(self) -> tuple[Mask | None, Mask | None]:
         """Return and forget the frame's foreground and shadow."""

@@ -8,12 +8,12 @@ from typing import Literal
 
 from server.models.catalog import find_model
 from server.models.installed import network_path
-from tracking.detectors import BackgroundSettings, HogSettings, OnnxSettings
+from tracking.detectors import BackgroundSettings, FusedSettings, HogSettings, OnnxSettings
 
 _MIN_PROBABILITY = 0.05
 """The default `onnx.min_score` of installed networks."""
 
-DetectorKind = Literal["background", "boxes", "hog", "onnx"]
+DetectorKind = Literal["background", "boxes", "hog", "onnx", "fused"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +23,13 @@ class DetectSettings(BackgroundSettings):
     kind: DetectorKind = "background"  # boxes: the background detector of the paper, without extensions
     hog: HogSettings = field(default_factory=HogSettings)
     onnx: OnnxSettings = field(default_factory=OnnxSettings)
+    fused: FusedSettings = field(default_factory=FusedSettings)
 
     def __post_init__(self) -> None:
         BackgroundSettings.__post_init__(self)
-        if self.kind == "onnx" and self.onnx.model is None:
-            raise ValueError(
-                "onnx.model: kind onnx needs the path of an ONNX file, or the name of an installed network"
-            )
+        if self.kind in {"onnx", "fused"} and self.onnx.model is None:
+            needed = "the path of an ONNX file, or the name of an installed network"
+            raise ValueError(f"onnx.model: kind {self.kind} needs {needed}")
 
     def onnx_in(self, folder: Path) -> OnnxSettings:
         """Return the network's settings; its file is relative to ``folder``, or an installed one."""
@@ -39,8 +39,7 @@ class DetectSettings(BackgroundSettings):
         if installable is None:
             return replace(self.onnx, model=folder / self.onnx.model)
         # Scores of installed networks are probabilities, and the tracker makes use of doubtful boxes.
-        is_default = self.onnx.min_score == OnnxSettings().min_score
-        min_score = _MIN_PROBABILITY if is_default else self.onnx.min_score
+        min_score = _MIN_PROBABILITY if self.onnx.min_score is None else self.onnx.min_score
         return replace(
             self.onnx, model=network_path(installable), resize=installable.resize, min_score=min_score
         )

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fakes.tracking.tiny_networks import save_network, yolov8
 from server.camera.detector_setup import make_detector
 from server.config.loader import build_config
 from server.media.letterbox import Letterbox
 from server.system.errors import UserError
-from tracking.detectors import PAPER_DETECTOR, BackgroundDetector, HogDetector, MotFileDetector
+from tracking.detectors import PAPER_DETECTOR, BackgroundDetector, FusedDetector, HogDetector, MotFileDetector
 
 SIZE = (64, 48)
 
@@ -35,6 +36,15 @@ def test_the_kind_selects_the_detector(tmp_path: Path) -> None:
     )
     assert isinstance(hog, HogDetector)
     assert (hog.settings.max_detections, hog.appearance_bins) == (3, 16)
+
+
+def test_kind_fused_takes_the_network_and_the_background(tmp_path: Path) -> None:
+    save_network(tmp_path / "tiny.onnx", yolov8([(30.0, 32.0, 12.0, 40.0, 0.72)]))
+    fused = observer(tmp_path, {"kind": "fused", "onnx": {"model": "tiny.onnx", "resize": "stretch"}})
+    assert isinstance(fused, FusedDetector)
+    found = fused.detect(np.full((SIZE[1], SIZE[0], 3), 255, dtype=np.uint8))
+    assert found.scores == pytest.approx([0.72])
+    assert found.histograms.shape == (1, fused.appearance_bins)
 
 
 def test_kind_boxes_always_has_the_settings_of_the_paper(tmp_path: Path) -> None:
@@ -89,6 +99,7 @@ def test_a_detection_file_takes_precedence_over_the_kind(tmp_path: Path) -> None
     ("detect", "camera", "expected"),
     [
         ({"kind": "onnx"}, {}, "detect: onnx.model: kind onnx needs the path"),
+        ({"kind": "fused"}, {}, "detect: onnx.model: kind fused needs the path"),
         ({"kind": "onnx", "onnx": {"model": "none.onnx"}}, {}, "camera c0: detect: "),
         ({"kind": "nobody"}, {}, "detect.kind: "),
         ({"hog": {"scale_step": 0.5}}, {}, "detect.hog: scale_step must be above 1"),

@@ -78,3 +78,10 @@ def test_an_empty_or_plain_background_has_no_motion() -> None:
     assert registration.find(SCENE, IDENTITY, None) == STILL
     registration.set_background(np.full_like(SCENE, 90))
     assert registration.find(SCENE, IDENTITY, None) == STILL
+
+
+def test_boxes_of_a_frame_are_moved_back_to_where_they_are_in_the_background() -> None:
+    motion, boxes = Motion(-9.0, 5.0, grow=0.02, turn=-0.026), np.array([[30.0, 80.0, 60.0, 160.0]])
+    there = motion.move_boxes(boxes, SIZE)
+    assert np.abs(there - boxes).max() > 3.0
+    np.testing.assert_allclose(motion.move_boxes_back(there, SIZE), boxes)

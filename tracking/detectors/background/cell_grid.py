@@ -54,11 +54,28 @@ class CellGrid:
     def cells_to_work(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Convert boxes from cells to pixels of the working image, clipped to it."""
         height, width = self._work
-        per_cell = np.array(
-            [width / (width // self._cell_pixels), height / (height // self._cell_pixels)] * 2
-        )
         limits = np.array([width, height, width, height], dtype=np.float64)
-        return np.asarray(np.clip((boxes - self.margin) * per_cell, 0.0, limits))
+        return np.asarray(np.clip((boxes - self.margin) * self._pixels_per_cell, 0.0, limits))
+
+    def work_to_cells(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Convert boxes from pixels of the working image to cells."""
+        return np.asarray(boxes / self._pixels_per_cell + self.margin)
+
+    @property
+    def bounds(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """The first and last `(x, y)` of the image, in cells."""
+        size = np.array([self._work[1] // self._cell_pixels, self._work[0] // self._cell_pixels])
+        return np.full(2, float(self.margin)), size + float(self.margin)
+
+    @property
+    def _pixels_per_cell(self) -> npt.NDArray[np.float64]:
+        height, width = self._work
+        return np.array([width / (width // self._cell_pixels), height / (height // self._cell_pixels)] * 2)
+
+    @property
+    def work_size(self) -> tuple[int, int]:
+        """The width and height of the working image, pixels."""
+        return self._work[1], self._work[0]
 
     @property
     def work_height(self) -> int:
@@ -72,5 +89,12 @@ class CellGrid:
 
     def work_to_image(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Convert boxes from pixels of the working image to pixels of the camera's image."""
-        per_pixel = np.array([self._size[1] / self._work[1], self._size[0] / self._work[0]] * 2)
-        return np.asarray(boxes * per_pixel)
+        return np.asarray(boxes * self._image_pixels)
+
+    def image_to_work(self, boxes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Convert boxes from pixels of the camera's image to pixels of the working image."""
+        return np.asarray(boxes / self._image_pixels)
+
+    @property
+    def _image_pixels(self) -> npt.NDArray[np.float64]:
+        return np.array([self._size[1] / self._work[1], self._size[0] / self._work[0]] * 2)

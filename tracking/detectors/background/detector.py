@@ -11,11 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.appearance import GRAY_LEVELS
-from tracking.detectors.background.box_filter import BoxFilter, BoxFilterSettings, HeightRange
+from tracking.detectors.background.box_filter import BoxFilter, BoxFilterSettings, HeightRange, ScanPeaks
 from tracking.detectors.background.cell_grid import CellGrid
 from tracking.detectors.background.foreground_fit import (
     ForegroundFitSettings,
-    PersonHypotheses,
     fit_foreground,
     shrink_to_foreground,
 )
@@ -25,12 +24,13 @@ from tracking.detectors.background.height_model import (
     HeightModelEstimator,
     HeightModelSettings,
 )
+from tracking.detectors.background.isolated_people import IsolatedPerson
 from tracking.detectors.background.median import MedianBackground, MedianSettings
 from tracking.detectors.background.mog2 import Mog2Background, Mog2Settings
-from tracking.detectors.background.motion import STILL
+from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
-from tracking.detectors.base import Image, Mask, require_at_least_one, validate_image
+from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
 from tracking.types import Detections
 
@@ -107,6 +107,31 @@ PAPER_DETECTOR = paper_settings(BackgroundSettings())
 """The paper's box filters, like `PAPER_COSTS` its costs."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ForegroundScan:
+    """A frame's foreground, and where in it people could be.
+
+    Attributes:
+        image: the working image, `(h, w, 3)`, moved to where the background is, as are all other planes.
+        mask: its foreground, `(h, w)`, 255 where a person may be visible.
+        foreground: share of foreground per cell, `(H, W)`.
+        cost: cost of the background in each cell to a covering body, `(H, W)`.
+        weight: 1 in visible cells, `(H, W)`.
+        peaks: candidates, in cells.
+        fit: the settings of the fit, as far as the height model is known.
+        motion: where the background is in the frame.
+    """
+
+    image: Image
+    mask: Mask
+    foreground: Plane
+    cost: Plane
+    weight: Plane
+    peaks: ScanPeaks
+    fit: ForegroundFitSettings
+    motion: Motion = STILL
+
+
 class _Background(Protocol):
     def segment(self, image: Image) -> Segmentation | None: ...
 
@@ -165,21 +190,82 @@ class BackgroundDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
+        scan = self.scan(image)
+        if scan is None:
+            return Detections.empty(self.appearance_bins)
+        found = fit_foreground(scan.peaks, scan.foreground, scan.cost, scan.weight, scan.fit)
+        boxes = shrink_to_foreground(found.boxes, scan.foreground, scan.weight)
+        self.learn(scan, boxes[: found.person_count])
+        return self.detections(scan.image, boxes, found.scores, scan.mask, scan.motion)
+
+    def scan(self, image: Image) -> ForegroundScan | None:
+        """Segment and scan the next frame, which `learn` completes; `None` while the background is unknown.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
+        """
         grid = self._grid_for(image)
         work_image = grid.resize(image)
         segmentation = self._background.segment(work_image)
         self.warming_up = segmentation is None
         if segmentation is None:
-            return Detections.empty(self.appearance_bins)
+            return None
         mask = _clean_mask(segmentation.foreground & grid.visible)
         self._height_estimator.observe(mask, grid.visible)
-        found = self._fit(mask, segmentation.shadow & grid.visible & ~mask, grid)
-        boxes = grid.cells_to_work(found.boxes)
-        self._background.learn(mask, _occupied_mask(boxes[: found.person_count], mask.shape))
-        histograms = self._appearance.histograms(segmentation.image, boxes, mask)
-        if segmentation.motion != STILL:
-            boxes = segmentation.motion.move_boxes(boxes, (mask.shape[1], mask.shape[0]))
-        return Detections(grid.work_to_image(boxes), found.scores, histograms)
+        shadow = segmentation.shadow & grid.visible & ~mask
+        return replace(self._scan_mask(segmentation.image, mask, shadow, grid), motion=segmentation.motion)
+
+    def learn(self, scan: ForegroundScan, people: npt.NDArray[np.float64]) -> None:
+        """Update the background with the frame of a scan where nobody is; `people` `(K, 4)` are in cells."""
+        boxes = self.grid.cells_to_work(people)
+        self._background.learn(scan.mask, _occupied_mask(boxes, scan.mask.shape))
+
+    def observe_people(self, boxes: npt.NDArray[np.float64], frames: int = 1) -> None:
+        """Learn the height of people from whole people of one frame, boxes `(K, 4)` in cells.
+
+        They replace the blobs from which it is learned otherwise; the frame represents `frames` frames.
+        """
+        in_work = self.grid.cells_to_work(boxes)
+        self._height_estimator.observe_people(
+            [IsolatedPerson((box[0] + box[2]) / 2.0, box[3], box[3] - box[1]) for box in in_work.tolist()],
+            frames,
+        )
+
+    def detections(
+        self,
+        work_image: Image,
+        boxes: npt.NDArray[np.float64],
+        scores: npt.NDArray[np.float64],
+        mask: Mask | None = None,
+        motion: Motion = STILL,
+    ) -> Detections:
+        """Return boxes `(K, 4)` in cells as detections, with the appearance of their pixels in the mask.
+
+        `motion`: where the background, and so the image's content, is in the frame.
+        """
+        in_work = self.grid.cells_to_work(boxes)
+        histograms = self._appearance.histograms(work_image, in_work, mask)
+        if motion != STILL:
+            in_work = motion.move_boxes(in_work, (work_image.shape[1], work_image.shape[0]))
+        return Detections(self.grid.work_to_image(in_work), scores, histograms)
+
+    def to_cells(self, boxes: npt.NDArray[np.float64], motion: Motion = STILL) -> npt.NDArray[np.float64]:
+        """Return boxes `(N, 4)` of a frame, in its pixels, in cells of the background."""
+        in_work = self.grid.image_to_work(boxes)
+        if motion != STILL:
+            in_work = motion.move_boxes_back(in_work, self.grid.work_size)
+        return self.grid.work_to_cells(in_work)
+
+    @property
+    def grid(self) -> CellGrid:
+        """The cells of the images.
+
+        Raises:
+            ValueError: there was no image yet.
+        """
+        if self._grid is None:
+            raise ValueError("the size of the images is not known yet")
+        return self._grid
 
     @property
     def appearance_bins(self) -> int:
@@ -191,7 +277,7 @@ class BackgroundDetector:
         """Expected box height by foot row, in pixels of the working image; None: not known yet."""
         return self._height_estimator.model
 
-    def _fit(self, mask: Mask, shadow: Mask, grid: CellGrid) -> PersonHypotheses:
+    def _scan_mask(self, work_image: Image, mask: Mask, shadow: Mask, grid: CellGrid) -> ForegroundScan:
         settings = self.settings
         foreground = grid.cell_shares(mask)
         empty = np.maximum(grid.weight - foreground - grid.cell_shares(shadow), 0.0)
@@ -199,14 +285,10 @@ class BackgroundDetector:
         if self._filter is None:
             self._filter = BoxFilter(grid.weight, mask.shape[0] // CELL, settings.box_filter)
         peaks = self._filter.peaks(foreground - cost, self._heights(grid))
-        fit_settings = settings.foreground_fit
+        fit = settings.foreground_fit
         if not self._height_estimator.is_reliable:
-            limit = min(fit_settings.max_people, fit_settings.max_people_uncalibrated)
-            fit_settings = replace(fit_settings, max_people=limit)
-        found = fit_foreground(peaks, foreground, cost, grid.weight, fit_settings)
-        return PersonHypotheses(
-            shrink_to_foreground(found.boxes, foreground, grid.weight), found.scores, found.person_count
-        )
+            fit = replace(fit, max_people=min(fit.max_people, fit.max_people_uncalibrated))
+        return ForegroundScan(work_image, mask, foreground, cost, grid.weight, peaks, fit)
 
     def _heights(self, grid: CellGrid) -> HeightRange | None:
         """Return the possible heights in cells; the same object while the model is unchanged."""

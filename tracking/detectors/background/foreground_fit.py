@@ -68,7 +68,7 @@ def fit_foreground(
         scores.append(float(search.gain_per_visible_area()[index]))
         search.add(index)
     person_count = len(chosen) if settings.enabled else settings.max_hypotheses
-    for index in _alternatives(peaks.boxes, chosen, settings):
+    for index in select_alternatives(peaks.boxes, chosen, settings):
         chosen.append(index)
         scores.append(float(shares[index]))
     return PersonHypotheses(peaks.boxes[chosen].reshape(-1, 4), np.clip(scores, 0.0, 1.0), person_count)
@@ -129,6 +129,11 @@ class GreedySearch:
         least = _MIN_VISIBLE * self._peaks.areas
         return np.asarray(self._peaks.gain_factors * self.gains / np.maximum(self.visible, least))
 
+    def selection_gains(self) -> npt.NDArray[np.float64]:
+        """Return what selecting each candidate gains, `(P,)`; -inf: too little."""
+        shares = self.gain_per_visible_area()
+        return np.where(shares >= self._settings.min_gain, shares * self._peaks.areas, -np.inf)
+
     def add(self, index: int) -> None:
         """Add a candidate to the selected: it covers its cells."""
         bounds, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
@@ -155,14 +160,13 @@ class GreedySearch:
         """Return the candidate with the largest gain given the selected, or `None` if none gains enough."""
         if not len(self.gains):
             return None
-        shares = self.gain_per_visible_area()
-        gains = np.where(shares >= self._settings.min_gain, shares * self._peaks.areas, -np.inf)
+        gains = self.selection_gains()
         gains[chosen] = -np.inf
         best = int(np.argmax(gains))
         return best if np.isfinite(gains[best]) else None
 
 
-def _alternatives(
+def select_alternatives(
     boxes: npt.NDArray[np.float64], chosen: list[int], settings: ForegroundFitSettings
 ) -> list[int]:
     """Return the next best candidates that overlap neither each other nor the selected too much."""

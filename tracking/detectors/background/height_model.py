@@ -10,12 +10,17 @@ it.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detectors.background.isolated_people import SampleNoveltyFilter, find_isolated_people
+from tracking.detectors.background.isolated_people import (
+    IsolatedPerson,
+    SampleNoveltyFilter,
+    find_isolated_people,
+)
 from tracking.detectors.base import Mask
 
 
@@ -108,6 +113,7 @@ class HeightModelEstimator:
         self._fitted_on = 0
         self._sample_count = 0
         self._max_people = 1
+        self._has_known_people = False
         self.model: HeightModel | None = None
         if settings.enabled:
             self.model = self._prior.model
@@ -128,10 +134,26 @@ class HeightModelEstimator:
         self._frames += 1
         if not self._settings.enabled or self._frames % self._settings.sample_every:
             return
-        people = find_isolated_people(foreground, visible)
+        if not self._has_known_people:
+            self._add_people(find_isolated_people(foreground, visible), frames * self._settings.sample_every)
+
+    def observe_people(self, people: Sequence[IsolatedPerson], frames: int = 1) -> None:
+        """Add people of one frame that are more certain than blobs, in pixels of the image.
+
+        From the first on they alone count. `frames`: the number of consecutive frames that it represents.
+        """
+        if not self._settings.enabled or not (people or self._has_known_people):
+            return
+        if not self._has_known_people:
+            self._has_known_people = True
+            self._samples.clear()
+            self._sample_count = self._fitted_on = 0
+        self._add_people(people, frames)
+
+    def _add_people(self, people: Sequence[IsolatedPerson], frames: int) -> None:
         self._max_people = max(self._max_people, len(people))
         weight = max(round(frames / _FRAMES), 1)
-        for person in self._novelty_filter.new_samples(people, frames * self._settings.sample_every):
+        for person in self._novelty_filter.new_samples(people, frames):
             self._samples.extend([(person.foot_row, person.height)] * weight)
             self._sample_count += weight
         # Refit when the number of samples has grown by a tenth.

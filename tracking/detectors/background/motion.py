@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,10 +48,20 @@ class Motion:
     def move_boxes(self, boxes: Floats, size: tuple[int, int]) -> Floats:
         """Move boxes `(K, 4)` of the background, in pixels, to where they are in the frame, still upright."""
         matrix = self.matrix(size)
-        centers = (boxes[:, :2] + boxes[:, 2:]) / 2.0
-        moved = centers @ matrix[:, :2].T + matrix[:, 2]
-        half = (boxes[:, 2:] - boxes[:, :2]) / 2.0 * (1.0 + self.grow)
-        return np.concatenate([moved - half, moved + half], axis=1)
+        return _moved(boxes, lambda centers: centers @ matrix[:, :2].T + matrix[:, 2], 1.0 + self.grow)
+
+    def move_boxes_back(self, boxes: Floats, size: tuple[int, int]) -> Floats:
+        """Move boxes `(K, 4)` of the frame, in pixels, to where they are in the background, still upright."""
+        matrix = self.matrix(size)
+        inverse = np.linalg.inv(matrix[:, :2])
+        return _moved(boxes, lambda centers: (centers - matrix[:, 2]) @ inverse.T, 1.0 / (1.0 + self.grow))
+
+
+def _moved(boxes: Floats, move: Callable[[Floats], Floats], scale: float) -> Floats:
+    """Return boxes with their centers moved and their sides scaled."""
+    centers = move((boxes[:, :2] + boxes[:, 2:]) / 2.0)
+    half = (boxes[:, 2:] - boxes[:, :2]) / 2.0 * scale
+    return np.concatenate([centers - half, centers + half], axis=1)
 
 
 STILL = Motion()

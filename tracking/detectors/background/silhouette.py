@@ -56,6 +56,11 @@ def part_rectangles(
     return PartRectangles(left, top, right, bottom)
 
 
+def body_rectangles(boxes: npt.NDArray[np.float64], body: Body, shape: tuple[int, ...]) -> PartRectangles:
+    """Return the parts of bodies of one shape in boxes `(K, 4)`, clipped to a plane of `shape`."""
+    return part_rectangles(boxes, BODY_PARTS[body], shape)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PartRectangles:
     """The parts of K bodies in whole cells, each `(K, P)`."""
@@ -79,6 +84,15 @@ class PartRectangles:
     def select(self, chosen: npt.NDArray[np.int64]) -> PartRectangles:
         """Return the parts of the chosen bodies."""
         return PartRectangles(self.left[chosen], self.top[chosen], self.right[chosen], self.bottom[chosen])
+
+    def followed_by(self, other: PartRectangles) -> PartRectangles:
+        """Return these parts, then those of other bodies of the same shape."""
+        return PartRectangles(
+            np.concatenate([self.left, other.left]),
+            np.concatenate([self.top, other.top]),
+            np.concatenate([self.right, other.right]),
+            np.concatenate([self.bottom, other.bottom]),
+        )
 
     def clip_to(self, region: tuple[slice, slice]) -> PartRectangles:
         """Return the parts relative to a region of the plane, clipped to it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,6 +22,7 @@ _INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(fl
 _DIMENSIONS = 4
 # Gray level of the letterbox bars, as in YOLO's training.
 _BAR_LEVEL = 114
+_MIN_SCORE = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class OnnxSettings:
     model: Path | None = None  # path of the file
     output_layout: Layout = "auto"  # layout of the output: yolov5, yolov8, end2end; auto: by its shape
     classes: tuple[int, ...] = (0,)  # class numbers of people: 0 in COCO
-    min_score: float = 0.25  # boxes below this score are dropped
+    min_score: float | None = None  # boxes below this score are dropped; None: 0.25
     nms_iou: float = 0.7  # overlap (IoU) above which the box of lower score is dropped
     resize: Literal["letterbox", "stretch"] = (
         "letterbox"  # fit images into the input with bars, or stretch them
@@ -47,7 +48,7 @@ class OnnxSettings:
     def __post_init__(self) -> None:
         if not self.classes or min(self.classes) < 0:
             raise ValueError(f"classes are numbers from 0, at least one, not {list(self.classes)}")
-        if not 0.0 <= self.min_score <= 1.0:
+        if self.min_score is not None and not 0.0 <= self.min_score <= 1.0:
             raise ValueError(f"min_score is a share between 0 and 1, not {self.min_score}")
         if self.input_size < 1 or self.threads < 1 or self.max_detections < 1:
             raise ValueError("input_size, threads and max_detections must be at least 1")
@@ -91,15 +92,25 @@ class OnnxDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 image, or the network's output is not a YOLO output.
         """
+        found = self.find(image)
+        return replace(found, histograms=self._appearance.histograms(image, found.boxes))
+
+    def find(self, image: Image) -> Detections:
+        """Return the people detected in an image, best first, without their appearance.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 image, or the network's output is not a YOLO output.
+        """
         validate_image(image)
         planes, scale, offset = self._fit_to_input(image)
         found = decode_output(self._run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
         boxes = np.clip((found.boxes - offset) / scale, 0.0, limits)
-        kept = (found.scores >= self.settings.min_score) & self._ignore_filter.keep(image.shape, boxes)
+        min_score = _MIN_SCORE if self.settings.min_score is None else self.settings.min_score
+        kept = (found.scores >= min_score) & self._ignore_filter.keep(image.shape, boxes)
         boxes, scores = boxes[kept], found.scores[kept]
         best = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
-        return Detections(boxes[best], scores[best], self._appearance.histograms(image, boxes[best]))
+        return Detections(boxes[best], scores[best], np.empty((len(best), 0)))
 
     def _run(self, planes: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         try:

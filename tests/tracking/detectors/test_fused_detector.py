@@ -1,0 +1,146 @@
+"""The fused detector: network and silhouettes support each other, and each detects where the other fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pytest
+
+from fakes.tracking.drawn_people import WIDTH, Figure, picture
+from tracking.boxes import Floats, iou
+from tracking.detectors import BackgroundDetector, FusedDetector, FusedSettings
+from tracking.detectors.base import Image
+from tracking.types import Detections
+
+WALKER = Figure(10, 200, speed=2.0, begin=40)
+OTHER = Figure(300, 230, speed=-1.0, begin=40)
+POSTER = np.array([150.0, 40.0, 180.0, 110.0])
+
+Finder = Callable[[int], Sequence[tuple[Floats, float]]]
+
+
+class ListedNetwork:
+    """A network that finds the listed boxes, with their scores, in each frame."""
+
+    def __init__(self, finder: Finder) -> None:
+        self._finder = finder
+        self.frame = 0
+
+    def find(self, image: Image) -> Detections:
+        """Return the boxes of the current frame."""
+        assert image.ndim == 3
+        listed = self._finder(self.frame)
+        boxes = np.array([box for box, _ in listed]).reshape(-1, 4)
+        return Detections(boxes, np.array([score for _, score in listed]), np.empty((len(listed), 0)))
+
+
+def detect_all(
+    finder: Finder, figures: Sequence[Figure], frames: range, gain: Callable[[int], float] = lambda _: 1.0
+) -> list[Detections]:
+    network = ListedNetwork(finder)
+    detector = FusedDetector(BackgroundDetector(), network)
+    found = []
+    for network.frame in frames:
+        found.append(detector.detect(picture(figures, network.frame, gain(network.frame)), network.frame))
+    return found
+
+
+def score_at(found: Detections, box: Floats) -> float:
+    """Return the best score of the detections on a box."""
+    return float(found.scores[iou(found.boxes, box) >= 0.5].max(initial=0.0))
+
+
+def mean_score(found: list[Detections], figure: Figure, frames: range) -> float:
+    return float(np.mean([score_at(found[frame], figure.box(frame)) for frame in frames]))
+
+
+def test_network_and_silhouette_together_are_surer_than_each_alone() -> None:
+    both = detect_all(lambda frame: [(WALKER.box(frame), 0.7)], [WALKER], range(120))
+    silhouette = detect_all(lambda _: [], [WALKER], range(120))
+    frames = range(80, 120)
+    assert mean_score(both, WALKER, frames) > 0.9
+    assert 0.3 < mean_score(silhouette, WALKER, frames) < 0.8
+
+
+def test_a_network_box_without_foreground_is_doubted() -> None:
+    found = detect_all(lambda _: [(POSTER, 0.8)], [WALKER], range(120))
+    assert max(score_at(found[frame], POSTER) for frame in range(60, 120)) < 0.5
+
+
+def test_of_two_people_the_one_that_the_network_misses_is_found_by_the_silhouette() -> None:
+    found = detect_all(lambda frame: [(WALKER.box(frame), 0.9)], [WALKER, OTHER], range(130))
+    frames = range(90, 130)
+    assert mean_score(found, WALKER, frames) > 0.9
+    assert 0.3 < mean_score(found, OTHER, frames) < mean_score(found, WALKER, frames)
+
+
+def test_a_person_is_counted_once() -> None:
+    shift = np.array([6.0, -4.0, 6.0, -4.0])
+    found = detect_all(
+        lambda frame: [(WALKER.box(frame), 0.9), (WALKER.box(frame) + shift, 0.6)],
+        [WALKER],
+        range(110),
+    )
+    for frame in range(80, 110):
+        assert np.count_nonzero(found[frame].scores >= 0.5) == 1
+
+
+def test_while_the_background_is_unknown_the_network_detects_alone() -> None:
+    early = Figure(10, 200, speed=2.0)
+    found = detect_all(lambda frame: [(early.box(frame), 0.8)], [early], range(3))
+    for frame, detections in enumerate(found):
+        np.testing.assert_allclose(detections.boxes, [early.box(frame)])
+        np.testing.assert_allclose(detections.scores, [0.8])
+
+
+def test_when_the_picture_changes_at_once_the_network_detects_alone() -> None:
+    moved = Figure(10, 200, speed=2.0)
+    network = ListedNetwork(lambda frame: [(moved.box(frame), 0.8)])
+    detector = FusedDetector(BackgroundDetector(), network)
+    for network.frame in range(60):
+        detector.detect(picture([], network.frame))
+    network.frame = 60
+    turned = np.ascontiguousarray(np.flipud(picture([], 60)))
+    found = detector.detect(turned, 60)
+    np.testing.assert_allclose(found.boxes, [moved.box(60)])
+
+
+def test_heights_are_learned_from_people_of_whom_both_are_sure() -> None:
+    # The blobs are those of pairs who walk side by side: nobody is alone.
+    pairs = [
+        Figure(10 + 40 * place, foot, speed=1.0, begin=40, color=color)
+        for foot in (180, 230)
+        for place, color in ((0, (40, 60, 190)), (0.7, (190, 60, 40)))
+    ]
+    network = ListedNetwork(lambda frame: [(pair.box(frame), 0.95) for pair in pairs])
+    background = BackgroundDetector()
+    detector = FusedDetector(background, network)
+    for network.frame in range(120):
+        detector.detect(picture(pairs, network.frame), network.frame)
+    assert background.height_model is not None
+    for foot in (180.0, 230.0):
+        expected = 0.7 * foot - 40.0
+        assert background.height_model.expected_height(np.array([foot]))[0] == pytest.approx(
+            expected, rel=0.1
+        )
+
+
+def test_a_recording_is_prepared_by_network_and_background() -> None:
+    network = ListedNetwork(lambda frame: [(WALKER.box(frame), 0.9)] if frame >= WALKER.begin else [])
+    detector = FusedDetector(BackgroundDetector(), network)
+
+    def scanned() -> Iterator[Image]:
+        for network.frame in range(0, 160, 20):
+            yield picture([WALKER], network.frame)
+
+    detector.prepare(scanned(), every=20)
+    network.frame = 100
+    found = detector.detect(picture([WALKER], 100))
+    assert score_at(found, WALKER.box(100)) > 0.9
+    assert found.boxes.max() <= WIDTH
+
+
+def test_settings_are_shares() -> None:
+    with pytest.raises(ValueError, match=r"min_probability is between 0 and 1, not 1.5"):
+        FusedSettings(min_probability=1.5)

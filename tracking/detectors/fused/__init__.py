@@ -1,0 +1,1 @@
+"""A network's boxes and the silhouettes of the foreground as hypotheses of one explanation."""

@@ -1,0 +1,167 @@
+"""A network and a learned background that together detect people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats, heights, iou
+from tracking.detectors.background.detector import BackgroundDetector, ForegroundScan
+from tracking.detectors.background.motion import STILL, Motion
+from tracking.detectors.base import Image
+from tracking.detectors.fused.explanation import (
+    FusedHypotheses,
+    FusionWeights,
+    NetworkBoxes,
+    explain_frame,
+    to_log_odds,
+    to_probability,
+)
+from tracking.types import Detections
+
+_WEIGHTS = FusionWeights()
+_SURE, _NETWORK_SHARE = 0.5, 0.5
+"""Least probability of a network box that enters a person's sides, and its share in them."""
+_AGREED, _CERTAIN = 0.4, 0.8
+"""Least gain per visible area, and least probability of the network, of people whose height is learned."""
+_MARGIN, _COVERED = 0.03, 0.05
+"""Least distance of whole people to the border, in heights, and largest overlap (IoU) with one in front."""
+
+
+class PersonNetwork(Protocol):
+    """A network that finds people in single images; its scores are probabilities."""
+
+    def find(self, image: Image) -> Detections:
+        """Return the people in an image `(H, W, 3)`, without appearance."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class FusedSettings:
+    """How a network and the background are combined.
+
+    Raises:
+        ValueError: a setting is not a share.
+    """
+
+    min_probability: float = 0.25  # least probability of a person who explains foreground
+    max_unexplained: float = (
+        0.2  # share of the image that is foreground but not the network's: beyond, it detects alone
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("min_probability", "max_unexplained"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ValueError(f"{name} is between 0 and 1, not {getattr(self, name)}")
+
+
+class FusedDetector:
+    """Detects people by a network and by the foreground's silhouettes. Deterministic.
+
+    While the background is unknown, or much of the foreground is unexplained, the network detects alone.
+    """
+
+    warming_up = False
+
+    def __init__(
+        self, background: BackgroundDetector, network: PersonNetwork, settings: FusedSettings | None = None
+    ) -> None:
+        """Take over a background detector, which nobody else uses, and a network."""
+        self.settings = settings or FusedSettings()
+        self._background = background
+        self._network = network
+
+    @property
+    def appearance_bins(self) -> int:
+        """The length of a row of the histograms."""
+        return self._background.appearance_bins
+
+    def prepare(self, images: Iterable[Image], every: int) -> None:
+        """Learn the background and the height model from a recording before its first frame.
+
+        Raises:
+            ValueError: not `(H, W, 3)` uint8 images of one size.
+        """
+        found: list[Detections] = []
+
+        def searched() -> Iterator[Image]:
+            for image in images:
+                found.append(self._network.find(image))
+                yield image
+
+        self._background.prepare(searched(), every)
+        for people in found:
+            network = self._to_cells(people)
+            self._background.observe_people(network.boxes[self._is_whole(network)], every)
+
+    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+        """Return the detections of the next frame, with probabilities as scores.
+
+        Raises:
+            ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
+        """
+        scan = self._background.scan(image)
+        found = self._network.find(image)
+        network = self._to_cells(found, STILL if scan is None else scan.motion)
+        if scan is None or self._is_flooded(scan, network):
+            if scan is not None:
+                self._background.learn(scan, network.boxes[found.scores >= self.settings.min_probability])
+            grid = self._background.grid
+            boxes = self._background.to_cells(found.boxes)
+            return self._background.detections(grid.resize(image), boxes, found.scores)
+        fused = self._explain(scan, network)
+        self._background.observe_people(self._agreed_people(fused, network))
+        self._background.learn(scan, fused.boxes[: fused.person_count])
+        return self._background.detections(
+            scan.image, _average_sides(fused, network), to_probability(fused.log_odds), scan.mask, scan.motion
+        )
+
+    def _to_cells(self, found: Detections, motion: Motion = STILL) -> NetworkBoxes:
+        return NetworkBoxes(self._background.to_cells(found.boxes, motion), to_log_odds(found.scores))
+
+    def _explain(self, scan: ForegroundScan, network: NetworkBoxes) -> FusedHypotheses:
+        least = float(to_log_odds(np.array(self.settings.min_probability)))
+        # However uncertain the height of people is, those that the network sees may all be there.
+        seen = int(np.count_nonzero(network.log_odds >= least))
+        fit = replace(scan.fit, max_people=max(scan.fit.max_people, seen))
+        body = self._background.settings.box_filter.body
+        return explain_frame(scan, network, body, fit, _WEIGHTS, least)
+
+    def _is_flooded(self, scan: ForegroundScan, network: NetworkBoxes) -> bool:
+        """Return whether much of the image is foreground outside of the network's boxes."""
+        rest = scan.foreground.copy()
+        for left, top, right, bottom in np.maximum(np.rint(network.boxes), 0.0).astype(np.int64).tolist():
+            rest[top:bottom, left:right] = 0.0
+        return float(rest.sum()) > self.settings.max_unexplained * float(scan.weight.sum())
+
+    def _agreed_people(self, fused: FusedHypotheses, network: NetworkBoxes) -> Floats:
+        """Return the network's boxes `(K, 4)` of whole people where silhouettes confirm it."""
+        count = fused.person_count
+        agreed = fused.supports[:count][fused.silhouettes[:count] >= _AGREED]
+        agreed = agreed[agreed >= 0]
+        return network.boxes[agreed[self._is_whole(network)[agreed]]]
+
+    def _is_whole(self, network: NetworkBoxes) -> npt.NDArray[np.bool_]:
+        """Return which sure network boxes are inside the image and covered by no other, `(N,)`."""
+        boxes = network.boxes
+        reach = _MARGIN * heights(boxes)[:, None]
+        first, last = self._background.grid.bounds
+        is_inside = (boxes[:, :2] - reach >= first).all(axis=1) & (boxes[:, 2:] + reach <= last).all(axis=1)
+        is_in_front = boxes[:, 3][None] > boxes[:, 3][:, None]
+        is_covered = ((iou(boxes[:, None], boxes[None]) > _COVERED) & is_in_front).any(axis=1)
+        return np.asarray(is_inside & ~is_covered & (network.log_odds >= to_log_odds(np.array(_CERTAIN))))
+
+
+def _average_sides(fused: FusedHypotheses, network: NetworkBoxes) -> Floats:
+    """Return the boxes `(K, 4)` in cells, averaged with the network's where it is sure."""
+    boxes = fused.boxes.copy()
+    supported = np.flatnonzero(fused.supports >= 0)
+    supporting = fused.supports[supported]
+    is_sure = network.log_odds[supporting] >= to_log_odds(np.array(_SURE))
+    supported, supporting = supported[is_sure], supporting[is_sure]
+    boxes[supported] += _NETWORK_SHARE * (network.boxes[supporting] - boxes[supported])
+    return boxes
