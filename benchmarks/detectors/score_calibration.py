@@ -5,14 +5,15 @@
 A score's logit times *slope* plus *offset* is the logit of the probability that the box is right: that it
 overlaps a person (IoU of one half) whom no better box overlaps (Platt, Probabilistic outputs for support
 vector machines, 1999). `server/models/person_networks.py` has the constants. The errors are expected
-calibration errors, with the constants there and with the fitted ones, on the recordings of the fit and on
-others.
+calibration errors: with the constants there, with those fitted on the scenes of the title, and for each scene
+with those fitted on the others.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +71,18 @@ def fit_platt(logits: Floats, right: NDArray[np.bool_]) -> Platt:
     return Platt(slope, offset)
 
 
+def fit(in_use: Platt, recordings: Sequence[ScoredBoxes]) -> Platt:
+    """Return the calibration fitted to the boxes of some recordings, detected with the one in use."""
+    joined = ScoredBoxes.joined(recordings)
+    return fit_platt(in_use.logits(joined.scores), joined.right)
+
+
+def error_of(calibration: Platt, in_use: Platt, boxes: ScoredBoxes) -> float:
+    """Return the calibration error of boxes, detected with the calibration in use, with another one."""
+    probabilities = calibration.probabilities(in_use.logits(boxes.scores))
+    return replace(boxes, scores=probabilities).calibration_error
+
+
 def detect(model: InstallableModel, view: ScoredView, every: int) -> ScoredBoxes:
     """Run a network on every n-th frame of a view."""
     height, width = next(view.images(1)).shape[:2]
@@ -104,17 +117,16 @@ def measure(options: argparse.Namespace) -> None:
             name: ScoredBoxes.joined([detect(model, view, options.every) for view in views])
             for name, views in scenes.items()
         }
-        joined = ScoredBoxes.joined([found[name] for name in FITTED])
-        fitted = fit_platt(in_use.logits(joined.scores), joined.right)
+        fitted = fit(in_use, [found[name] for name in FITTED])
         for title, calibration in (("in use", in_use), ("fitted", fitted)):
-            errors = [
-                ScoredBoxes(
-                    calibration.probabilities(in_use.logits(boxes.scores)), boxes.right, boxes.people
-                ).calibration_error
-                for boxes in found.values()
-            ]
             constants = (f"{calibration.slope:.2f}", f"{calibration.offset:.2f}")
+            errors = [error_of(calibration, in_use, boxes) for boxes in found.values()]
             rows.append([model.name, title, *constants, *(f"{error:.3f}" for error in errors)])
+        without = {
+            name: fit(in_use, [boxes for other, boxes in found.items() if other != name]) for name in found
+        }
+        errors = [error_of(without[name], in_use, boxes) for name, boxes in found.items()]
+        rows.append([model.name, "cross-validated", "", "", *(f"{error:.3f}" for error in errors)])
     fitted_on = ", ".join(FITTED)
     report.table(
         f"Calibration of scores, fitted on {fitted_on}; every {options.every}th frame",
