@@ -19,6 +19,8 @@ from server.config.site_config import Config
 WINDOW_S = 2.0
 TOLERANCE = 0.1
 """A camera has recovered when the F1 score of its tracks' boxes over a window stays this close."""
+FIRST_SEED, SEED_S = 1, 0.2
+"""The first seed, and the seconds by which a disturbance begins later with the next."""
 LATER_S = 10.0
 """Seconds after the beginning from which all should be as before."""
 
@@ -52,16 +54,18 @@ class CaseScores:
 class DisturbedScene:
     """A scene that is disturbed from a frame on. All runs have the frames before in common.
 
+    With each seed a disturbance begins a little later, so that also those without random numbers vary.
+
     Args:
         scene: recordings and truth.
         config: of the site.
-        start: the first disturbed frame, from 0.
+        start: the first disturbed frame, from 0, with the first seed.
         frames: number of frames.
     """
 
     def __init__(self, scene: BenchmarkScene, config: Config, start: int, frames: int) -> None:
         self.scene, self.config, self.start, self.frames = scene, config, start, frames
-        undisturbed = self._disturbed(Undisturbed(), 0)
+        undisturbed = self._disturbed(Undisturbed(), FIRST_SEED)
         self._sources = {
             camera: DisturbedSource(partial(open_frames, config, camera, frames), undisturbed[camera])
             for camera in config.camera_ids
@@ -110,8 +114,9 @@ class DisturbedScene:
 
     def _disturbed(self, disturbance: Disturbance, seed: int) -> dict[str, Disturbed]:
         fps = self.config.site.fps
+        start = self.start + round(SEED_S * fps * (seed - FIRST_SEED))
         return {
-            camera: Disturbed(disturbance, self.start, fps, seed, index)
+            camera: Disturbed(disturbance, start, fps, seed, index)
             for index, camera in enumerate(self.config.camera_ids)
         }
 

@@ -31,8 +31,8 @@ _CENTERNET_STRIDE, _CENTERNET_SIDE = 4, 512
 _SSD_SIDE, _SSD_CELLS, _SSD_PERSON = 300, (19, 10, 5, 3, 2, 1), 4
 
 # Slope and offset of a score's logit that make it the probability of a person (Platt, Probabilistic outputs
-# for support vector machines, 1999). `python -m benchmarks.detectors.score_calibration` fits them. Errors: .05
-# to .14 on terrace and pets09; .03 (NanoDet), .06 (CenterNet) and .23 (SSD) on terrace2.
+# for support vector machines, 1999). Fitted by `python -m benchmarks.detectors.score_calibration`. Errors:
+# .05 to .14 on terrace and pets09; .03 (NanoDet), .06 (CenterNet) and .23 (SSD) on terrace2.
 SSD_CALIBRATION, NANODET_CALIBRATION, CENTERNET_CALIBRATION = (4.2, 1.5), (2.9, 1.2), (3.6, 1.3)
 
 

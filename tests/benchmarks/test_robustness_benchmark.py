@@ -12,12 +12,12 @@ import pytest
 from benchmarks.common.detection_scores import ScoredBoxes
 from benchmarks.robustness import __main__ as robustness
 from benchmarks.robustness.cases import Undisturbed, recovery_s
-from benchmarks.robustness.disturbances.base import Disturbance
+from benchmarks.robustness.disturbances.base import Disturbance, Moment
 from benchmarks.robustness.disturbances.catalog import CATALOG, STRENGTHS
 from benchmarks.robustness.disturbances.lens import Covered
 from benchmarks.robustness.disturbances.light import Gain
 from benchmarks.robustness.disturbances.motion import Knock, Sway
-from benchmarks.robustness.disturbances.transmission import Frozen
+from benchmarks.robustness.disturbances.transmission import Frozen, LowRateH264
 from benchmarks.robustness.disturbed_views import Disturbed, DisturbedSource
 from benchmarks.scene_runs.scores import rolling_f1
 from fakes.media.videos import write_timed
@@ -95,6 +95,14 @@ def test_a_disturbance_begins_at_its_frame_with_its_strength_and_is_equal_in_eve
 def test_a_disturbance_of_some_seconds_ends_and_one_of_one_camera_spares_the_others() -> None:
     assert changed(frames_of(Gain(factor=0.5, lasts_s=1.5))) == list(range(START, START + 15))
     assert changed(frames_of(Gain(factor=0.5, one_camera=True), camera=1)) == []
+
+
+def test_compressed_pictures_are_those_of_their_frames() -> None:
+    effect = LowRateH264(crf=40).begin()
+    for frame, level in enumerate((40, 90, 200, 120)):
+        image = effect(np.full((96, 128, 3), level, dtype=np.uint8), Moment(frame, frame / FPS, 1, 0))
+        assert image is not None
+        assert abs(float(image.mean()) - level) < 5
 
 
 def test_the_background_is_learned_before_the_disturbance() -> None:
