@@ -9,12 +9,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from tracking.detectors.background.local_light import find_local_light, reduce_to_cells, relight, unlight
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
 from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves, fit_tone_curves
-from tracking.detectors.base import Image, Mask, require_at_least_one
+from tracking.detectors.base import Image, Mask, Plane, require_at_least_one
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,7 @@ class MedianBackground:
         self._exact: npt.NDArray[np.float32] | None = None
         self._rounded: Image | None = None
         self._curves: ToneCurves | None = None
+        self._gain: Plane | None = None
         self._unlikely: Mask | None = None
         self._last: Image | None = None
         """The last frame, where the background is."""
@@ -77,7 +79,8 @@ class MedianBackground:
             return None
         motion = self._registration.find_still(image)
         aligned = _aligned(image, motion, self._rounded)
-        return self._compare(aligned, motion, self._rounded, fit_tone_curves(aligned, self._rounded))
+        curves, gain = self._fit_light(aligned, self._rounded, None)
+        return self._compare(aligned, motion, self._rounded, curves, gain)
 
     def segment(self, image: Image) -> Segmentation | None:
         """Segment the next frame; `None` while the background is unknown."""
@@ -87,11 +90,14 @@ class MedianBackground:
         if background is None:
             return None
         before, looks = self._curves, self._registration.is_due()
-        aligned, motion, curves = self._align(image, background, before, looks=looks)
+        aligned, motion = self._align(image, background, before, looks=looks)
+        curves, gain = self._fit_light(aligned, background, before)
         if not looks and before is not None and curves.agreement < before.agreement - _MOVED:
-            aligned, motion, curves = self._align(image, background, before, looks=True)
-        self._last, self._curves = aligned, curves
-        segmentation = self._compare(aligned, motion, background, curves)
+            aligned, motion = self._align(image, background, before, looks=True)
+            if motion != self._registration.rest:
+                curves, gain = self._fit_light(aligned, background, before)
+        self._last, self._curves, self._gain = aligned, curves, gain
+        segmentation = self._compare(aligned, motion, background, curves, gain)
         self._relearn_on_light_change(segmentation.foreground | segmentation.shadow)
         return segmentation
 
@@ -110,7 +116,8 @@ class MedianBackground:
         checks_static, updates = self._static_filter.is_due(), self._frames % self._settings.learn_every == 0
         if not (checks_static or updates):
             return
-        leveled = self._curves.invert(self._last, self._rounded)
+        leveled = self._last if self._gain is None else unlight(self._last, self._gain)
+        leveled = self._curves.invert(leveled, self._rounded)
         static = self._static_filter.find(leveled, self._rounded, foreground) if checks_static else None
         if static is not None:
             self._exact[static > 0] = leveled[static > 0]
@@ -125,29 +132,54 @@ class MedianBackground:
 
     def _align(
         self, image: Image, background: Image, before: ToneCurves | None, *, looks: bool
-    ) -> tuple[Image, Motion, ToneCurves]:
-        """Return a frame where the background is, its motion and its tone curves.
-
-        Without `looks` the camera is taken to rest.
-        """
+    ) -> tuple[Image, Motion]:
+        """Return a frame where the background is, and its motion; without `looks` the camera is at rest."""
         motion = self._registration.rest
         if looks:
             motion = self._registration.find(image, before or IDENTITY, self._unlikely)
         outside = background if motion == STILL or before is None else before.apply(background)
-        aligned = _aligned(image, motion, outside)
-        return aligned, motion, fit_tone_curves(aligned, background, self._unlikely, before)
+        return _aligned(image, motion, outside), motion
 
-    def _compare(self, image: Image, motion: Motion, background: Image, curves: ToneCurves) -> Segmentation:
+    def _fit_light(
+        self, image: Image, background: Image, before: ToneCurves | None
+    ) -> tuple[ToneCurves, Plane | None]:
+        """Return the tone curves of an aligned frame, and the gain of its local light, if there is one.
+
+        What is left of the last frame's curves in a part of the picture is local light; it is taken away
+        before the curves are fitted, which would follow it otherwise.
+        """
+        cells, background_cells = reduce_to_cells(image), reduce_to_cells(background)
+        curves = before or fit_tone_curves(image, background)
+        light = find_local_light(cells, curves.apply(background_cells))
+        if light is not None and (sign := light.exposure_sign):
+            rest, outside = light.without(sign), light.outside(sign, image.shape)
+            unlit = unlight(image, rest.gain(image.shape)) if rest.sign.any() else image
+            curves = fit_tone_curves(unlit, background, outside)
+            light = find_local_light(cells, curves.apply(background_cells))
+        gain = None if light is None else light.gain(image.shape)
+        unlit = image if gain is None else unlight(image, gain)
+        return fit_tone_curves(unlit, background, self._unlikely, curves), gain
+
+    def _compare(
+        self, image: Image, motion: Motion, background: Image, curves: ToneCurves, gain: Plane | None = None
+    ) -> Segmentation:
         """Return the segmentation of an aligned image against the background at the image's light."""
         expected = curves.apply(background)
         if curves.noise > _NOISY:
             image, expected = _smoothed(image), _smoothed(expected)
-        blue, green, red = cv2.split(cv2.absdiff(image, expected))
-        difference = cv2.max(cv2.max(blue, green), red)
-        _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
-        mask = np.asarray(binary, dtype=np.uint8)
+        difference = _difference(image, expected)
+        if gain is not None:
+            lit = relight(expected, gain)
+            lit_difference = _difference(image, lit)
+            np.copyto(expected, lit, where=(lit_difference < difference)[..., None])
+            difference = np.minimum(difference, lit_difference)
+        mask = self._exceeding(difference)
         shadow = shadow_mask(image, expected, mask, self._shadows)
         return Segmentation(mask & ~shadow, shadow, image, motion)
+
+    def _exceeding(self, difference: Mask) -> Mask:
+        _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
+        return np.asarray(binary, dtype=np.uint8)
 
     def _bootstrap(self, image: Image) -> None:
         settings = self._settings
@@ -201,6 +233,12 @@ _NOISY = 6.0
 
 def _smoothed(image: Image) -> Image:
     return np.asarray(cv2.GaussianBlur(image, (5, 5), 0.0), dtype=np.uint8)
+
+
+def _difference(image: Image, expected: Image) -> Mask:
+    """Return the largest difference of the channels, `(H, W)`."""
+    blue, green, red = cv2.split(cv2.absdiff(image, expected))
+    return np.asarray(cv2.max(cv2.max(blue, green), red), dtype=np.uint8)
 
 
 def _aligned(image: Image, motion: Motion, outside: Image) -> Image:

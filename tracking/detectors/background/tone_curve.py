@@ -32,7 +32,7 @@ _OUTLIER = 14.0
 _OUTLIERS_OF_SEARCH = (24.0, 18.0, _OUTLIER)
 # A jump of the exposure is sought if less than a share of the pairs agree with the curve that was tracked, or
 # so many fewer than in the frame before; and found if a curve has so many more.
-_TRACKED_SHARE, _JUMP_SHARE, _BETTER_SHARE = 0.6, 0.03, 0.02
+_TRACKED_SHARE, _JUMP_SHARE, _BETTER_SHARE = 0.6, 0.03, 0.1
 # Levels of the background and of the frame per bin of the histogram in which a jump is sought; the kernel
 # that smooths the latter; and the cost, in pixels, of a step that is twice or not at all that of a line.
 _PATH_OLD, _PATH_NEW = 16, 4
