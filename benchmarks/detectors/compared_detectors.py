@@ -5,15 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import cv2
 import numpy as np
 
+from benchmarks.common.detector_names import detector_names, detector_settings
 from benchmarks.detectors.scored_views import ScoredView
-from server.config.sections.detect import DetectorKind
-from server.models.catalog import MODELS
-from server.models.installed import is_installed
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.detectors import Detector, Image
 from tracking.detectors.ignore_mask import Polygons, visible_mask
@@ -75,22 +73,18 @@ class ComparedDetector:
 
 _TITLES = {"background": MYVIEW, "boxes": "the paper's box filters", "hog": "OpenCV's HOG"}
 """Titles of kinds of detectors."""
+_ALONE = ("boxes",)
+"""Detectors whose boxes other trackers do not get."""
 
 
 def compared_detectors() -> list[ComparedDetector]:
-    """Return all kinds of detectors, connected components, and the networks that are installed."""
-    kinds = [kind for kind in get_args(DetectorKind) if kind != "onnx"]
+    """Return all detectors, with the networks that are installed, and connected components."""
     return [
         *(
-            ComparedDetector(_TITLES.get(kind, kind), {"kind": kind}, with_other_trackers=kind != "boxes")
-            for kind in kinds
+            ComparedDetector(_TITLES.get(name, name), detector_settings(name), name not in _ALONE)
+            for name in detector_names()
         ),
         ComparedDetector("MOG2 + connected components", None),
-        *(
-            ComparedDetector(model.name, {"kind": "onnx", "onnx": {"model": model.name}})
-            for model in MODELS
-            if is_installed(model)
-        ),
     ]
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 import cv2
 
 from benchmarks.bestview.scenes import BenchmarkScene
+from benchmarks.common.detector_names import detector_settings
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.scene_runs.options import (
@@ -32,7 +33,7 @@ from benchmarks.scene_runs.options import (
     selected_scenes,
     track_cells,
 )
-from benchmarks.scene_runs.pipeline_run import detector_settings, length_in_frames, open_frames, run_scene
+from benchmarks.scene_runs.pipeline_run import length_in_frames, open_frames, run_scene
 from benchmarks.scene_runs.scores import score_run
 from server.camera.sources.frame_timing import frame_index
 from server.cli.render.plots import new_figure, save_figure

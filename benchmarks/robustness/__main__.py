@@ -30,6 +30,7 @@ import cv2
 import numpy as np
 
 from benchmarks.bestview.scenes import BenchmarkScene
+from benchmarks.common.detector_names import detector_settings
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.robustness.cases import FIRST_SEED, CaseScores, DisturbedScene, Undisturbed
@@ -44,7 +45,7 @@ from benchmarks.scene_runs.options import (
     selected_scenes,
     track_cells,
 )
-from benchmarks.scene_runs.pipeline_run import detector_settings, length_in_frames
+from benchmarks.scene_runs.pipeline_run import length_in_frames
 
 COLUMNS = (*("", *DETECTION_COLUMNS, *TRACK_COLUMNS, "cost", "worst", "later", "cost", "seen", "recovery"),)
 

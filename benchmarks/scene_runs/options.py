@@ -26,7 +26,9 @@ def add_options(options: argparse.ArgumentParser, scenes: Sequence[str] = (*RECO
     """Add the options that select scenes, detectors and frames."""
     options.add_argument("--scene", action="append", choices=scenes, help="may be repeated")
     options.add_argument(
-        "--detector", action="append", help="detect.kind, or an installed network; may be repeated"
+        "--detector",
+        action="append",
+        help="a kind, an installed network, or both: fused+nanodet; may be repeated",
     )
     options.add_argument("--frames", type=int, default=_ALL_FRAMES, help="maximum of each camera")
     options.set_defaults(all_scenes=scenes)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from benchmarks.bestview.service_decisions import Rendering, decide
 from benchmarks.detectors.compared_detectors import rows_of
@@ -16,7 +15,6 @@ from server.camera.sources.opening import open_video
 from server.cli.render.camera_workers import run_cameras
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks
-from server.models.catalog import find_model
 from tracking.motchallenge import MotRow
 
 
@@ -142,10 +140,3 @@ def length_in_frames(config: Config) -> int:
         opened.container.close()
         lengths.append(round(opened.frames / opened.fps * config.site.fps))
     return min(lengths)
-
-
-def detector_settings(name: str) -> dict[str, Any]:
-    """Return the section `detect` for an installed network, or for a kind of detector."""
-    if find_model(name) is None:
-        return {"kind": name}
-    return {"kind": "onnx", "onnx": {"model": name}}

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 
+from benchmarks.common.detector_names import detector_settings
 from benchmarks.common.environment import CannotRunError
 from benchmarks.detectors.compared_detectors import BlobDetector, compared_detectors, rows_of
 from benchmarks.detectors.score_calibration import Platt, fit_platt
 from benchmarks.detectors.scored_views import ScoredView, oracle, scores_of_boxes, scores_of_tracks, views_of
-from server.config.sections.detect import DetectorKind
 from server.models.catalog import MODELS
 from tracking.motchallenge import MotRow
 
@@ -50,12 +49,12 @@ def test_blobs_are_boxes_of_moving_objects() -> None:
     np.testing.assert_allclose(row.box, (58, 30, 83, 90), atol=4)
 
 
-def test_all_kinds_of_detectors_are_compared_and_find_nothing_in_an_empty_room(
+def test_detectors_without_a_network_are_compared_and_find_nothing_in_an_empty_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MYVIEW_MODELS", str(tmp_path))
     compared = compared_detectors()
-    assert {spec.detect["kind"] for spec in compared if spec.detect} == set(get_args(DetectorKind)) - {"onnx"}
+    assert {spec.detect["kind"] for spec in compared if spec.detect} == {"background", "boxes", "hog"}
     view = ScoredView({"id": "c0", "source": "none.mp4", "ignore": [[[0, 0], [9, 0], [9, 9]]]}, None, 0.3)
     empty = np.full((120, 160, 3), 90, dtype=np.uint8)
     for spec in compared:
@@ -65,8 +64,11 @@ def test_all_kinds_of_detectors_are_compared_and_find_nothing_in_an_empty_room(
 def test_installed_networks_are_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYVIEW_MODELS", str(tmp_path))
     (tmp_path / f"{MODELS[0].name}.onnx").touch()
-    networks = [spec.detect for spec in compared_detectors() if spec.name == MODELS[0].name]
-    assert networks == [{"kind": "onnx", "onnx": {"model": MODELS[0].name}}]
+    network = {"onnx": {"model": MODELS[0].name}}
+    compared = [spec.detect for spec in compared_detectors()]
+    assert {"kind": "onnx", **network} in compared
+    assert {"kind": "fused", **network} in compared
+    assert detector_settings(f"fused+{MODELS[0].name}") == {"kind": "fused", **network}
 
 
 def test_the_fit_of_a_calibration_finds_the_constants_that_made_the_scores() -> None:
