@@ -65,8 +65,8 @@ def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) 
     with _as_user_error(f"camera {camera.id}: detect"):
         settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
         if camera.kind == "overhead":
-            return _create_detector(overhead_settings(settings), None)
-        return _create_detector(settings, _floor(config, camera, letterbox))
+            return _create_detector(overhead_settings(settings), None, config.site.fps)
+        return _create_detector(settings, _floor(config, camera, letterbox), config.site.fps)
 
 
 def make_prescanned_detector(
@@ -120,7 +120,9 @@ def _floor(config: Config, camera: CameraSettings, letterbox: Letterbox) -> Floo
     return FloorGeometry(horizon, slope) if _MIN_SLOPE <= slope <= _MAX_SLOPE else None
 
 
-def _create_detector(settings: DetectSettings, floor: FloorGeometry | None) -> CameraDetector:
+def _create_detector(
+    settings: DetectSettings, floor: FloorGeometry | None, frame_rate: float
+) -> CameraDetector:
     """Return the detector that the settings name."""
     appearance = AppearanceExtractor(settings.appearance, settings.gray_bins)
     match settings.kind:
@@ -129,9 +131,8 @@ def _create_detector(settings: DetectSettings, floor: FloorGeometry | None) -> C
         case "onnx":
             return _open_network(settings, appearance)
         case "fused":
-            return FusedDetector(
-                BackgroundDetector(settings, floor), _open_network(settings, appearance), settings.fused
-            )
+            background = BackgroundDetector(settings, floor)
+            return FusedDetector(background, _open_network(settings, appearance), settings.fused, frame_rate)
         case "boxes":
             return BackgroundDetector(paper_settings(settings))
         case "background":

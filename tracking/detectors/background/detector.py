@@ -250,11 +250,10 @@ class BackgroundDetector:
         return Detections(self.grid.work_to_image(in_work), scores, histograms)
 
     def to_cells(self, boxes: npt.NDArray[np.float64], motion: Motion = STILL) -> npt.NDArray[np.float64]:
-        """Return boxes `(N, 4)` of a frame, in its pixels, in cells of the background."""
-        in_work = self.grid.image_to_work(boxes)
+        """Return boxes `(N, 4)` of a frame, in pixels of the working image, in cells of the background."""
         if motion != STILL:
-            in_work = motion.move_boxes_back(in_work, self.grid.work_size)
-        return self.grid.work_to_cells(in_work)
+            boxes = motion.move_boxes_back(boxes, self.grid.work_size)
+        return self.grid.work_to_cells(boxes)
 
     @property
     def grid(self) -> CellGrid:

@@ -13,6 +13,7 @@ from tracking.boxes import Floats, heights, iou
 from tracking.detectors.background.detector import BackgroundDetector, ForegroundScan
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.base import Image
+from tracking.detectors.fused.carried_boxes import CarriedBoxes
 from tracking.detectors.fused.explanation import (
     FusedHypotheses,
     FusionWeights,
@@ -21,6 +22,7 @@ from tracking.detectors.fused.explanation import (
     to_log_odds,
     to_probability,
 )
+from tracking.detectors.fused.schedule import NetworkSchedule
 from tracking.types import Detections
 
 _WEIGHTS = FusionWeights()
@@ -30,6 +32,11 @@ _AGREED, _CERTAIN = 0.4, 0.8
 """Least gain per visible area, and least probability of the network, of people whose height is learned."""
 _MARGIN, _COVERED = 0.03, 0.05
 """Least distance of whole people to the border, in heights, and largest overlap (IoU) with one in front."""
+
+_CROSSING = 0.2
+"""Overlap (IoU) of two people from which they are about to cross."""
+_KNOWN = 0.3
+"""Least overlap (IoU) of a person with one who was there at the last run; below, somebody is new."""
 
 
 class PersonNetwork(Protocol):
@@ -45,18 +52,23 @@ class FusedSettings:
     """How a network and the background are combined.
 
     Raises:
-        ValueError: a setting is not a share.
+        ValueError: a setting is out of range.
     """
 
     min_probability: float = 0.25  # least probability of a person who explains foreground
     max_unexplained: float = (
         0.2  # share of the image that is foreground but not the network's: beyond, it detects alone
     )
+    network_interval_s: float = (
+        0.2  # seconds between two runs of the network; half where needed; 0: every frame
+    )
 
     def __post_init__(self) -> None:
         for name in ("min_probability", "max_unexplained"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ValueError(f"{name} is between 0 and 1, not {getattr(self, name)}")
+        if self.network_interval_s < 0.0:
+            raise ValueError(f"network_interval_s is at least 0, not {self.network_interval_s}")
 
 
 class FusedDetector:
@@ -68,12 +80,22 @@ class FusedDetector:
     warming_up = False
 
     def __init__(
-        self, background: BackgroundDetector, network: PersonNetwork, settings: FusedSettings | None = None
+        self,
+        background: BackgroundDetector,
+        network: PersonNetwork,
+        settings: FusedSettings | None = None,
+        frame_rate: float = 25.0,
     ) -> None:
-        """Take over a background detector, which nobody else uses, and a network."""
+        """Take over a background detector, which nobody else uses, and a network; frames are per second."""
         self.settings = settings or FusedSettings()
         self._background = background
         self._network = network
+        self._schedule = NetworkSchedule(self.settings.network_interval_s, frame_rate)
+        self._carried = CarriedBoxes()
+        self._known = np.empty((0, 4))
+        """The people at the last run of the network, in cells."""
+        self._is_needed = True
+        self._frame = -1
 
     @property
     def appearance_bins(self) -> int:
@@ -95,32 +117,54 @@ class FusedDetector:
 
         self._background.prepare(searched(), every)
         for people in found:
-            network = self._to_cells(people)
+            in_work = replace(people, boxes=self._background.grid.image_to_work(people.boxes))
+            network = self._to_cells(in_work)
             self._background.observe_people(network.boxes[self._is_whole(network)], every)
 
-    def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
+    def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Return the detections of the next frame, with probabilities as scores.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
+        self._frame = self._frame + 1 if frame is None else frame
         scan = self._background.scan(image)
-        found = self._network.find(image)
-        network = self._to_cells(found, STILL if scan is None else scan.motion)
-        if scan is None or self._is_flooded(scan, network):
+        grid = self._background.grid
+        work_image = grid.resize(image)
+        runs = self._schedule.is_due(self._frame, needed=self._is_needed)
+        if runs:
+            found = self._network.find(image)
+            self._carried.renew(work_image, replace(found, boxes=grid.image_to_work(found.boxes)))
+        else:
+            self._carried.carry(work_image)
+        found = self._carried.found
+        if scan is None or self._is_flooded(scan, found):
+            self._is_needed = True
             if scan is not None:
-                self._background.learn(scan, network.boxes[found.scores >= self.settings.min_probability])
-            grid = self._background.grid
-            boxes = self._background.to_cells(found.boxes)
-            return self._background.detections(grid.resize(image), boxes, found.scores)
+                people = self._to_cells(found, scan.motion).boxes
+                self._background.learn(scan, people[found.scores >= self.settings.min_probability])
+            boxes = grid.work_to_cells(found.boxes)
+            return self._background.detections(work_image, boxes, found.scores)
+        network = self._to_cells(found, scan.motion)
         fused = self._explain(scan, network)
-        self._background.observe_people(self._agreed_people(fused, network))
+        if runs:
+            self._background.observe_people(self._agreed_people(fused, network))
+            self._known = fused.boxes[: fused.person_count]
+        self._is_needed = self._needs_network(fused)
         self._background.learn(scan, fused.boxes[: fused.person_count])
         return self._background.detections(
             scan.image, _average_sides(fused, network), to_probability(fused.log_odds), scan.mask, scan.motion
         )
 
+    def _needs_network(self, fused: FusedHypotheses) -> bool:
+        """Return whether somebody seems to be new or two people are about to cross."""
+        people = fused.boxes[: fused.person_count]
+        overlaps = np.triu(iou(people[:, None], people[None]), 1)
+        is_new = iou(people[:, None], self._known[None]).max(axis=1, initial=0.0) < _KNOWN
+        return bool((overlaps >= _CROSSING).any() or is_new.any())
+
     def _to_cells(self, found: Detections, motion: Motion = STILL) -> NetworkBoxes:
+        """Return boxes in pixels of the working image in cells of the background."""
         return NetworkBoxes(self._background.to_cells(found.boxes, motion), to_log_odds(found.scores))
 
     def _explain(self, scan: ForegroundScan, network: NetworkBoxes) -> FusedHypotheses:
@@ -131,10 +175,11 @@ class FusedDetector:
         body = self._background.settings.box_filter.body
         return explain_frame(scan, network, body, fit, _WEIGHTS, least)
 
-    def _is_flooded(self, scan: ForegroundScan, network: NetworkBoxes) -> bool:
+    def _is_flooded(self, scan: ForegroundScan, found: Detections) -> bool:
         """Return whether much of the image is foreground outside of the network's boxes."""
         rest = scan.foreground.copy()
-        for left, top, right, bottom in np.maximum(np.rint(network.boxes), 0.0).astype(np.int64).tolist():
+        boxes = self._to_cells(found, scan.motion).boxes
+        for left, top, right, bottom in np.maximum(np.rint(boxes), 0.0).astype(np.int64).tolist():
             rest[top:bottom, left:right] = 0.0
         return float(rest.sum()) > self.settings.max_unexplained * float(scan.weight.sum())
 
