@@ -9,7 +9,8 @@ who can no longer be seen in a camera do not count there.
 
 *rec.*, *prec.*, *AP* are of all cameras' detections since the disturbance began, the first two of confident
 ones; *HOTA* and *IDF1* are means over the cameras, *joint* is the IDF1 over all cameras, of the whole
-recording. *cost* is the loss of joint IDF1 in points, *worst* the largest of all seeds. *later* is the joint
+recording. *cost* is the loss of joint IDF1 in points, on the people who can still be seen; *worst* is the
+largest of all seeds. *later* is the joint
 IDF1 of what follows 10 seconds after the beginning, scored as a recording of its own, with its loss. *seen*
 is the share of the frames since the beginning in which a person's chosen view shows them. *recovery* is the
 time after the beginning from which the F1 score of the tracks' boxes over 2 seconds stays within .1 of the
@@ -33,7 +34,7 @@ from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.common.detector_names import detector_settings
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
-from benchmarks.robustness.cases import FIRST_SEED, CaseScores, DisturbedScene, Undisturbed
+from benchmarks.robustness.cases import FIRST_SEED, Case, DisturbedScene
 from benchmarks.robustness.disturbances.catalog import CATALOG, STRENGTHS
 from benchmarks.robustness.plots import plot_costs
 from benchmarks.scene_runs.options import (
@@ -52,43 +53,32 @@ COLUMNS = (*("", *DETECTION_COLUMNS, *TRACK_COLUMNS, "cost", "worst", "later", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """The scores of a disturbance of one strength, for all seeds."""
+    """A disturbance of one strength, with all seeds."""
 
     name: str
-    strength: str
-    scores: Sequence[CaseScores]
-    recovery_s: float
-    """The longest of all seeds."""
+    cases: Sequence[Case]
 
     @property
-    def joint(self) -> list[float]:
-        """The joint IDF1 of each seed, percent."""
-        return [100.0 * score.whole.tracks.joint.idf1 for score in self.scores]
+    def cost(self) -> float:
+        """The mean loss of joint IDF1, in points."""
+        return float(np.mean([case.cost for case in self.cases]))
 
-    @property
-    def later(self) -> float:
-        """The mean joint IDF1 of what follows later, percent; NaN: nothing does."""
-        return float(np.mean([_later(score) for score in self.scores]))
-
-    def cells(self, undisturbed: Row) -> list[str]:
+    def cells(self) -> list[str]:
         """Return the row's cells."""
-        since = [score.since for score in self.scores]
-        cost, worst = (np.mean(undisturbed.joint) - value for value in (np.mean(self.joint), min(self.joint)))
-        later = self.later
+        since = [case.disturbed.since for case in self.cases]
+        later = np.mean([case.disturbed.later_joint for case in self.cases])
+        later_cost = np.mean([case.later_cost for case in self.cases])
+        recovery = max(case.recovery_s for case in self.cases)
         return [
-            f"{self.name} {self.strength}".strip(),
+            self.name,
             *detection_cells(since),
-            *track_cells([score.whole for score in self.scores]),
-            f"{cost:.1f}",
-            f"{worst:.1f}",
-            *((f"{later:.1f}", f"{undisturbed.later - later:.1f}") if np.isfinite(later) else ("", "")),
+            *track_cells([case.disturbed.whole for case in self.cases]),
+            f"{self.cost:.1f}",
+            f"{max(case.cost for case in self.cases):.1f}",
+            *((f"{later:.1f}", f"{later_cost:.1f}") if np.isfinite(later) else ("", "")),
             f"{100 * np.mean([score.visible for score in since]):.1f}",
-            "never" if np.isinf(self.recovery_s) else f"{self.recovery_s:.1f} s",
+            "never" if np.isinf(recovery) else f"{recovery:.1f} s",
         ]
-
-
-def _later(score: CaseScores) -> float:
-    return float("nan") if score.later is None else 100.0 * score.later.tracks.joint.idf1
 
 
 def measure_scene(
@@ -98,24 +88,18 @@ def measure_scene(
     config = scene.config(detect=detector_settings(detector))
     frames = min(length_in_frames(config), options.frames)
     start = frames // 2 if options.start is None else options.start
-    disturbed_scene = DisturbedScene(scene, config, start, frames)
-    undisturbed = disturbed_scene.run(Undisturbed(), FIRST_SEED)
-    truth = scene.gt or undisturbed.rendering.tracks
-    reference = disturbed_scene.score(undisturbed, truth, Undisturbed(), FIRST_SEED)
-    rows = [Row("undisturbed", "", [reference], 0.0)]
+    disturbed = DisturbedScene(scene, config, start, frames)
+    rows = [Row("undisturbed", [Case(disturbed.undisturbed, disturbed.undisturbed, 0.0)])]
     for name in options.disturbance or CATALOG:
         for strength in options.strength or STRENGTHS:
-            disturbance = CATALOG[name][strength]
-            scores = [
-                disturbed_scene.score(disturbed_scene.run(disturbance, seed), truth, disturbance, seed)
-                for seed in options.seed or [FIRST_SEED]
+            cases = [
+                disturbed.measure(CATALOG[name][strength], number) for number in options.seed or [FIRST_SEED]
             ]
-            recovery = max(disturbed_scene.recovery_s(score, reference) for score in scores)
-            rows.append(Row(name, strength, scores, recovery))
-            print(" ".join(rows[-1].cells(rows[0])), flush=True)
+            rows.append(Row(f"{name} {strength}", cases))
+            print(" ".join(rows[-1].cells()), flush=True)
     against = "" if scene.gt else ", against the tracks of the undisturbed run"
     title = f"{scene.name}, {detector}: {frames} frames, disturbed from {start} on{against}"
-    report.table(title, COLUMNS, [row.cells(rows[0]) for row in rows])
+    report.table(title, COLUMNS, [row.cells() for row in rows])
     return rows
 
 
@@ -123,15 +107,12 @@ def measure(options: argparse.Namespace) -> None:
     """Measure all scenes; print and save tables and plot."""
     cv2.setNumThreads(1)
     report = Report()
-    costs: dict[str, Mapping[tuple[str, str], float]] = {}
+    costs: dict[str, Mapping[str, float]] = {}
     with tempfile.TemporaryDirectory(prefix="myview-robustness-") as folder:
         for scene in selected_scenes(options, Path(folder), report):
             for detector in selected_detectors(options):
                 rows = measure_scene(report, scene, detector, options)
-                costs[f"{scene.name}, {detector}"] = {
-                    (row.name, row.strength): float(np.mean(rows[0].joint) - np.mean(row.joint))
-                    for row in rows[1:]
-                }
+                costs[f"{scene.name}, {detector}"] = {row.name: row.cost for row in rows[1:]}
     report.save(options.out / "robustness.txt")
     plot_costs(costs, options.out / "robustness.png")
 

@@ -43,19 +43,18 @@ class Disturbed:
 
     def truth(self, rows: Sequence[MotRow], size: tuple[int, int]) -> list[MotRow]:
         """Return the true boxes, moved with the picture; people who are not seen get the confidence 0."""
-        by_frame: dict[int, list[MotRow]] = {}
+        changes: dict[int, tuple[Affine | None, Floats | None]] = {}
+        seen = []
         for row in rows:
-            by_frame.setdefault(row.frame, []).append(row)
-        return [row for frame, people in by_frame.items() for row in self._truth_of(frame, people, size)]
-
-    def _truth_of(self, frame: int, people: list[MotRow], size: tuple[int, int]) -> list[MotRow]:
-        moment = self.moment(frame - 1)
-        if moment is None:
-            return people
-        matrix, cover = self.disturbance.motion(moment, size), self.disturbance.cover(moment, size)
-        if matrix is not None:
-            people = [_moved(row, matrix, size) for row in people]
-        return people if cover is None else [_uncovered(row, cover) for row in people]
+            moment = self.moment(row.frame - 1)
+            if moment is not None:
+                if row.frame not in changes:
+                    motion = self.disturbance.motion(moment, size)
+                    changes[row.frame] = motion, self.disturbance.cover(moment, size)
+                seen.append(_changed(row, *changes[row.frame], size))
+            else:
+                seen.append(row)
+        return seen
 
 
 class DisturbedSource:
@@ -94,6 +93,11 @@ class DisturbedSource:
     def close(self) -> None:
         """Close the source."""
         self._source.close()
+
+
+def _changed(row: MotRow, motion: Affine | None, cover: Floats | None, size: tuple[int, int]) -> MotRow:
+    moved = row if motion is None else _moved(row, motion, size)
+    return moved if cover is None else _uncovered(moved, cover)
 
 
 def _moved(row: MotRow, matrix: Affine, size: tuple[int, int]) -> MotRow:

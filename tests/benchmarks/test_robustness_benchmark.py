@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,9 @@ def test_whoever_cannot_be_seen_does_not_count() -> None:
         (hidden,) = Disturbed(disturbance, START, FPS, 1, 0).truth([row], (WIDTH, HEIGHT))
         assert (hidden.confidence, round(hidden.visible, 2)) == (0.0, 0.0)
     beside = MotRow(START + 5, 7, 130.0, 40.0, 20.0, 40.0, visible=1.0)
-    assert Disturbed(Covered(share=0.5), START, FPS, 1, 0).truth([beside], (WIDTH, HEIGHT)) == [beside]
+    truth = [beside, row, replace(beside, frame=START), replace(row, frame=START)]
+    seen = Disturbed(Covered(share=0.5), START, FPS, 1, 0).truth(truth, (WIDTH, HEIGHT))
+    assert [other.confidence for other in seen] == [1.0, 0.0, 1.0, 1.0]
 
 
 def test_recovery_is_when_the_score_stays_as_good_as_undisturbed() -> None:
