@@ -28,6 +28,9 @@ settings.load_profile("fixed examples")
 # As in every process of a site: further threads would only spin.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# No test depends on the networks that the user has installed.
+os.environ["MYVIEW_MODELS"] = str(ROOT / "tests" / "no-networks")
+
 if sys.dont_write_bytecode:
     # Compiling takes half of a command's start, and tests start hundreds. The cache is inside .venv.
     sys.dont_write_bytecode = False

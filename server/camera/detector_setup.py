@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -10,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from bestview import camera_height, horizon_row
+from server.camera.detector_choice import choose_detector, describe_detector
 from server.camera.sources import FrameSource, Recording
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
@@ -32,6 +34,8 @@ from tracking.detectors import (
     overhead_settings,
     paper_settings,
 )
+
+log = logging.getLogger(__name__)
 
 _NO_IMAGE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -63,7 +67,8 @@ def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) 
     polygons = [letterbox.camera_to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)
     with _as_user_error(f"camera {camera.id}: detect"):
-        settings = replace(config.detect, ignore=(*config.detect.ignore, *ignore))
+        chosen = choose_detector(config.detect, camera)
+        settings = replace(chosen, ignore=(*chosen.ignore, *ignore))
         if camera.kind == "overhead":
             return _create_detector(overhead_settings(settings), None, config.site.fps)
         return _create_detector(settings, _floor(config, camera, letterbox), config.site.fps)
@@ -80,6 +85,7 @@ def make_prescanned_detector(
         UserError: the detector's files or the recording cannot be read.
     """
     detector, settings = make_detector(config, camera, letterbox), config.detect
+    log.info("camera %s: people are detected by: %s", camera.id, describe_detector(detector))
     if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
         detector.number_frames_by(source.pulse_by_frame_count)
     if isinstance(detector, BackgroundDetector | FusedDetector):
@@ -135,7 +141,7 @@ def _create_detector(
             return FusedDetector(background, _open_network(settings, appearance), settings.fused, frame_rate)
         case "boxes":
             return BackgroundDetector(paper_settings(settings))
-        case "background":
+        case "background" | "auto":
             return BackgroundDetector(settings, floor)
 
 

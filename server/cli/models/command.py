@@ -26,7 +26,9 @@ def list_models() -> None:
     for model in MODELS:
         state = "installed" if is_installed(model) else "not installed"
         typer.echo(f"{model.name:14} {state:14} licence {model.license:11} {model.title}")
-    typer.echo(f"\nFolder: {models_folder()}\nTo use one: `detect: {{kind: fused, onnx: {{model: NAME}}}}`")
+    typer.echo(
+        f"\nFolder: {models_folder()}\nThe first installed is used, or: `detect: {{onnx: {{model: NAME}}}}`"
+    )
 
 
 @app.command()

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from server.models.catalog import find_model
+from server.models.catalog import InstallableModel, find_model
 from server.models.installed import network_path
 from tracking.detectors import BackgroundSettings, FusedSettings, HogSettings, OnnxSettings
 
 _MIN_PROBABILITY = 0.05
 """The default `onnx.min_score` of installed networks."""
 
-DetectorKind = Literal["background", "boxes", "hog", "onnx", "fused"]
+DetectorKind = Literal["auto", "background", "boxes", "hog", "onnx", "fused"]
 
 
 @dataclass(frozen=True, slots=True)
 class DetectSettings(BackgroundSettings):
     """Settings of the background detector and of the detectors that can replace it."""
 
-    kind: DetectorKind = "background"  # boxes: the background detector of the paper, without extensions
+    kind: DetectorKind = "auto"  # auto: fused if a network is installed or named, otherwise background
     hog: HogSettings = field(default_factory=HogSettings)
     onnx: OnnxSettings = field(default_factory=OnnxSettings)
     fused: FusedSettings = field(default_factory=FusedSettings)
@@ -38,8 +38,11 @@ class DetectSettings(BackgroundSettings):
         installable = find_model(str(self.onnx.model))
         if installable is None:
             return replace(self.onnx, model=folder / self.onnx.model)
+        return self.with_installed(installable).onnx
+
+    def with_installed(self, model: InstallableModel) -> Self:
+        """Return the settings with the file of an installed network."""
         # Scores of installed networks are probabilities, and the tracker makes use of doubtful boxes.
         min_score = _MIN_PROBABILITY if self.onnx.min_score is None else self.onnx.min_score
-        return replace(
-            self.onnx, model=network_path(installable), resize=installable.resize, min_score=min_score
-        )
+        onnx = replace(self.onnx, model=network_path(model), resize=model.resize, min_score=min_score)
+        return replace(self, onnx=onnx)

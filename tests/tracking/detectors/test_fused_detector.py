@@ -128,6 +128,13 @@ def test_the_network_runs_earlier_for_somebody_new() -> None:
     assert [run for run in network.runs if run >= 90][:2] == [90, 93]
 
 
+def test_where_the_network_finds_nobody_the_silhouettes_count_as_without_it() -> None:
+    walkers = [Figure(10 + 80 * k, 170 + 25 * k, speed=0.5, begin=40) for k in range(3)]
+    found = detect_all(lambda _: [], walkers, range(160))
+    for walker in walkers:
+        assert mean_score(found, walker, range(130, 160)) > 0.75
+
+
 def test_heights_are_learned_from_people_of_whom_both_are_sure() -> None:
     # The blobs are those of pairs who walk side by side: nobody is alone.
     pairs = [

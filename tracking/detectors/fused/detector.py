@@ -22,6 +22,7 @@ from tracking.detectors.fused.explanation import (
     to_log_odds,
     to_probability,
 )
+from tracking.detectors.fused.reliance import NetworkReliance
 from tracking.detectors.fused.schedule import NetworkSchedule
 from tracking.types import Detections
 
@@ -33,6 +34,8 @@ _AGREED, _CERTAIN = 0.4, 0.8
 _MARGIN, _COVERED = 0.03, 0.05
 """Least distance of whole people to the border, in heights, and largest overlap (IoU) with one in front."""
 
+_CLEAR = 0.6
+"""Least gain per visible area of a clear silhouette."""
 _CROSSING = 0.2
 """Overlap (IoU) of two people from which they are about to cross."""
 _KNOWN = 0.3
@@ -89,13 +92,19 @@ class FusedDetector:
         """Take over a background detector, which nobody else uses, and a network; frames are per second."""
         self.settings = settings or FusedSettings()
         self._background = background
-        self._network = network
+        self.network = network
         self._schedule = NetworkSchedule(self.settings.network_interval_s, frame_rate)
         self._carried = CarriedBoxes()
+        self._reliance = NetworkReliance()
         self._known = np.empty((0, 4))
         """The people at the last run of the network, in cells."""
         self._is_needed = True
         self._frame = -1
+
+    @property
+    def frames_per_run(self) -> int:
+        """Frames per regular run of the network."""
+        return self._schedule.every
 
     @property
     def appearance_bins(self) -> int:
@@ -112,7 +121,7 @@ class FusedDetector:
 
         def searched() -> Iterator[Image]:
             for image in images:
-                found.append(self._network.find(image))
+                found.append(self.network.find(image))
                 yield image
 
         self._background.prepare(searched(), every)
@@ -133,7 +142,7 @@ class FusedDetector:
         work_image = grid.resize(image)
         runs = self._schedule.is_due(self._frame, needed=self._is_needed)
         if runs:
-            found = self._network.find(image)
+            found = self.network.find(image)
             self._carried.renew(work_image, replace(found, boxes=grid.image_to_work(found.boxes)))
         else:
             self._carried.carry(work_image)
@@ -148,6 +157,8 @@ class FusedDetector:
         network = self._to_cells(found, scan.motion)
         fused = self._explain(scan, network)
         if runs:
+            is_clear = fused.silhouettes[: fused.person_count] >= _CLEAR
+            self._reliance.observe(fused.supports[: fused.person_count][is_clear] >= 0)
             self._background.observe_people(self._agreed_people(fused, network))
             self._known = fused.boxes[: fused.person_count]
         self._is_needed = self._needs_network(fused)
@@ -173,7 +184,8 @@ class FusedDetector:
         seen = int(np.count_nonzero(network.log_odds >= least))
         fit = replace(scan.fit, max_people=max(scan.fit.max_people, seen))
         body = self._background.settings.box_filter.body
-        return explain_frame(scan, network, body, fit, _WEIGHTS, least)
+        weights = replace(_WEIGHTS, unsupported=self._reliance.share * _WEIGHTS.unsupported)
+        return explain_frame(scan, network, body, fit, weights, least)
 
     def _is_flooded(self, scan: ForegroundScan, found: Detections) -> bool:
         """Return whether much of the image is foreground outside of the network's boxes."""

@@ -14,6 +14,7 @@ from tracking.boxes import Floats
 from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
 from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
+from tracking.detectors.neural.providers import Provider, provider_names
 from tracking.detectors.neural.yolo_output import Layout, decode_output
 from tracking.detectors.non_maximum_suppression import non_maximum_suppression
 from tracking.types import Detections
@@ -42,6 +43,9 @@ class OnnxSettings:
         "letterbox"  # fit images into the input with bars, or stretch them
     )
     input_size: int = 640  # side of the input in pixels, if the file leaves it open
+    provider: Provider = (
+        "auto"  # what runs the network: the first that is installed, cuda, openvino, coreml, cpu
+    )
     threads: int = 1  # threads of the network; each camera has its own process
     max_detections: int = 100  # most boxes per frame
 
@@ -73,13 +77,18 @@ class OnnxDetector:
         self._ignore_filter = IgnoreFilter(ignore)
         if settings.model is None:
             raise ValueError("no model is given: the path of an ONNX file")
-        self._session = _open_session(settings.model, settings.threads)
+        self._session = _open_session(settings.model, settings.threads, settings.provider)
         self._name, self._size, self._type = _input_of(self._session, settings)
         # Run a blank image, to detect an unusable network before the first frame.
         try:
             self.detect(np.zeros((*self._size, 3), dtype=np.uint8))
         except ValueError as error:
             raise ValueError(f"{settings.model}: {error}") from error
+
+    @property
+    def provider(self) -> str:
+        """What runs the network: onnxruntime's execution provider."""
+        return str(self._session.get_providers()[0]).removesuffix("ExecutionProvider")
 
     @property
     def appearance_bins(self) -> int:
@@ -141,19 +150,20 @@ class OnnxDetector:
         )
 
 
-def _open_session(model: Path, threads: int) -> Any:
+def _open_session(model: Path, threads: int, provider: Provider) -> Any:
     """Open the file with onnxruntime, which is imported only here since it is an optional dependency."""
     try:
         import onnxruntime  # noqa: PLC0415
     except ImportError as error:
         raise ImportError("onnxruntime is not installed: pip install 'myview[neural]'") from error
     content = model.read_bytes()
+    providers = provider_names(provider, onnxruntime.get_available_providers())
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # errors are raised instead of printed
     try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(content, options, providers=providers)
     except Exception as error:  # onnxruntime has no common exception class
         raise ValueError(f"{model}: not a usable ONNX file: {_first_line(error)}") from error
 
