@@ -13,7 +13,7 @@ _EXPECTED, _EXPECTED_SIGHTINGS = 0.9, 20.0
 """Share of clear silhouettes that a network finds, and how many sightings this expectation is worth."""
 _MEMORY = 500.0
 """Sightings after which a sighting has lost two thirds of its weight."""
-_RELIABLE = 0.5
+_RELIABLE = 0.3
 """Share found from which the silence of a network counts in full."""
 
 
