@@ -11,6 +11,9 @@ from server.models.installed import is_installed
 NETWORK = "onnx"
 """The kind that is a network alone, which is named by its network."""
 
+CHOICE = "auto"
+"""The kind that is one of the others."""
+
 
 def detector_names() -> list[str]:
     """Return all detectors: kinds without a network, installed networks, and kinds with each of these."""
@@ -18,7 +21,7 @@ def detector_names() -> list[str]:
     kinds: tuple[DetectorKind, ...] = get_args(DetectorKind)
     with_network = [kind for kind in kinds if _needs_network(kind)]
     return [
-        *(kind for kind in kinds if kind not in with_network),
+        *(kind for kind in kinds if kind not in with_network and kind != CHOICE),
         *networks,
         *(f"{kind}+{network}" for kind in with_network if kind != NETWORK for network in networks),
     ]
