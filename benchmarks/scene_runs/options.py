@@ -15,7 +15,7 @@ from benchmarks.scene_runs.scores import SceneScores
 
 RECORDED = ("terrace", "terrace2", "pets09", "campus4", "lab4")
 DRAWN = "room"
-ROOM_CAMERAS, ROOM_PEOPLE, ROOM_S = 3, 5, 40.0
+ROOM_CAMERAS, ROOM_PEOPLE, ROOM_S = 3, 5, 30.0
 
 DETECTION_COLUMNS = ("rec.", "prec.", "AP")
 TRACK_COLUMNS = ("HOTA", "IDF1", "joint")
