@@ -10,6 +10,8 @@ from server.models.installed import is_installed
 
 NETWORK = "onnx"
 """The kind that is a network alone, which is named by its network."""
+_ONE_OF_THE_OTHERS = "auto"
+"""The kind that stands for another one, by what is installed."""
 
 CHOICE = "auto"
 """The kind that is one of the others."""
@@ -18,7 +20,7 @@ CHOICE = "auto"
 def detector_names() -> list[str]:
     """Return all detectors: kinds without a network, installed networks, and kinds with each of these."""
     networks = [model.name for model in MODELS if is_installed(model)]
-    kinds: tuple[DetectorKind, ...] = get_args(DetectorKind)
+    kinds = [kind for kind in get_args(DetectorKind) if kind != _ONE_OF_THE_OTHERS]
     with_network = [kind for kind in kinds if _needs_network(kind)]
     return [
         *(kind for kind in kinds if kind not in with_network and kind != CHOICE),

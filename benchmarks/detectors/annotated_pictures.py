@@ -8,11 +8,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.detectors.compared_detectors import compared_detectors, run_detector
+from benchmarks.detectors.compared_detectors import BLOBS, MYVIEW, PAPER, compared_detectors, run_detector
 from benchmarks.detectors.scored_views import ScoredView
 from tracking.detectors import Image
 from tracking.motchallenge import MotRow
 
+_DRAWN = (MYVIEW, PAPER, BLOBS)
 _FRAMES = 900
 _EVERY = 150
 _PALETTE = ((60, 180, 75), (60, 60, 230), (0, 165, 255), (230, 50, 240), (240, 200, 0), (0, 220, 220))
@@ -25,7 +26,9 @@ def save_pictures(views: list[ScoredView], folder: Path) -> Iterator[Path]:
     for view in views:
         images = [image for frame, image in enumerate(view.images(_FRAMES)) if frame % _EVERY == _EVERY - 1]
         rows = []
-        for detector_spec in compared_detectors()[:3]:
+        for detector_spec in compared_detectors():
+            if detector_spec.name not in _DRAWN:
+                continue
             run = run_detector(detector_spec, view, _FRAMES)
             drawn = []
             for index, image in enumerate(images):

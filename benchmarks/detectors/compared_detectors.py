@@ -45,7 +45,7 @@ class BlobDetector:
         return Detections(boxes, np.ones(len(boxes)), np.empty((len(boxes), 0)))
 
 
-MYVIEW = "MyView"
+MYVIEW, PAPER, BLOBS = "MyView", "the paper's box filters", "MOG2 + connected components"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class ComparedDetector:
         return view.make_detector(self.detect, size)
 
 
-_TITLES = {"background": MYVIEW, "boxes": "the paper's box filters", "hog": "OpenCV's HOG"}
+_TITLES = {"background": MYVIEW, "boxes": PAPER, "hog": "OpenCV's HOG"}
 """Titles of kinds of detectors."""
 _ALONE = ("boxes",)
 """Detectors whose boxes other trackers do not get."""
@@ -84,7 +84,7 @@ def compared_detectors() -> list[ComparedDetector]:
             ComparedDetector(_TITLES.get(name, name), detector_settings(name), name not in _ALONE)
             for name in detector_names()
         ),
-        ComparedDetector("MOG2 + connected components", None),
+        ComparedDetector(BLOBS, None),
     ]
 
 
