@@ -147,10 +147,10 @@ class RenderPool:
 
     async def close(self) -> None:
         """End all streams and their workers."""
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        # Those that are ending already are only waited for: cancelled again, they would leave their workers.
+        for subject, running in list(self._running.items()):
+            self._end(subject, running)
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _start(self, subject: Subject) -> _RunningStream:
         if len(self._running) >= self._max_streams:

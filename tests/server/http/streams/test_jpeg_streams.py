@@ -7,6 +7,7 @@ import io
 import os
 import signal
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import av
 import cv2
@@ -262,6 +263,19 @@ async def test_the_number_of_rendered_streams_is_limited() -> None:
             await asyncio.sleep(0.01)
         async with drawn.session.get("/cameras/c1/live.jpg") as other:
             assert other.status == 200, "an unwatched stream frees its place"
+
+
+async def test_a_worker_that_is_being_ended_is_gone_when_the_service_has_closed() -> None:
+    async for drawn in drawn_room():
+        pool, view = drawn.app[SERVICE].rendering, CameraView("c0")
+        async with drawn.session.get("/cameras/c0/live.mjpeg") as answer:
+            await anext(jpeg_parts(answer))
+            pid = pool.streams[view].pid
+            pool._end(view, pool._running[view])
+            for _ in range(5):
+                await asyncio.sleep(0)  # it is killed, and waited for
+            await pool.close()
+            assert not Path(f"/proc/{pid}").exists()
 
 
 async def test_rendered_streams_count_towards_the_viewer_limit() -> None:
