@@ -159,6 +159,7 @@ class BackgroundDetector:
         self._filter: BoxFilter | None = None
         self._height_model: HeightModel | None = None
         self._height_range: HeightRange | None = None
+        self._views = 0
         self.warming_up = True
         """Whether the last frame could not be searched because the background was unknown."""
 
@@ -208,6 +209,7 @@ class BackgroundDetector:
         work_image = grid.resize(image)
         segmentation = self._background.segment(work_image)
         self.warming_up = segmentation is None
+        self._forget_other_view()
         if segmentation is None:
             return None
         mask = _clean_mask(segmentation.foreground & grid.visible)
@@ -265,6 +267,13 @@ class BackgroundDetector:
         if self._grid is None:
             raise ValueError("the size of the images is not known yet")
         return self._grid
+
+    def _forget_other_view(self) -> None:
+        """Forget the heights of people, and the floor, when the background begins to learn another view."""
+        views = self._background.views if isinstance(self._background, MedianBackground) else 0
+        if views != self._views:
+            self._views = views
+            self._height_estimator = HeightModelEstimator(self.settings.height_model)
 
     @property
     def appearance_bins(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tracking.detectors.background.local_light import find_local_light, reduce_to_cells, relight, unlight
 from tracking.detectors.background.motion import STILL, Motion
-from tracking.detectors.background.registration import Registration
+from tracking.detectors.background.registration import Registration, count_edges
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
 from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves, fit_tone_curves
@@ -33,8 +33,8 @@ class MedianSettings:
     )
     learn_every: int = 5  # frames between two updates of the background
     learn_rate: float = 0.02  # share of the new frame in each update, where no person is
-    relearn_share: float = 0.6  # foreground share of the image that indicates a change of light
-    relearn_frames: int = 15  # consecutive such frames before the background is learned again
+    relearn_share: float = 0.5  # foreground share of the image that indicates another view
+    relearn_frames: int = 10  # consecutive such frames before the background is learned again
 
     def __post_init__(self) -> None:
         require_at_least_one(self, "bootstrap_frames", "samples", "learn_every")
@@ -62,6 +62,10 @@ class MedianBackground:
         self._curves: ToneCurves | None = None
         self._gain: Plane | None = None
         self._unlikely: Mask | None = None
+        self._retired: Image | None = None
+        """The background before this one."""
+        self.views = 0
+        """How many times another view was learned."""
         self._last: Image | None = None
         """The last frame, where the background is."""
 
@@ -97,9 +101,16 @@ class MedianBackground:
             if motion != self._registration.rest:
                 curves, gain = self._fit_light(aligned, background, before)
         self._last, self._curves, self._gain = aligned, curves, gain
+        if curves.contrast_of(reduce_to_cells(background)) < _BLIND:
+            return None
         segmentation = self._compare(aligned, motion, background, curves, gain)
-        self._relearn_on_light_change(segmentation.foreground | segmentation.shadow)
-        return segmentation
+        self._flooded = self._flooded + 1 if self._is_flooded(segmentation) else 0
+        if self._flooded >= self._settings.relearn_frames:
+            self._invalidate(image, background)
+            return None
+        # At the background's light people look the same whatever the camera's exposure is.
+        unlit = aligned if gain is None else unlight(aligned, gain)
+        return replace(segmentation, image=curves.invert(unlit))
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Update the background with the last frame, except where people are.
@@ -207,26 +218,63 @@ class MedianBackground:
         self._samples.append(fit_tone_curves(aligned, first).invert(aligned, first))
 
     def _take_median(self) -> None:
-        ordered = np.sort(np.stack(self._samples), axis=0)
-        self._rounded = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
-        self._exact = self._rounded.astype(np.float32)
-        self._registration = Registration()
-        self._registration.set_background(self._rounded)
-        self._curves = None
+        samples = np.stack(self._samples)
+        ordered = np.sort(samples, axis=0)
+        median = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
+        if self._retired is not None:
+            self._keep_seen(median, samples, self._retired)
+        self._use(median)
 
-    def _relearn_on_light_change(self, mask: Mask) -> None:
-        flooded = cv2.countNonZero(mask) > self._settings.relearn_share * mask.size
-        self._flooded = self._flooded + 1 if flooded else 0
-        if self._flooded >= self._settings.relearn_frames:
-            self._frames = 0
-            self._flooded = 0
-            self._samples = []
+    def _keep_seen(self, median: Image, samples: Image, retired: Image) -> None:
+        """Keep the old background where some of the samples show it: people hide it in the others."""
+        old = fit_tone_curves(self._samples[0], retired).apply(retired)
+        seen = np.mean(
+            [_difference(sample, old) < self._settings.threshold / 2.0 for sample in samples], axis=0
+        )
+        np.copyto(median, old, where=(seen >= _SEEN)[..., None])
+
+    def _use(self, background: Image) -> None:
+        """Compare frames with this background from now on."""
+        self._rounded, self._exact = background, background.astype(np.float32)
+        self._registration = Registration()
+        self._registration.set_background(background)
+        self._curves = self._gain = self._unlikely = None
+
+    def _is_flooded(self, segmentation: Segmentation) -> bool:
+        """Return whether so much of a frame is foreground that the background no longer explains it."""
+        differs = cv2.countNonZero(segmentation.foreground | segmentation.shadow)
+        return differs > self._settings.relearn_share * segmentation.foreground.size
+
+    def _invalidate(self, image: Image, background: Image) -> None:
+        """Go back to the background before this one if it explains the frame, or learn another one.
+
+        While the lens is covered there is nothing to learn, and the background is kept.
+        """
+        if count_edges(image) < _COVERED * count_edges(background):
+            return
+        self._flooded = 0
+        retired, self._retired = self._retired, background
+        if retired is not None:
+            curves, gain = self._fit_light(image, retired, None)
+            if not self._is_flooded(self._compare(image, STILL, retired, curves, gain)):
+                self._use(retired)
+                return
+        self._frames, self._samples = 0, []
+        self._exact = self._rounded = self._gain = None
+        self._unlikely = None
+        self.views += 1
 
 
 # Updates of the background until its edges are sought again.
 _POINTS_EVERY = 10
 # Drop of the share of pixels that follow the tone curves at which a camera at rest may have moved.
 _MOVED = 0.03
+# Share of the background's contrast below which the lens is covered, in fog, or in the dark.
+_BLIND = 0.1
+# Share of the background's edges below which the lens is covered.
+_COVERED = 0.25
+# Share of the samples that have to show the old background where it is kept.
+_SEEN = 0.2
 # Noise, in gray levels, from which frames are smoothed.
 _NOISY = 6.0
 

@@ -142,6 +142,11 @@ def _smooth_gray(image: Image) -> Plane:
     return gray.astype(np.float32)
 
 
+def count_edges(image: Image) -> int:
+    """Return how many parts of an image have edges that show whether it has moved."""
+    return _Points(_smooth_gray(image)).count
+
+
 class _Points:
     """The strongest edges of a background."""
 

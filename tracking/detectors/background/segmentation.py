@@ -21,7 +21,7 @@ class Segmentation:
     Attributes:
         foreground: pixels that differ clearly from the background.
         shadow: pixels that look like a shadow: shadows, or gray clothing.
-        image: `(H, W, 3)`, the frame, moved to where the background is.
+        image: `(H, W, 3)`, the frame where the background is, and at its light.
         motion: where the background is in the frame.
     """
 

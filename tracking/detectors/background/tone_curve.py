@@ -60,18 +60,26 @@ class ToneCurves:
         """Return a background `(H, W, 3)` as the camera shows it in the frame."""
         return np.asarray(cv2.LUT(image, self._tables().astype(np.uint8)), dtype=np.uint8)
 
-    def invert(self, image: Image, background: Image) -> Image:
-        """Return a frame `(H, W, 3)` at the levels of the background; where they are clipped, the latter."""
+    def invert(self, image: Image, background: Image | None = None) -> Image:
+        """Return a frame `(H, W, 3)` at the levels of the background.
+
+        Where the background's own levels are clipped in the frame, they are returned if it is given.
+        """
         curves = self._tables()[0].T
         levels = np.arange(_LEVELS, dtype=np.float64)
-        steep = np.stack([np.gradient(curve) >= _MIN_SLOPE for curve in curves])
         rising = curves + 1e-3 * levels
         inverse = np.stack([np.interp(levels, curve, levels) for curve in rising], axis=1)
         leveled = np.asarray(cv2.LUT(image, np.rint(inverse[None]).astype(np.uint8)), dtype=np.uint8)
-        if not steep.all():
-            clipped = cv2.LUT(background, np.where(steep, 0, 255).astype(np.uint8).T[None].copy())
-            np.copyto(leveled, background, where=clipped > 0)
+        if background is not None:
+            steep = np.gradient(curves, axis=1) >= _MIN_SLOPE
+            if not steep.all():
+                clipped = cv2.LUT(background, np.where(steep, 0, 255).astype(np.uint8).T[None].copy())
+                np.copyto(leveled, background, where=clipped > 0)
         return leveled
+
+    def contrast_of(self, background: Image) -> float:
+        """Return the contrast that a background has in the frame over its own: 0 behind a cover."""
+        return float(self.apply(background).std() / max(float(background.std()), 1.0))
 
     def gray_table(self) -> Floats:
         """Return the frame's gray level for each gray level of the background, `(256,)`."""
