@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -28,7 +27,12 @@ from tracking.detectors.background.isolated_people import IsolatedPerson
 from tracking.detectors.background.median import MedianBackground, MedianSettings
 from tracking.detectors.background.mog2 import Mog2Background, Mog2Settings
 from tracking.detectors.background.motion import STILL, Motion
-from tracking.detectors.background.segmentation import Segmentation, ShadowSettings
+from tracking.detectors.background.segmentation import (
+    Segmentation,
+    ShadowSettings,
+    clean_mask,
+    occupied_mask,
+)
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
 from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings
@@ -182,7 +186,7 @@ class BackgroundDetector:
             segmentation = background.segment_still(work_image)
             if segmentation is not None and self._grid is not None:
                 self._height_estimator.observe(
-                    _clean_mask(segmentation.foreground & self._grid.visible), self._grid.visible, every
+                    clean_mask(segmentation.foreground & self._grid.visible), self._grid.visible, every
                 )
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
@@ -212,7 +216,7 @@ class BackgroundDetector:
         self._forget_other_view()
         if segmentation is None:
             return None
-        mask = _clean_mask(segmentation.foreground & grid.visible)
+        mask = clean_mask(segmentation.foreground & grid.visible)
         self._height_estimator.observe(mask, grid.visible)
         shadow = segmentation.shadow & grid.visible & ~mask
         return replace(self._scan_mask(segmentation.image, mask, shadow, grid), motion=segmentation.motion)
@@ -220,7 +224,7 @@ class BackgroundDetector:
     def learn(self, scan: ForegroundScan, people: npt.NDArray[np.float64]) -> None:
         """Update the background with the frame of a scan where nobody is; `people` `(K, 4)` are in cells."""
         boxes = self.grid.cells_to_work(people)
-        self._background.learn(scan.mask, _occupied_mask(boxes, scan.mask.shape))
+        self._background.learn(scan.mask, occupied_mask(boxes, scan.mask.shape))
 
     def observe_people(self, boxes: npt.NDArray[np.float64], frames: int = 1) -> None:
         """Learn the height of people from whole people of one frame, boxes `(K, 4)` in cells.
@@ -332,24 +336,3 @@ class BackgroundDetector:
         if image.shape != self._shape:
             raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
         return self._grid
-
-
-# Closing connects a head to its shoulders if the hair has the background's color.
-_CLOSE = np.ones((5, 3), dtype=np.uint8)
-# Margin around a box, in its sides, where the background is not updated: shadows, hands, inexact boxes.
-_OCCUPIED_MARGIN = 0.15
-
-
-def _clean_mask(mask: Mask) -> Mask:
-    """Remove isolated pixels and close small holes."""
-    return np.asarray(cv2.morphologyEx(cv2.medianBlur(mask, 5), cv2.MORPH_CLOSE, _CLOSE), dtype=np.uint8)
-
-
-def _occupied_mask(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
-    """Return a mask of `shape` that is 255 in and around the boxes."""
-    occupied = np.zeros(shape, dtype=np.uint8)
-    for left, top, right, bottom in boxes:
-        x, y = _OCCUPIED_MARGIN * (right - left), _OCCUPIED_MARGIN * (bottom - top)
-        rows = slice(max(int(top - y), 0), int(bottom + y) + 1)
-        occupied[rows, max(int(left - x), 0) : int(right + x) + 1] = 255
-    return occupied

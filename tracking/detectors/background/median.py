@@ -82,7 +82,7 @@ class MedianBackground:
         if self._rounded is None:
             return None
         motion = self._registration.find_still(image)
-        aligned = _aligned(image, motion, self._rounded)
+        aligned = motion.align(image, self._rounded)
         curves, gain = self._fit_light(aligned, self._rounded, None)
         return self._compare(aligned, motion, self._rounded, curves, gain)
 
@@ -149,7 +149,7 @@ class MedianBackground:
         if looks:
             motion = self._registration.find(image, before or IDENTITY, self._unlikely)
         outside = background if motion == STILL or before is None else before.apply(background)
-        return _aligned(image, motion, outside), motion
+        return motion.align(image, outside), motion
 
     def _fit_light(
         self, image: Image, background: Image, before: ToneCurves | None
@@ -214,7 +214,7 @@ class MedianBackground:
             self._sampling.set_background(image)
             return
         first = self._samples[0]
-        aligned = _aligned(image, self._sampling.find_still(image), first)
+        aligned = self._sampling.find_still(image).align(image, first)
         self._samples.append(fit_tone_curves(aligned, first).invert(aligned, first))
 
     def _take_median(self) -> None:
@@ -287,21 +287,3 @@ def _difference(image: Image, expected: Image) -> Mask:
     """Return the largest difference of the channels, `(H, W)`."""
     blue, green, red = cv2.split(cv2.absdiff(image, expected))
     return np.asarray(cv2.max(cv2.max(blue, green), red), dtype=np.uint8)
-
-
-def _aligned(image: Image, motion: Motion, outside: Image) -> Image:
-    """Return the image moved to where the background is, with `outside` where it shows nothing."""
-    if motion == STILL:
-        return image
-    size = (image.shape[1], image.shape[0])
-    return np.asarray(
-        cv2.warpAffine(
-            image,
-            motion.matrix(size),
-            size,
-            dst=outside.copy(),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_TRANSPARENT,
-        ),
-        dtype=np.uint8,
-    )

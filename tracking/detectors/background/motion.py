@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from tracking.boxes import Floats
+from tracking.detectors.base import Image
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,17 @@ class Motion:
         return float(
             np.sqrt(shift + radius * ((self.grow - other.grow) ** 2 + (self.turn - other.turn) ** 2))
         )
+
+    def align(self, image: Image, outside: Image) -> Image:
+        """Return a frame `(H, W, 3)` moved to where the background is; where it shows nothing, `outside`."""
+        if self == STILL:
+            return image
+        size = (image.shape[1], image.shape[0])
+        flags, border = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, cv2.BORDER_TRANSPARENT
+        aligned = cv2.warpAffine(
+            image, self.matrix(size), size, dst=outside.copy(), flags=flags, borderMode=border
+        )
+        return np.asarray(aligned, dtype=np.uint8)
 
     def move_boxes(self, boxes: Floats, size: tuple[int, int]) -> Floats:
         """Move boxes `(K, 4)` of the background, in pixels, to where they are in the frame, still upright."""

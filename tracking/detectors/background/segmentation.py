@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.base import Image, Mask
@@ -63,3 +65,24 @@ def shadow_mask(image: Image, background: Image, foreground: Mask, settings: Sha
     darker = (mean >= settings.min_ratio) & (mean <= settings.max_ratio)
     shadow.ravel()[where[darker & (spread <= settings.max_chroma_spread * mean)]] = 255
     return shadow
+
+
+# Closing connects a head to its shoulders if the hair has the background's color.
+_CLOSE = np.ones((5, 3), dtype=np.uint8)
+# Margin around a box, in its sides, where the background is not updated: shadows, hands, inexact boxes.
+_OCCUPIED_MARGIN = 0.15
+
+
+def clean_mask(mask: Mask) -> Mask:
+    """Remove isolated pixels and close small holes."""
+    return np.asarray(cv2.morphologyEx(cv2.medianBlur(mask, 5), cv2.MORPH_CLOSE, _CLOSE), dtype=np.uint8)
+
+
+def occupied_mask(boxes: npt.NDArray[np.float64], shape: tuple[int, ...]) -> Mask:
+    """Return a mask of `shape` that is 255 in and around the boxes."""
+    occupied = np.zeros(shape, dtype=np.uint8)
+    for left, top, right, bottom in boxes:
+        x, y = _OCCUPIED_MARGIN * (right - left), _OCCUPIED_MARGIN * (bottom - top)
+        rows = slice(max(int(top - y), 0), int(bottom + y) + 1)
+        occupied[rows, max(int(left - x), 0) : int(right + x) + 1] = 255
+    return occupied
