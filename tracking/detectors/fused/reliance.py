@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-_EXPECTED, _EXPECTED_SIGHTINGS = 0.9, 20.0
+_EXPECTED, _EXPECTED_SIGHTINGS = 0.9, 10.0
 """Share of clear silhouettes that a network finds, and how many sightings this expectation is worth."""
 _MEMORY = 500.0
 """Sightings after which a sighting has lost two thirds of its weight."""
