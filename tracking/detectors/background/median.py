@@ -184,12 +184,15 @@ class MedianBackground:
             lit_difference = _difference(image, lit)
             np.copyto(expected, lit, where=(lit_difference < difference)[..., None])
             difference = np.minimum(difference, lit_difference)
-        mask = self._exceeding(difference)
+        # In a darker picture people differ by less, and so does what is not there: by the noise at least.
+        contrast = min(max(curves.contrast_of(reduce_to_cells(background)), _LEAST_CONTRAST), 1.0)
+        mask = self._exceeding(difference, max(contrast, _NOISES * curves.noise / self._settings.threshold))
         shadow = shadow_mask(image, expected, mask, self._shadows)
         return Segmentation(mask & ~shadow, shadow, image, motion)
 
-    def _exceeding(self, difference: Mask) -> Mask:
-        _, binary = cv2.threshold(difference, self._settings.threshold, 255, cv2.THRESH_BINARY)
+    def _exceeding(self, difference: Mask, contrast: float) -> Mask:
+        threshold = min(contrast, 1.0) * self._settings.threshold
+        _, binary = cv2.threshold(difference, threshold, 255, cv2.THRESH_BINARY)
         return np.asarray(binary, dtype=np.uint8)
 
     def _bootstrap(self, image: Image) -> None:
@@ -271,6 +274,8 @@ _POINTS_EVERY = 10
 _MOVED = 0.03
 # Share of the background's contrast below which the lens is covered, in fog, or in the dark.
 _BLIND = 0.1
+# Least share of the threshold in a darker picture, and the least threshold in deviations of the noise.
+_LEAST_CONTRAST, _NOISES = 0.4, 4.0
 # Share of the background's edges below which the lens is covered.
 _COVERED = 0.25
 # Share of the samples that have to show the old background where it is kept.
