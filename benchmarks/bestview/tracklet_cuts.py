@@ -18,7 +18,7 @@ from tracking.motchallenge import MotRow
 
 def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]:
     """Return each camera's final boxes, numbered by tracklet as the service splits tracks."""
-    settings = config.view.identity
+    settings = config.view.identity.resolve(config.site.fps)
     tracklets, reader = TrackletSplitter(settings), WindowReader((config.site.width, config.site.height))
     ground, error = camera_homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
     aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)

@@ -89,9 +89,9 @@ class LoopedRecordings:
                 "lookahead": _LOOKAHEAD,
                 "buffer_s": seconds(60.0),
                 "identity": {
-                    "forget_after": _FORGET,
-                    "comparable_frames": _FORGET - 50,
-                    "travel_frames": _FORGET,
+                    "forget_after_s": _FORGET / self.time_scale.fps,
+                    "comparable_s": (_FORGET - 50) / self.time_scale.fps,
+                    "maximum_travel_s": _FORGET / self.time_scale.fps,
                 },
             },
             "record": {

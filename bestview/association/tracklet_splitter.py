@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.association.appearance.histograms import MeanHistogram
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.sightings import AppearanceHistogram, TrackObservations
 from bestview.association.tracklet import TrackKey, Tracklet, TrackletEndpoint, TrackletKey
 
 Floats = NDArray[np.float64]
-_MINIMUM_UNCROWDED_FRAMES = 4
-"""Frames outside crowds that a tracklet needs before the next crowd can end it."""
+_MINIMUM_UNCROWDED_S = 0.16
+"""Seconds outside crowds that a tracklet needs before the next crowd can end it."""
 _STABLE_CLUSTERINGS = 2
 """Clusterings for which a tracklet must have kept one person id to be settled while it continues."""
 
@@ -45,8 +45,9 @@ class TrackletSplitter:
             matrix.
     """
 
-    def __init__(self, settings: IdentitySettings) -> None:
+    def __init__(self, settings: ResolvedIdentitySettings) -> None:
         self._settings = settings
+        self._minimum_uncrowded = max(round(_MINIMUM_UNCROWDED_S * settings.frame_rate), 1)
         self.active: list[Tracklet] = []
         self._current: dict[TrackKey, Tracklet] = {}
         self._row: dict[TrackletKey, int] = {}
@@ -119,7 +120,7 @@ class TrackletSplitter:
         out_of_crowd = (
             not crowded
             and tracklet.crowd_frames_at_end >= settings.crowd_frames
-            and tracklet.uncrowded_frames >= _MINIMUM_UNCROWDED_FRAMES
+            and tracklet.uncrowded_frames >= self._minimum_uncrowded
         )
         return out_of_crowd or frame - tracklet.end.frame > settings.gap_frames
 

@@ -33,6 +33,7 @@ from server.config.unknown_keys import no_unknown_keys
 from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
+_ROUNDING = 1e-9
 _SERVICE = re.compile(r"bestview(-\d+)?")
 """Names of best-view services as clients of the pulse server; no camera may have one."""
 
@@ -117,11 +118,11 @@ class Config(BaseSettings):
     @model_validator(mode="after")
     def _settled_after_published(self) -> Self:
         identity = self.view.identity
-        least = identity.publish_after + 2 * identity.clustering_interval
-        if identity.settle_after < least:
+        least = identity.publish_after_s + 2.0 * identity.clustering_interval_s
+        if identity.settle_after_s < least - _ROUNDING:
             raise ValueError(
-                f"view.identity.settle_after: is {identity.settle_after} frames but must be "
-                f"at least {least} (publish_after + 2 * clustering_interval), "
+                f"view.identity.settle_after_s: is {identity.settle_after_s:g} seconds but must be "
+                f"at least {least:g} (publish_after_s + 2 * clustering_interval_s), "
                 "so that a settled person has been published"
             )
         return self

@@ -56,7 +56,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
         "view": {
             "lookahead": 2 * GOP,
             "late_after_s": 0.1,
-            "identity": {"confirmation_frames": 1, "clustering_interval": 1},
+            "identity": {"confirmation_s": 0.04, "clustering_interval_s": 0.04},
         },
         **changes,
     }

@@ -36,7 +36,7 @@ cameras:
     ignore: [[[0, 0], [9, 0], [9, 9]]]
   - {id: c1, source: "rtsp://10.0.0.2/a", offset: 2}
 track: {window: {stride: 5}}
-view: {lookahead: 25, identity: {confirmation_frames: 2}}
+view: {lookahead: 25, identity: {confirmation_s: 0.08}}
 http: {port: 8080}
 """
 _TOKENS = b"""tokens:

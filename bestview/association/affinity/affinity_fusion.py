@@ -15,7 +15,7 @@ from bestview.association.appearance.histograms import MeanHistogram
 from bestview.association.appearance.likelihood import AppearanceWeights, CameraAppearances
 from bestview.association.clustering import cluster
 from bestview.association.registry.person import Person
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet import Tracklet
 
 Ints = NDArray[np.int64]
@@ -31,7 +31,7 @@ class AffinityFusion:
     """
 
     def __init__(
-        self, settings: IdentitySettings, calibrated: Mapping[str, bool], walking_speed: float
+        self, settings: ResolvedIdentitySettings, calibrated: Mapping[str, bool], walking_speed: float
     ) -> None:
         self._settings, self._calibrated, self._walking_speed = settings, calibrated, walking_speed
         self._scales = DistanceScales(settings.appearance_frames)

@@ -17,7 +17,7 @@ from bestview.association.affinity.localized_frames import LocalizedFrames
 from bestview.association.affinity.pair_table import SparsePairTable, unique_pairs
 from bestview.association.co_occurrence import MINIMUM_FRAME_SCORE
 from bestview.association.index_ranges import expand_counts
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet import TrackletKey
 
 Floats = NDArray[np.float64]
@@ -39,7 +39,7 @@ class AffinityMatrix:
         settings: of identity.
     """
 
-    def __init__(self, settings: IdentitySettings) -> None:
+    def __init__(self, settings: ResolvedIdentitySettings) -> None:
         self._ground_cap, self._memory, self._appearance_cap = (
             settings.maximum_ground_evidence,
             settings.cross_camera_memory,

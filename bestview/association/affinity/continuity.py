@@ -8,19 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet import Tracklet
 from bestview.geometry.ground_plane import foot_points
 
 Floats = NDArray[np.float64]
 
-_GAP_DECAY_FRAMES = 25.0
-"""Gap in frames after which the evidence of a continued track falls to a third."""
 _IMPOSSIBLE_REACH = 2.0
 """Distance in reaches from which on it cannot be the same person."""
 
 
-def continuation_evidence(tracklet: Tracklet, settings: IdentitySettings) -> float:
+def continuation_evidence(tracklet: Tracklet, settings: ResolvedIdentitySettings) -> float:
     """Compute the evidence that a tracklet is the same person as its predecessor in the track.
 
     A confirmation by an operator weighs as much as the largest ground evidence against it.
@@ -33,7 +31,7 @@ def continuation_evidence(tracklet: Tracklet, settings: IdentitySettings) -> flo
     return float(
         evidence
         if tracklet.frames_since_predecessor <= settings.gap_frames
-        else evidence * np.exp(-tracklet.frames_since_predecessor / _GAP_DECAY_FRAMES)
+        else evidence * np.exp(-tracklet.frames_since_predecessor / settings.gap_decay_frames)
     )
 
 
@@ -83,7 +81,7 @@ def reappearance_evidence(
     endpoints: EndpointArrays,
     first: NDArray[np.int64],
     second: NDArray[np.int64],
-    settings: IdentitySettings,
+    settings: ResolvedIdentitySettings,
     height: float,
     walking_speed: float,
 ) -> tuple[Floats, NDArray[np.bool_]]:

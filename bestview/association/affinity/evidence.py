@@ -16,7 +16,7 @@ from bestview.association.affinity.continuity import (
 from bestview.association.affinity.pair_table import SparsePairTable
 from bestview.association.index_ranges import pairs_of_equal_label, sorted_unique
 from bestview.association.registry.person import Person
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet import Tracklet
 
 Floats = NDArray[np.float64]
@@ -43,7 +43,7 @@ class PairEvidence:
         people: Sequence[Person],
         affinity: AffinityMatrix,
         calibrated: Mapping[str, bool],
-        settings: IdentitySettings,
+        settings: ResolvedIdentitySettings,
         height: float,
         walking_speed: float,
     ) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 
 Floats = NDArray[np.float64]
 
@@ -42,13 +42,13 @@ class TravelTimeModel:
     """Learns transitions between cameras, and scores how plausible an arrival is.
 
     Args:
-        settings: `travel_frames` and related ones.
+        settings: `maximum_travel_frames` and related ones.
         cameras: how many there are.
     """
 
-    def __init__(self, settings: IdentitySettings, cameras: int) -> None:
+    def __init__(self, settings: ResolvedIdentitySettings, cameras: int) -> None:
         self._settings, self._cameras = settings, max(cameras, 1)
-        self.bin_edges = travel_time_bins(settings.travel_frames)
+        self.bin_edges = travel_time_bins(settings.maximum_travel_frames)
         self._departures: dict[str, _DepartureCounts] = {}
 
     def learn(self, departure: CameraSighting, arrival: CameraSighting) -> None:
@@ -72,7 +72,7 @@ class TravelTimeModel:
     def evidence(self, arrivals: Sequence[CameraSighting], departures: Sequence[CameraSighting]) -> Floats:
         """Compute the log-likelihood ratio of arriving from a camera in that time, against chance.
 
-        By chance people arrive at any camera, at any time up to `travel_frames`.
+        By chance people arrive at any camera, at any time up to `maximum_travel_frames`.
 
         Args:
             arrivals: N first sightings.

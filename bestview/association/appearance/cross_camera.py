@@ -18,13 +18,15 @@ from bestview.association.appearance.histograms import (
     MeanHistogram,
     cdf_distance,
 )
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet import Tracklet, TrackletKey
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-_MINIMUM_HISTOGRAM_FRAMES = 20
-"""Frames from which a mean histogram represents the person rather than the moment."""
+_MINIMUM_HISTOGRAM_S = 0.8
+"""Seconds from which a mean histogram represents the person rather than the moment..."""
+_MINIMUM_HISTOGRAM_FRAMES = 3
+"""... and at least so many frames."""
 _MAXIMUM_SCORE = 0.5
 """Largest score of one update."""
 _SWAP_MARGIN = 0.4
@@ -41,8 +43,11 @@ class CrossCameraAppearance:
         calibrated: by camera; two calibrated cameras are compared on the ground instead.
     """
 
-    def __init__(self, settings: IdentitySettings, calibrated: Mapping[str, bool]) -> None:
+    def __init__(self, settings: ResolvedIdentitySettings, calibrated: Mapping[str, bool]) -> None:
         self._settings, self._calibrated = settings, calibrated
+        self._minimum_frames = max(
+            round(_MINIMUM_HISTOGRAM_S * settings.frame_rate), _MINIMUM_HISTOGRAM_FRAMES
+        )
         self.equalizer = HistogramEqualizer()
         self._learned: set[TrackletKey] = set()
 
@@ -101,14 +106,14 @@ class CrossCameraAppearance:
         curves = np.full((len(tracklets), CDF_POINTS), np.nan)
         for camera in cameras:
             for tracklet in tracklets[camera]:
-                histogram = _stable_histogram(tracklet)
+                histogram = _stable_histogram(tracklet, self._minimum_frames)
                 # Once per tracklet: a person who stays must not weigh more than one who walks through.
                 if histogram is not None and tracklet.key not in self._learned:
                     self._learned.add(tracklet.key)
                     self.equalizer.learn(tracklet.key.camera, histogram.mean)
             bins: dict[int, list[int]] = {}
             for index in range(camera.start, camera.stop):
-                histogram = _stable_histogram(tracklets[index])
+                histogram = _stable_histogram(tracklets[index], self._minimum_frames)
                 if histogram is not None:
                     bins.setdefault(histogram.histogram_sum.size, []).append(index)
             for rows in bins.values():
@@ -122,9 +127,9 @@ class CrossCameraAppearance:
         return curves
 
 
-def _stable_histogram(tracklet: Tracklet) -> MeanHistogram | None:
+def _stable_histogram(tracklet: Tracklet, minimum_frames: int) -> MeanHistogram | None:
     histogram = tracklet.appearance.by_camera.get(tracklet.key.camera)
-    return histogram if histogram is not None and histogram.frame_count >= _MINIMUM_HISTOGRAM_FRAMES else None
+    return histogram if histogram is not None and histogram.frame_count >= minimum_frames else None
 
 
 @dataclass(frozen=True, slots=True)

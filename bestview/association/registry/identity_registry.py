@@ -76,7 +76,8 @@ class IdentityRegistry:
         overhead: Collection[str] = (),
         fps: float = 25.0,
     ) -> None:
-        self._settings, self._overhead = settings, frozenset(overhead)
+        self._settings = resolved = settings.resolve(fps)
+        self._overhead = frozenset(overhead)
         self._foot_error = FootPointError(settings.foot_sideways, settings.foot_upwards)
         self._homographies = {
             camera: None if matrix is None else validate_homography(matrix, f"camera {camera}")
@@ -85,9 +86,9 @@ class IdentityRegistry:
         self._camera_index = {camera: i for i, camera in enumerate(self._homographies)}
         self._height_estimate = PersonHeightEstimate()
         calibrated = {camera: matrix is not None for camera, matrix in self._homographies.items()}
-        self._cross_camera = CrossCameraAppearance(settings, calibrated)
-        self._splitter = TrackletSplitter(settings)
-        self._people = PersonStore(settings, len(self._homographies))
+        self._cross_camera = CrossCameraAppearance(resolved, calibrated)
+        self._splitter = TrackletSplitter(resolved)
+        self._people = PersonStore(resolved, len(self._homographies))
         # Whether a person should be detected is only known for views in which people stand upright.
         self._ghost_check = GhostCheck(
             {
@@ -96,8 +97,8 @@ class IdentityRegistry:
             }
         )
         self._picture_sizes: Mapping[str, tuple[int, int]] = {}
-        self._affinity = AffinityMatrix(settings)
-        self._fusion = AffinityFusion(settings, calibrated, settings.maximum_speed_heights / fps)
+        self._affinity = AffinityMatrix(resolved)
+        self._fusion = AffinityFusion(resolved, calibrated, resolved.maximum_speed_heights / fps)
         self._corrections = IdCorrections()
         self._visible_settled_ids: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._last_frame: int | None = None

@@ -12,7 +12,7 @@ from bestview.association.appearance.cross_camera import CrossCameraAppearance
 from bestview.association.registry.corrections import Merge
 from bestview.association.registry.person import Person
 from bestview.association.registry.reidentification import LostPerson, Reidentifier
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet import Tracklet
 from bestview.association.tracklet_clusters import TrackletCluster
 
@@ -20,7 +20,7 @@ from bestview.association.tracklet_clusters import TrackletCluster
 class PersonStore:
     """The known people by id."""
 
-    def __init__(self, settings: IdentitySettings, cameras: int) -> None:
+    def __init__(self, settings: ResolvedIdentitySettings, cameras: int) -> None:
         self._settings = settings
         self._reidentifier = Reidentifier(settings, cameras)
         self._by_id: dict[int, Person] = {}

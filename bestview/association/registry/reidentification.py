@@ -20,7 +20,7 @@ from bestview.association.appearance.histograms import (
     cdf_distance,
 )
 from bestview.association.registry.person import Person
-from bestview.association.settings import IdentitySettings
+from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet_clusters import TrackletCluster
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Reidentifier:
         cameras: how many there are.
     """
 
-    def __init__(self, settings: IdentitySettings, cameras: int) -> None:
+    def __init__(self, settings: ResolvedIdentitySettings, cameras: int) -> None:
         self._settings = settings
         self._travel = TravelTimeModel(settings, cameras)
         self._covisible_cameras: set[tuple[str, str]] = set()

@@ -59,7 +59,7 @@ class PersonTracker:
         fps: float = 25.0,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
-        self._forget_after = settings.forget_after
+        self._forget_after = settings.resolve(fps).forget_after
         self.registry = PersonRegistry(settings.maximum_departed_people)
         """All people, those of other shards included."""
         self._share = share

@@ -18,7 +18,9 @@ from bestview.association.sightings import TrackObservations
 from bestview.association.tracklet import TrackKey, TrackletKey
 
 FRAMES = 4
-SETTINGS = IdentitySettings(maximum_ground_evidence=5.0, ground_correlation_frames=2.0, comparable_frames=100)
+SETTINGS = IdentitySettings(maximum_ground_evidence=5.0, ground_correlation_s=0.08, comparable_s=4.0).resolve(
+    25.0
+)
 CAP = SETTINGS.maximum_ground_evidence
 ROWS = range(10)
 

@@ -25,7 +25,7 @@ from bestview.association.registry.person import Person
 from bestview.association.tracklet import Tracklet, TrackletEndpoint, TrackletKey
 
 CAMERAS = {"c0": True, "c1": True, "c2": False}
-SETTINGS = IdentitySettings(crowd_frames=1)
+SETTINGS = IdentitySettings(crowd_s=0.04, appearance_s=0.32).resolve(25.0)
 WEIGHTS = AppearanceWeights(
     SETTINGS.appearance_evidence, SETTINGS.maximum_appearance_evidence, SETTINGS.appearance_frames
 )

@@ -23,7 +23,7 @@ from fakes.bestview.identity_scenes import (
 
 WIDE, HIGH, TALL = 640, 440, 1.75
 PICTURES = dict.fromkeys(VIEWS, (WIDE, HIGH))
-SETTINGS = IdentitySettings(confirmation_frames=25, ghost_penalty=4.0, clustering_interval=5)
+SETTINGS = IdentitySettings(confirmation_s=1.0, ghost_penalty=4.0, clustering_interval_s=0.2)
 
 
 def created_at(

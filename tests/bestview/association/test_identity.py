@@ -52,7 +52,7 @@ def test_a_person_has_one_id_in_every_camera(maximum_open: int) -> None:
 
 def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
     seen = collect_updates(
-        registry(confirmation_frames=25, clustering_interval=5), in_two_cameras(1, (0, 0)), 60
+        registry(confirmation_s=1.0, clustering_interval_s=0.2), in_two_cameras(1, (0, 0)), 60
     )
     # Two cameras see 10 frames together in every update.
     assert [update.created for update in seen] == [(), (), (1,)] + [()] * 9
@@ -93,7 +93,7 @@ def test_an_impossible_distance_means_another_person() -> None:
     assert numbers(collect_updates(registry(), stays, 200)[-1]) == {("south", 1): 1, ("south", 2): 2}
 
 
-@pytest.mark.parametrize("settings", [{}, {"comparable_frames": 250}], ids=["clustered", "reidentified"])
+@pytest.mark.parametrize("settings", [{}, {"comparable_s": 10.0}], ids=["clustered", "reidentified"])
 def test_a_returning_person_with_the_same_appearance_gets_the_id_back(settings: dict[str, int]) -> None:
     stays = [StraightTrack("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3, 5)]
     stays += [
@@ -110,7 +110,7 @@ def test_similar_people_do_not_get_each_others_ids_back() -> None:
     stays = [StraightTrack("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
     stays += [StraightTrack("south", 10, 400, 999, (4, 2), coat=3)]
     assert numbers(collect_updates(registry(), stays, 600)[-1]) == {("south", 10): 4}
-    assert numbers(collect_updates(registry(comparable_frames=250), stays, 600)[-1]) == {("south", 10): 4}
+    assert numbers(collect_updates(registry(comparable_s=10.0), stays, 600)[-1]) == {("south", 10): 4}
 
 
 @pytest.mark.parametrize(("fps", "people"), [(5.0, 1), (25.0, 2)])
@@ -118,7 +118,7 @@ def test_reappearance_reach_depends_on_time_not_on_frames(fps: float, people: in
     here = StraightTrack("south", 1, 0, 30, (-4, 0), coat=3)
     there = StraightTrack("south", 2, 46, 999, (1.7, 0), coat=3)
     identities = IdentityRegistry(
-        replace(IdentitySettings(), confirmation_frames=5, clustering_interval=5), CALIBRATED, fps=fps
+        replace(IdentitySettings(), confirmation_s=0.2, clustering_interval_s=0.2), CALIBRATED, fps=fps
     )
     assert len({*persons_by_track(collect_updates(identities, [here, there], 200)).values()}) == people
 
@@ -247,7 +247,7 @@ def test_simultaneous_tracks_of_a_camera_never_share_an_id(data: st.DataObject) 
 @OPEN_TRACKLET_LIMITS
 def test_a_person_settled_while_visible_does_not_depart(maximum_open: int) -> None:
     seen = collect_updates(
-        registry(maximum_open_tracklets=maximum_open, departed_after=60, settle_after=100),
+        registry(maximum_open_tracklets=maximum_open, departed_after_s=2.4, settle_after_s=4.0),
         in_two_cameras(1, (0, 0), end=400),
         600,
     )
@@ -259,11 +259,11 @@ def test_a_person_settled_while_visible_does_not_depart(maximum_open: int) -> No
 
 def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     identities = registry(
-        forget_after=200,
+        forget_after_s=8.0,
         maximum_departed_people=5,
-        comparable_frames=100,
-        settle_after=100,
-        departed_after=50,
+        comparable_s=4.0,
+        settle_after_s=4.0,
+        departed_after_s=2.0,
     )
     stays = [StraightTrack("south", i, 30 * i, 30 * i + 25, (4.0 * (-1) ** i, i % 5 - 2)) for i in range(100)]
     sizes = []
@@ -281,16 +281,16 @@ def test_memory_does_not_grow_with_the_length_of_the_recording() -> None:
     [
         {name: 0}
         for name in (
-            "confirmation_frames",
-            "comparable_frames",
+            "confirmation_s",
+            "comparable_s",
             "maximum_open_tracklets",
-            "publish_after",
-            "merge_after",
-            "gap_frames",
+            "publish_after_s",
+            "merge_after_s",
+            "gap_s",
             "crowd_iou",
         )
     ]
-    + [{"confirmation_frames": 0, "comparable_frames": 5000, "merge_after": 500, "settle_after": 20}],
+    + [{"confirmation_s": 0.0, "comparable_s": 200.0, "merge_after_s": 20.0, "settle_after_s": 0.8}],
     ids=", ".join,
 )
 def test_minimal_settings_work_while_cameras_come_and_go(zero_settings: Mapping[str, int]) -> None:
@@ -372,7 +372,7 @@ def test_travel_times_separate_people_who_look_alike() -> None:
 
     def ids_with(**changes: float) -> dict[tuple[str, int], int]:
         return persons_by_track(
-            collect_updates(registry(BLIND, comparable_frames=20, **changes), list(stays()), 3600)
+            collect_updates(registry(BLIND, comparable_s=0.8, **changes), list(stays()), 3600)
         )
 
     times, alone = ids_with(), ids_with(maximum_travel_evidence=0.0)

@@ -28,7 +28,7 @@ def histogram_at(frame: int) -> AppearanceHistogram:
 
 
 def split_tracks(*updates: Sequence[TrackUpdate]) -> TrackletSplitter:
-    tracklets = TrackletSplitter(IdentitySettings())
+    tracklets = TrackletSplitter(IdentitySettings().resolve(25.0))
     for tracks in updates:
         rows, _ = tracklets.update(
             align_tracks(tracks, {"c0": None}, FEET), {track.key: track.appearance for track in tracks}
@@ -89,10 +89,10 @@ def test_appearance_histograms_in_a_crowd_do_not_count() -> None:
 
 def test_of_too_many_tracklets_the_longest_unseen_settle_first_but_not_before_publication() -> None:
     few = IdentitySettings(
-        maximum_open_tracklets=2, settle_after=100, publish_after=5, clustering_interval=10
+        maximum_open_tracklets=2, settle_after_s=4.0, publish_after_s=0.2, clustering_interval_s=0.4
     )
     tracks = [track(n, 0, [(50.0 * n, 0.0, 50.0 * n + 10, 20.0)] * (10 * n)) for n in range(1, 6)]
-    tracklets = TrackletSplitter(few)
+    tracklets = TrackletSplitter(few.resolve(25.0))
     tracklets.update(align_tracks(tracks, {"c0": None}, FEET), {})
     assert [tracklet.end.frame for tracklet in tracklets.active] == [9, 19, 29, 39, 49]
     assert tracklets.settleable_rows(49) == [0, 1], "the third was published just now"

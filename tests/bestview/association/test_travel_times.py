@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from math import log
 
@@ -15,13 +14,15 @@ from bestview import IdentitySettings
 from bestview.association.affinity.travel_times import CameraSighting, TravelTimeModel, travel_time_bins
 
 CAMERAS = ("c0", "c1", "c2")
-SETTINGS = IdentitySettings(travel_frames=1000, travel_half_weight_count=5.0, maximum_travel_evidence=4.0)
+SETTINGS = IdentitySettings(
+    maximum_travel_s=40.0, travel_half_weight_count=5.0, maximum_travel_evidence=4.0
+).resolve(25.0)
 TRANSITIONS = st.tuples(st.sampled_from(CAMERAS), st.sampled_from(CAMERAS), st.integers(-50, 1500))
 
 
 def reference_evidence(transitions: list[tuple[str, str, int]], lost: str, found: str, frames: int) -> float:
     """Compute the evidence from the list of all transitions."""
-    edges = travel_time_bins(SETTINGS.travel_frames).tolist()
+    edges = travel_time_bins(SETTINGS.maximum_travel_frames).tolist()
 
     def bin_of(time: int) -> int:
         return next((i for i, (low, high) in enumerate(pairwise(edges)) if low <= time < high), -1)
@@ -99,7 +100,10 @@ def test_time_bins_cover_all_times_without_gaps(longest: int) -> None:
 
 def test_minimal_settings_work() -> None:
     travel = TravelTimeModel(
-        replace(SETTINGS, travel_frames=0, travel_half_weight_count=0.0, maximum_travel_evidence=0.0), 0
+        IdentitySettings(
+            maximum_travel_s=0.0, travel_half_weight_count=0.0, maximum_travel_evidence=0.0
+        ).resolve(25.0),
+        0,
     )
     travel.learn(CameraSighting("c0", 0), CameraSighting("c1", 1))
     assert travel.evidence([CameraSighting("c1", 1)], [CameraSighting("c0", 0)]).tolist() == [[0.0]]

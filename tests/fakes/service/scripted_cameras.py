@@ -54,7 +54,7 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
         "view": {
             "lookahead": 2 * GOP,
             "switch_cost_s": 0.04,
-            "identity": {"confirmation_frames": 1, "clustering_interval": 1},
+            "identity": {"confirmation_s": 0.04, "clustering_interval_s": 0.04},
         },
     }
     for section, value in changes.items():

@@ -11,7 +11,7 @@ from server.service.identity.people import PersonTracker
 
 
 def people(**settings: int) -> PersonTracker:
-    identity = IdentitySettings(**{"confirmation_frames": 1, "clustering_interval": 1, **settings})
+    identity = IdentitySettings(**{"confirmation_s": 0.04, "clustering_interval_s": 0.04, **settings})
     return PersonTracker(identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), lag=0)
 
 

@@ -141,14 +141,14 @@ def test_a_lookahead_below_the_trackers_lag_is_refused_with_the_minimum() -> Non
 
 
 def test_a_person_must_be_published_before_they_are_settled() -> None:
-    identity = {"publish_after": 7, "clustering_interval": 4, "settle_after": 14}
-    assert "view.identity.settle_after: is 14 frames but must be at least 15" in error_of(
+    identity = {"publish_after_s": 0.28, "clustering_interval_s": 0.16, "settle_after_s": 0.56}
+    assert "view.identity.settle_after_s: is 0.56 seconds but must be at least 0.6" in error_of(
         site(view={"identity": identity})
     )
     config = build_config(
-        site(view={"identity": identity | {"settle_after": 15}}), where="site.yaml", folder=Path()
+        site(view={"identity": identity | {"settle_after_s": 0.6}}), where="site.yaml", folder=Path()
     )
-    assert config.view.identity.settle_after == 15
+    assert config.view.identity.settle_after_s == 0.6
 
 
 @pytest.mark.parametrize(

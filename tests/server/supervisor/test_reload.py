@@ -68,7 +68,7 @@ def changed_config(keys: set[str]) -> Config:
         camera: {"id": camera, "source": "scene:room"} for camera in CAMERAS
     }
     small = {
-        "view": {"identity": {"confirmation_frames": 1, "clustering_interval": 1}},
+        "view": {"identity": {"confirmation_s": 0.04, "clustering_interval_s": 0.04}},
         "track": {"window": WINDOW},
     }
     for key in keys:

@@ -46,7 +46,7 @@ def test_a_manual_merge_is_permanent(steps: list[tuple[bool, int, int]]) -> None
 
 
 def scripted_tracker(*updates: IdentityUpdate) -> PersonTracker:
-    tracker = people(departed_after=10)
+    tracker = people(departed_after_s=0.4)
     tracker._registry = ScriptedRegistry(*updates)  # type: ignore[assignment]
     return tracker
 

@@ -266,7 +266,7 @@ def test_two_tracks_of_one_person_in_one_picture_are_one_box() -> None:
 
 
 def test_people_not_seen_for_long_are_forgotten_entirely() -> None:
-    tracker = people(departed_after=STRIDE, forget_after=3 * STRIDE)
+    tracker = people(departed_after_s=STRIDE / 25, forget_after_s=3 * STRIDE / 25)
     tracker.update(epoch_of(0, camera_tracks("c0", 0, {1: SMALL})))
     [number] = tracker.known
     for epoch in range(1, 4):
