@@ -14,7 +14,14 @@ from tracking.solvers.base import DEFAULT_SOLVER, Solution, Solver, SolveReport,
 from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
 from tracking.types import Detections
-from tracking.window import AppearanceHistogram, WindowResult, WindowSettings, WindowTrack, merge_results
+from tracking.window import (
+    AppearanceHistogram,
+    ResolvedWindowSettings,
+    WindowResult,
+    WindowSettings,
+    WindowTrack,
+    merge_results,
+)
 
 __all__ = [
     "DEFAULT_SOLVER",
@@ -24,6 +31,7 @@ __all__ = [
     "Detections",
     "Network",
     "OnlineTracker",
+    "ResolvedWindowSettings",
     "Solution",
     "SolveReport",
     "Solver",

@@ -90,15 +90,15 @@ def create_tracker(
     """Create a tracker for `fps` frames per second.
 
     `costs`, `solver` and `assist` apply to the default tracker only, which is a `CorrectableTracker` if
-    `assist` is enabled; `temporal` and `fps` apply to temporal consistency only.
+    `assist` is enabled; `temporal` applies to temporal consistency only.
 
     Raises:
         ValueError: no tracker has that name.
     """
     if name == DEFAULT_TRACKER:
         if assist is not None and assist.enabled:
-            return CorrectableTracker(window, costs, solver(), assist)
-        return OnlineTracker(window, costs, solver())
+            return CorrectableTracker(window, costs, solver(), assist, fps)
+        return OnlineTracker(window, costs, solver(), fps)
     if name == TEMPORAL_TRACKER:
         tracker: Tracker = import_module(
             "tracking.baselines.temporal_consistency.tracker"
@@ -107,8 +107,8 @@ def create_tracker(
     if name == _GRAPH:
         from tracking.baselines.track_graph import TrackGraph  # noqa: PLC0415 — imported on demand
 
-        return TrackGraph(window)
-    return StepwiseTracker(_method_of(name)(), window)
+        return TrackGraph(window, fps=fps)
+    return StepwiseTracker(_method_of(name)(), window, fps=fps)
 
 
 def _method_of(name: str) -> type[PredictionMethod[Any]]:

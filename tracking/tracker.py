@@ -15,6 +15,7 @@ from tracking.interpolation import interpolate_gaps
 from tracking.lifecycle.gating import gate_detections, restrict_network
 from tracking.lifecycle.initiation import Birth, find_births
 from tracking.lifecycle.termination import terminated_ids
+from tracking.model.motion import DEFAULT_FRAME_RATE
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.object_state import Sighting, TrackedObject
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, create_solver
@@ -41,9 +42,15 @@ class OnlineTracker:
     the last final frame, which is one frame of overlap.
     """
 
-    def __init__(self, window: WindowSettings, costs: CostSettings, solver: Solver) -> None:
-        self._window = window
-        self._costs = costs
+    def __init__(
+        self,
+        window: WindowSettings,
+        costs: CostSettings,
+        solver: Solver,
+        fps: float = DEFAULT_FRAME_RATE,
+    ) -> None:
+        self._window = window.resolve(fps)
+        self._costs = costs.for_frame_rate(fps)
         self._solver = solver
         # For a single object dynamic programming is exact.
         self._single = create_solver("separate-dp")
@@ -201,7 +208,13 @@ class OnlineTracker:
                 added = True
             elif self._evict_if_full(first, occluded):
                 self._objects.append(
-                    TrackedObject(self._assign_id(birth, frame), birth.histogram, birth.box, frame)
+                    TrackedObject(
+                        self._assign_id(birth, frame),
+                        birth.histogram,
+                        birth.box,
+                        frame,
+                        self._window.frame_rate,
+                    )
                 )
                 added = True
         return added

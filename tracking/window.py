@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,9 @@ import numpy.typing as npt
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections, RiskEvent
+
+_MIN_INTERPOLATED = 2
+"""Missed frames that are interpolated at any frame rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,11 +24,10 @@ class WindowSettings:
         ValueError: a setting is out of range.
     """
 
-    window: int = (
-        15  # M: frames of a window; a frame is final once window minus stride frames have followed it
-    )
-    stride: int = 5  # s: frames between two windows, which end at frames n where s divides n + 1
-    birth_window: int = 15  # frames over which a new object is tested; at most the window
+    length_s: float = 0.6  # M: seconds of a window; a frame is final length_s - stride_s later
+    stride_s: float = 0.2  # s: seconds between two windows
+    min_frames: int = 10  # frames of a window at least: at low frame rates it is longer
+    birth_s: float = 0.6  # seconds over which a new object is tested; at most the window
     birth_min_visible: float = 0.5  # share of these frames in which a new object must be detected
     birth_max_cost: float = 0.7  # largest mean cost per frame of its path: appearance, motion, confidence
     birth_min_score: float = 0.3  # least score of the detections of a new object
@@ -33,27 +35,63 @@ class WindowSettings:
     birth_max_tests: int = 8  # most tests per window, best detections first
     birth_max_iou: float = 0.35  # overlap (IoU) with a track above which a detection starts no new one
     duplicate_overlap: float = 0.8  # mean overlap of two tracks above which they are duplicates
-    forget_after: int = 1500  # F: occluded frames after which an object is dropped and its id retired
+    forget_after_s: float = 60.0  # F: seconds occluded after which an object is dropped, its id retired
     max_objects: int = 24  # most objects kept; the longest occluded one is dropped first
     template_update_rate: float = 0.05  # weight of a new histogram in an object's template
-    gate_heights: float = 0.5  # box heights by which an object may move between two frames
-    gate_growth: float = 0.3  # box heights added to that for each further frame since its last detection
+    gate_heights: float = 0.2  # box heights by which an object may move at once
+    gate_speed: float = 7.5  # box heights per second since its last detection, added to that
     max_height_ratio: float = 1.5  # factor by which its height may change meanwhile
-    max_interpolated_gap: int = 20  # longest occlusion, in frames, that is interpolated
-    reidentify_after: int = 100  # occluded frames after which an object only returns by re-identification
+    max_interpolated_gap_s: float = 0.8  # longest occlusion, in seconds, that is interpolated
+    reidentify_after_s: float = 4.0  # seconds of occlusion after which it only returns by re-identification
     reidentify_max_distance: float = 0.35  # largest appearance distance for that, 0 to 1
 
     def __post_init__(self) -> None:
-        if not 1 <= self.stride <= self.window:
-            raise ValueError(f"stride must be between 1 and the window of {self.window}, not {self.stride}")
-        if not 1 <= self.birth_window <= self.window:
+        if not 0.0 < self.stride_s <= self.length_s:
             raise ValueError(
-                f"birth_window must be between 1 and the window of {self.window}, not {self.birth_window}"
+                f"stride_s must be above 0, and at most length_s, {self.length_s:g}, not {self.stride_s:g}"
+            )
+        if not 0.0 < self.birth_s <= self.length_s:
+            raise ValueError(
+                f"birth_s must be above 0, and at most length_s, {self.length_s:g}, not {self.birth_s:g}"
             )
         if not 0.0 < self.birth_min_visible <= 1.0:
             raise ValueError(f"birth_min_visible is a share between 0 and 1, not {self.birth_min_visible}")
-        if self.forget_after < 1 or self.max_objects < 1:
-            raise ValueError("forget_after and max_objects must be at least 1")
+        if not self.forget_after_s > 0.0 or self.max_objects < 1 or self.min_frames < 1:
+            raise ValueError("forget_after_s must be above 0, and max_objects and min_frames at least 1")
+
+    def resolve(self, frame_rate: float) -> ResolvedWindowSettings:
+        """Return the settings with all times in frames, for so many frames per second."""
+
+        def frames(seconds: float, least: int = 1) -> int:
+            return max(round(seconds * frame_rate), least)
+
+        window = frames(self.length_s, self.min_frames)
+        return ResolvedWindowSettings(
+            **{field.name: getattr(self, field.name) for field in fields(WindowSettings)},
+            frame_rate=frame_rate,
+            window=window,
+            stride=min(frames(self.stride_s), window),
+            birth_window=min(frames(self.birth_s, self.min_frames), window),
+            forget_after=frames(self.forget_after_s, window),
+            max_interpolated_gap=frames(self.max_interpolated_gap_s, _MIN_INTERPOLATED),
+            reidentify_after=frames(self.reidentify_after_s, window),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResolvedWindowSettings(WindowSettings):
+    """Settings for one frame rate: each time is also given as a number of frames.
+
+    Windows end at the frames n where `stride` divides n + 1.
+    """
+
+    frame_rate: float
+    window: int
+    stride: int
+    birth_window: int
+    forget_after: int
+    max_interpolated_gap: int
+    reidentify_after: int
 
     @property
     def min_final_lag(self) -> int:

@@ -48,7 +48,7 @@ class GroundTruthRegistry:
 
 def decide(config: Config, messages: Messages, people: Sequence[int] | None = None) -> Rendering:
     """Align the cameras' messages, associate tracks and select views; with `people`, true ids are given."""
-    aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
+    aligner = EpochAligner(config.camera_ids, config.window.stride, grace=0)
     last = {camera: camera_messages[-1].last for camera, camera_messages in messages.items()}
     decider = ViewDecider(
         config, camera_homographies(config), lambda camera, pulse: 0 <= pulse <= last[camera]
@@ -85,7 +85,7 @@ def _messages_of(
     config: Config, camera: str, rows: Sequence[MotRow], people: Sequence[int], frames: int
 ) -> list[CameraTracks]:
     """Build track messages with all people in each, so that local track ids are indices in `people`."""
-    stride = config.track.window.stride
+    stride = config.window.stride
     boxes: dict[tuple[int, int], Box] = {(row.id, row.frame - 1): row.box for row in rows}
     spans = [(end - stride + 1, end) for end in range(stride - 1, frames, stride)]
     spans.append((frames - frames % stride, frames - 1))

@@ -21,7 +21,7 @@ def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]
     settings = config.view.identity.resolve(config.site.fps)
     tracklets, reader = TrackletSplitter(settings), WindowReader((config.site.width, config.site.height))
     ground, error = camera_homographies(config), FootPointError(settings.foot_sideways, settings.foot_upwards)
-    aligner = EpochAligner(config.camera_ids, config.track.window.stride, grace=0)
+    aligner = EpochAligner(config.camera_ids, config.window.stride, grace=0)
     for camera in config.camera_ids:
         aligner.camera_connected(camera)
         aligner.frame_received(camera, messages[camera][0].boot, 0)

@@ -34,14 +34,14 @@ class TrackingSetup:
 FISH = TrackingSetup(
     WindowSettings(
         max_height_ratio=2.5,
-        gate_heights=1.0,
-        gate_growth=0.4,
+        gate_heights=0.6,
+        gate_speed=10.0,
         birth_max_iou=0.05,
         birth_min_peak_score=0.7,
         birth_min_score=0.5,
         birth_min_visible=0.8,
     ),
-    CostSettings(displacement=1.0, gate=1.2, motion_slack=0.5, motion_drift=0.1, reappearance_drift=0.1),
+    CostSettings(displacement=1.0, gate=1.2, motion_slack=0.5, motion_drift=2.5, reappearance_drift=2.5),
     InteractiveSettings(enabled=True),
 )
 """Settings in box heights for bodies that are three times as long as high, and turn.

@@ -12,15 +12,16 @@ from benchmarks.paper_experiments.walking_people import WalkParameters
 from tracking import PAPER_COSTS, CostSettings, WindowSettings
 
 _FOR_EVER = 1_000_000
+_FPS = 25.0
+"""The trackers' default: the paper counts in frames."""
 PAPER_WINDOW = WindowSettings(
-    window=19,
-    stride=18,
-    birth_window=19,
+    length_s=19 / _FPS,
+    stride_s=18 / _FPS,
+    birth_s=19 / _FPS,
     gate_heights=_FOR_EVER,
-    gate_growth=_FOR_EVER,
     max_height_ratio=_FOR_EVER,
-    reidentify_after=_FOR_EVER,
-    forget_after=_FOR_EVER,
+    reidentify_after_s=_FOR_EVER,
+    forget_after_s=_FOR_EVER,
     template_update_rate=0.0,
 )
 """Segments of 20 frames, including the templates' one, with a stride of 18: so 1351 frames are 75 segments
@@ -80,7 +81,7 @@ def _layout(costs: CostSettings) -> TrackerSetting:
 
 def _whole(frames: int, costs: CostSettings = PAPER_COSTS) -> TrackerSetting:
     """Return settings that solve the whole sequence at once, as the paper does here."""
-    window = replace(PAPER_WINDOW, window=frames, stride=frames, birth_window=frames)
+    window = replace(PAPER_WINDOW, length_s=frames / _FPS, stride_s=frames / _FPS, birth_s=frames / _FPS)
     return TrackerSetting("paper, one window", costs, window)
 
 

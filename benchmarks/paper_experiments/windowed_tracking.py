@@ -11,6 +11,7 @@ from benchmarks.paper_experiments.label_errors import named
 from benchmarks.paper_experiments.scene import ExperimentScene
 from tracking import CostSettings, Detections, OnlineTracker, SolveReport, Template, WindowSettings
 from tracking.boxes import BOX_SIDES, Floats
+from tracking.model.motion import DEFAULT_FRAME_RATE
 from tracking.model.network import Network, build_network, build_network_per_object
 from tracking.solvers.base import OCCLUDED, Solver
 
@@ -47,15 +48,16 @@ def _follow_known(
         if item.box is not None:
             boxes[k, 0] = item.box
     templates, reports, first = list(scene.templates), [], 1
+    size = window.resolve(DEFAULT_FRAME_RATE)
     while first < frames:
-        stop = min(first + window.window, frames)
+        stop = min(first + size.window, frames)
         solution = solver.solve(_network(scene, templates, first, stop, costs))
         reports.append(solution.report)
         for k, states in enumerate(solution.states):
             seen = scene.seen[k if len(scene.seen) > 1 else 0]
             for t, state in enumerate(states, first):
                 boxes[k, t] = seen[t].boxes[state] if state != OCCLUDED else np.nan
-        first = first + window.stride if stop < frames else frames
+        first = first + size.stride if stop < frames else frames
         last = boxes[:, first - 1]
         templates = [
             replace(item, box=None if np.isnan(box).any() else box)

@@ -49,7 +49,7 @@ class SimulatedCrowd:
     def epochs(self, config: Config, count: int) -> Iterator[Epoch]:
         """Yield the cameras' messages: a complete window per epoch, as the tracker sends it."""
         rng = np.random.default_rng(_SEED)
-        window, stride = config.track.window.window, config.track.window.stride
+        window, stride = config.window.window, config.window.stride
         cameras = [rng.permutation(self.cameras)[: self.seen_by] for _ in range(self.people)]
         height = rng.uniform(40, 120, self.people)
         begin = rng.uniform((0, 200), (_WIDTH, _HEIGHT), (self.people, 2))
@@ -140,7 +140,7 @@ def decision_times(crowd: SimulatedCrowd, gop: int, epochs: int, *, all_terms: b
         with watch.watching(*stages):
             for decision in decider.step(epoch):
                 state.put(decision)
-    frames = epochs * config.track.window.stride
+    frames = epochs * config.window.stride
     return StageSeconds(**{stage: spent / frames for stage, spent in watch.seconds.items()})
 
 

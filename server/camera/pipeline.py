@@ -119,8 +119,10 @@ class CameraPipeline:
             self._letterbox,
             prescan=warm_up,
         )
-        self._tracker = SkippedFrameInterpolator(tracker, self._detector.appearance_bins, track.window.stride)
-        self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, track.window.stride)
+        self._tracker = SkippedFrameInterpolator(
+            tracker, self._detector.appearance_bins, config.window.stride
+        )
+        self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, config.window.stride)
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
             CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None

@@ -198,7 +198,7 @@ class CameraProcess:
 
     async def _track(self) -> None:
         """Detect and track, frame by frame, behind the video."""
-        stride, thumbnail_interval = self._config.track.window.stride, max(1, round(self._config.site.fps))
+        stride, thumbnail_interval = self._config.window.stride, max(1, round(self._config.site.fps))
         detection_times: list[float] = []
         while (item := await self._backlog.get()) is not None:
             pulse, image, skipped = item.pulse, item.image, item.skipped

@@ -30,6 +30,7 @@ from server.config.sections import (
 )
 from server.config.sections.detect import DetectSettings
 from server.config.unknown_keys import no_unknown_keys
+from tracking import ResolvedWindowSettings
 from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
@@ -99,6 +100,11 @@ class Config(BaseSettings):
         """The fewest look-ahead frames, after which tracks no longer change."""
         return self.encode.gop + self.track.final_lag(self.site.fps)
 
+    @property
+    def window(self) -> ResolvedWindowSettings:
+        """The trackers' window at the site's frame rate."""
+        return self.track.window.resolve(self.site.fps)
+
     def check_lookahead(self, view: ViewSettings) -> None:
         """Check that these settings look far enough ahead.
 
@@ -106,7 +112,7 @@ class Config(BaseSettings):
             ValueError: they do not.
         """
         if view.lookahead < self.least_lookahead:
-            lag = "track.window.window - track.window.stride"
+            lag = "the frames of track.window.length_s - stride_s"
             if self.track.tracker == TEMPORAL_TRACKER:
                 lag = "the frames of all stages of track.temporal, less one"
             raise ValueError(

@@ -51,7 +51,7 @@ class BestViewPipeline:
         self.config = config
         self.pulses = PulseFollower(config)
         cameras = config.camera_ids
-        fps, stride = config.site.fps, config.track.window.stride
+        fps, stride = config.site.fps, config.window.stride
         grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
         # Frames must still be buffered when the last camera that is waited for has reported.
         frames = max(

@@ -16,7 +16,7 @@ _CAMERA_KEYS = ("source", "password", "offset", "at_end", "h264", "options", "ig
 _TRACK = tuple(name for name in TrackSettings.model_fields if name != "backlog_s")
 _SHARED_KEYS = ("detect", *(f"track.{name}" for name in _TRACK))
 """Settings that only camera processes use."""
-_EPOCHS = ("track.window.window", "track.window.stride")
+_EPOCHS = ("track.window.length_s", "track.window.stride_s", "track.window.min_frames")
 """Of these, settings by which the best view aligns tracking windows: they need a restart of the site."""
 _BY_LAG = ("tracker", "temporal")
 """Of these, settings that may change the lag of final frames, and then need a restart of the site."""

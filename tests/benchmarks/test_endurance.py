@@ -21,7 +21,7 @@ MAX_GROWTH = 200_000
 
 @pytest.mark.slow
 def test_the_trackers_memory_does_not_grow_over_hundreds_of_frames() -> None:
-    settings = WindowSettings(forget_after=50, max_objects=8)
+    settings = WindowSettings(forget_after_s=2.0, max_objects=8).resolve(25.0)
     tracker = OnlineTracker(settings, CostSettings(), create_solver("columns"))
     scene = crowd(2, seed=1)
     objects, allocated = 0, 0

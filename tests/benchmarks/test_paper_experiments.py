@@ -17,6 +17,7 @@ from benchmarks.paper_experiments.noisy_detections import SceneParameters, play
 from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
 from benchmarks.paper_experiments.walking_people import WalkParameters
 from benchmarks.paper_experiments.windowed_tracking import follow
+from fakes.tracking.windows import window_of_frames
 from tracking import PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, create_solver
 from tracking.boxes import iou
 
@@ -95,7 +96,7 @@ def test_each_object_has_one_track_and_each_track_one_object() -> None:
 @pytest.mark.parametrize("solver", ["columns", "exact", "greedy-dp", "separate-dp"])
 def test_people_who_stand_apart_keep_their_labels(solver: str) -> None:
     scene = two_apart()
-    window = WindowSettings(window=3, stride=2, birth_window=3)
+    window = window_of_frames(3, 2)
     followed = follow(scene, PAPER_COSTS, window, create_solver(solver))
     assert len(followed.reports) == 1  # three frames after the templates'
     np.testing.assert_array_equal(followed.boxes, scene.truth.boxes)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from fakes.tracking.windows import window_of_frames
 from tracking import PAPER_COSTS, CostSettings, TemplateTracker, WindowSettings, create_solver
 from tracking.boxes import iou
 from tracking.detectors import TemplateSettings
@@ -44,7 +45,7 @@ def picture(frame: int) -> Picture:
 
 def tracker(stride: int = 5) -> TemplateTracker:
     costs = replace(PAPER_COSTS, confidence=1.0)
-    window = WindowSettings(window=15, stride=stride)
+    window = window_of_frames(15, stride)
     settings = TemplateSettings(max_peaks=30)
     return TemplateTracker(picture(0), places(0), settings, window, costs, create_solver("columns"))
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.strolls import WalkingPerson, detections_at, final_boxes, track_all, tracker
+from fakes.tracking.windows import window_of_frames
 from tracking.boxes import iou
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
@@ -52,8 +53,8 @@ def streams(draw: st.DrawFn) -> list[Detections]:
 def test_every_frame_becomes_final_once_and_in_order(
     stream: list[Detections], start: int, size: tuple[int, int]
 ) -> None:
-    window = WindowSettings(window=size[0], stride=size[1], birth_window=min(size[0], 15))
-    results = track_all(stream, tracker(window), start)
+    settings = window_of_frames(*size)
+    window, results = settings.resolve(25.0), track_all(stream, tracker(settings), start)
     assert results[0].first == start
     assert results[-1].final_to == start + len(stream) - 1
     for earlier, later in pairwise(results):
@@ -106,7 +107,7 @@ def test_people_are_found_and_numbered_from_one(first: int) -> None:
     results = track_all([detections_at(people, n, 1.0) for n in range(40)], tracker(), first)
     found = final_boxes(results)
     # People present from the start are published from the first window that is long enough for initiation.
-    assert min(found) < first + WindowSettings().stride
+    assert min(found) < first + WindowSettings().resolve(25.0).stride
     assert sorted(found) == list(range(min(found), first + 40))
     for frame, boxes in found.items():
         assert sorted(boxes) == [1, 2]
@@ -163,7 +164,7 @@ def test_a_person_back_soon_keeps_the_id_and_one_back_late_gets_a_new_one() -> N
         seen = [n for n in range(60 + absence) if n < 30 or n >= 30 + absence]
         stay = WalkingPerson(100.0, 40.0, 0.0, 2)
         stream = [detections_at([stay] if n in seen else [], n, 1.0) for n in range(60 + absence)]
-        return _ids(track_all(stream, tracker(WindowSettings(forget_after=60))))
+        return _ids(track_all(stream, tracker(WindowSettings(forget_after_s=2.4))))
 
     assert ids(40) == {1}
     assert ids(80) == {1, 2}
@@ -197,8 +198,8 @@ def test_after_a_long_gap_tracking_restarts_without_a_result_for_the_gap() -> No
 
 
 def test_memory_is_bounded_by_the_window_and_the_list() -> None:
-    window = WindowSettings(forget_after=30, max_objects=3)
-    tracked = tracker(window)
+    settings = WindowSettings(forget_after_s=1.2, max_objects=3)
+    tracked, window = tracker(settings), settings.resolve(25.0)
     for n in range(600):
         people = [WalkingPerson(60.0 * k, 40.0, 0.0, (n // 40 + k) % 8) for k in range(5)]
         tracked.push(n, detections_at(people if n % 40 < 25 else [], n))
@@ -244,7 +245,7 @@ def test_flush_without_frames_and_twice_gives_nothing() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"stride": 0}, {"stride": 16}, {"birth_window": 16}, {"birth_min_visible": 0.0}, {"max_objects": 0}],
+    [{"stride_s": 0.0}, {"stride_s": 0.7}, {"birth_s": 0.7}, {"birth_min_visible": 0.0}, {"max_objects": 0}],
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):

@@ -19,6 +19,7 @@ from tracking.appearance_histograms import add_appearance_histograms
 from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
+from tracking.model.motion import DEFAULT_FRAME_RATE
 from tracking.model.object_state import mean_histogram, uniform_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
@@ -102,9 +103,13 @@ class StepwiseTracker(Generic[S]):
     """Frame-by-frame tracker with a prediction method. Its results are final immediately."""
 
     def __init__(
-        self, method: PredictionMethod[S], window: WindowSettings, settings: StepwiseSettings | None = None
+        self,
+        method: PredictionMethod[S],
+        window: WindowSettings,
+        settings: StepwiseSettings | None = None,
+        fps: float = DEFAULT_FRAME_RATE,
     ) -> None:
-        self._method, self._window = method, window
+        self._method, self._window = method, window.resolve(fps)
         self._settings = settings or StepwiseSettings()
         self._objects: list[StepwiseTrack[S]] = []
         self._ended: list[StepwiseTrack[S]] = []

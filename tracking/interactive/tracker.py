@@ -18,6 +18,7 @@ from tracking.interactive.settings import InteractiveSettings
 from tracking.interactive.solved_window import SolvedWindow
 from tracking.interactive.window_memory import WindowMemory, WindowSnapshot
 from tracking.lifecycle.initiation import Birth
+from tracking.model.motion import DEFAULT_FRAME_RATE
 from tracking.model.network import Network
 from tracking.model.object_state import TrackedObject
 from tracking.model.settings import CostSettings
@@ -40,11 +41,16 @@ class CorrectableTracker(OnlineTracker):
     """
 
     def __init__(
-        self, window: WindowSettings, costs: CostSettings, solver: Solver, assist: InteractiveSettings
+        self,
+        window: WindowSettings,
+        costs: CostSettings,
+        solver: Solver,
+        assist: InteractiveSettings,
+        fps: float = DEFAULT_FRAME_RATE,
     ) -> None:
-        super().__init__(window, costs, solver)
+        super().__init__(window, costs, solver, fps)
         self._settings = assist
-        self._risk_predictor = RiskPredictor(assist, costs)
+        self._risk_predictor = RiskPredictor(assist, self._costs)
         self._memory = WindowMemory(assist.memory_frames)
         self._corrections: dict[int, dict[int, PositionCorrection]] = {}
         """By frame and object: a later correction replaces an earlier one."""

@@ -16,24 +16,26 @@ from tracking.boxes import Floats, distance_in_heights, heights
 from tracking.model.network import Network
 from tracking.model.object_state import TrackedObject
 from tracking.types import Detections
-from tracking.window import WindowSettings
+from tracking.window import ResolvedWindowSettings
 
 
 def gate_detections(
-    item: TrackedObject, frame: int, detections: Detections, window: WindowSettings
+    item: TrackedObject, frame: int, detections: Detections, window: ResolvedWindowSettings
 ) -> npt.NDArray[np.bool_]:
     """Return which detections of a frame the object can be, `(K,)` bool."""
     return within_gate(item.box, detections.boxes, abs(frame - item.frame), window)
 
 
-def within_gate(box: Floats, boxes: Floats, elapsed: int, window: WindowSettings) -> npt.NDArray[np.bool_]:
+def within_gate(
+    box: Floats, boxes: Floats, elapsed: int, window: ResolvedWindowSettings
+) -> npt.NDArray[np.bool_]:
     """Return which boxes `(K, 4)` an object of `box` `(4,)` can have reached after `elapsed` frames, `(K,)`.
 
-    It may have moved by `gate_heights + gate_growth (elapsed - 1)` heights (`distance_in_heights`), and its
+    In t seconds it may have moved by `gate_heights + gate_speed t` heights (`distance_in_heights`), and its
     height may have changed by `max_height_ratio`.
     """
     height, other_heights = float(heights(box)), heights(boxes)
-    max_distance = window.gate_heights + window.gate_growth * max(elapsed - 1, 0)
+    max_distance = window.gate_heights + window.gate_speed * max(elapsed, 1) / window.frame_rate
     similar = (other_heights <= window.max_height_ratio * max(height, 1.0)) & (
         height <= window.max_height_ratio * np.maximum(other_heights, 1.0)
     )

@@ -14,7 +14,7 @@ from tracking.model.network import CostSettings, build_network
 from tracking.model.object_state import Template, mean_histogram
 from tracking.solvers.base import OCCLUDED, Solver
 from tracking.types import Detections
-from tracking.window import WindowSettings
+from tracking.window import ResolvedWindowSettings
 
 # Least share of the frames visible in either track in which backward and forward track agree.
 _MIN_AGREEMENT = 0.8
@@ -39,7 +39,7 @@ class Birth:
 def find_births(
     frames: Sequence[Detections],
     occupied: Sequence[Floats],
-    window: WindowSettings,
+    window: ResolvedWindowSettings,
     costs: CostSettings,
     solver: Solver,
 ) -> list[Birth]:
@@ -85,12 +85,14 @@ def find_births(
     return births
 
 
-def _required_frames(window: WindowSettings) -> int:
+def _required_frames(window: ResolvedWindowSettings) -> int:
     """Return the number of frames in which a new object must be detected."""
     return int(np.ceil(window.birth_min_visible * window.birth_window))
 
 
-def _unassigned_detections(detections: Detections, boxes: Floats, window: WindowSettings) -> Detections:
+def _unassigned_detections(
+    detections: Detections, boxes: Floats, window: ResolvedWindowSettings
+) -> Detections:
     """Return the confident detections of a frame that overlap no known object."""
     kept = detections.scores >= window.birth_min_score
     if len(boxes) and len(detections):
@@ -107,7 +109,7 @@ def _birth_from_path(frames: Sequence[Detections], path: npt.NDArray[np.int64]) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BirthTest:
-    window: WindowSettings
+    window: ResolvedWindowSettings
     costs: CostSettings
     solver: Solver
 

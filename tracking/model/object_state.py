@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.model.motion import MotionModel
+from tracking.model.motion import DEFAULT_FRAME_RATE, MotionModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +38,9 @@ class Template:
             raise ValueError(f"a template's box has shape (4,), not {self.box.shape}")
 
 
-# Detections that determine the velocity.
-_HISTORY_LENGTH = 12
+# Seconds of detections that determine the velocity, and their least number.
+_HISTORY_S = 0.48
+_MIN_HISTORY = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,20 +72,29 @@ class TrackedObject:
         present: it was detected in the last final frame.
     """
 
-    __slots__ = ("_history", "box", "frame", "histogram", "id", "is_confirmed", "present")
+    __slots__ = ("_frame_rate", "_history", "box", "frame", "histogram", "id", "is_confirmed", "present")
 
-    def __init__(self, number: int, histogram: Floats, box: Floats, frame: int) -> None:
+    def __init__(
+        self,
+        number: int,
+        histogram: Floats,
+        box: Floats,
+        frame: int,
+        frame_rate: float = DEFAULT_FRAME_RATE,
+    ) -> None:
         self.id = number
         self.histogram = histogram
         self.box = box
         self.frame = frame
-        self._history: deque[tuple[int, Floats]] = deque(maxlen=_HISTORY_LENGTH)
+        self._frame_rate = frame_rate
+        history = max(round(_HISTORY_S * frame_rate), _MIN_HISTORY)
+        self._history: deque[tuple[int, Floats]] = deque(maxlen=history)
         self.is_confirmed = False
         self.present = False
 
     def copy(self) -> TrackedObject:
         """Return a copy."""
-        other = TrackedObject(self.id, self.histogram, self.box, self.frame)
+        other = TrackedObject(self.id, self.histogram, self.box, self.frame, self._frame_rate)
         other._history.extend(self._history)
         other.is_confirmed, other.present = self.is_confirmed, self.present
         return other
@@ -97,7 +107,7 @@ class TrackedObject:
         motion = None
         if self._history:
             frames, boxes = zip(*self._history, strict=True)
-            motion = MotionModel.of(frames, np.stack(boxes), first)
+            motion = MotionModel.of(frames, np.stack(boxes), first, self._frame_rate)
         return Template(self.id, self.histogram, self.box if self.present else None, motion)
 
     def update(self, sighting: Sighting, rate: float) -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from tracking.appearance import AppearanceMeasure
+from tracking.model.motion import DEFAULT_FRAME_RATE
 
 ConflictRule = Literal["corners", "overlap"]
 ConflictRows = Literal["clique", "star"]
 DisplacementUnit = Literal["pixels", "heights"]
 
 
+_JITTER, _SPEED, _TOP_SPEED = 0.1, 1.0, 2.5
+"""Heights by which the box of somebody who stands changes from frame to frame; heights per second of somebody
+who walks, and who runs."""
 # Pixels: a smaller gate was probably meant in heights.
 _MIN_GATE_PIXELS = 2.0
 
@@ -29,7 +33,8 @@ class CostSettings:
 
     # λ1: weight of the change of appearance between two frames; no unit (g is in [0, 1]).
     appearance: float = 0.25
-    # λ2: weight of the displacement between two frames; cost per displacement unit (below).
+    # λ2: weight of the displacement between two frames, 0.04 seconds apart; cost per displacement unit
+    # (below).
     displacement: float = 2.0
     # Unit of displacement and gate: pixels of the image, or mean heights of the two boxes.
     displacement_unit: DisplacementUnit = "heights"
@@ -43,14 +48,14 @@ class CostSettings:
     # Cost of an arc into an occlusion, once per occlusion. 0 is the paper.
     disappearance: float = 1.0
     # Largest cost of the distance from an object's predicted position, reached at
-    # `motion_slack + motion_drift * elapsed frames` heights. 0 is the paper.
+    # `motion_slack + motion_drift * elapsed seconds` heights. 0 is the paper.
     motion: float = 0.2
-    motion_drift: float = 0.04
+    motion_drift: float = 1.0
     # Weight of the square of that distance for arcs out of an occlusion, in units of
-    # `motion_slack + reappearance_drift * elapsed frames` heights; beyond there is no arc. 0 is the
+    # `motion_slack + reappearance_drift * elapsed seconds` heights; beyond there is no arc. 0 is the
     # paper: no limit.
     reappearance: float = 1.0
-    reappearance_drift: float = 0.03
+    reappearance_drift: float = 0.75
     # Largest appearance distance to the template at which an object reappears after an occlusion, 0 to 1.
     reappearance_max_distance: float = 0.5
     # Deviation from the predicted position that is measurement error, heights.
@@ -60,7 +65,7 @@ class CostSettings:
     unknown_appearance: float = 0.3
     # How histograms are compared: g(.), in [0, 1].
     measure: AppearanceMeasure = "bhattacharyya"
-    # Longest displacement from one frame to the next, in displacement units; None: any.
+    # Longest displacement within 0.04 seconds, in displacement units; None: any.
     gate: float | None = 0.6
     # μ: weight of the spatial layout term, cost per pixel of L1 change between two objects; 0 is off.
     layout: float = 0.0
@@ -101,6 +106,21 @@ class CostSettings:
             raise ValueError(f"conflict_distance must be positive, not {self.conflict_distance}")
         if not self.conflict_overlap > 0.0:
             raise ValueError(f"conflict_overlap must be positive, not {self.conflict_overlap}")
+
+    def for_frame_rate(self, frame_rate: float) -> CostSettings:
+        """Return the settings for so many frames per second.
+
+        People walk further between two frames that are further apart, while boxes jitter alike: displacements
+        are weighed and limited by what both add up to. Pixels, the paper's unit, are left as they are.
+        """
+        if self.displacement_unit == "pixels" or frame_rate == DEFAULT_FRAME_RATE:
+            return self
+        scale = (_JITTER + _SPEED / frame_rate) / (_JITTER + _SPEED / DEFAULT_FRAME_RATE)
+        gate = self.gate
+        if gate is not None:
+            longer = 1.0 / frame_rate - 1.0 / DEFAULT_FRAME_RATE
+            gate = max(gate + _TOP_SPEED * longer, gate / 2.0)
+        return replace(self, displacement=self.displacement / scale, gate=gate)
 
 
 PAPER_COSTS = CostSettings(

@@ -31,14 +31,14 @@ class Renderer:
         cameras = config.camera_ids
         self._config, self._folder = config, folder
         # Undecided frames, and frames by which a camera is ahead.
-        frames = 4 * (config.view.lookahead + config.encode.gop + config.track.window.stride)
+        frames = 4 * (config.view.lookahead + config.encode.gop + config.window.stride)
         stream_format = stream_format_for(
             config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )
         self._frame_buffers = {
             camera: FrameBuffer(config.site.fps, frames, stream_format) for camera in cameras
         }
-        self._aligner = EpochAligner(cameras, config.track.window.stride, grace=0)
+        self._aligner = EpochAligner(cameras, config.window.stride, grace=0)
         for camera in cameras:
             self._aligner.camera_connected(camera)
         self._decider = ViewDecider(

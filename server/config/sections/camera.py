@@ -87,7 +87,7 @@ class TrackSettings(Section):
         return (
             self.temporal.max_final_lag(fps)
             if self.tracker == TEMPORAL_TRACKER
-            else self.window.min_final_lag
+            else self.window.resolve(fps).min_final_lag
         )
 
     @field_validator("tracker")

@@ -57,7 +57,7 @@ class WalkSession:
             return
         if not self._epochs:
             # The pulse number is unknown before the first epoch; frames are counted from the walk's start.
-            self._start = max(self._start, epoch.last + 1 - self._config.track.window.stride)
+            self._start = max(self._start, epoch.last + 1 - self._config.window.stride)
         self._epochs += 1
         for camera, message in epoch.tracks.items():
             self._walks[camera].add(message, self._start)
@@ -106,7 +106,7 @@ class WalkSession:
     @property
     def seconds(self) -> float:
         """The duration of the walk."""
-        return self._epochs * self._config.track.window.stride / self._fps
+        return self._epochs * self._config.window.stride / self._fps
 
     def coverage(self) -> WalkCoverage:
         """Return the coverage so far."""

@@ -94,7 +94,7 @@ class ViewDecider:
             config.overhead,
             fps,
         )
-        stride, gop = config.track.window.stride, config.encode.gop
+        stride, gop = config.window.stride, config.encode.gop
         self._max_gops_per_epoch = -(-stride // gop) + 1
         """One more than an epoch completes, so that a backlog after a shorter look-ahead shrinks."""
         self._quality_buffer = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
@@ -138,7 +138,7 @@ class ViewDecider:
         """
         gop, lookahead = self._config.encode.gop, self._config.view.lookahead
         if self._next_gop is None or epoch.skipped:  # earlier frames are unknown
-            start = epoch.last - self._config.track.window.stride + 1
+            start = epoch.last - self._config.window.stride + 1
             self._next_gop = -(-start // gop) * gop
         self._quality_buffer.put(self.people.update(epoch))
         last = epoch.last - lookahead + 1

@@ -283,9 +283,7 @@ class Overloaded(LoadMonitor):
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         super().__init__(config, camera_id, live=live)
-        self._shedder = LoadShedder(
-            shed_levels(config.track.window.stride, live=True)[-1:], LevelBounds(1e9, 1e9)
-        )
+        self._shedder = LoadShedder(shed_levels(config.window.stride, live=True)[-1:], LevelBounds(1e9, 1e9))
 
     @property
     def level(self) -> int:

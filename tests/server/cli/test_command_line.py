@@ -277,7 +277,7 @@ def test_track_reads_settings_from_a_configuration_in_any_folder(run: RunCommand
     (tmp_path / "det.txt").write_text("1,-1,10,10,8,20,0.9,-1,-1,-1\n")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "ground.json").write_text('{"homography": {}}')
-    path = site(tmp_path / "sub", ground="ground.json", track={"window": {"window": 10, "birth_window": 10}})
+    path = site(tmp_path / "sub", ground="ground.json", track={"window": {"length_s": 0.4, "birth_s": 0.4}})
     assert run("track", "--det", "det.txt", "--out", "t.txt", "--config", path).code == 0
     path = site(tmp_path / "sub", track={"window": {"widow": 10}})
     assert "widow" in input_error(run("track", "--det", "det.txt", "--out", "t.txt", "--config", path))

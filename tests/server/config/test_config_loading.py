@@ -36,7 +36,7 @@ def test_an_unknown_key_is_refused_with_a_suggestion() -> None:
 
 
 def test_an_unknown_key_in_nested_settings_is_refused() -> None:
-    assert "did you mean 'stride'?" in error_of(site(track={"window": {"strid": 5}}))
+    assert "did you mean 'stride_s'?" in error_of(site(track={"window": {"strid": 5}}))
     assert "unknown key" in error_of(site(detect={"median": {"no_such": 5}}))
 
 

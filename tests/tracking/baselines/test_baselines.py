@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.strolls import WalkingPerson, detections_at, final_boxes
-from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
+from fakes.tracking.windows import window_of_frames
+from tracking import CostSettings, Detections, WindowResult, create_solver
 from tracking.baselines import StepwiseSettings
 from tracking.baselines.integral_histograms import BINS, ColorIntegralImage
 from tracking.boxes import Floats, iou
@@ -23,7 +24,7 @@ from tracking.registry import (
     tracker_names,
 )
 
-WINDOW = WindowSettings(window=6, stride=3, birth_window=6)
+WINDOW = window_of_frames(6, 3)
 DETECTION_TRACKERS = [name for name in tracker_names() if name != TEMPORAL_TRACKER]
 """All but temporal consistency, which tracks blobs instead of detections and has separate tests."""
 SIZE = (120, 200)
@@ -195,7 +196,7 @@ def test_every_frame_is_published_once_and_no_id_is_reused(stream: list[tuple[in
 
 @pytest.mark.parametrize("name", DETECTION_TRACKERS)
 def test_no_result_spans_a_long_gap_and_ids_are_new_after_it(name: str) -> None:
-    tracker, later = _tracker(name), WINDOW.forget_after + 12
+    tracker, later = _tracker(name), WINDOW.resolve(25.0).forget_after + 12
     before = _follow(tracker, 8, 1)
     results = [tracker.push(frame, _detections(9, 1), _picture(9, 1)) for frame in range(later, later + 9)]
     after = [result for result in (*results, tracker.flush()) if result is not None]

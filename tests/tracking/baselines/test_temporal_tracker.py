@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fakes.tracking.strolls import final_boxes
-from tracking import CostSettings, Detections, WindowResult, WindowSettings, create_solver
+from fakes.tracking.windows import window_of_frames
+from tracking import CostSettings, Detections, WindowResult, create_solver
 from tracking.baselines.temporal_consistency import BlobSettings, TemporalSettings
 from tracking.baselines.temporal_consistency.blobs import BlobDetector
 from tracking.baselines.temporal_consistency.tracker import TemporalBlobTracker
@@ -17,11 +18,11 @@ from tracking.detectors.base import Image
 from tracking.registry import create_tracker, needs_images
 
 SIZE = (150, 200)
-WINDOW = WindowSettings(window=10, stride=5, birth_window=10)
 _HALF = 11
 _COLORS = ((40, 40, 200), (200, 70, 30), (50, 160, 50))
 SETTINGS = TemporalSettings(window_stages=4, stage_s=0.2, forget_after_s=2.0)
 FPS = 25.0
+WINDOW = window_of_frames(10, 5, fps=FPS)
 _NO_DETECTIONS: Detections = Detections.empty(0)
 
 
@@ -134,7 +135,7 @@ def test_the_same_pictures_give_the_same_tracks() -> None:
 
 
 def test_ids_are_new_after_a_long_gap_and_no_result_spans_it() -> None:
-    tracker, later = _tracker(), WINDOW.forget_after + 40
+    tracker, later = _tracker(), WINDOW.resolve(FPS).forget_after + 40
     before = _follow(tracker, {frame: _picture(_meet(0), frame) for frame in range(20)})
     after = _follow(tracker, {later + frame: _picture(_meet(0), frame) for frame in range(20)})
     assert after[0].first == later

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.strolls import BINS, WalkingPerson, detections_at, final_boxes, peaked_histogram
-from tracking import CostSettings, Detections, WindowSettings, create_solver
+from fakes.tracking.windows import window_of_frames
+from tracking import CostSettings, Detections, create_solver
 from tracking.appearance import appearance_distance_matrix
 from tracking.baselines.track_groups import TrackEndpoint, TrackGraphSettings, departed_member
 from tracking.boxes import iou
@@ -21,7 +22,7 @@ CLOSE = 25
 
 
 def _tracker(name: str) -> Tracker:
-    window = WindowSettings(window=6, stride=3, birth_window=6)
+    window = window_of_frames(6, 3)
     return create_tracker(name, window, CostSettings(), lambda: create_solver("columns"))
 
 

@@ -184,9 +184,9 @@ def test_the_memory_is_bounded() -> None:
         tracked.push(n, detections_at(SIMILAR, n % 60, 0.5))
         tracked.apply_corrections([_at(SIMILAR[0], n % 60, 1)])
     memory = tracked._memory
-    assert len(memory.detections) <= 40 + WindowSettings().window + 1
+    assert len(memory.detections) <= 40 + WindowSettings().resolve(25.0).window + 1
     assert len(memory.assignments) <= len(memory.detections)
-    assert len(memory.snapshots) <= 40 // WindowSettings().stride + 2
+    assert len(memory.snapshots) <= 40 // WindowSettings().resolve(25.0).stride + 2
     assert len(tracked._corrections) <= 41
 
 

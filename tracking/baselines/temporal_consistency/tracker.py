@@ -31,7 +31,7 @@ class TemporalBlobTracker:
         self, window: WindowSettings, settings: TemporalSettings | None = None, fps: float = 25.0
     ) -> None:
         """Set up for results every `stride` frames of a recording at `fps` frames per second."""
-        self._window, self._settings, self._fps = window, settings or TemporalSettings(), fps
+        self._window, self._settings, self._fps = window.resolve(fps), settings or TemporalSettings(), fps
         self._every = self._settings.stage_frames(fps)
         self._blobs: BlobDetector | None = None
         self._scale = 1.0

@@ -12,7 +12,7 @@ from server.camera.load.load_shedder import ShedLevel, shed_levels
 from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
 from tracking import CostSettings, Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 
-WINDOW = WindowSettings()
+WINDOW = WindowSettings().resolve(25.0)
 FRAMES = 80
 
 

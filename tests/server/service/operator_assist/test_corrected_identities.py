@@ -18,7 +18,7 @@ from tracking import CostSettings, Detections, WindowSettings, create_solver
 from tracking.interactive import CorrectableTracker, InteractiveSettings, PositionCorrection
 
 WIDTH, HEIGHT = 640, 360
-WINDOW = WindowSettings()
+WINDOW = WindowSettings().resolve(25.0)
 ASSIST = InteractiveSettings(enabled=True)
 MET = 60
 """The frame in which two people of the same appearance meet and turn back."""
