@@ -37,7 +37,7 @@ ABLATIONS = (
     Ablation("no cost of reappearing elsewhere", {"costs": {"reappearance": 0.0}}),
     Ablation("no gate on displacement", {"costs": {"gate": None}}),
     Ablation("births from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
-    Ablation("no interpolation of gaps", {"window": {"max_interpolated_gap": 0}}),
+    Ablation("no interpolation of gaps", {"window": {"max_interpolated_gap_s": 0.0}}),
     Ablation("no displacement cost", {"costs": {"displacement": 0.0}}),
     Ablation(
         "displacement in pixels",
@@ -48,9 +48,9 @@ ABLATIONS = (
     Ablation("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
     Ablation(
         "no gating",
-        {"window": {"gate_heights": 1e3, "gate_growth": 1e3, "max_height_ratio": 1e3}},
+        {"window": {"gate_heights": 1e3, "max_height_ratio": 1e3}},
     ),
-    Ablation("window of 5 frames", {"window": {"window": 5, "birth_window": 5}}),
+    Ablation("window of 0.2 seconds", {"window": {"length_s": 0.2, "birth_s": 0.2, "min_frames": 1}}),
     Ablation("no re-identification", {"window": {"reidentify_max_distance": 0.0}}),
     Ablation("fixed templates", {"window": {"template_update_rate": 0.0}}),
     Ablation("the paper's costs", {"costs": asdict(PAPER_COSTS)}),

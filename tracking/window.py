@@ -73,7 +73,9 @@ class WindowSettings:
             stride=min(frames(self.stride_s), window),
             birth_window=min(frames(self.birth_s, self.min_frames), window),
             forget_after=frames(self.forget_after_s, window),
-            max_interpolated_gap=frames(self.max_interpolated_gap_s, _MIN_INTERPOLATED),
+            max_interpolated_gap=frames(
+                self.max_interpolated_gap_s, _MIN_INTERPOLATED if self.max_interpolated_gap_s else 0
+            ),
             reidentify_after=frames(self.reidentify_after_s, window),
         )
 

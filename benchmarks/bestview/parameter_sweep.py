@@ -80,7 +80,14 @@ def sweep(scene: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[Swee
         else:
             config = scene.config(
                 encode={"gop": setting.gop},
-                track={"window": {"window": STRIDE, "stride": STRIDE, "birth_window": STRIDE}},
+                track={
+                    "window": {
+                        "length_s": STRIDE / fps,
+                        "stride_s": STRIDE / fps,
+                        "birth_s": STRIDE / fps,
+                        "min_frames": 1,
+                    }
+                },
                 view={
                     "lookahead": setting.lookahead,
                     "switch_cost_s": setting.switch_cost_s,

@@ -103,7 +103,7 @@ class SceneRunner:
 
     def run_before(self, frame: int) -> None:
         """Run to the last end of an epoch before a frame; that frame is not taken."""
-        last_epoch = frame - self._config.track.window.stride
+        last_epoch = frame - self._config.window.stride
         if all(pipeline.frames <= last_epoch for pipeline in self._pipelines.values()):
             self._run(lambda: min(pipeline.frames for pipeline in self._pipelines.values()) > last_epoch)
 

@@ -34,6 +34,8 @@ from tracking import ResolvedWindowSettings
 from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
+_LOOKAHEAD_S = 1.0
+"""Seconds of the look-ahead where none is configured; more if the tracks need it."""
 _ROUNDING = 1e-9
 _SERVICE = re.compile(r"bestview(-\d+)?")
 """Names of best-view services as clients of the pulse server; no camera may have one."""
@@ -92,6 +94,9 @@ class Config(BaseSettings):
 
     @model_validator(mode="after")
     def _lookahead_covers_the_tracker(self) -> Self:
+        if "lookahead" not in self.view.model_fields_set:
+            lookahead = max(round(_LOOKAHEAD_S * self.site.fps), self.least_lookahead)
+            object.__setattr__(self, "view", self.view.model_copy(update={"lookahead": lookahead}))
         self.check_lookahead(self.view)
         return self
 

@@ -49,7 +49,12 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
         "encode": {"gop": GOP, "codec": codec},
         "cameras": [{"id": camera, "source": "scene:room", "ground": _GROUND} for camera in CAMERAS],
         "track": {
-            "window": {"window": 5, "stride": STRIDE, "birth_window": 5},
+            "window": {
+                "length_s": 5 / FPS,
+                "stride_s": STRIDE / FPS,
+                "birth_s": 5 / FPS,
+                "min_frames": 1,
+            },
             "backlog_s": 0.2,
             "assist": {"enabled": True},
         },

@@ -65,7 +65,8 @@ class ViewSettings(Section):
     """The best-view service."""
 
     lookahead: PositiveInt = 25
-    """Frames that view selection looks ahead: N of the paper's section III; all of it is delay."""
+    """Frames that view selection looks ahead: N of the paper's section III; all of it is delay. By default
+    those of one second, or as many as the tracks need."""
     switch_cost_s: Seconds = 0.3
     """λ: a cut costs as much as so many seconds of not seeing the person while another camera does; or twice
     as many of a view worth half the best one."""

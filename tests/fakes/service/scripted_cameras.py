@@ -50,7 +50,14 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
             {"id": camera, "source": "scene:room"} if isinstance(camera, str) else camera
             for camera in cameras
         ],
-        "track": {"window": {"window": 5, "stride": STRIDE, "birth_window": 5}},
+        "track": {
+            "window": {
+                "length_s": 5 / FPS,
+                "stride_s": STRIDE / FPS,
+                "birth_s": 5 / FPS,
+                "min_frames": 1,
+            }
+        },
         "view": {
             "lookahead": 2 * GOP,
             "switch_cost_s": 0.04,

@@ -29,6 +29,7 @@ from server.service.bus_connection import BusConnection
 from synthetic import Scene, write_recording
 
 FRAMES = 60
+WINDOW = {"length_s": 15 / FPS, "stride_s": 5 / FPS, "birth_s": 15 / FPS}
 
 
 def site(folder: Path, **cameras: str) -> Config:
@@ -39,8 +40,11 @@ def site(folder: Path, **cameras: str) -> Config:
         "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
         "zenoh": {"connect": bus, "listen": bus},
         "cameras": [{"id": camera, "source": source} for camera, source in cameras.items()],
-        "track": {"backlog_s": PATIENCE},
-        "view": {"late_after_s": PATIENCE},
+        "track": {"backlog_s": PATIENCE, "window": WINDOW},
+        "view": {
+            "late_after_s": PATIENCE,
+            "identity": {"confirmation_s": 0.5, "clustering_interval_s": 0.2},
+        },
     }
     return build_config(content, where="hall", folder=folder)
 
