@@ -81,7 +81,9 @@ class LoopedRecordings:
         ``keep_hours`` is the retention of the recording.
         """
         seconds = self.time_scale.seconds
+        window = {"length_s": 15 / self.time_scale.fps, "stride_s": 5 / self.time_scale.fps}
         return {
+            "track": {"window": {**window, "birth_s": window["length_s"]}},
             "encode": {"gop": _GOP},
             "http": {"viewer_queue_gops": round(_VIEWER_S * self.time_scale.fps / _GOP)},
             "detect": {"work_width": WIDTH, "prescan_every": 10},

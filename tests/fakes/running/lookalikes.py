@@ -25,7 +25,7 @@ _FAR, _STEP = 100, 2
 """Pixels from the meeting point to where they stand, and per frame."""
 STANDING = MEETING + _FAR // _STEP
 """The pulse from which they stand still."""
-_OCCLUDED = 6
+_OCCLUDED = 3
 """Frames before and after the meeting in which one occludes the other."""
 _GRAY, _GREEN = 110, (60, 200, 60)
 
