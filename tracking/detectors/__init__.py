@@ -1,17 +1,17 @@
 """Detectors: candidate boxes with scores and histograms."""
 
 from tracking.detectors.background.box_filter import BoxFilterSettings
-from tracking.detectors.background.detector import (
-    PAPER_DETECTOR,
-    BackgroundDetector,
-    BackgroundSettings,
-    overhead_settings,
-    paper_settings,
-)
+from tracking.detectors.background.detector import BackgroundDetector
 from tracking.detectors.background.foreground_fit import ForegroundFitSettings
 from tracking.detectors.background.height_model import FloorGeometry, HeightModelSettings
 from tracking.detectors.background.median import MedianSettings
 from tracking.detectors.background.mog2 import Mog2Settings
+from tracking.detectors.background.settings import (
+    PAPER_DETECTOR,
+    BackgroundSettings,
+    overhead_settings,
+    paper_settings,
+)
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
 from tracking.detectors.base import Detector, Image
 from tracking.detectors.color_histogram import AppearanceExtractor, AppearanceSettings, color_histograms
