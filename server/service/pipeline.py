@@ -107,7 +107,6 @@ class BestViewPipeline:
         self.recorder = Recorder(config, self.frame_buffers, self.stream_format, frames, self.audio_buffer)
         self._last_decided = -1
         """The last pulse of the last epoch; later frames have no tracks."""
-        self._forget_after = config.view.identity.resolve(fps).forget_after
         self.loss_recorder = LossRecorder(self.frame_buffers, self.ingest.states, stride)
         self.stage_timers = StageTimers()
         self.on_decision: list[Callable[[GopChoices], None]] = []
@@ -298,4 +297,4 @@ class BestViewPipeline:
         if self._decision_writer is not None:
             self._decision_writer.write_or_skip(decision)
         self.loss_recorder.record_gop(decision)
-        self.ingest.forget_thumbnails_before(decision.first - self._forget_after)
+        self.ingest.forget_thumbnails_before(decision.first - self.decider.people.forget_after)

@@ -59,7 +59,8 @@ class PersonTracker:
         fps: float = 25.0,
     ) -> None:
         self._registry = IdentityRegistry(settings, homographies, overhead, fps)
-        self._forget_after = settings.resolve(fps).forget_after
+        self.forget_after = settings.resolve(fps).forget_after
+        """Frames unseen after which people are forgotten."""
         self.registry = PersonRegistry(settings.maximum_departed_people)
         """All people, those of other shards included."""
         self._share = share
@@ -269,8 +270,8 @@ class PersonTracker:
 
     def _forget(self, now: int) -> None:
         """Forget tracks and people not seen for ``forget_after`` frames, as the registry does."""
-        for key in [key for key, last in self._last_reported.items() if last < now - self._forget_after]:
+        for key in [key for key, last in self._last_reported.items() if last < now - self.forget_after]:
             del self._last_reported[key]
             self._parts.pop(key, None)
             self._reader.local_numbers.forget(key)
-        self.registry.forget_unseen_since(now - self._forget_after)
+        self.registry.forget_unseen_since(now - self.forget_after)
