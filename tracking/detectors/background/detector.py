@@ -108,7 +108,7 @@ class BackgroundDetector:
         background = self._background
         if not isinstance(background, MedianBackground):
             return
-        work_images = [self._grid_for(image).resize(image) for image in images]
+        work_images = [self.to_work_image(image) for image in images]
         background.prepare(work_images)
         for work_image in work_images:
             segmentation = background.segment_still(work_image)
@@ -123,7 +123,7 @@ class BackgroundDetector:
         Raises:
             ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
-        scan = self.scan(image)
+        scan = self.scan(self.to_work_image(image))
         if scan is None:
             return Detections.empty(self.appearance_bins)
         found = fit_foreground(scan.peaks, scan.foreground, scan.cost, scan.weight, scan.fit)
@@ -131,14 +131,17 @@ class BackgroundDetector:
         self.learn(scan, boxes[: found.person_count])
         return self.detections(scan.image, boxes, found.scores, scan.mask, scan.motion)
 
-    def scan(self, image: Image) -> ForegroundScan | None:
-        """Segment and scan the next frame, which `learn` completes; `None` while the background is unknown.
+    def to_work_image(self, image: Image) -> Image:
+        """Return an image in the size that is searched, `(h, w, 3)`.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
-        grid = self._grid_for(image)
-        work_image = grid.resize(image)
+        return self._grid_for(image).resize(image)
+
+    def scan(self, work_image: Image) -> ForegroundScan | None:
+        """Segment and scan the next frame, which `learn` completes; `None`: the background is unknown."""
+        grid = self.grid
         segmentation = self._background.segment(work_image)
         self.warming_up = segmentation is None
         self._forget_other_view()

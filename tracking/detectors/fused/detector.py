@@ -137,24 +137,22 @@ class FusedDetector:
             ValueError: not an `(H, W, 3)` uint8 image, or another size than before.
         """
         self._frame = self._frame + 1 if frame is None else frame
-        scan = self._background.scan(image)
-        grid = self._background.grid
-        work_image = grid.resize(image)
+        work_image = self._background.to_work_image(image)
+        scan = self._background.scan(work_image)
         runs = self._schedule.is_due(self._frame, needed=self._is_needed)
         if runs:
             found = self.network.find(image)
-            self._carried.renew(work_image, replace(found, boxes=grid.image_to_work(found.boxes)))
+            in_work = self._background.grid.image_to_work(found.boxes)
+            self._carried.renew(work_image, replace(found, boxes=in_work))
         else:
             self._carried.carry(work_image)
         found = self._carried.found
-        if scan is None or self._is_flooded(scan, found):
-            self._is_needed = True
-            if scan is not None:
-                people = self._to_cells(found, scan.motion).boxes
-                self._background.learn(scan, people[found.scores >= self.settings.min_probability])
-            boxes = grid.work_to_cells(found.boxes)
-            return self._background.detections(work_image, boxes, found.scores)
+        if scan is None:
+            return self._network_alone(work_image, found)
         network = self._to_cells(found, scan.motion)
+        if self._is_flooded(scan, network):
+            self._background.learn(scan, network.boxes[found.scores >= self.settings.min_probability])
+            return self._network_alone(work_image, found)
         fused = self._explain(scan, network)
         if runs:
             is_clear = fused.silhouettes[: fused.person_count] >= _CLEAR
@@ -166,6 +164,12 @@ class FusedDetector:
         return self._background.detections(
             scan.image, _average_sides(fused, network), to_probability(fused.log_odds), scan.mask, scan.motion
         )
+
+    def _network_alone(self, work_image: Image, found: Detections) -> Detections:
+        """Return the network's boxes of a frame; the network is needed soon again."""
+        self._is_needed = True
+        boxes = self._background.grid.work_to_cells(found.boxes)
+        return self._background.detections(work_image, boxes, found.scores)
 
     def _needs_network(self, fused: FusedHypotheses) -> bool:
         """Return whether somebody seems to be new or two people are about to cross."""
@@ -187,11 +191,10 @@ class FusedDetector:
         weights = replace(_WEIGHTS, unsupported=self._reliance.share * _WEIGHTS.unsupported)
         return explain_frame(scan, network, body, fit, weights, least)
 
-    def _is_flooded(self, scan: ForegroundScan, found: Detections) -> bool:
+    def _is_flooded(self, scan: ForegroundScan, network: NetworkBoxes) -> bool:
         """Return whether much of the image is foreground outside of the network's boxes."""
         rest = scan.foreground.copy()
-        boxes = self._to_cells(found, scan.motion).boxes
-        for left, top, right, bottom in np.maximum(np.rint(boxes), 0.0).astype(np.int64).tolist():
+        for left, top, right, bottom in np.maximum(np.rint(network.boxes), 0.0).astype(np.int64).tolist():
             rest[top:bottom, left:right] = 0.0
         return float(rest.sum()) > self.settings.max_unexplained * float(scan.weight.sum())
 

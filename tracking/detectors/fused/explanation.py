@@ -109,10 +109,8 @@ class FusedSearch(GreedySearch):
 
     def log_odds(self) -> Floats:
         """Return the log-odds of each candidate given the selected, `(P,)`."""
-        return np.asarray(
-            self._weights.bias
-            + self._weights.silhouette * self.gain_per_visible_area()
-            + np.where(self._free, self._support, -np.inf).max(axis=1)
+        return self._log_odds(
+            self.gain_per_visible_area(), np.where(self._free, self._support, -np.inf).max(axis=1)
         )
 
     def selection_gains(self) -> Floats:
@@ -120,9 +118,14 @@ class FusedSearch(GreedySearch):
         support = np.where(self._free, self._support, -np.inf)
         best = support.argmax(axis=1)
         rows = np.arange(len(best))
-        gains = self.gain_per_visible_area() * self._peaks.areas
-        gains += support[rows, best] / self._weights.silhouette * self._support_areas[rows, best]
-        return np.where(self.log_odds() >= self._min_log_odds, gains, -np.inf)
+        shares, strongest = self.gain_per_visible_area(), support[rows, best]
+        gains = shares * self._peaks.areas
+        gains += strongest / self._weights.silhouette * self._support_areas[rows, best]
+        return np.where(self._log_odds(shares, strongest) >= self._min_log_odds, gains, -np.inf)
+
+    def _log_odds(self, shares: Floats, support: Floats) -> Floats:
+        """Return the log-odds by the gains per visible area and what the network says, both `(P,)`."""
+        return np.asarray(self._weights.bias + self._weights.silhouette * shares + support)
 
     def supporting_box(self, index: int) -> int:
         """Return the free network box that supports a candidate most, or -1."""
