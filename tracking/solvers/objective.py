@@ -36,7 +36,7 @@ def path_cost(network: Network, nodes: Ints, owner: int) -> float:
     """Return the cost of one object's path through `nodes` (M,); infinite where an arc is missing."""
     frames = np.arange(network.frames)
     visited = network.node[owner, frames, nodes].sum()
-    between = network.pair[network.sets[owner], frames[:-1], nodes[:-1], nodes[1:]].sum()
+    between = network.pair[network.pair_sets[owner], frames[:-1], nodes[:-1], nodes[1:]].sum()
     return float(visited + between + network.source[owner, nodes[0]] + network.sink[owner, nodes[-1]])
 
 

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from hypothesis import strategies as st
 
+from tracking.model.motion import MotionModel
 from tracking.model.network import CostSettings, Network, Template, build_network, build_network_per_object
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers.objective import conflict_count, total_cost
@@ -17,6 +18,8 @@ BINS = 4
 SETTINGS = PAPER_COSTS
 SPARSE = 0.3
 """Share of windows and frames with fewer observations, down to none."""
+MOTION = {"motion": 0.2, "reappearance": 1.0, "disappearance": 1.0}
+"""Weights of each object's own motion, which the paper does not have."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ def cases(
     layouts: tuple[float, ...] = (0.0,),
     stars: bool = True,
 ) -> Case:
-    """Draw a window: ties, empty frames, gates and own observations included."""
+    """Draw a window: ties, empty frames, gates, own observations, and motion of each object included."""
     seed = draw(st.integers(0, 2**32 - 1))
     # Sizes come from the seed, not from hypothesis, which would draw mostly the smallest windows.
     rng = np.random.default_rng(seed)
@@ -51,6 +54,7 @@ def cases(
         gate=None if rng.integers(2) else 40.0,
         conflict_rows="star" if stars and rng.integers(2) else "clique",
         conflict_distance=float(rng.choice([40.0, 120.0])),
+        **(MOTION if rng.integers(2) else {}),
     )
     return Case(
         objects=int(rng.integers(1, objects + 1)),
@@ -82,11 +86,21 @@ def network_of(case: Case) -> Network:
     templates = []
     for index in range(case.objects):
         box = seen().boxes[:1].reshape(-1) if rng.uniform() < 0.8 else np.empty(0)
-        templates.append(Template(index + 1, looks(1)[0], box if box.size else None))
+        motion = _motion(np.random.default_rng([case.seed, index]))
+        templates.append(Template(index + 1, looks(1)[0], box if box.size else None, motion))
     if case.shared:
         return build_network(templates, [seen() for _ in range(case.frames)], case.settings)
     own = [[seen() for _ in range(case.frames)] for _ in range(case.objects)]
     return build_network_per_object(templates, own, case.settings)
+
+
+def _motion(rng: np.random.Generator) -> MotionModel | None:
+    """Return how an object moved before the window; `None`: unknown."""
+    if rng.uniform() < SPARSE:
+        return None
+    corner = rng.uniform(0.0, 100.0, 2)
+    box = np.concatenate([corner, corner + np.array([20.0, 50.0])])
+    return MotionModel(box, rng.uniform(-250.0, 250.0, 2), int(rng.integers(1, 20)))
 
 
 def exhaustive_optimum(network: Network) -> float:

@@ -11,7 +11,7 @@ from fakes.tracking.random_networks import Case, cases, network_of
 from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers.dynamic_programming import greedy_paths
-from tracking.solvers.objective import conflict_count, total_cost
+from tracking.solvers.objective import conflict_count, path_cost, path_costs, total_cost
 from tracking.solvers.rounding import LocalSearch, is_integral, round_relaxation
 from tracking.types import Detections
 
@@ -55,6 +55,18 @@ def test_a_jump_that_gating_forbids_is_repaired() -> None:
     better = LocalSearch(network).improve(jump)
     assert np.isfinite(total_cost(network, better))
     assert conflict_count(network, better) == 0
+
+
+@many
+@given(case=cases(objects=4, frames=4, places=4))
+def test_a_path_costs_the_same_alone_as_among_others(case: Case) -> None:
+    """Where motion is known, shared observations cost each object something else."""
+    network = network_of(case)
+    nodes = np.random.default_rng(case.seed).integers(
+        0, network.max_places + 1, (network.objects, network.frames)
+    )
+    alone = [path_cost(network, path, owner) for owner, path in enumerate(nodes)]
+    np.testing.assert_allclose(alone, path_costs(network, nodes))
 
 
 @many
