@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 from tracking.baselines.stepwise import PredictionMethod, StepwiseTracker
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.detectors.base import Image
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.interactive import CorrectableTracker, InteractiveSettings
 from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver
@@ -84,7 +85,7 @@ def create_tracker(
     costs: CostSettings,
     solver: Callable[[], Solver],
     temporal: TemporalSettings | None = None,
-    fps: float = 25.0,
+    fps: float = DEFAULT_FPS,
     assist: InteractiveSettings | None = None,
 ) -> Tracker:
     """Create a tracker for `fps` frames per second.

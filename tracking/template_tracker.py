@@ -7,7 +7,7 @@ import numpy as np
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
 from tracking.detectors.template import TemplateDetector, TemplateSettings
-from tracking.model.motion import DEFAULT_FRAME_RATE
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.model.network import build_network_per_object
 from tracking.model.object_state import Template
 from tracking.model.settings import CostSettings
@@ -36,14 +36,14 @@ class TemplateTracker:
         costs: CostSettings,
         solver: Solver,
         frame: int = 0,
-        fps: float = DEFAULT_FRAME_RATE,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         initial_boxes = np.asarray(boxes, dtype=np.float64)
         if initial_boxes.ndim != 2 or initial_boxes.shape[1] != BOX_SIDES or not len(initial_boxes):  # noqa: PLR2004 — rows, sides
             raise ValueError(f"templates are boxes (n, 4), at least one, not {initial_boxes.shape}")
         self._detectors = [TemplateDetector(_crop(image, box), settings) for box in initial_boxes]
         self._last_boxes: list[Floats | None] = list(initial_boxes)
-        self._window, self._costs, self._solver = window.resolve(fps), costs.for_frame_rate(fps), solver
+        self._window, self._costs, self._solver = window.resolve(fps), costs.for_fps(fps), solver
         self._detections: list[list[Detections]] = [[] for _ in initial_boxes]
         self._first = frame + 1
         self._last = frame

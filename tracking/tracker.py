@@ -11,11 +11,11 @@ from tracking.appearance import appearance_distance_matrix
 from tracking.appearance_histograms import add_appearance_histograms
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.interpolation import interpolate_gaps
 from tracking.lifecycle.gating import gate_detections, restrict_network
 from tracking.lifecycle.initiation import Birth, find_births
 from tracking.lifecycle.termination import terminated_ids
-from tracking.model.motion import DEFAULT_FRAME_RATE
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.object_state import Sighting, TrackedObject
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, create_solver
@@ -47,10 +47,10 @@ class OnlineTracker:
         window: WindowSettings,
         costs: CostSettings,
         solver: Solver,
-        fps: float = DEFAULT_FRAME_RATE,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         self._window = window.resolve(fps)
-        self._costs = costs.for_frame_rate(fps)
+        self._costs = costs.for_fps(fps)
         self._solver = solver
         # For a single object dynamic programming is exact.
         self._single = create_solver("separate-dp")
@@ -213,7 +213,7 @@ class OnlineTracker:
                         birth.histogram,
                         birth.box,
                         frame,
-                        self._window.frame_rate,
+                        self._window.fps,
                     )
                 )
                 added = True

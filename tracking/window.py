@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats
+from tracking.frame_rate import frames_in
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections, RiskEvent
 
@@ -59,24 +60,20 @@ class WindowSettings:
         if not self.forget_after_s > 0.0 or self.max_objects < 1 or self.min_frames < 1:
             raise ValueError("forget_after_s must be above 0, and max_objects and min_frames at least 1")
 
-    def resolve(self, frame_rate: float) -> ResolvedWindowSettings:
+    def resolve(self, fps: float) -> ResolvedWindowSettings:
         """Return the settings with all times in frames, for so many frames per second."""
-
-        def frames(seconds: float, least: int = 1) -> int:
-            return max(round(seconds * frame_rate), least)
-
-        window = frames(self.length_s, self.min_frames)
+        window = frames_in(self.length_s, fps, self.min_frames)
         return ResolvedWindowSettings(
             **{field.name: getattr(self, field.name) for field in fields(WindowSettings)},
-            frame_rate=frame_rate,
+            fps=fps,
             window=window,
-            stride=min(frames(self.stride_s), window),
-            birth_window=min(frames(self.birth_s, self.min_frames), window),
-            forget_after=frames(self.forget_after_s, window),
-            max_interpolated_gap=frames(
-                self.max_interpolated_gap_s, _MIN_INTERPOLATED if self.max_interpolated_gap_s else 0
+            stride=min(frames_in(self.stride_s, fps), window),
+            birth_window=min(frames_in(self.birth_s, fps, self.min_frames), window),
+            forget_after=frames_in(self.forget_after_s, fps, window),
+            max_interpolated_gap=frames_in(
+                self.max_interpolated_gap_s, fps, _MIN_INTERPOLATED if self.max_interpolated_gap_s else 0
             ),
-            reidentify_after=frames(self.reidentify_after_s, window),
+            reidentify_after=frames_in(self.reidentify_after_s, fps, window),
         )
 
 
@@ -87,7 +84,7 @@ class ResolvedWindowSettings(WindowSettings):
     Windows end at the frames n where `stride` divides n + 1.
     """
 
-    frame_rate: float
+    fps: float
     window: int
     stride: int
     birth_window: int

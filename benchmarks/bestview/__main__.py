@@ -98,7 +98,7 @@ def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterato
 
 def as_live(scene: BenchmarkScene) -> BenchmarkScene:
     """Return the scene without prescan: nothing is known before its first frame."""
-    return replace(scene, content={**scene.content, "detect": {"prescan_frames": 0}})
+    return replace(scene, content={**scene.content, "detect": {"prescan_s": 0}})
 
 
 def score_row(scores: MethodScores) -> list[str]:

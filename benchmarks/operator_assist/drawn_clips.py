@@ -154,6 +154,6 @@ def render_clip(film: ClipScene, seed: int) -> Clip:
 def _detector(film: ClipScene, ahead: Sequence[Image]) -> ForegroundBlobDetector | BackgroundDetector:
     if not film.people:
         return ForegroundBlobDetector(ahead)
-    detector = BackgroundDetector()
-    detector.prepare(ahead, _EVERY)
+    detector = BackgroundDetector(fps=film.fps)
+    detector.prepare(ahead, _EVERY / film.fps)
     return detector

@@ -26,7 +26,7 @@ from benchmarks.operator_assist.simulated_operator import OperatorProfile
 from tracking.boxes import Floats
 from tracking.interactive import RiskFeatures, RiskReason
 
-_MARGIN, _GONE = 4.0, 5
+_MARGIN, _GONE_S = 4.0, 0.2
 """Settings that report more risk events than by default, to learn the risk of those, too."""
 _RIDGE = 1.0
 _STEPS = 50
@@ -63,7 +63,7 @@ def main() -> None:
     options.add_argument("--clips", type=int, default=50, help="how many")
     chosen = options.parse_args()
     kind = kinds()["school"]
-    assist = replace(kind.setup.assist, swap_margin=_MARGIN, crossing_margin=_MARGIN, hidden_frames=_GONE)
+    assist = replace(kind.setup.assist, swap_margin=_MARGIN, crossing_margin=_MARGIN, hidden_s=_GONE_S)
     setup = replace(kind.setup, assist=assist)
     tracked_clips = [track_clip(clip, setup) for clip in kind.clips(chosen.clips, first=0)]
     table = []

@@ -11,7 +11,7 @@ from benchmarks.paper_experiments.label_errors import named
 from benchmarks.paper_experiments.scene import ExperimentScene
 from tracking import CostSettings, Detections, OnlineTracker, SolveReport, Template, WindowSettings
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.model.motion import DEFAULT_FRAME_RATE
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.model.network import Network, build_network, build_network_per_object
 from tracking.solvers.base import OCCLUDED, Solver
 
@@ -48,7 +48,7 @@ def _follow_known(
         if item.box is not None:
             boxes[k, 0] = item.box
     templates, reports, first = list(scene.templates), [], 1
-    size = window.resolve(DEFAULT_FRAME_RATE)
+    size = window.resolve(DEFAULT_FPS)
     while first < frames:
         stop = min(first + size.window, frames)
         solution = solver.solve(_network(scene, templates, first, stop, costs))

@@ -86,7 +86,7 @@ class LoopedRecordings:
             "track": {"window": {**window, "birth_s": window["length_s"]}},
             "encode": {"gop": _GOP},
             "http": {"viewer_queue_gops": round(_VIEWER_S * self.time_scale.fps / _GOP)},
-            "detect": {"work_width": WIDTH, "prescan_every": 10},
+            "detect": {"work_width": WIDTH, "prescan_every_s": 0.4},
             "view": {
                 "lookahead": _LOOKAHEAD,
                 "buffer_s": seconds(60.0),

@@ -126,11 +126,11 @@ class IdentitySettings:
             if value is not None and not value >= 0:
                 raise ValueError(f"identity {field.name}: {value} is below 0")
 
-    def resolve(self, frame_rate: float) -> ResolvedIdentitySettings:
+    def resolve(self, fps: float) -> ResolvedIdentitySettings:
         """Return the settings with all times also in frames, for so many frames per second."""
 
         def frames(seconds: float, least: int = 0) -> int:
-            return max(round(seconds * frame_rate), least)
+            return max(round(seconds * fps), least)
 
         publish_after, clustering_interval = (
             frames(self.publish_after_s),
@@ -138,13 +138,13 @@ class IdentitySettings:
         )
         return ResolvedIdentitySettings(
             **{field.name: getattr(self, field.name) for field in fields(self)},
-            frame_rate=frame_rate,
+            fps=fps,
             crowd_frames=frames(self.crowd_s),
             gap_frames=frames(self.gap_s),
-            ground_correlation_frames=max(self.ground_correlation_s * frame_rate, 1.0),
+            ground_correlation_frames=max(self.ground_correlation_s * fps, 1.0),
             appearance_frames=frames(self.appearance_s, _MIN_HISTOGRAM_FRAMES),
-            continuation_decay_frames=self.continuation_decay_s * frame_rate,
-            gap_decay_frames=self.gap_decay_s * frame_rate,
+            continuation_decay_frames=self.continuation_decay_s * fps,
+            gap_decay_frames=self.gap_decay_s * fps,
             reappearance_frames=frames(self.reappearance_s),
             confirmation_frames=frames(self.confirmation_s),
             clustering_interval=clustering_interval,
@@ -162,7 +162,7 @@ class IdentitySettings:
 class ResolvedIdentitySettings(IdentitySettings):
     """Settings for one frame rate: each time is also given as a number of frames."""
 
-    frame_rate: float
+    fps: float
     crowd_frames: int
     gap_frames: int
     ground_correlation_frames: float

@@ -47,7 +47,7 @@ class TrackletSplitter:
 
     def __init__(self, settings: ResolvedIdentitySettings) -> None:
         self._settings = settings
-        self._minimum_uncrowded = max(round(_MINIMUM_UNCROWDED_S * settings.frame_rate), 1)
+        self._minimum_uncrowded = max(round(_MINIMUM_UNCROWDED_S * settings.fps), 1)
         self.active: list[Tracklet] = []
         self._current: dict[TrackKey, Tracklet] = {}
         self._row: dict[TrackletKey, int] = {}

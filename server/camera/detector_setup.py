@@ -89,10 +89,9 @@ def make_prescanned_detector(
     if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
         detector.number_frames_by(source.pulse_by_frame_count)
     if isinstance(detector, BackgroundDetector | FusedDetector):
-        indices = range(0, settings.prescan_frames, settings.prescan_every)
-        detector.prepare(
-            (letterbox.image(image) for image in source.prescan_images(indices)), settings.prescan_every
-        )
+        indices = settings.prescan_frames(config.site.fps)
+        images = (letterbox.image(image) for image in source.prescan_images(indices))
+        detector.prepare(images, indices.step / config.site.fps)
     return detector
 
 
@@ -126,9 +125,7 @@ def _floor(config: Config, camera: CameraSettings, letterbox: Letterbox) -> Floo
     return FloorGeometry(horizon, slope) if _MIN_SLOPE <= slope <= _MAX_SLOPE else None
 
 
-def _create_detector(
-    settings: DetectSettings, floor: FloorGeometry | None, frame_rate: float
-) -> CameraDetector:
+def _create_detector(settings: DetectSettings, floor: FloorGeometry | None, fps: float) -> CameraDetector:
     """Return the detector that the settings name."""
     appearance = AppearanceExtractor(settings.appearance, settings.gray_bins)
     match settings.kind:
@@ -137,12 +134,12 @@ def _create_detector(
         case "onnx":
             return _open_network(settings, appearance)
         case "fused":
-            background = BackgroundDetector(settings, floor)
-            return FusedDetector(background, _open_network(settings, appearance), settings.fused, frame_rate)
+            background = BackgroundDetector(settings, floor, fps)
+            return FusedDetector(background, _open_network(settings, appearance), settings.fused)
         case "boxes":
-            return BackgroundDetector(paper_settings(settings))
+            return BackgroundDetector(paper_settings(settings), fps=fps)
         case "background" | "auto":
-            return BackgroundDetector(settings, floor)
+            return BackgroundDetector(settings, floor, fps)
 
 
 def _open_network(settings: DetectSettings, appearance: AppearanceExtractor) -> OnnxDetector:

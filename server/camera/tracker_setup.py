@@ -39,7 +39,7 @@ def set_up_tracker(
         name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
     )
     if prescan and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
-        indices = range(0, config.detect.prescan_frames, config.detect.prescan_every)
+        indices = config.detect.prescan_frames(config.site.fps)
         tracker.prepare(letterbox.image(image) for image in source.prescan_images(indices))
     return tracker
 

@@ -14,6 +14,7 @@ from fakes.programs import needs_chromium
 from fakes.running.assist_page import PERSON_POSITION_JS, assisted_site, check_every_gop_once, open_page
 from fakes.running.lookalikes import FRAMES, MEETING, STANDING, write_camera
 from fakes.running.site import RunningSite
+from fakes.running.stream_frames import FPS
 from fakes.timeouts import PATIENCE_MS
 
 pytestmark = [
@@ -34,7 +35,7 @@ async def test_pointing_at_a_person_restores_their_id_without_interrupting_the_s
     """The person from the left turns back; the tracker assumes that the two pass each other."""
     # One camera with given detections, so that a busy machine keeps up.
     cameras = [write_camera(ALIKE, tmp_path)]
-    async with assisted_site(tmp_path, cameras, memory_frames=FRAMES) as site, open_page(site) as page:
+    async with assisted_site(tmp_path, cameras, memory_s=FRAMES / FPS) as site, open_page(site) as page:
         await point(site, page)
 
 

@@ -19,7 +19,7 @@ from tracking.appearance_histograms import add_appearance_histograms
 from tracking.assignment import assign_pairs
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
-from tracking.model.motion import DEFAULT_FRAME_RATE
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.model.object_state import mean_histogram, uniform_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
@@ -107,7 +107,7 @@ class StepwiseTracker(Generic[S]):
         method: PredictionMethod[S],
         window: WindowSettings,
         settings: StepwiseSettings | None = None,
-        fps: float = DEFAULT_FRAME_RATE,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         self._method, self._window = method, window.resolve(fps)
         self._settings = settings or StepwiseSettings()

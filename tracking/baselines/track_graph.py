@@ -27,7 +27,7 @@ from tracking.baselines.track_groups import (
 )
 from tracking.boxes import Floats, areas, intersections
 from tracking.detectors.base import Image
-from tracking.model.motion import DEFAULT_FRAME_RATE
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
 from tracking.window import WindowSettings
@@ -44,7 +44,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         window: WindowSettings,
         settings: StepwiseSettings | None = None,
         graph: TrackGraphSettings | None = None,
-        fps: float = DEFAULT_FRAME_RATE,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         super().__init__(KalmanPrediction(), window, settings, fps)
         self._graph = graph or TrackGraphSettings()

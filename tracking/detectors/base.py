@@ -60,3 +60,15 @@ def require_at_least_one(settings: object, *names: str) -> None:
         value = getattr(settings, name)
         if value < 1:
             raise ValueError(f"{name} must be at least 1, not {value}")
+
+
+def require_positive(settings: object, *names: str) -> None:
+    """Check times and lengths among a detector's settings.
+
+    Raises:
+        ValueError: one of them is not above 0; the message names it.
+    """
+    for name in names:
+        value = getattr(settings, name)
+        if not value > 0.0:
+            raise ValueError(f"{name} must be above 0, not {value:g}")

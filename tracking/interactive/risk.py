@@ -11,7 +11,7 @@ import numpy as np
 from tracking.appearance import appearance_distance_matrix
 from tracking.boxes import Floats, dice_overlap
 from tracking.interactive.lookahead import predict_crossings, predict_paths
-from tracking.interactive.settings import InteractiveSettings
+from tracking.interactive.settings import ResolvedInteractiveSettings
 from tracking.interactive.solved_window import SolvedWindow
 from tracking.interactive.swap_margins import CheapestSwaps, find_cheapest_swaps
 from tracking.model.settings import CostSettings
@@ -69,7 +69,7 @@ def failure_probability(reason: RiskReason, features: RiskFeatures) -> float:
 class RiskPredictor:
     """Predicts identity failures from solved windows. Stateless."""
 
-    def __init__(self, settings: InteractiveSettings, costs: CostSettings) -> None:
+    def __init__(self, settings: ResolvedInteractiveSettings, costs: CostSettings) -> None:
         self._settings = settings
         self._costs = costs
 

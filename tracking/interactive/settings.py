@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
-_MAX_FRAMES = 10_000
-"""Limit of frames back or ahead: message size and prediction time grow with them."""
+from tracking.frame_rate import frames_in
+
+_MAX_S = 400.0
+"""Limit of seconds back or ahead: message size and prediction time grow with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,24 +19,19 @@ class InteractiveSettings:
     """
 
     enabled: bool = False  # predict risks and accept operator corrections; false: no overhead
-    memory_frames: int = 250  # frames back that a correction may change
-    horizon_frames: int = 25  # frames ahead for which motion is extrapolated
+    memory_s: float = 10.0  # seconds back that a correction may change
+    horizon_s: float = 1.0  # seconds ahead for which motion is extrapolated
     swap_margin: float = 1.0  # swap margin (cost) below which a past pair is at risk
     crossing_margin: float = 1.0  # swap margin (cost) below which a predicted crossing is at risk
-    hidden_frames: int = 10  # frames after which an occluded object is at risk
+    hidden_s: float = 0.4  # seconds after which an occluded object is at risk
     min_confidence: float = 0.15  # detection score below which an object is at risk, 0 to 1
     max_solver_gap: float = 0.01  # relative gap of a window above which its solution is at risk
     correction_weight: float = 2.0  # largest cost of a correction for an object at another position
     hidden_share: float = 0.25  # share of it that an occlusion costs the corrected object
 
     def __post_init__(self) -> None:
-        if not all(
-            1 <= frames <= _MAX_FRAMES
-            for frames in (self.memory_frames, self.horizon_frames, self.hidden_frames)
-        ):
-            raise ValueError(
-                f"memory_frames, horizon_frames and hidden_frames must be 1 to {_MAX_FRAMES} frames"
-            )
+        if not all(0.0 < seconds <= _MAX_S for seconds in (self.memory_s, self.horizon_s, self.hidden_s)):
+            raise ValueError(f"memory_s, horizon_s and hidden_s must be above 0, and at most {_MAX_S:g} s")
         if (
             not min(self.swap_margin, self.crossing_margin, self.max_solver_gap, self.correction_weight)
             >= 0.0
@@ -45,3 +42,21 @@ class InteractiveSettings:
         for name in ("min_confidence", "hidden_share"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} is a share between 0 and 1, not {getattr(self, name)}")
+
+    def resolve(self, fps: float) -> ResolvedInteractiveSettings:
+        """Return the settings with all times also in frames, for so many frames per second."""
+        return ResolvedInteractiveSettings(
+            **{field.name: getattr(self, field.name) for field in fields(InteractiveSettings)},
+            memory_frames=frames_in(self.memory_s, fps),
+            horizon_frames=frames_in(self.horizon_s, fps),
+            hidden_frames=frames_in(self.hidden_s, fps),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResolvedInteractiveSettings(InteractiveSettings):
+    """Settings for one frame rate: each time is also given as a number of frames."""
+
+    memory_frames: int
+    horizon_frames: int
+    hidden_frames: int

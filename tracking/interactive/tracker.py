@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES
 from tracking.detectors.base import Image
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.interactive.corrections import PositionCorrection, apply_corrections, near_correction
 from tracking.interactive.hypothesis_insertion import apply_insertions
 from tracking.interactive.late_correction import backdate_correction
@@ -18,7 +19,6 @@ from tracking.interactive.settings import InteractiveSettings
 from tracking.interactive.solved_window import SolvedWindow
 from tracking.interactive.window_memory import WindowMemory, WindowSnapshot
 from tracking.lifecycle.initiation import Birth
-from tracking.model.motion import DEFAULT_FRAME_RATE
 from tracking.model.network import Network
 from tracking.model.object_state import TrackedObject
 from tracking.model.settings import CostSettings
@@ -37,7 +37,7 @@ _RECENT_FRAMES = 75
 class CorrectableTracker(OnlineTracker):
     """An `OnlineTracker` that predicts identity failures and applies an operator's corrections.
 
-    Without a correction its tracks are those of an `OnlineTracker`. Memory is bounded by `memory_frames`.
+    Without a correction its tracks are those of an `OnlineTracker`. Memory is bounded by `memory_s`.
     """
 
     def __init__(
@@ -46,12 +46,12 @@ class CorrectableTracker(OnlineTracker):
         costs: CostSettings,
         solver: Solver,
         assist: InteractiveSettings,
-        fps: float = DEFAULT_FRAME_RATE,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         super().__init__(window, costs, solver, fps)
-        self._settings = assist
-        self._risk_predictor = RiskPredictor(assist, self._costs)
-        self._memory = WindowMemory(assist.memory_frames)
+        self._settings = assist.resolve(fps)
+        self._risk_predictor = RiskPredictor(self._settings, self._costs)
+        self._memory = WindowMemory(self._settings.memory_frames)
         self._corrections: dict[int, dict[int, PositionCorrection]] = {}
         """By frame and object: a later correction replaces an earlier one."""
         self._contradicted_frames: list[int] = []

@@ -35,7 +35,7 @@ def within_gate(
     height may have changed by `max_height_ratio`.
     """
     height, other_heights = float(heights(box)), heights(boxes)
-    max_distance = window.gate_heights + window.gate_speed * max(elapsed, 1) / window.frame_rate
+    max_distance = window.gate_heights + window.gate_speed * max(elapsed, 1) / window.fps
     similar = (other_heights <= window.max_height_ratio * max(height, 1.0)) & (
         height <= window.max_height_ratio * np.maximum(other_heights, 1.0)
     )

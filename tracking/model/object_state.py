@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.model.motion import DEFAULT_FRAME_RATE, MotionModel
+from tracking.frame_rate import DEFAULT_FPS, frames_in
+from tracking.model.motion import MotionModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +73,7 @@ class TrackedObject:
         present: it was detected in the last final frame.
     """
 
-    __slots__ = ("_frame_rate", "_history", "box", "frame", "histogram", "id", "is_confirmed", "present")
+    __slots__ = ("_fps", "_history", "box", "frame", "histogram", "id", "is_confirmed", "present")
 
     def __init__(
         self,
@@ -80,21 +81,21 @@ class TrackedObject:
         histogram: Floats,
         box: Floats,
         frame: int,
-        frame_rate: float = DEFAULT_FRAME_RATE,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         self.id = number
         self.histogram = histogram
         self.box = box
         self.frame = frame
-        self._frame_rate = frame_rate
-        history = max(round(_HISTORY_S * frame_rate), _MIN_HISTORY)
+        self._fps = fps
+        history = frames_in(_HISTORY_S, fps, _MIN_HISTORY)
         self._history: deque[tuple[int, Floats]] = deque(maxlen=history)
         self.is_confirmed = False
         self.present = False
 
     def copy(self) -> TrackedObject:
         """Return a copy."""
-        other = TrackedObject(self.id, self.histogram, self.box, self.frame, self._frame_rate)
+        other = TrackedObject(self.id, self.histogram, self.box, self.frame, self._fps)
         other._history.extend(self._history)
         other.is_confirmed, other.present = self.is_confirmed, self.present
         return other
@@ -107,7 +108,7 @@ class TrackedObject:
         motion = None
         if self._history:
             frames, boxes = zip(*self._history, strict=True)
-            motion = MotionModel.of(frames, np.stack(boxes), first, self._frame_rate)
+            motion = MotionModel.of(frames, np.stack(boxes), first, self._fps)
         return Template(self.id, self.histogram, self.box if self.present else None, motion)
 
     def update(self, sighting: Sighting, rate: float) -> None:

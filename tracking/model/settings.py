@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tracking.appearance import AppearanceMeasure
-from tracking.model.motion import DEFAULT_FRAME_RATE
+from tracking.frame_rate import DEFAULT_FPS
 
 ConflictRule = Literal["corners", "overlap"]
 ConflictRows = Literal["clique", "star"]
@@ -107,18 +107,18 @@ class CostSettings:
         if not self.conflict_overlap > 0.0:
             raise ValueError(f"conflict_overlap must be positive, not {self.conflict_overlap}")
 
-    def for_frame_rate(self, frame_rate: float) -> CostSettings:
+    def for_fps(self, fps: float) -> CostSettings:
         """Return the settings for so many frames per second.
 
         People walk further between two frames that are further apart, while boxes jitter alike: displacements
         are weighed and limited by what both add up to. Pixels, the paper's unit, are left as they are.
         """
-        if self.displacement_unit == "pixels" or frame_rate == DEFAULT_FRAME_RATE:
+        if self.displacement_unit == "pixels" or fps == DEFAULT_FPS:
             return self
-        scale = (_JITTER + _SPEED / frame_rate) / (_JITTER + _SPEED / DEFAULT_FRAME_RATE)
+        scale = (_JITTER + _SPEED / fps) / (_JITTER + _SPEED / DEFAULT_FPS)
         gate = self.gate
         if gate is not None:
-            longer = 1.0 / frame_rate - 1.0 / DEFAULT_FRAME_RATE
+            longer = 1.0 / fps - 1.0 / DEFAULT_FPS
             gate = max(gate + _TOP_SPEED * longer, gate / 2.0)
         return replace(self, displacement=self.displacement / scale, gate=gate)
 

@@ -45,9 +45,7 @@ class CrossCameraAppearance:
 
     def __init__(self, settings: ResolvedIdentitySettings, calibrated: Mapping[str, bool]) -> None:
         self._settings, self._calibrated = settings, calibrated
-        self._minimum_frames = max(
-            round(_MINIMUM_HISTOGRAM_S * settings.frame_rate), _MINIMUM_HISTOGRAM_FRAMES
-        )
+        self._minimum_frames = max(round(_MINIMUM_HISTOGRAM_S * settings.fps), _MINIMUM_HISTOGRAM_FRAMES)
         self.equalizer = HistogramEqualizer()
         self._learned: set[TrackletKey] = set()
 

@@ -58,7 +58,7 @@ class FlagSettings(Section):
     reasons: list[RiskReason] = ["crossing", "id_switch", "track_loss", "optimality_gap"]
     """The kinds of predicted failures for which flags are raised."""
     answer_s: Annotated[float, Field(gt=0, le=600)] = 8.0
-    """Seconds after the expected moment in which a flag can be answered; see `track.assist.memory_frames`."""
+    """Seconds after the expected moment in which a flag can be answered; see `track.assist.memory_s`."""
 
 
 class ViewSettings(Section):

@@ -83,7 +83,8 @@ class AssistService:
     @property
     def memory_frames(self) -> int:
         """How many frames back a position can be corrected."""
-        return self._pipeline.config.track.assist.memory_frames
+        config = self._pipeline.config
+        return config.track.assist.resolve(config.site.fps).memory_frames
 
     @property
     def why_unavailable(self) -> str:

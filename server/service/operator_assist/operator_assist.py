@@ -68,7 +68,7 @@ class OperatorAssist:
 
     def step(self, epoch: Epoch, config: Config) -> None:
         """Process an epoch's risk events."""
-        people, assist = self._people, config.track.assist
+        people, assist = self._people, config.track.assist.resolve(config.site.fps)
         people.published.frames = assist.memory_frames if assist.enabled else 0
         self.flags.step(epoch.last, self._risk_events(epoch), people.registry.current)
 

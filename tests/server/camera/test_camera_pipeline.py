@@ -25,7 +25,7 @@ from synthetic import Scene, write_recording
 
 FRAMES = 48
 STRIDE = 5
-LIVE = {"prescan_frames": 0}
+LIVE = {"prescan_s": 0}
 """The background is learned while tracking."""
 
 

@@ -46,7 +46,7 @@ def _recall(kind: str, scene: Scene, pictures: dict[int, NDArray[np.uint8]]) -> 
     config = _config(kind)
     detector = make_detector(config, config.cameras[0], Letterbox(SIZE, SIZE))
     assert isinstance(detector, BackgroundDetector)
-    detector.prepare([pictures[frame] for frame in _LEARNED], 10)
+    detector.prepare([pictures[frame] for frame in _LEARNED], 0.4)
     found = []
     for frame in _SEARCHED:
         detections = detector.detect(pictures[frame])

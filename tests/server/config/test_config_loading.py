@@ -40,11 +40,15 @@ def test_an_unknown_key_in_nested_settings_is_refused() -> None:
     assert "unknown key" in error_of(site(detect={"median": {"no_such": 5}}))
 
 
-@pytest.mark.parametrize("detect", [{"prescan_every": 0}, {"prescan_frames": -1}])
-def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, Any]) -> None:
-    assert "detect: prescan_frames must be at least 0, and prescan_every at least 1" in error_of(
-        site(detect=detect)
-    )
+@pytest.mark.parametrize(
+    ("detect", "expected"),
+    [
+        ({"prescan_every_s": 0}, "detect: prescan_every_s must be above 0, not 0"),
+        ({"prescan_s": -1}, "detect: prescan_s is at least 0, not -1"),
+    ],
+)
+def test_impossible_times_of_the_prescan_are_refused(detect: dict[str, Any], expected: str) -> None:
+    assert expected in error_of(site(detect=detect))
 
 
 @pytest.mark.parametrize(
@@ -53,9 +57,9 @@ def test_zero_counts_in_settings_are_refused_for_recordings(detect: dict[str, An
         ({"gray_bins": 0}, "gray_bins must be 1 to 256, not 0"),
         ({"work_width": 0}, "work_width must be at least 1, not 0"),
         ({"median": {"samples": 0}}, "samples must be at least 1, not 0"),
-        ({"median": {"learn_every": 0}}, "learn_every must be at least 1, not 0"),
-        ({"median": {"bootstrap_frames": 0}}, "bootstrap_frames must be at least 1, not 0"),
-        ({"static_foreground": {"check_every": 0}}, "check_every must be at least 1, not 0"),
+        ({"median": {"learn_every_s": 0}}, "learn_every_s must be above 0, not 0"),
+        ({"median": {"bootstrap_s": 0}}, "bootstrap_s must be above 0, not 0"),
+        ({"static_foreground": {"check_every_s": 0}}, "check_every_s must be above 0, not 0"),
     ],
 )
 def test_counts_of_zero_are_refused(detect: dict[str, Any], reason: str) -> None:

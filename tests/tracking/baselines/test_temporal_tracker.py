@@ -145,7 +145,7 @@ def test_ids_are_new_after_a_long_gap_and_no_result_spans_it() -> None:
 
 def test_without_preparation_the_background_is_learned_online() -> None:
     settings = TemporalSettings(
-        window_stages=2, stage_s=0.2, blobs=BlobSettings(bootstrap_frames=20, samples=10)
+        window_stages=2, stage_s=0.2, blobs=BlobSettings(bootstrap_s=20 / FPS, samples=10)
     )
     tracker = TemporalBlobTracker(WINDOW, settings, FPS)
     pictures = {frame: _picture({} if frame < 20 else {0: (60.0, 40.0)}, frame) for frame in range(60)}

@@ -68,7 +68,7 @@ def test_a_person_in_the_first_frame_of_a_recording_is_detected_and_leaves_no_gh
     walker = Figure(10, 200, speed=2.0, begin=0)
     detector = BackgroundDetector()
     assert detector.warming_up
-    detector.prepare([picture([walker], frame) for frame in range(0, 160, 20)], every=20)
+    detector.prepare([picture([walker], frame) for frame in range(0, 160, 20)], every_s=0.8)
     seen = detect_all(detector, [walker], range(100))
     assert not detector.warming_up
     assert np.mean([best_overlap(seen[frame], walker, frame) >= 0.5 for frame in range(100)]) >= 0.95
@@ -78,7 +78,7 @@ def test_a_person_in_the_first_frame_of_a_recording_is_detected_and_leaves_no_gh
 
 def test_a_prepared_background_is_replaced_when_the_picture_changes() -> None:
     detector = BackgroundDetector()
-    detector.prepare([picture([], frame) for frame in range(3)], every=1)
+    detector.prepare([picture([], frame) for frame in range(3)], every_s=0.04)
     upside_down = [np.ascontiguousarray(picture([], frame)[::-1]) for frame in range(120)]
     seen = [detector.detect(image) for image in upside_down]
     assert (seen[-1].scores < SURE).all()
@@ -173,7 +173,7 @@ def test_with_floor_geometry_fragments_and_pairs_of_people_do_not_change_the_hei
 
 def test_with_floor_geometry_there_is_a_height_model_without_or_with_inconsistent_samples() -> None:
     floor = FloorGeometry(20.0, 0.65)
-    before = HeightModelEstimator(HeightModelSettings(), floor, HEIGHT).model
+    before = HeightModelEstimator(HeightModelSettings(), floor=floor, rows=HEIGHT).model
     assert before is not None
     assert before.expected_height(np.array([20.0, 120.0])).tolist() == [0.0, 65.0]
     assert HeightModelEstimator(HeightModelSettings()).model is None
@@ -220,7 +220,7 @@ def test_a_standing_person_gives_one_sample_and_a_walking_one_gives_many() -> No
         stands = IsolatedPerson(60.0 + frame % 3, 130.0, 50.0)
         walks = IsolatedPerson(80.0 + 2.0 * frame, 200.0, 100.0)
         flickers = [] if 100 <= frame < 140 else [stands]
-        for person in novelty.new_samples([*flickers, walks]):
+        for person in novelty.new_samples([*flickers, walks], 0.04):
             counted["walks" if person is walks else "stands"] += 1
     assert counted["stands"] == 1
     assert 60 <= counted["walks"] <= 80
@@ -228,9 +228,9 @@ def test_a_standing_person_gives_one_sample_and_a_walking_one_gives_many() -> No
 
 def test_a_place_is_forgotten_when_it_is_empty() -> None:
     novelty, person = SampleNoveltyFilter(), IsolatedPerson(60.0, 130.0, 50.0)
-    assert novelty.new_samples([person]) == [person]
-    assert novelty.new_samples([], frames=200) == []
-    assert novelty.new_samples([person]) == [person]
+    assert novelty.new_samples([person], 0.04) == [person]
+    assert novelty.new_samples([], 8.0) == []
+    assert novelty.new_samples([person], 0.04) == [person]
 
 
 def test_a_standing_person_with_hidden_feet_does_not_change_the_height_model() -> None:
@@ -284,7 +284,9 @@ def test_more_fragments_than_people_do_not_change_the_height_model() -> None:
 def test_the_height_model_is_reliable_with_floor_geometry_or_many_samples() -> None:
     alone = HeightModelEstimator(HeightModelSettings())
     assert not alone.is_reliable
-    assert HeightModelEstimator(HeightModelSettings(), FloorGeometry(57.0, 0.7), HEIGHT).is_reliable
+    assert HeightModelEstimator(
+        HeightModelSettings(), floor=FloorGeometry(57.0, 0.7), rows=HEIGHT
+    ).is_reliable
     visible = np.full((HEIGHT, WIDTH), 255, dtype=np.uint8)
     reliable = []
     for step in range(120):

@@ -110,7 +110,7 @@ def test_when_the_picture_changes_at_once_the_network_detects_alone() -> None:
 
 def test_between_two_runs_of_the_network_its_boxes_are_carried_along() -> None:
     network = ListedNetwork(lambda frame: [(WALKER.box(frame), 0.9)] if frame >= WALKER.begin else [])
-    detector = FusedDetector(BackgroundDetector(), network, frame_rate=25.0)
+    detector = FusedDetector(BackgroundDetector(), network)
     scores = []
     for network.frame in range(120):
         found = detector.detect(picture([WALKER], network.frame), network.frame)
@@ -122,7 +122,7 @@ def test_between_two_runs_of_the_network_its_boxes_are_carried_along() -> None:
 def test_the_network_runs_earlier_for_somebody_new() -> None:
     late = Figure(200, 210, speed=1.0, begin=92)
     network = ListedNetwork(lambda frame: [(WALKER.box(frame), 0.9)] if frame >= WALKER.begin else [])
-    detector = FusedDetector(BackgroundDetector(), network, frame_rate=25.0)
+    detector = FusedDetector(BackgroundDetector(), network)
     for network.frame in range(100):
         detector.detect(picture([WALKER, late], network.frame), network.frame)
     assert [run for run in network.runs if run >= 90][:2] == [90, 93]
@@ -163,7 +163,7 @@ def test_a_recording_is_prepared_by_network_and_background() -> None:
         for network.frame in range(0, 160, 20):
             yield picture([WALKER], network.frame)
 
-    detector.prepare(scanned(), every=20)
+    detector.prepare(scanned(), every_s=0.8)
     network.frame = 100
     found = detector.detect(picture([WALKER], 100))
     assert score_at(found, WALKER.box(100)) > 0.9

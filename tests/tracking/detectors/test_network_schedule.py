@@ -11,9 +11,9 @@ def runs(schedule: NetworkSchedule, frames: range, *, needed: bool = False) -> l
     return [frame for frame in frames if schedule.is_due(frame, needed=needed)]
 
 
-@pytest.mark.parametrize(("frame_rate", "every"), [(60.0, 12), (25.0, 5), (12.5, 2), (5.0, 1), (2.0, 1)])
-def test_the_interval_is_in_seconds(frame_rate: float, every: int) -> None:
-    assert runs(NetworkSchedule(0.2, frame_rate), range(60)) == list(range(0, 60, every))
+@pytest.mark.parametrize(("fps", "every"), [(60.0, 12), (25.0, 5), (12.5, 2), (5.0, 1), (2.0, 1)])
+def test_the_interval_is_in_seconds(fps: float, every: int) -> None:
+    assert runs(NetworkSchedule(0.2, fps), range(60)) == list(range(0, 60, every))
 
 
 def test_a_network_in_need_runs_earlier_but_not_for_long() -> None:

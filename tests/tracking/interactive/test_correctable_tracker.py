@@ -11,6 +11,7 @@ import pytest
 from fakes.tracking.strolls import TEST_COSTS, WIDTH, WalkingPerson, detections_at, final_boxes, track_all
 from tracking import Detections, OnlineTracker, WindowResult, WindowSettings, create_solver
 from tracking.boxes import iou
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.interactive import CorrectableTracker, InteractiveSettings, PositionCorrection
 from tracking.interactive.late_correction import backdate_correction
 from tracking.registry import create_tracker
@@ -20,7 +21,7 @@ SIMILAR = [WalkingPerson(0, 50, 4.0, 1), WalkingPerson(300, 50, -4.0, 1)]
 
 
 def _interactive_tracker(memory: int = 250) -> CorrectableTracker:
-    assist = InteractiveSettings(enabled=True, memory_frames=memory)
+    assist = InteractiveSettings(enabled=True, memory_s=memory / DEFAULT_FPS)
     return CorrectableTracker(WindowSettings(), TEST_COSTS, create_solver("columns"), assist)
 
 
@@ -243,10 +244,10 @@ def test_the_interactive_tracker_is_created_only_if_enabled(
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"memory_frames": 0},
-        {"memory_frames": 10**6},
-        {"horizon_frames": 0},
-        {"horizon_frames": 10**12},
+        {"memory_s": 0},
+        {"memory_s": 10**6},
+        {"horizon_s": 0},
+        {"horizon_s": 10**12},
         {"correction_weight": -1.0},
         {"hidden_share": 1.5},
     ],

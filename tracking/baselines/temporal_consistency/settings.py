@@ -29,7 +29,7 @@ class BlobSettings:
     )
     dilation_m: float = 0.06  # meters by which the foreground is dilated, so that parts of a body are one
     min_area_m2: float = 0.04  # square meters of floor below which a blob is noise
-    bootstrap_frames: int = 100  # frames from which the background is learned live
+    bootstrap_s: float = 4.0  # seconds from which the background is learned live
     samples: int = 25  # frames of these that are used
     learn_rate: float = 0.05  # share of each sample that enters the background where no person is
 
@@ -39,8 +39,8 @@ class BlobSettings:
             raise ValueError(
                 "work_width, threshold, brightness_floor, chroma_floor and samples must be above 0"
             )
-        if not self.samples <= min(self.bootstrap_frames, _MAX_SAMPLES):
-            raise ValueError(f"samples must be at most bootstrap_frames, and at most {_MAX_SAMPLES}")
+        if not self.bootstrap_s > 0.0 or self.samples > _MAX_SAMPLES:
+            raise ValueError(f"bootstrap_s must be above 0, and samples at most {_MAX_SAMPLES}")
         if not 0.0 <= self.learn_rate <= 1.0:
             raise ValueError(f"learn_rate is a share between 0 and 1, not {self.learn_rate}")
         if not 0.0 <= self.dilation_m <= _MAX_DILATION_M or not self.min_area_m2 >= 0.0:

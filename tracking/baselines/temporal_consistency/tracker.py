@@ -15,6 +15,7 @@ from tracking.baselines.temporal_consistency.trajectories import BlobBoxHistory,
 from tracking.baselines.temporal_consistency.window import Stage, StageDecision, TemporalWindow
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.model.object_state import mean_histogram, uniform_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
@@ -28,7 +29,7 @@ class TemporalBlobTracker:
     """
 
     def __init__(
-        self, window: WindowSettings, settings: TemporalSettings | None = None, fps: float = 25.0
+        self, window: WindowSettings, settings: TemporalSettings | None = None, fps: float = DEFAULT_FPS
     ) -> None:
         """Set up for results every `stride` frames of a recording at `fps` frames per second."""
         self._window, self._settings, self._fps = window.resolve(fps), settings or TemporalSettings(), fps
@@ -130,12 +131,12 @@ class TemporalBlobTracker:
                 self._apply_decision(done)
 
     def _bootstrap(self, blobs: BlobDetector, work_image: Image) -> None:
-        settings = self._settings.blobs
-        used = (self._bootstrap_frames + 1) * settings.samples // settings.bootstrap_frames
-        if used > self._bootstrap_frames * settings.samples // settings.bootstrap_frames:
+        samples = self._settings.blobs.samples
+        needed = frames_in(self._settings.blobs.bootstrap_s, self._fps, samples)
+        if (self._bootstrap_frames + 1) * samples // needed > self._bootstrap_frames * samples // needed:
             self._bootstrap_images.append(work_image)
         self._bootstrap_frames += 1
-        if self._bootstrap_frames >= settings.bootstrap_frames:
+        if self._bootstrap_frames >= needed:
             blobs.prepare(self._bootstrap_images)
             self._bootstrap_images = []
 

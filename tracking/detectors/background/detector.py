@@ -33,6 +33,7 @@ from tracking.detectors.background.segmentation import (
 from tracking.detectors.background.settings import BackgroundSettings
 from tracking.detectors.base import Image, Mask, Plane, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
+from tracking.frame_rate import DEFAULT_FPS
 from tracking.types import Detections
 
 # Pixels of the working image per cell of the box filter, on each axis.
@@ -74,17 +75,23 @@ class BackgroundDetector:
     """Detects standing people in one camera's foreground. Deterministic; warms up for about a second."""
 
     def __init__(
-        self, settings: BackgroundSettings | None = None, floor: FloorGeometry | None = None
+        self,
+        settings: BackgroundSettings | None = None,
+        floor: FloorGeometry | None = None,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         """Start without a background; `floor` is the calibrated floor geometry, if known."""
         self.settings = settings or BackgroundSettings()
+        self.fps = fps
         self._appearance = AppearanceExtractor(self.settings.appearance, self.settings.gray_bins)
         self._floor = floor
-        self._height_estimator = HeightModelEstimator(self.settings.height_model)
+        self._height_estimator = HeightModelEstimator(self.settings.height_model, fps)
         self._background: _Background = (
-            MedianBackground(self.settings.median, self.settings.static_foreground, self.settings.shadows)
+            MedianBackground(
+                self.settings.median, self.settings.static_foreground, self.settings.shadows, fps
+            )
             if self.settings.model == "median"
-            else Mog2Background(self.settings.mog2)
+            else Mog2Background(self.settings.mog2, fps)
         )
         self._shape: tuple[int, ...] | None = None
         self._grid: CellGrid | None = None
@@ -95,12 +102,12 @@ class BackgroundDetector:
         self.warming_up = True
         """Whether the last frame could not be searched because the background was unknown."""
 
-    def prepare(self, images: Iterable[Image], every: int) -> None:
+    def prepare(self, images: Iterable[Image], every_s: float) -> None:
         """Learn the background and the height model from a recording before its first frame.
 
         Args:
             images: images of the recording, people included; they are consumed one by one.
-            every: frames of the recording per image.
+            every_s: seconds of the recording per image.
 
         Raises:
             ValueError: not `(H, W, 3)` uint8 images of one size.
@@ -113,8 +120,8 @@ class BackgroundDetector:
         for work_image in work_images:
             segmentation = background.segment_still(work_image)
             if segmentation is not None and self._grid is not None:
-                self._height_estimator.observe(
-                    clean_mask(segmentation.foreground & self._grid.visible), self._grid.visible, every
+                self._height_estimator.sample(
+                    clean_mask(segmentation.foreground & self._grid.visible), self._grid.visible, every_s
                 )
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:  # noqa: ARG002 — Detector
@@ -157,15 +164,15 @@ class BackgroundDetector:
         boxes = self.grid.cells_to_work(people)
         self._background.learn(scan.mask, occupied_mask(boxes, scan.mask.shape))
 
-    def observe_people(self, boxes: npt.NDArray[np.float64], frames: int = 1) -> None:
+    def observe_people(self, boxes: npt.NDArray[np.float64], represented_s: float) -> None:
         """Learn the height of people from whole people of one frame, boxes `(K, 4)` in cells.
 
-        They replace the blobs from which it is learned otherwise; the frame represents `frames` frames.
+        They replace the blobs from which it is learned otherwise; the frame represents so many seconds.
         """
         in_work = self.grid.cells_to_work(boxes)
         self._height_estimator.observe_people(
             [IsolatedPerson((box[0] + box[2]) / 2.0, box[3], box[3] - box[1]) for box in in_work.tolist()],
-            frames,
+            represented_s,
         )
 
     def detections(
@@ -208,7 +215,7 @@ class BackgroundDetector:
         views = self._background.views if isinstance(self._background, MedianBackground) else 0
         if views != self._views:
             self._views = views
-            self._height_estimator = HeightModelEstimator(self.settings.height_model)
+            self._height_estimator = HeightModelEstimator(self.settings.height_model, self.fps)
 
     @property
     def appearance_bins(self) -> int:
@@ -262,7 +269,7 @@ class BackgroundDetector:
             if self._floor is not None:
                 floor = self._floor.scaled_by(self._grid.work_scale)
                 self._height_estimator = HeightModelEstimator(
-                    self.settings.height_model, floor, self._grid.work_height
+                    self.settings.height_model, self.fps, floor, self._grid.work_height
                 )
         if image.shape != self._shape:
             raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")

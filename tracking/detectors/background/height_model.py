@@ -22,6 +22,7 @@ from tracking.detectors.background.isolated_people import (
     find_isolated_people,
 )
 from tracking.detectors.base import Mask
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class HeightModelSettings:
     enabled: bool = True  # false: all heights everywhere (the paper)
     min_samples: int = 3  # isolated people at different positions needed for the model
     max_samples: int = 1000  # newest samples kept
-    sample_every: int = 1  # frames between two samples
+    sample_every_s: float = 0.04  # seconds between two samples
     prior_slope: float = 0.65  # person height over camera height: the slope without samples
     prior_slope_std: float = 0.18  # standard deviation of this slope
     min_height: float = (
@@ -102,10 +103,16 @@ class HeightModelEstimator:
     """
 
     def __init__(
-        self, settings: HeightModelSettings, floor: FloorGeometry | None = None, rows: float = 0.0
+        self,
+        settings: HeightModelSettings,
+        fps: float = DEFAULT_FPS,
+        floor: FloorGeometry | None = None,
+        rows: float = 0.0,
     ) -> None:
         """Start without samples; `rows` is the height of the image in which `floor` is given."""
         self._settings = settings
+        self._sample_every = frames_in(settings.sample_every_s, fps)
+        self._frame_s = 1.0 / fps
         self._prior = height_prior(settings, floor, rows)
         self._samples: deque[tuple[float, float]] = deque(maxlen=settings.max_samples)
         self._novelty_filter = SampleNoveltyFilter()
@@ -126,21 +133,21 @@ class HeightModelEstimator:
             return model is not None
         return model.level_std <= _RELIABLE * (model.slope * model.center + model.offset)
 
-    def observe(self, foreground: Mask, visible: Mask, frames: int = 1) -> None:
-        """Add the isolated people of one frame's foreground `(H, W)`; `visible` is 0 in ignored areas.
-
-        `frames`: the number of consecutive frames that it represents.
-        """
+    def observe(self, foreground: Mask, visible: Mask) -> None:
+        """Add the isolated people of the next foreground `(H, W)`; `visible` is 0 in ignored areas."""
         self._frames += 1
-        if not self._settings.enabled or self._frames % self._settings.sample_every:
-            return
-        if not self._has_known_people:
-            self._add_people(find_isolated_people(foreground, visible), frames * self._settings.sample_every)
+        if self._frames % self._sample_every == 0:
+            self.sample(foreground, visible, self._sample_every * self._frame_s)
 
-    def observe_people(self, people: Sequence[IsolatedPerson], frames: int = 1) -> None:
+    def sample(self, foreground: Mask, visible: Mask, represented_s: float) -> None:
+        """Add the isolated people of a frame that represents so many seconds, as `observe` does."""
+        if self._settings.enabled and not self._has_known_people:
+            self._add_people(find_isolated_people(foreground, visible), represented_s)
+
+    def observe_people(self, people: Sequence[IsolatedPerson], represented_s: float) -> None:
         """Add people of one frame that are more certain than blobs, in pixels of the image.
 
-        From the first on they alone count. `frames`: the number of consecutive frames that it represents.
+        From the first on they alone count. `represented_s`: the seconds that the frame represents.
         """
         if not self._settings.enabled or not (people or self._has_known_people):
             return
@@ -148,12 +155,12 @@ class HeightModelEstimator:
             self._has_known_people = True
             self._samples.clear()
             self._sample_count = self._fitted_on = 0
-        self._add_people(people, frames)
+        self._add_people(people, represented_s)
 
-    def _add_people(self, people: Sequence[IsolatedPerson], frames: int) -> None:
+    def _add_people(self, people: Sequence[IsolatedPerson], represented_s: float) -> None:
         self._max_people = max(self._max_people, len(people))
-        weight = max(round(frames / _FRAMES), 1)
-        for person in self._novelty_filter.new_samples(people, frames):
+        weight = max(round(represented_s / _SAMPLE_S), 1)
+        for person in self._novelty_filter.new_samples(people, represented_s):
             self._samples.extend([(person.foot_row, person.height)] * weight)
             self._sample_count += weight
         # Refit when the number of samples has grown by a tenth.
@@ -163,8 +170,8 @@ class HeightModelEstimator:
             self.model = fit_height_model(samples, self._settings, self._prior, self._max_people)
 
 
-# Frames per sample of a walking person, and correlated samples that count as one independent sample.
-_FRAMES = 4
+# Seconds per sample of a walking person, and correlated samples that count as one independent sample.
+_SAMPLE_S = 0.16
 _CORRELATED_SAMPLES = 6.0
 # Standard deviation of a sample, in heights: strides, missing parts of the outline.
 _NOISE = 0.06

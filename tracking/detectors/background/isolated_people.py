@@ -68,8 +68,9 @@ def _has_neighbor(blobs: npt.NDArray[np.int64], label: int) -> bool:
 
 # Movement of center, foot or head, in person heights, after which a person counts as a new sample.
 _STEP = 0.1
-# Frames after which a position without a person is dropped.
-_MAX_AGE = 50
+# Seconds after which a position without a person is dropped.
+_MAX_AGE_S = 2.0
+_ROUNDING = 1e-6
 
 
 class SampleNoveltyFilter:
@@ -78,11 +79,11 @@ class SampleNoveltyFilter:
     def __init__(self) -> None:
         self._positions = np.empty((0, 3))
         self._ages = np.empty(0)
-        """Frames since a person was detected there."""
+        """Seconds since a person was detected there."""
 
-    def new_samples(self, people: Sequence[IsolatedPerson], frames: int = 1) -> list[IsolatedPerson]:
-        """Return the people who count as new samples; `frames` have passed since the previous call."""
-        self._ages += frames
+    def new_samples(self, people: Sequence[IsolatedPerson], elapsed_s: float) -> list[IsolatedPerson]:
+        """Return the people who count as new samples; `elapsed_s` seconds have passed since the last call."""
+        self._ages += elapsed_s
         new: list[IsolatedPerson] = []
         for person in people:
             position = np.array([person.center, person.foot_row, person.foot_row - person.height])
@@ -92,6 +93,6 @@ class SampleNoveltyFilter:
                 new.append(person)
                 self._positions = np.concatenate([self._positions, position[None]])
                 self._ages = np.append(self._ages, 0.0)
-        kept = self._ages <= _MAX_AGE
+        kept = self._ages <= _MAX_AGE_S + _ROUNDING
         self._positions, self._ages = self._positions[kept], self._ages[kept]
         return new

@@ -15,7 +15,8 @@ from tracking.detectors.background.registration import Registration, count_edges
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
 from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves, fit_tone_curves
-from tracking.detectors.base import Image, Mask, Plane, require_at_least_one
+from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, require_positive
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,18 +27,19 @@ class MedianSettings:
         ValueError: a setting is out of range.
     """
 
-    bootstrap_frames: int = 50  # frames whose median is the first background (2 s at 25 frames/s)
-    samples: int = 15  # bootstrap frames that enter the median; odd
+    bootstrap_s: float = 2.0  # seconds whose median is the first background; longer below `samples` frames
+    samples: int = 15  # frames of them that enter the median; odd
     threshold: float = (
         24.0  # largest difference over the channels, in gray levels, above which a pixel is foreground
     )
-    learn_every: int = 5  # frames between two updates of the background
-    learn_rate: float = 0.02  # share of the new frame in each update, where no person is
+    learn_every_s: float = 0.2  # seconds between two updates of the background
+    learn_s: float = 10.0  # seconds in which the background follows a change, where no person is
     relearn_share: float = 0.5  # foreground share of the image that indicates another view
-    relearn_frames: int = 10  # consecutive such frames before the background is learned again
+    relearn_s: float = 0.4  # seconds of such frames before the background is learned again
 
     def __post_init__(self) -> None:
-        require_at_least_one(self, "bootstrap_frames", "samples", "learn_every")
+        require_at_least_one(self, "samples")
+        require_positive(self, "bootstrap_s", "learn_every_s", "learn_s", "relearn_s")
 
 
 class MedianBackground:
@@ -48,12 +50,22 @@ class MedianBackground:
     """
 
     def __init__(
-        self, settings: MedianSettings, static: StaticForegroundSettings, shadows: ShadowSettings
+        self,
+        settings: MedianSettings,
+        static: StaticForegroundSettings,
+        shadows: ShadowSettings,
+        fps: float = DEFAULT_FPS,
     ) -> None:
         self._settings = settings
-        self._static_filter = GhostFinder(static)
+        self._fps = fps
+        self._bootstrap_frames = frames_in(settings.bootstrap_s, fps, settings.samples)
+        self._learn_every = frames_in(settings.learn_every_s, fps)
+        self._learn_rate = min(self._learn_every / fps / settings.learn_s, 1.0)
+        self._points_every = self._learn_every * frames_in(_POINTS_EVERY_S, fps / self._learn_every)
+        self._relearn_frames = frames_in(settings.relearn_s, fps, _MIN_RELEARN_FRAMES)
+        self._static_filter = GhostFinder(static, fps)
         self._shadows = shadows
-        self._registration = Registration()
+        self._registration = Registration(fps)
         self._samples: list[Image] = []
         self._frames = 0
         self._flooded = 0
@@ -75,7 +87,7 @@ class MedianBackground:
             self._sample(image)
         if self._samples:
             self._take_median()
-            self._frames, self._samples = self._settings.bootstrap_frames, []
+            self._frames, self._samples = self._bootstrap_frames, []
 
     def segment_still(self, image: Image) -> Segmentation | None:
         """Segment an image that is not the next frame."""
@@ -105,7 +117,7 @@ class MedianBackground:
             return None
         segmentation = self._compare(aligned, motion, background, curves, gain)
         self._flooded = self._flooded + 1 if self._is_flooded(segmentation) else 0
-        if self._flooded >= self._settings.relearn_frames:
+        if self._flooded >= self._relearn_frames:
             self._invalidate(image, background)
             return None
         # At the background's light people look the same whatever the camera's exposure is.
@@ -124,7 +136,7 @@ class MedianBackground:
             self._unlikely = None
         if self._exact is None or self._rounded is None or self._last is None or self._curves is None:
             return
-        checks_static, updates = self._static_filter.is_due(), self._frames % self._settings.learn_every == 0
+        checks_static, updates = self._static_filter.is_due(), self._frames % self._learn_every == 0
         if not (checks_static or updates):
             return
         leveled = self._last if self._gain is None else unlight(self._last, self._gain)
@@ -134,11 +146,11 @@ class MedianBackground:
             self._exact[static > 0] = leveled[static > 0]
         if updates:
             unoccupied = cv2.bitwise_not(occupied)
-            cv2.accumulateWeighted(leveled, self._exact, self._settings.learn_rate, mask=unoccupied)
+            cv2.accumulateWeighted(leveled, self._exact, self._learn_rate, mask=unoccupied)
         elif static is None:
             return
         self._rounded = np.rint(self._exact).astype(np.uint8)
-        if self._frames % (_POINTS_EVERY * self._settings.learn_every) == 0:
+        if self._frames % self._points_every == 0:
             self._registration.set_background(self._rounded)
 
     def _align(
@@ -196,17 +208,15 @@ class MedianBackground:
         return np.asarray(binary, dtype=np.uint8)
 
     def _bootstrap(self, image: Image) -> None:
-        settings = self._settings
-        if self._frames >= settings.bootstrap_frames:
+        frames, samples, done = self._bootstrap_frames, self._settings.samples, self._frames + 1
+        if done > frames:
             return
         # Spread the samples evenly, the last one on the last frame.
-        used = (self._frames + 1) * settings.samples // settings.bootstrap_frames
-        if used > self._frames * settings.samples // settings.bootstrap_frames:
+        if done * samples // frames > self._frames * samples // frames:
             self._sample(image)
-        done = self._frames + 1
-        if done in {(settings.bootstrap_frames + 1) // 2, settings.bootstrap_frames} and self._samples:
+        if done in {(frames + 1) // 2, frames} and self._samples:
             self._take_median()
-        if done == settings.bootstrap_frames:
+        if done == frames:
             self._samples = []
 
     def _sample(self, image: Image) -> None:
@@ -239,7 +249,7 @@ class MedianBackground:
     def _use(self, background: Image) -> None:
         """Compare frames with this background from now on."""
         self._rounded, self._exact = background, background.astype(np.float32)
-        self._registration = Registration()
+        self._registration = Registration(self._fps)
         self._registration.set_background(background)
         self._curves = self._gain = self._unlikely = None
 
@@ -268,8 +278,10 @@ class MedianBackground:
         self.views += 1
 
 
-# Updates of the background until its edges are sought again.
-_POINTS_EVERY = 10
+# Seconds until the background's edges are sought again.
+_POINTS_EVERY_S = 2.0
+# Fewest frames that show that another background is needed.
+_MIN_RELEARN_FRAMES = 3
 # Drop of the share of pixels that follow the tone curves at which a camera at rest may have moved.
 _MOVED = 0.03
 # Share of the background's contrast below which the lens is covered, in fog, or in the dark.

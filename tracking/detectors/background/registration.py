@@ -17,6 +17,7 @@ from tracking.boxes import Floats
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves
 from tracking.detectors.base import Image, Mask, Plane
+from tracking.frame_rate import DEFAULT_FPS
 
 # Size of the blocks whose pixel with the strongest edge is a point; its least edge, gray levels per pixel.
 _BLOCK = 8
@@ -43,7 +44,7 @@ _OUTSIDE = -1000.0
 class Registration:
     """Follows the motion of one camera's picture against its background."""
 
-    def __init__(self, fps: float = 25.0) -> None:
+    def __init__(self, fps: float = DEFAULT_FPS) -> None:
         self._fps = fps
         self._points: _Points | None = None
         self._motion = self._mean = STILL

@@ -13,8 +13,9 @@ from tracking.detectors.background.median import MedianSettings
 from tracking.detectors.background.mog2 import Mog2Settings
 from tracking.detectors.background.segmentation import ShadowSettings
 from tracking.detectors.background.static_foreground import StaticForegroundSettings
-from tracking.detectors.base import require_at_least_one
+from tracking.detectors.base import require_at_least_one, require_positive
 from tracking.detectors.color_histogram import AppearanceSettings
+from tracking.frame_rate import frames_in
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +29,8 @@ class BackgroundSettings:
     model: Literal["median", "mog2"] = "median"  # how the background is learned
     work_width: int = 360  # pixels; wider images are resized first
     gray_bins: int = 64  # bins of the gray histograms, 1 to 256
-    prescan_frames: int = 500  # frames of a recording scanned before the first is searched; 0: none
-    prescan_every: int = 20  # every n-th of these frames is used
+    prescan_s: float = 20.0  # seconds of a recording scanned before its first frame is searched; 0: none
+    prescan_every_s: float = 0.8  # seconds between two of the frames that are used
     ignore: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of (x, y) in pixels to ignore
     border_margin: float = 0.25  # share of the image height by which people may extend beyond the image
     appearance: AppearanceSettings = field(default_factory=AppearanceSettings)
@@ -42,11 +43,16 @@ class BackgroundSettings:
     foreground_fit: ForegroundFitSettings = field(default_factory=ForegroundFitSettings)
 
     def __post_init__(self) -> None:
-        if self.prescan_frames < 0 or self.prescan_every < 1:
-            raise ValueError("prescan_frames must be at least 0, and prescan_every at least 1")
+        if self.prescan_s < 0.0:
+            raise ValueError(f"prescan_s is at least 0, not {self.prescan_s:g}")
+        require_positive(self, "prescan_every_s")
         require_at_least_one(self, "work_width")
         if not 1 <= self.gray_bins <= GRAY_LEVELS:
             raise ValueError(f"gray_bins must be 1 to {GRAY_LEVELS}, not {self.gray_bins}")
+
+    def prescan_frames(self, fps: float) -> range:
+        """Return the numbers of the frames of a recording from which the background is learned ahead."""
+        return range(0, frames_in(self.prescan_s, fps, 0), frames_in(self.prescan_every_s, fps))
 
 
 def paper_settings(settings: BackgroundSettings) -> BackgroundSettings:

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detectors.base import Image, Mask, Plane, require_at_least_one
+from tracking.detectors.base import Image, Mask, Plane, require_positive
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 
 _RING = np.ones((5, 5), dtype=np.uint8)
 _SMALL = np.ones((3, 3), dtype=np.uint8)
@@ -16,6 +17,8 @@ _SMALL = np.ones((3, 3), dtype=np.uint8)
 _OUTLINE_MARGIN = 6
 # Window (width, height) around a pixel of the outline in which the colors of its sides are compared.
 _CONTRAST_WINDOW = (9, 9)
+# Fewest checks that say that something does not move; counts are limited to what a byte holds.
+_MIN_CHECKS, _MAX_COUNT = 3, np.uint8(200)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +26,13 @@ class StaticForegroundSettings:
     """When foreground that never moves is absorbed into the background.
 
     Raises:
-        ValueError: `check_every` is below 1.
+        ValueError: a time is not positive.
     """
 
-    check_every: int = 5  # frames between two checks for motion
-    still_checks: int = 6  # consecutive checks without motion before a region is examined
-    settled_after_checks: int = 20  # checks as background after which a pixel counts as settled
-    settled_still_checks: int = 50  # checks without motion at settled pixels: moved furniture, not ghosts
+    check_every_s: float = 0.2  # seconds between two checks for motion
+    still_s: float = 1.2  # seconds without motion before a region is examined
+    settled_after_s: float = 4.0  # seconds as background after which a pixel counts as settled
+    settled_still_s: float = 10.0  # seconds without motion at settled pixels: moved furniture, not ghosts
     motion_threshold: float = 14.0  # gray levels between two checks that count as motion
     min_outline_share: float = 0.3  # least share of a region's outline that is next to background
     min_edge_ratio: float = 1.3  # contrast of a ghost's outline in the background over that in the frame
@@ -37,7 +40,7 @@ class StaticForegroundSettings:
     min_area: int = 40  # square pixels of the working image; smaller regions are noise
 
     def __post_init__(self) -> None:
-        require_at_least_one(self, "check_every")
+        require_positive(self, "check_every_s", "still_s", "settled_after_s", "settled_still_s")
 
 
 class GhostFinder:
@@ -49,8 +52,13 @@ class GhostFinder:
     learned, so at pixels where the background was visible static foreground has to persist longer.
     """
 
-    def __init__(self, settings: StaticForegroundSettings) -> None:
+    def __init__(self, settings: StaticForegroundSettings, fps: float = DEFAULT_FPS) -> None:
         self._settings = settings
+        self._check_every = frames_in(settings.check_every_s, fps)
+        checks_per_s = fps / self._check_every
+        self._still_checks = frames_in(settings.still_s, checks_per_s, _MIN_CHECKS)
+        self._settled_after = frames_in(settings.settled_after_s, checks_per_s, _MIN_CHECKS)
+        self._settled_still_checks = frames_in(settings.settled_still_s, checks_per_s, _MIN_CHECKS)
         self._frames = 0
         self._last: Mask | None = None
         self._still: Mask | None = None
@@ -59,7 +67,7 @@ class GhostFinder:
     def is_due(self) -> bool:
         """Count a frame; return whether it is to be checked."""
         self._frames += 1
-        return self._frames % self._settings.check_every == 0
+        return self._frames % self._check_every == 0
 
     def find(self, image: Image, background: Image, foreground: Mask) -> Mask | None:
         """Return the mask of static foreground to absorb in this frame, or `None`.
@@ -71,13 +79,11 @@ class GhostFinder:
         """
         gray = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         still = self._count_still(gray, foreground)
-        self._background_checks = np.minimum(self._background_checks, np.uint8(200)) + (
-            foreground == 0
-        ).astype(np.uint8)
-        settled = self._background_checks >= self._settings.settled_after_checks
-        static = np.asarray(
-            still >= np.where(settled, self._settings.settled_still_checks, self._settings.still_checks)
+        self._background_checks = np.minimum(self._background_checks, _MAX_COUNT) + (foreground == 0).astype(
+            np.uint8
         )
+        settled = self._background_checks >= self._settled_after
+        static = np.asarray(still >= np.where(settled, self._settled_still_checks, self._still_checks))
         if not static.any():
             return None
         return self._check_regions(image, background, foreground, static)
@@ -87,7 +93,7 @@ class GhostFinder:
             self._still = np.zeros_like(gray)
         else:
             motionless = (cv2.absdiff(gray, self._last) < self._settings.motion_threshold) & (foreground > 0)
-            counted = np.minimum(self._still, np.uint8(200)) + np.uint8(1)
+            counted = np.minimum(self._still, _MAX_COUNT) + np.uint8(1)
             self._still = np.where(motionless, counted, np.uint8(0)).astype(np.uint8)
         self._last = gray
         return self._still

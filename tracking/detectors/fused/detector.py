@@ -87,13 +87,13 @@ class FusedDetector:
         background: BackgroundDetector,
         network: PersonNetwork,
         settings: FusedSettings | None = None,
-        frame_rate: float = 25.0,
     ) -> None:
-        """Take over a background detector, which nobody else uses, and a network; frames are per second."""
+        """Take over a background detector, which nobody else uses, and a network."""
         self.settings = settings or FusedSettings()
         self._background = background
         self.network = network
-        self._schedule = NetworkSchedule(self.settings.network_interval_s, frame_rate)
+        self._schedule = NetworkSchedule(self.settings.network_interval_s, background.fps)
+        self._run_s = self._schedule.every / background.fps
         self._carried = CarriedBoxes()
         self._reliance = NetworkReliance()
         self._known = np.empty((0, 4))
@@ -111,8 +111,8 @@ class FusedDetector:
         """The length of a row of the histograms."""
         return self._background.appearance_bins
 
-    def prepare(self, images: Iterable[Image], every: int) -> None:
-        """Learn the background and the height model from a recording before its first frame.
+    def prepare(self, images: Iterable[Image], every_s: float) -> None:
+        """Learn the background and the height model from a recording, an image every so many seconds.
 
         Raises:
             ValueError: not `(H, W, 3)` uint8 images of one size.
@@ -124,11 +124,11 @@ class FusedDetector:
                 found.append(self.network.find(image))
                 yield image
 
-        self._background.prepare(searched(), every)
+        self._background.prepare(searched(), every_s)
         for people in found:
             in_work = replace(people, boxes=self._background.grid.image_to_work(people.boxes))
             network = self._to_cells(in_work)
-            self._background.observe_people(network.boxes[self._is_whole(network)], every)
+            self._background.observe_people(network.boxes[self._is_whole(network)], every_s)
 
     def detect(self, image: Image, frame: int | None = None) -> Detections:
         """Return the detections of the next frame, with probabilities as scores.
@@ -157,7 +157,7 @@ class FusedDetector:
         if runs:
             is_clear = fused.silhouettes[: fused.person_count] >= _CLEAR
             self._reliance.observe(fused.supports[: fused.person_count][is_clear] >= 0)
-            self._background.observe_people(self._agreed_people(fused, network))
+            self._background.observe_people(self._agreed_people(fused, network), self._run_s)
             self._known = fused.boxes[: fused.person_count]
         self._is_needed = self._needs_network(fused)
         self._background.learn(scan, fused.boxes[: fused.person_count])

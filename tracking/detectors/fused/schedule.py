@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tracking.frame_rate import frames_in
+
 _NEEDED_FASTER = 2
 """Runs per interval where the network is needed."""
 _SPARE_RUNS, _SPARE_PER_S = 3.0, 1.0
@@ -11,11 +13,11 @@ _SPARE_RUNS, _SPARE_PER_S = 3.0, 1.0
 class NetworkSchedule:
     """Decides by frame numbers, so that the same frames have the same runs, live and offline."""
 
-    def __init__(self, interval_s: float, frame_rate: float) -> None:
-        self.every = max(round(interval_s * frame_rate), 1)
+    def __init__(self, interval_s: float, fps: float) -> None:
+        self.every = frames_in(interval_s, fps)
         """Frames per regular run."""
         self._early = max(self.every // _NEEDED_FASTER, 1)
-        self._spare_per_frame = _SPARE_PER_S / frame_rate
+        self._spare_per_frame = _SPARE_PER_S / fps
         self._spare = _SPARE_RUNS
         self._last_frame: int | None = None
         self._last_run: int | None = None

@@ -63,7 +63,7 @@ def config_of(
         "sync": {"port": free_port(), "start_timeout_s": PATIENCE},
         "zenoh": {"connect": bus, "listen": bus},
         "cameras": cameras,
-        "detect": {} if ahead else {"prescan_frames": 0},
+        "detect": {} if ahead else {"prescan_s": 0, "median": {"bootstrap_s": 1.0}},
         "ground": "ground.json",
         "track": {"backlog_s": PATIENCE, "cross_view": {"enabled": use}, "cross_view_wait_s": wait},
         "view": {"late_after_s": PATIENCE},

@@ -135,7 +135,7 @@ def test_videos_are_tracked_first_and_must_have_equal_rates(run: RunCommand, tmp
     assert "c1 has 30 frames a second and c0 25" in line
     (tmp_path / "site.yaml").write_text(
         "ground: ground.json\n"  # which is to be made
-        "detect: {prescan_frames: 0}\n"  # so that twenty frames are too few to know the scene
+        "detect: {prescan_s: 0}\n"  # so that twenty frames are too few to know the scene
     )
     result = run("c0.mp4", "c1.mp4", "--fps", "25", "--config", "site.yaml", "--out", "ground.json")
     assert (result.code, result.err) == (2, "tracking c0\nmyview: c0.mp4: has no people\n")

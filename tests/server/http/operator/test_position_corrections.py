@@ -22,7 +22,7 @@ CORRECTIONS = "/api/operator/position_corrections"
 @pytest.fixture
 async def assisted() -> AsyncIterator[ServedSite]:
     """Serve a site whose cameras accept corrections: object 1 in both, 2 in c0 alone."""
-    async with aclosing(serve_site(track={"assist": {"enabled": True, "memory_frames": 10}})) as sites:
+    async with aclosing(serve_site(track={"assist": {"enabled": True, "memory_s": 10 / FPS}})) as sites:
         served = await anext(sites)
         show_people(served)
         yield served

@@ -71,7 +71,7 @@ def run_meeting(
         The person tracker, and by pulse the published positions of people.
     """
     people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), WINDOW.min_final_lag)
-    people.published.frames = ASSIST.memory_frames
+    people.published.frames = ASSIST.resolve(25.0).memory_frames
     camera, positions, first = Camera(), {}, 0
     pending: list[CameraTracks] = []
     for frame in range(frames):
