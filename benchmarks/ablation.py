@@ -50,7 +50,7 @@ ABLATIONS = (
         "no gating",
         {"window": {"gate_heights": 1e3, "max_height_ratio": 1e3}},
     ),
-    Ablation("window of 0.2 seconds", {"window": {"length_s": 0.2, "birth_s": 0.2, "min_frames": 1}}),
+    Ablation("window of 0.2 seconds", {"window": {"length_s": 0.2, "birth_s": 0.2, "min_frames": 3}}),
     Ablation("no re-identification", {"window": {"reidentify_max_distance": 0.0}}),
     Ablation("fixed templates", {"window": {"template_update_rate": 0.0}}),
     Ablation("the paper's costs", {"costs": asdict(PAPER_COSTS)}),

@@ -87,19 +87,20 @@ def create_tracker(
     temporal: TemporalSettings | None = None,
     fps: float = DEFAULT_FPS,
     assist: InteractiveSettings | None = None,
+    center: tuple[float, float] | None = None,
 ) -> Tracker:
-    """Create a tracker for `fps` frames per second.
+    """Create a tracker for `fps` frames per second, and images with this `center` in pixels.
 
-    `costs`, `solver` and `assist` apply to the default tracker only, which is a `CorrectableTracker` if
-    `assist` is enabled; `temporal` applies to temporal consistency only.
+    `costs`, `solver`, `assist` and `center` apply to the default tracker only, which is a
+    `CorrectableTracker` if `assist` is enabled; `temporal` applies to temporal consistency only.
 
     Raises:
         ValueError: no tracker has that name.
     """
     if name == DEFAULT_TRACKER:
         if assist is not None and assist.enabled:
-            return CorrectableTracker(window, costs, solver(), assist, fps)
-        return OnlineTracker(window, costs, solver(), fps)
+            return CorrectableTracker(window, costs, solver(), assist, fps, center)
+        return OnlineTracker(window, costs, solver(), fps, center)
     if name == TEMPORAL_TRACKER:
         tracker: Tracker = import_module(
             "tracking.baselines.temporal_consistency.tracker"

@@ -48,7 +48,13 @@ class OnlineTracker:
         costs: CostSettings,
         solver: Solver,
         fps: float = DEFAULT_FPS,
+        center: tuple[float, float] | None = None,
     ) -> None:
+        """Create a tracker for `fps` frames per second.
+
+        `center`, pixels: the center of the image, where the layout term places a hidden object (II.D).
+        """
+        self._center = center
         self._window = window.resolve(fps)
         self._costs = costs.for_fps(fps)
         self._solver = solver
@@ -161,7 +167,7 @@ class OnlineTracker:
         templates = [self._objects[n].template(first) for n in inside]
         ids = [template.id for template in templates]
         network = restrict_network(
-            build_network(templates, frames, self._costs), [allowed[n] for n in inside]
+            build_network(templates, frames, self._costs, self._center), [allowed[n] for n in inside]
         )
         network = self._adjust_costs(network, first, ids)
         solution = self._solver.solve(

@@ -21,7 +21,7 @@ class Detections:
         histograms: (K, B) float64, appearance; rows sum to 1. B = 0: unknown appearance.
 
     Raises:
-        ValueError: the shapes do not fit together.
+        ValueError: the shapes do not fit together, or a number is not finite.
     """
 
     boxes: NDArray[np.float64]
@@ -36,6 +36,14 @@ class Detections:
             raise ValueError(
                 f"{count} scores need histograms of shape ({count}, B), not {self.histograms.shape}"
             )
+        for name in ("boxes", "scores", "histograms"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"{name} are finite numbers: {self._first_wrong(name)}")
+
+    def _first_wrong(self, name: str) -> str:
+        rows = getattr(self, name).reshape(len(self), -1)
+        wrong = int(np.argmin(np.isfinite(rows).all(axis=1)))
+        return f"detection {wrong} has {rows[wrong].tolist()[:8]}"
 
     def __len__(self) -> int:
         return len(self.scores)

@@ -13,6 +13,9 @@ from tracking.frame_rate import frames_in
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections, RiskEvent
 
+SHORTEST_WINDOW = 3
+"""Frames: a shorter window tracks nobody, since the path of a new object has no cost to be tested."""
+
 _MIN_INTERPOLATED = 2
 """Missed frames that are interpolated at any frame rate."""
 
@@ -27,7 +30,7 @@ class WindowSettings:
 
     length_s: float = 0.6  # M: seconds of a window; a frame is final length_s - stride_s later
     stride_s: float = 0.2  # s: seconds between two windows
-    min_frames: int = 10  # frames of a window at least: at low frame rates it is longer
+    min_frames: int = 10  # frames of a window at least, 3 or more: at low frame rates it is longer
     birth_s: float = 0.6  # seconds over which a new object is tested; at most the window
     birth_min_visible: float = 0.5  # share of these frames in which a new object must be detected
     birth_max_cost: float = 0.7  # largest mean cost per frame of its path: appearance, motion, confidence
@@ -57,8 +60,13 @@ class WindowSettings:
             )
         if not 0.0 < self.birth_min_visible <= 1.0:
             raise ValueError(f"birth_min_visible is a share between 0 and 1, not {self.birth_min_visible}")
-        if not self.forget_after_s > 0.0 or self.max_objects < 1 or self.min_frames < 1:
-            raise ValueError("forget_after_s must be above 0, and max_objects and min_frames at least 1")
+        if not self.forget_after_s > 0.0 or self.max_objects < 1:
+            raise ValueError("forget_after_s must be above 0, and max_objects at least 1")
+        if self.min_frames < SHORTEST_WINDOW:
+            raise ValueError(
+                f"min_frames must be at least {SHORTEST_WINDOW}, not {self.min_frames}:"
+                " in a shorter window no track is confirmed"
+            )
 
     def resolve(self, fps: float) -> ResolvedWindowSettings:
         """Return the settings with all times in frames, for so many frames per second."""

@@ -118,7 +118,10 @@ class _Camera:
 
     def __init__(self, config: Config, camera: str, frames: CameraDetections) -> None:
         track = config.track
-        self.tracker = OnlineTracker(track.window, track.costs, create_solver(track.solver), config.site.fps)
+        center = frames.size[0] / 2.0, frames.size[1] / 2.0
+        self.tracker = OnlineTracker(
+            track.window, track.costs, create_solver(track.solver), config.site.fps, center
+        )
         self.builder = TrackMessageBuilder(camera, 0, frames.size, config.window.stride)
         self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.peers_of(camera) else None
         self._frames = frames

@@ -85,7 +85,7 @@ def sweep(scene: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[Swee
                         "length_s": STRIDE / fps,
                         "stride_s": STRIDE / fps,
                         "birth_s": STRIDE / fps,
-                        "min_frames": 1,
+                        "min_frames": 3,
                     }
                 },
                 view={

@@ -10,6 +10,9 @@ from tracking.boxes import Floats
 WIDTH, HEIGHT = 352, 288
 """CIF, as in the paper (IV.A)."""
 
+CENTER = (WIDTH / 2.0, HEIGHT / 2.0)
+"""Where the layout term places a hidden object (II.D)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectTruth:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.paper_experiments.label_errors import named
-from benchmarks.paper_experiments.scene import ExperimentScene
+from benchmarks.paper_experiments.scene import CENTER, ExperimentScene
 from tracking import CostSettings, Detections, OnlineTracker, SolveReport, Template, WindowSettings
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.frame_rate import DEFAULT_FPS
@@ -71,15 +71,15 @@ def _network(
 ) -> Network:
     parts: list[Sequence[Detections]] = [frames[first:stop] for frames in scene.seen]
     if len(parts) == 1:
-        return build_network(templates, parts[0], costs)
-    return build_network_per_object(templates, parts, costs)
+        return build_network(templates, parts[0], costs, CENTER)
+    return build_network_per_object(templates, parts, costs, CENTER)
 
 
 def _follow_found(
     scene: ExperimentScene, costs: CostSettings, window: WindowSettings, solver: Solver
 ) -> TrackedLabels:
     """Track with the online tracker, which initiates tracks itself."""
-    tracker = OnlineTracker(window, costs, solver)
+    tracker = OnlineTracker(window, costs, solver, center=CENTER)
     tracks: dict[int, Floats] = {}
     reports = []
     frames = scene.truth.frames

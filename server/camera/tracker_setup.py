@@ -35,8 +35,9 @@ def set_up_tracker(
     track = config.track
     letterbox = letterbox or (None if source is None else Letterbox(source.size, source.size))
     settings = track.temporal if letterbox is None else _with_room_width(track.temporal, camera, letterbox)
+    center = None if letterbox is None else (letterbox.site_size[0] / 2.0, letterbox.site_size[1] / 2.0)
     tracker = create_tracker(
-        name, track.window, track.costs, solver, settings, config.site.fps, assist=track.assist
+        name, track.window, track.costs, solver, settings, config.site.fps, track.assist, center
     )
     if prescan and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
         indices = config.detect.prescan_frames(config.site.fps)

@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 from fakes.tracking.strolls import WalkingPerson, detections_at, final_boxes, track_all, tracker
 from fakes.tracking.windows import window_of_frames
 from tracking.boxes import iou
+from tracking.model.network import CostSettings, Network
+from tracking.solvers import Solution, WarmStart, create_solver
+from tracking.tracker import OnlineTracker
 from tracking.types import Detections
 from tracking.window import WindowResult, WindowSettings
 
@@ -245,11 +248,47 @@ def test_flush_without_frames_and_twice_gives_nothing() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"stride_s": 0.0}, {"stride_s": 0.7}, {"birth_s": 0.7}, {"birth_min_visible": 0.0}, {"max_objects": 0}],
+    [
+        {"stride_s": 0.0},
+        {"stride_s": 0.7},
+        {"birth_s": 0.7},
+        {"birth_min_visible": 0.0},
+        {"max_objects": 0},
+        {"min_frames": 2},
+    ],
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         WindowSettings(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("length", "stride"), [(1, 1), (2, 1), (3, 1), (3, 3)])
+def test_the_shortest_windows_track_people(length: int, stride: int) -> None:
+    tracked = tracker(window_of_frames(length, stride))
+    results = track_all([detections_at([WalkingPerson(50, 50, 2, 0)], n) for n in range(20)], tracked)
+    assert _ids(results) == {1}
+
+
+@pytest.mark.parametrize(
+    ("center", "place"), [((320.0, 180.0), (320.0, 180.0)), (None, (60.0, 70.0))], ids=["image", "unknown"]
+)
+def test_the_layout_term_places_hidden_people_at_the_center_of_the_image(
+    center: tuple[float, float] | None, place: tuple[float, float]
+) -> None:
+    solved: list[Network] = []
+
+    class Recorder:
+        name = "recorder"
+
+        def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
+            solved.append(network)
+            return create_solver("columns").solve(network, warm_start)
+
+    standing = Detections(np.array([[50.0, 40.0, 70.0, 100.0]]), np.ones(1), np.empty((1, 0)))
+    tracked = OnlineTracker(WindowSettings(), CostSettings(), Recorder(), center=center)
+    for frame in range(15):
+        tracked.push(frame, standing)
+    assert {tuple(hidden) for hidden in solved[-1].locations[0, :, -1].tolist()} == {(*place, *place)}
 
 
 def test_two_people_who_cross_without_appearance_keep_their_ids() -> None:

@@ -47,8 +47,9 @@ class CorrectableTracker(OnlineTracker):
         solver: Solver,
         assist: InteractiveSettings,
         fps: float = DEFAULT_FPS,
+        center: tuple[float, float] | None = None,
     ) -> None:
-        super().__init__(window, costs, solver, fps)
+        super().__init__(window, costs, solver, fps, center)
         self._settings = assist.resolve(fps)
         self._risk_predictor = RiskPredictor(self._settings, self._costs)
         self._memory = WindowMemory(self._settings.memory_frames)

@@ -24,7 +24,7 @@ class Template:
         motion: its motion up to its last detection; None: unknown.
 
     Raises:
-        ValueError: the box has not 4 numbers, or the histogram is not one row.
+        ValueError: the box has not 4 numbers, the histogram is not one row, or a number is not finite.
     """
 
     id: int
@@ -37,6 +37,11 @@ class Template:
             raise ValueError(f"a template's histogram has shape (B,), not {self.histogram.shape}")
         if self.box is not None and self.box.shape != (BOX_SIDES,):
             raise ValueError(f"a template's box has shape (4,), not {self.box.shape}")
+        numbers = self.histogram if self.box is None else np.concatenate([self.histogram, self.box])
+        if not np.isfinite(numbers).all():
+            raise ValueError(
+                f"a template's box and histogram are finite numbers: object {self.id} has others"
+            )
 
 
 # Seconds of detections that determine the velocity, and their least number.

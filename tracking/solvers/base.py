@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
@@ -59,6 +60,8 @@ class SolveReport:
     @property
     def gap(self) -> float:
         """Largest distance from the optimum, relative to max(1, |objective|); never negative."""
+        if not math.isfinite(self.objective):
+            return math.inf
         return max(0.0, self.objective - self.bound) / max(1.0, abs(self.objective))
 
 

@@ -20,6 +20,7 @@ from tracking.solvers.arc_master import ArcMaster, path_arcs
 from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.path_master import PathMaster, PathMasterSolution
 from tracking.solvers.relaxation import (
@@ -206,7 +207,8 @@ class ColumnGenerationSolver(TimedSolver):
         """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
-        return solution_from_relaxation(self.name, network, solve_relaxation(network, warm_start))
+        found = solve_relaxation(network, warm_start)
+        return solution_from_relaxation(self.name, network, found, warm_start=warm_start)
 
 
 def solve_relaxation(network: Network, warm_start: WarmStart | None = None) -> RelaxedSolution:
@@ -215,6 +217,7 @@ def solve_relaxation(network: Network, warm_start: WarmStart | None = None) -> R
     The columns are paths if only conflicts couple the objects, and arcs under the layout term, for which
     whole paths are unsuitable.
     """
+    network = allow_hiding(network)
     if not network.layout:
         return PathGeneration(network).run(warm_start)
     return start_arc_generation(network, PathPricer(Trellis.of(network)), ConflictSeparator(network)).run()
@@ -231,16 +234,17 @@ class SquaredLayoutSolver(TimedSolver):
 
     name = "l2"
 
-    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
         """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
         if not network.layout:
             return solution_from_relaxation(self.name, network, solve_relaxation(network))
-        start = LocalSearch(network, _SQUARED_POWER).improve(greedy_paths(network).nodes)
+        solvable = allow_hiding(network)
+        start = LocalSearch(solvable, _SQUARED_POWER).improve(greedy_paths(solvable).nodes)
         starts = path_arcs(np.arange(network.objects), start)
-        found = _SquaredLayoutGeneration(network, starts, [], ConflictSeparator(network)).run()
-        return solution_from_relaxation(self.name, network, found, _SQUARED_POWER)
+        found = _SquaredLayoutGeneration(solvable, starts, [], ConflictSeparator(network)).run()
+        return solution_from_relaxation(self.name, network, found, _SQUARED_POWER, warm_start)
 
 
 class _SquaredLayoutGeneration(ArcGeneration):

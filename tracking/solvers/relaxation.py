@@ -10,7 +10,7 @@ from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
 from tracking.solvers.objective import Ints, conflict_count, path_costs
-from tracking.solvers.viterbi import PathPricer, Paths, best_paths
+from tracking.solvers.viterbi import PathPricer, Paths, Trellis, best_paths
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 OPTIMALITY_TOLERANCE = 1e-11
@@ -67,7 +67,8 @@ def try_warm_start(
     priced = pricing.best_paths(node, np.arange(network.objects))
     bound = float(priced.costs.sum() - prices.sum())
     paths = []
-    for nodes in (priced.nodes, _follow_warm_start(network, pricing, node, warm_start, priced.nodes)):
+    trellis = pricing.trellis.with_node(node)
+    for nodes in (priced.nodes, follow_warm_start(network, trellis, warm_start, priced.nodes)):
         true_costs = path_costs(network, nodes)
         paths.append(Paths(nodes, true_costs))
         cost = float(true_costs.sum())
@@ -89,10 +90,11 @@ def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Float
     return node
 
 
-def _follow_warm_start(
-    network: Network, pricing: PathPricer, node: Floats, warm_start: WarmStart, nodes: Ints
-) -> Ints:
-    """Return `nodes` (n, M), replaced by the best paths that follow the warm start where it differs."""
+def follow_warm_start(network: Network, trellis: Trellis, warm_start: WarmStart, nodes: Ints) -> Ints:
+    """Return `nodes` (n, M), replaced by the best paths that follow the warm start where it differs.
+
+    `trellis` has the costs of the paths, with or without prices.
+    """
     if len(warm_start.states) != network.objects:
         return nodes
     known = warm_start.states[:, : network.frames]
@@ -102,10 +104,10 @@ def _follow_warm_start(
     differing = np.flatnonzero((usable & (hinted != nodes[:, :frames])).any(axis=1))
     if not len(differing):
         return nodes
-    restricted = node[differing].copy()
+    restricted = trellis.node[differing].copy()
     off = np.arange(network.max_places + 1) != hinted[differing, :, None]
     restricted[:, :frames][off & usable[differing, :, None]] = np.inf
-    found = best_paths(pricing.trellis.with_node(node).select(differing).with_node(restricted))
+    found = best_paths(trellis.select(differing).with_node(restricted))
     # Ignore the warm start where it requires missing arcs.
     feasible = np.isfinite(found.costs)
     followed = nodes.copy()

@@ -9,38 +9,48 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport
+from tracking.solvers.candidates import candidate_nodes
 from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, states_from_nodes, total_cost
 from tracking.solvers.relaxation import RelaxedSolution
 from tracking.solvers.rounding import LocalSearch, is_integral, round_relaxation
-from tracking.solvers.warm_start import ConflictPrice
+from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 
 def solution_from_relaxation(
-    solver: str, network: Network, found: RelaxedSolution, power: int = 1
+    solver: str,
+    network: Network,
+    found: RelaxedSolution,
+    power: int = 1,
+    warm_start: WarmStart | None = None,
 ) -> Solution:
     """Return the solution for the optimum of the relaxation; `power` is that of the layout term."""
-    nodes = integer_nodes(network, found.usage, power)
+    nodes = integer_nodes(network, found.usage, power, warm_start)
     integral = is_integral(found.usage)
     proof = Certificate(solver, found.bound, integral, found.rounds, found.prices)
     return build_solution(network, nodes, proof, power)
 
 
-def integer_nodes(network: Network, usage: Floats, power: int = 1) -> Ints:
+def integer_nodes(
+    network: Network, usage: Floats, power: int = 1, warm_start: WarmStart | None = None
+) -> Ints:
     """Return nodes (n, M) without conflicts for y = `usage` (n, M, S).
 
     If y is integral, they are its paths. Otherwise y is rounded (II.D) and improved by local search, and so
-    are the greedy paths; the cheaper ones are returned, the rounded ones if equal.
+    are the greedy paths and the cheapest of `candidate_nodes`; the cheapest of the three are returned, the
+    rounded ones if equal. So no answer is dearer than hiding everybody.
     """
     nodes = round_relaxation(network, usage)
-    if is_integral(usage):
+    if is_integral(usage) and np.isfinite(total_cost(network, nodes, power)):
         return nodes
+    network = allow_hiding(network)
     improver = LocalSearch(network, power)
-    nodes = improver.improve(nodes)
-    greedy = improver.improve(greedy_paths(network, improver.alone).nodes)
-    if conflict_count(network, greedy):
-        return nodes
-    return greedy if total_cost(network, greedy, power) < total_cost(network, nodes, power) else nodes
+    candidates = candidate_nodes(network, improver.alone, warm_start)
+    greedy = greedy_paths(network, improver.alone).nodes
+    starts = [nodes, greedy, min(candidates, key=lambda found: total_cost(network, found, power))]
+    improved = [improver.improve(start) for start in starts if not conflict_count(network, start)]
+    return min(improved, key=lambda found: total_cost(network, found, power))
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,7 +53,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
                 "length_s": 5 / FPS,
                 "stride_s": STRIDE / FPS,
                 "birth_s": 5 / FPS,
-                "min_frames": 1,
+                "min_frames": 3,
             },
             "backlog_s": 0.2,
             "assist": {"enabled": True},

@@ -55,7 +55,8 @@ def track_one(
         raise UserError("track: name a video, or its detections with --det, or both")
     loaded = config_for_video(video, det, config)
     frames = _from_detections(det) if video is None and det is not None else detect_frames(loaded)
-    person_tracker = _set_up(loaded, _tracker_for(loaded, tracker, video), lambda: solver_for(loaded, solver))
+    name = _tracker_for(loaded, tracker, video)
+    person_tracker = _set_up(loaded, name, lambda: solver_for(loaded, solver), has_pictures=video is not None)
     rows: list[MotRow] = []
     with atomic_file(out, video, det) as draft:
         for frame in frames:
@@ -80,10 +81,10 @@ def _tracker_for(config: Config, name: str | None, video: Path | None) -> str:
     return chosen
 
 
-def _set_up(config: Config, name: str, solver: Callable[[], Solver]) -> Tracker:
-    """Return the tracker, warmed up on the video if it needs pictures."""
+def _set_up(config: Config, name: str, solver: Callable[[], Solver], *, has_pictures: bool) -> Tracker:
+    """Return the tracker, set up for the video's size, and warmed up on it if it needs pictures."""
     camera = config.cameras[0]
-    if not needs_images(name):
+    if not has_pictures:
         return set_up_tracker(config, name, camera, None, solver)
     with closing(open_source(camera, config.site)) as source:
         return set_up_tracker(config, name, camera, source, solver)

@@ -55,7 +55,7 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
                 "length_s": 5 / FPS,
                 "stride_s": STRIDE / FPS,
                 "birth_s": 5 / FPS,
-                "min_frames": 1,
+                "min_frames": 3,
             }
         },
         "view": {

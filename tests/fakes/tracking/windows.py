@@ -15,6 +15,6 @@ def window_of_frames(
         length_s=window / fps,
         stride_s=stride / fps,
         birth_s=(min(window, 15) if birth_window is None else birth_window) / fps,
-        min_frames=1,
+        min_frames=3,
         **settings,
     )

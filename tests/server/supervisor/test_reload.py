@@ -80,7 +80,7 @@ def changed_config(keys: set[str]) -> Config:
     return small_config([*cameras.values()], **content)
 
 
-WINDOW = {"length_s": 0.2, "stride_s": 0.2, "birth_s": 0.2, "min_frames": 1}
+WINDOW = {"length_s": 0.2, "stride_s": 0.2, "birth_s": 0.2, "min_frames": 3}
 
 
 @settings(max_examples=20)
@@ -111,7 +111,7 @@ def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
 
 
 def test_a_lookahead_below_the_current_lag_waits_for_a_restart() -> None:
-    track = {"window": {"length_s": 0.6, "stride_s": 0.2, "birth_s": 0.2, "min_frames": 1}}
+    track = {"window": {"length_s": 0.6, "stride_s": 0.2, "birth_s": 0.2, "min_frames": 3}}
     running = small_config(track=track, view={"lookahead": 15})
     reload = plan_reload(running, small_config(view={"lookahead": 5, "switch_cost_s": 1.0}))
     assert reload.live == ("view.switch_cost_s",)

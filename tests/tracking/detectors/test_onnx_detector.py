@@ -113,3 +113,12 @@ def test_boxes_are_mapped_back_from_the_stretched_input(tmp_path: Path) -> None:
     left, top, width, height = MIDDLE[0] - MIDDLE[2] / 2, MIDDLE[1] - MIDDLE[3] / 2, MIDDLE[2], MIDDLE[3]
     expected = [2 * left, top / 1.5, 2 * (left + width), (top + height) / 1.5]
     np.testing.assert_allclose(seen.boxes, [expected], atol=1e-4)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_rows_that_are_not_finite_are_nobody_and_an_output_without_others_is_refused(wrong: float) -> None:
+    output = yolov5([(*MIDDLE, 0.9, 0.8), (*AWAY, 0.9, 0.9)], boxes=2)
+    output[0, 1, 2] = wrong
+    np.testing.assert_allclose(decode_output(output, "yolov5", (0,)).boxes, [[24.0, 12.0, 36.0, 52.0]])
+    with pytest.raises(ValueError, match="no finite numbers"):
+        decode_output(np.full_like(output, wrong), "yolov5", (0,))

@@ -152,3 +152,23 @@ def test_shapes_of_detections_and_templates_are_checked() -> None:
     with pytest.raises(ValueError, match="shape"):
         Template(1, np.zeros(2), np.zeros(3))
     assert len(Detections.empty(8)) == 0
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("field", ["boxes", "scores", "histograms"])
+def test_numbers_that_are_not_finite_are_refused_with_the_detection_that_has_them(
+    field: str, wrong: float
+) -> None:
+    numbers = {"boxes": np.zeros((3, 4)), "scores": np.ones(3), "histograms": np.ones((3, 1))}
+    numbers[field].reshape(3, -1)[1, -1] = wrong
+    with pytest.raises(ValueError, match=f"{field} are finite numbers: detection 1 "):
+        Detections(**numbers)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_templates_that_are_not_finite_are_refused(wrong: float) -> None:
+    box = np.array([0.0, 0.0, 10.0, wrong])
+    with pytest.raises(ValueError, match="object 7"):
+        Template(7, np.ones(1), box)
+    with pytest.raises(ValueError, match="object 7"):
+        Template(7, np.array([wrong]), None)

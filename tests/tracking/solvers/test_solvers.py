@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import SETTINGS, Case, cases, exhaustive_optimum, network_of
@@ -20,6 +20,11 @@ TOLERANCE = 1e-9
 RELAXATIONS = ("arcs", "columns")
 CONFLICT_FREE = (*RELAXATIONS, "greedy-dp")
 bounded = settings(deadline=None, max_examples=60)
+NEAR = replace(SETTINGS, conflict_distance=120.0)
+HIDING_IS_CHEAPER = Case(3, 4, 3, shared=True, settings=replace(NEAR, layout=0.01), seed=110)
+"""A window whose rounded relaxation is dearer than hiding everybody."""
+MUST_BE_VISIBLE = Case(3, 3, 3, shared=True, settings=NEAR, seed=125)
+"""A window in which all objects cannot be hidden at once, if that is forbidden in half of the frames."""
 
 
 def solved(case: Case, name: str) -> Solution:
@@ -61,7 +66,40 @@ def test_the_bound_is_below_the_optimum_and_integral_relaxations_are_optimal(nam
         assert report.gap < TOLERANCE
 
 
-@pytest.mark.parametrize("name", ["arcs", "extended-dp", "greedy-dp"])
+@pytest.mark.parametrize("name", [*RELAXATIONS, "exact"])
+@settings(deadline=None, max_examples=60)
+@given(case=cases(objects=4, frames=4, places=4, layouts=(0.0, 0.002, 0.01)))
+@example(case=HIDING_IS_CHEAPER)
+def test_no_answer_is_dearer_than_hiding_everybody(name: str, case: Case) -> None:
+    network = network_of(case)
+    everybody = np.full((network.objects, network.frames), network.max_places)
+    hidden = total_cost(network, everybody)
+    assert create_solver(name).solve(network).report.objective <= hidden + TOLERANCE * max(1.0, hidden)
+
+
+@pytest.mark.parametrize("name", ["arcs", "columns", "exact", "extended-dp"])
+@settings(deadline=None, max_examples=40)
+@example(case=MUST_BE_VISIBLE, share=0.5)
+@given(case=cases(objects=3, frames=3, places=3), share=st.sampled_from([0.2, 0.5, 0.9]))
+def test_objects_that_may_not_be_hidden_have_the_answer_of_all_arcs(
+    name: str, case: Case, share: float
+) -> None:
+    network = network_of(case)
+    node = network.node.copy()
+    forbidden = np.random.default_rng(case.seed).uniform(size=node.shape[:2]) < share
+    node[:, :, -1][forbidden] = np.inf
+    network = replace(network, node=node)
+    joint = create_solver("extended-dp").solve(network).report
+    optimum = joint.objective
+    assume(np.isfinite(optimum) and not joint.conflicts)
+    report = create_solver(name).solve(network).report
+    assert (np.isfinite(report.objective), report.conflicts) == (True, 0)
+    assert report.bound <= optimum + TOLERANCE <= report.objective + 2.0 * TOLERANCE
+    if name == "exact":
+        assert report.objective == pytest.approx(optimum, rel=TOLERANCE)
+
+
+@pytest.mark.parametrize("name", ["arcs", "columns", "exact", "extended-dp", "greedy-dp"])
 @settings(deadline=None, max_examples=40)
 @given(case=cases(objects=3, frames=2, places=2), share=st.sampled_from([0.2, 0.5, 0.8]))
 def test_forbidden_nodes_are_avoided_or_the_report_has_conflicts(name: str, case: Case, share: float) -> None:

@@ -37,10 +37,10 @@ def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Seq
     | `yolov8` (v8, v9, v11, v12) | (1, 4 + C, N) | center x, y, width, height, C classes, as columns |
     | `end2end` (v10, v26, exports with NMS) | (1, N, 6) | left, top, right, bottom, score, class |
 
-    `auto` selects the layout by the shape.
+    `auto` selects the layout by the shape. Rows with numbers that are not finite are left out.
 
     Raises:
-        ValueError: the output has none of these shapes, or too few classes.
+        ValueError: the output has none of these shapes, too few classes, or no finite row.
     """
     if output.ndim != 3 or output.shape[0] != 1:  # noqa: PLR2004 — batch, rows, columns
         raise ValueError(_unfit(output.shape))
@@ -48,6 +48,10 @@ def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Seq
     kind = _layout_of(table.shape) if layout == "auto" else layout
     if kind == "yolov8":
         table = table.T
+    finite = np.isfinite(table).all(axis=1)
+    if len(table) and not finite.any():
+        raise ValueError("its output has no finite numbers")
+    table = table[finite]
     if kind == "end2end":
         if table.shape[1] != _END_TO_END:
             raise ValueError(_unfit(output.shape))
