@@ -15,10 +15,16 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
-from tracking.solvers.arc_master import ArcMaster, ArcMasterSolution, ArcSet, find_improving_arcs, path_arcs
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
 from tracking.solvers.dual_ascent import DualGuess, add_layout_prices, guess_duals
 from tracking.solvers.objective import Ints
+from tracking.solvers.programs.arc_master import (
+    ArcMaster,
+    ArcMasterSolution,
+    ArcSet,
+    find_improving_arcs,
+    path_arcs,
+)
 from tracking.solvers.relaxation import OPTIMALITY_TOLERANCE, RelaxedSolution, add_conflict_prices
 from tracking.solvers.viterbi import MinMarginals, PathPricer, Trellis, forward
 

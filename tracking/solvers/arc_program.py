@@ -12,7 +12,7 @@ from scipy import sparse
 from tracking.boxes import BOX_SIDES
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, TimedSolver
-from tracking.solvers.linear_program import LinearProgram, LinearProgramBuilder, solve_program
+from tracking.solvers.programs.linear_program import LinearProgram, LinearProgramBuilder, solve_program
 from tracking.solvers.relaxation import RelaxedSolution
 from tracking.solvers.solution_builder import empty_solution, solution_from_relaxation
 from tracking.solvers.warm_start import WarmStart

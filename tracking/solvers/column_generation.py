@@ -16,13 +16,13 @@ import numpy as np
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.arc_generation import ArcGeneration, start_arc_generation
-from tracking.solvers.arc_master import ArcMaster, path_arcs
 from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, path_costs
-from tracking.solvers.path_master import PathMaster, PathMasterSolution
+from tracking.solvers.programs.arc_master import ArcMaster, path_arcs
+from tracking.solvers.programs.path_master import PathMaster, PathMasterSolution
 from tracking.solvers.relaxation import (
     OPTIMALITY_TOLERANCE,
     RelaxedSolution,

@@ -18,8 +18,8 @@ from tracking.model.network import Network
 from tracking.solvers.arc_program import build_arc_program
 from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.column_generation import solve_relaxation
-from tracking.solvers.linear_program import solve_program
 from tracking.solvers.objective import Ints, total_cost
+from tracking.solvers.programs.linear_program import solve_program
 from tracking.solvers.relaxation import RelaxedSolution
 from tracking.solvers.rounding import is_integral
 from tracking.solvers.solution_builder import Certificate, build_solution, empty_solution, integer_nodes

@@ -11,8 +11,8 @@ from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.cutting_planes import ConflictRow
-from tracking.solvers.linear_program import create_highs, run_highs
 from tracking.solvers.objective import Ints
+from tracking.solvers.programs.linear_program import create_highs, run_highs
 from tracking.solvers.viterbi import Paths
 
 

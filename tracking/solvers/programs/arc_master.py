@@ -11,9 +11,9 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.cutting_planes import ConflictRow
-from tracking.solvers.layout_rows import LayoutConstraints
-from tracking.solvers.linear_program import create_highs, run_highs
 from tracking.solvers.objective import Ints
+from tracking.solvers.programs.layout_rows import LayoutConstraints
+from tracking.solvers.programs.linear_program import create_highs, run_highs
 from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis
 
 _NO_ROW = -1
