@@ -61,6 +61,9 @@ class ArcGeneration:
         self._master.add_arcs(starts)
         self._master.add_rows(rows)
 
+    _tolerance = OPTIMALITY_TOLERANCE
+    """Relative gap at which the optimum is proven."""
+
     def _new_master(self) -> ArcMaster:
         return ArcMaster(self._network)
 
@@ -81,10 +84,10 @@ class ArcGeneration:
             point = self._solve_with_violated_rows()
             rounds += 1
             priced = self._price(point)
-            is_optimal = point.objective - priced.bound <= OPTIMALITY_TOLERANCE * max(
-                1.0, abs(point.objective)
-            )
-            if is_optimal or not self._add_improving_arcs(priced):
+            gap = point.objective - priced.bound
+            if gap <= self._tolerance * max(1.0, abs(point.objective)) or not self._add_improving_arcs(
+                priced
+            ):
                 return self._relaxed(point, priced, rounds)
 
     def _relaxed(self, point: ArcMasterSolution, priced: _PricedTrellis, rounds: int) -> RelaxedSolution:

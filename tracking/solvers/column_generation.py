@@ -248,7 +248,9 @@ class SquaredLayoutSolver(TimedSolver):
 
 
 class _SquaredLayoutGeneration(ArcGeneration):
-    """The same search with the quadratic program."""
+    """The same search with the quadratic program, whose duals are less exact than a simplex method's."""
+
+    _tolerance = 1e-8
 
     def _new_master(self) -> ArcMaster:
         return ArcMaster(self._network, squared=True)

@@ -13,7 +13,7 @@ from tracking.model.network import Network
 from tracking.solvers.cutting_planes import ConflictRow
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.layout_rows import LayoutConstraints
-from tracking.solvers.programs.linear_program import create_highs, run_highs
+from tracking.solvers.programs.linear_program import LinearSolution, create_highs, run_highs
 from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis
 
 _NO_ROW = -1
@@ -88,7 +88,8 @@ class ArcMaster:
 
     def __init__(self, network: Network, *, squared: bool = False) -> None:
         self._network = network
-        self._highs = create_highs(growing=True, presolve=not squared)
+        self._squared = squared
+        self._highs = create_highs(growing=True, presolve=True)
         objects, frames, states = network.node.shape
         none = np.empty(0, dtype=np.int64)
         self._arcs = ArcSet(none, none, none, none)
@@ -198,7 +199,7 @@ class ArcMaster:
 
     def solve(self) -> ArcMasterSolution:
         """Solve the restricted program."""
-        found = run_highs(self._highs)
+        found = self._run()
         self._values = found.values[self._columns]
         objects, frames = self._network.objects, self._network.frames
         prices = np.maximum(0.0, -found.duals[self._conflict_rows]) if self.rows else np.empty(0)
@@ -210,6 +211,14 @@ class ArcMaster:
         return ArcMasterSolution(
             found.objective, prices, layout_prices, found.duals[:objects], bound_reduction
         )
+
+    def _run(self) -> LinearSolution:
+        if self._layout is None or not self._squared:
+            return run_highs(self._highs)
+        # Imported on demand: only the solver `l2` needs it.
+        from tracking.solvers.programs.quadratic_program import solve_quadratic_program  # noqa: PLC0415
+
+        return solve_quadratic_program(self._highs.getLp(), self._layout.squares, self._network.layout)
 
     def usage(self) -> Floats:
         """Return y (n, M, S), the flow through each node."""

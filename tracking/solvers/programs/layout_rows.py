@@ -22,6 +22,9 @@ class LayoutConstraints:
 
     With `squared`, the term is μ times the squared difference; then p+ alone, unbounded, is the difference,
     and its duals have no limits.
+
+    Attributes:
+        squares: the columns that are squared, at the weight μ.
     """
 
     def __init__(self, network: Network, highs: highspy.Highs, *, squared: bool) -> None:
@@ -73,19 +76,7 @@ class LayoutConstraints:
             (matrix.indices + first_row).astype(np.int32),
             matrix.data,
         )
-        if self._squared:
-            self._add_squares(highs, plus.ravel(), count)
-
-    def _add_squares(self, highs: highspy.Highs, squared: Ints, count: int) -> None:
-        """Set the cost of the columns `squared` to μ times their squares."""
-        hessian = highspy.HighsHessian()
-        hessian.dim_ = count
-        hessian.format_ = highspy.HessianFormat.kTriangular
-        hessian.start_ = np.searchsorted(squared, np.arange(count + 1)).astype(np.int32)
-        hessian.index_ = squared.astype(np.int32)
-        hessian.value_ = np.full(len(squared), 2.0 * self._network.layout)
-        if highs.passHessian(hessian) != highspy.HighsStatus.kOk:
-            raise RuntimeError("the solver rejects the quadratic layout term")
+        self.squares = highs.getNumCol() - count + plus.ravel()
 
     def entries(self, owner: Ints, step: Ints, origin: Ints, target: Ints) -> tuple[Ints, Floats]:
         """Return the rows and values, both (A, 4), of arcs from frame `step` to the next."""

@@ -84,10 +84,9 @@ def to_highs_model(program: LinearProgram) -> highspy.HighsLp:
     return model
 
 
-_FALLBACKS: tuple[tuple[str, str | float], ...] = (("presolve", "off"), ("qp_regularization_value", 0.0))
+_FALLBACKS: tuple[tuple[str, str], ...] = (("presolve", "off"),)
 """Options of further attempts, without a basis, if no optimum is found: a basis from before columns and rows
-were added may be ill-conditioned; presolve has reported feasible integer programs as infeasible; and
-regularized quadratic programs have ended in solver errors."""
+were added may be ill-conditioned, and presolve has reported feasible integer programs as infeasible."""
 
 
 def run_highs(solver: highspy.Highs) -> LinearSolution:
