@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tracking.boxes import iou
 from tracking.detectors.background.box_filter import ScanPeaks
-from tracking.detectors.background.silhouette import integral_image
+from tracking.detectors.background.silhouette import PartRectangles, integral_image
 from tracking.detectors.base import Plane
 
 
@@ -82,6 +82,23 @@ _REFINEMENTS = 2
 _MIN_VISIBLE = 0.6
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cover:
+    """What a candidate covers.
+
+    Attributes:
+        bounds: the rows and columns that it spans.
+        inside: its cells in them.
+        near: the candidates that reach into them.
+        parts: of these, relative to the bounds.
+    """
+
+    bounds: tuple[slice, slice]
+    inside: npt.NDArray[np.bool_]
+    near: npt.NDArray[np.int64]
+    parts: PartRectangles
+
+
 class GreedySearch:
     """Greedy selection, then refinement of each selected candidate.
 
@@ -101,6 +118,7 @@ class GreedySearch:
         self._cell_values = np.stack([np.maximum(foreground - cost, 0.0), weight], axis=-1)
         self._cover_counts = np.zeros(weight.shape, dtype=np.int32)
         self._extent = peaks.parts.extent
+        self._covers: dict[int, _Cover] = {}
 
     def select_people(self) -> list[int]:
         """Select people greedily; return their indices in the order of selection."""
@@ -136,25 +154,35 @@ class GreedySearch:
 
     def add(self, index: int) -> None:
         """Add a candidate to the selected: it covers its cells."""
-        bounds, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
-        self._update(bounds, inside & (self._cover_counts[bounds] == 0), -1.0)
-        self._cover_counts[bounds] += inside
+        cover = self._cover(index)
+        counts = self._cover_counts[cover.bounds]
+        self._update(cover, cover.inside & (counts == 0), -1.0)
+        counts += cover.inside
 
     def remove(self, index: int) -> None:
         """Remove a candidate from the selected."""
-        bounds, inside = self._peaks.parts.bounds(index), self._peaks.parts.mask(index)
-        self._cover_counts[bounds] -= inside
-        self._update(bounds, inside & (self._cover_counts[bounds] == 0), 1.0)
+        cover = self._cover(index)
+        counts = self._cover_counts[cover.bounds]
+        counts -= cover.inside
+        self._update(cover, cover.inside & (counts == 0), 1.0)
 
-    def _update(self, bounds: tuple[slice, slice], cells: npt.NDArray[np.bool_], sign: float) -> None:
+    def _update(self, cover: _Cover, cells: npt.NDArray[np.bool_], sign: float) -> None:
         """Update gains and visible areas of the bodies that overlap the changed cells."""
-        changed = integral_image(self._cell_values[bounds] * cells[..., None].astype(np.float32))
-        (top, bottom), (left, right) = ((span.start, span.stop) for span in bounds)
-        lefts, tops, rights, bottoms = self._extent
-        near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
-        change = self._peaks.parts.select(near).clip_to(bounds).sums(changed)
-        self.gains[near] += sign * change[:, 0]
-        self.visible[near] += sign * change[:, 1]
+        changed = integral_image(self._cell_values[cover.bounds] * cells[..., None].astype(np.float32))
+        change = cover.parts.sums(changed)
+        self.gains[cover.near] += sign * change[:, 0]
+        self.visible[cover.near] += sign * change[:, 1]
+
+    def _cover(self, index: int) -> _Cover:
+        """Return what a candidate covers; each is added and removed several times."""
+        if index not in self._covers:
+            bounds = self._peaks.parts.bounds(index)
+            (top, bottom), (left, right) = ((span.start, span.stop) for span in bounds)
+            lefts, tops, rights, bottoms = self._extent
+            near = np.flatnonzero((lefts < right) & (rights > left) & (tops < bottom) & (bottoms > top))
+            parts = self._peaks.parts.select(near).clip_to(bounds)
+            self._covers[index] = _Cover(bounds, self._peaks.parts.mask(index), near, parts)
+        return self._covers[index]
 
     def _best(self, chosen: list[int]) -> int | None:
         """Return the candidate with the largest gain given the selected, or `None` if none gains enough."""

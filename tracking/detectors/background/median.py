@@ -71,6 +71,8 @@ class MedianBackground:
         self._flooded = 0
         self._exact: npt.NDArray[np.float32] | None = None
         self._rounded: Image | None = None
+        self._reduced_from: Image | None = None
+        self._reduced: Image = np.empty((0, 0, 3), dtype=np.uint8)
         self._curves: ToneCurves | None = None
         self._gain: Plane | None = None
         self._unlikely: Mask | None = None
@@ -113,7 +115,7 @@ class MedianBackground:
             if motion != self._registration.rest:
                 curves, gain = self._fit_light(aligned, background, before)
         self._last, self._curves, self._gain = aligned, curves, gain
-        if curves.contrast_of(reduce_to_cells(background)) < _BLIND:
+        if curves.contrast_of(self._cells_of(background)) < _BLIND:
             return None
         segmentation = self._compare(aligned, motion, background, curves, gain)
         self._flooded = self._flooded + 1 if self._is_flooded(segmentation) else 0
@@ -171,7 +173,7 @@ class MedianBackground:
         What is left of the last frame's curves in a part of the picture is local light; it is taken away
         before the curves are fitted, which would follow it otherwise.
         """
-        cells, background_cells = reduce_to_cells(image), reduce_to_cells(background)
+        cells, background_cells = reduce_to_cells(image), self._cells_of(background)
         curves = before or fit_tone_curves(image, background)
         light = find_local_light(cells, curves.apply(background_cells))
         if light is not None and (sign := light.exposure_sign):
@@ -197,10 +199,16 @@ class MedianBackground:
             np.copyto(expected, lit, where=(lit_difference < difference)[..., None])
             difference = np.minimum(difference, lit_difference)
         # In a darker picture people differ by less, and so does what is not there: by the noise at least.
-        contrast = min(max(curves.contrast_of(reduce_to_cells(background)), _LEAST_CONTRAST), 1.0)
+        contrast = min(max(curves.contrast_of(self._cells_of(background)), _LEAST_CONTRAST), 1.0)
         mask = self._exceeding(difference, max(contrast, _NOISES * curves.noise / self._settings.threshold))
         shadow = shadow_mask(image, expected, mask, self._shadows)
         return Segmentation(mask & ~shadow, shadow, image, motion)
+
+    def _cells_of(self, background: Image) -> Image:
+        """Return the cells of a background; those of the last one are kept."""
+        if background is not self._reduced_from:
+            self._reduced_from, self._reduced = background, reduce_to_cells(background)
+        return self._reduced
 
     def _exceeding(self, difference: Mask, contrast: float) -> Mask:
         threshold = min(contrast, 1.0) * self._settings.threshold

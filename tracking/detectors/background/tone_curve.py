@@ -9,6 +9,7 @@ line, so that people who cover most of the picture, and levels that the backgrou
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -42,7 +43,7 @@ _PATH_PENALTY = 2.0
 _MIN_SLOPE = 0.2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ToneCurves:
     """The curves of the three channels, and how well the pixels follow them.
 
@@ -58,20 +59,16 @@ class ToneCurves:
 
     def apply(self, image: Image) -> Image:
         """Return a background `(H, W, 3)` as the camera shows it in the frame."""
-        return np.asarray(cv2.LUT(image, self._tables().astype(np.uint8)), dtype=np.uint8)
+        return np.asarray(cv2.LUT(image, self._table), dtype=np.uint8)
 
     def invert(self, image: Image, background: Image | None = None) -> Image:
         """Return a frame `(H, W, 3)` at the levels of the background.
 
         Where the background's own levels are clipped in the frame, they are returned if it is given.
         """
-        curves = self._tables()[0].T
-        levels = np.arange(_LEVELS, dtype=np.float64)
-        rising = curves + 1e-3 * levels
-        inverse = np.stack([np.interp(levels, curve, levels) for curve in rising], axis=1)
-        leveled = np.asarray(cv2.LUT(image, np.rint(inverse[None]).astype(np.uint8)), dtype=np.uint8)
+        leveled = np.asarray(cv2.LUT(image, self._inverse_table), dtype=np.uint8)
         if background is not None:
-            steep = np.gradient(curves, axis=1) >= _MIN_SLOPE
+            steep = np.gradient(self._table[0].T.astype(np.float64), axis=1) >= _MIN_SLOPE
             if not steep.all():
                 clipped = cv2.LUT(background, np.where(steep, 0, 255).astype(np.uint8).T[None].copy())
                 np.copyto(leveled, background, where=clipped > 0)
@@ -83,14 +80,23 @@ class ToneCurves:
 
     def gray_table(self) -> Floats:
         """Return the frame's gray level for each gray level of the background, `(256,)`."""
-        return np.asarray(self._tables()[0].mean(axis=1))
+        return np.asarray(self._table[0].mean(axis=1, dtype=np.float64))
 
-    def _tables(self) -> Floats:
-        """Return the rounded curves, `(1, 256, 3)`."""
+    @cached_property
+    def _table(self) -> Image:
+        """The rounded curves, `(1, 256, 3)`."""
         at = np.arange(_LEVELS, dtype=np.float64)
         curves = np.stack([np.interp(at, _KNOTS, levels) for levels in self.levels], axis=1)
         rising = np.maximum.accumulate(curves, axis=0)
-        return np.asarray(np.rint(np.clip(rising, 0.0, _LEVELS - 1.0))[None], dtype=np.float64)
+        return np.asarray(np.rint(np.clip(rising, 0.0, _LEVELS - 1.0))[None], dtype=np.uint8)
+
+    @cached_property
+    def _inverse_table(self) -> Image:
+        """The level of the background at each level of the frame, `(1, 256, 3)`."""
+        levels = np.arange(_LEVELS, dtype=np.float64)
+        rising = self._table[0].T + 1e-3 * levels
+        inverse = np.stack([np.interp(levels, curve, levels) for curve in rising], axis=1)
+        return np.asarray(np.rint(inverse[None]), dtype=np.uint8)
 
 
 IDENTITY = ToneCurves(np.tile(_KNOTS, (_CHANNELS, 1)))
