@@ -184,3 +184,4 @@ async def _end_streams(app: web.Application) -> None:
     app[EVENTS].close()
     app[SERVICE].streams.close()
     await app[SERVICE].rendering.close()
+    await app[SERVICE].calibration.close()

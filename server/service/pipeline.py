@@ -251,7 +251,6 @@ class BestViewPipeline:
             if self._decision_writer is not None:
                 closing.callback(self._decision_writer.close)
             closing.callback(self.recorder.close)
-            closing.callback(self.walk_session.discard)
             closing.callback(self.splicer.close)
 
     def _tracks(self, message: Message) -> None:

@@ -44,6 +44,8 @@ class WalkSession:
         """The last pulse of the last epoch."""
         self._epochs = 0
         self._task: asyncio.Task[None] | None = None
+        self._unfinished: set[asyncio.Task[None]] = set()
+        """The running calibration, and those that were cancelled and are ending their process."""
         self.state = WalkState.NONE
         self.result: CalibrationResult | None = None
         """The result of the calibration; None: it has not finished."""
@@ -96,12 +98,19 @@ class WalkSession:
         )
         self.result, self.state = None, WalkState.WORKING
         self._task = asyncio.create_task(self._calibrate(task), name="calibration")
+        self._unfinished.add(self._task)
+        self._task.add_done_callback(self._unfinished.discard)
 
     def discard(self) -> None:
         """Discard the walk and its result."""
         self._cancel_calibration()
         self._walks, self._epochs = {}, 0
         self.result, self.state = None, WalkState.NONE
+
+    async def close(self) -> None:
+        """Discard the walk, and wait until no calibration process is left."""
+        self.discard()
+        await asyncio.gather(*self._unfinished, return_exceptions=True)
 
     @property
     def seconds(self) -> float:

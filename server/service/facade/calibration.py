@@ -116,6 +116,10 @@ class CalibrationService:
         """Discard the walk and its result."""
         self._walk.discard()
 
+    async def close(self) -> None:
+        """Discard the walk, and wait until no calibration process is left."""
+        await self._walk.close()
+
     def ground_file(self) -> bytes | None:
         """Return the ground file that the walk has resulted in, JSON; None: there is none."""
         result = self._walk.result

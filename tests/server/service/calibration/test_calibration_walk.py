@@ -212,6 +212,28 @@ async def test_nothing_is_recorded_beyond_the_longest_walk(monkeypatch: pytest.M
     assert active_walk.seconds == 1.0
 
 
+async def test_closing_waits_for_the_end_of_a_cancelled_calibration() -> None:
+    ended = asyncio.Event()
+
+    async def calibrate(task: CalibrationTask) -> CalibrationResult:
+        del task
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.sleep(0)  # as while a process is waited for
+            ended.set()
+        return CalibrationResult()
+
+    session = WalkSession(walk_config(), calibrate)
+    session.start()
+    session.finish(1.75)
+    await asyncio.sleep(0)
+    session.discard()
+    assert not ended.is_set()
+    await session.close()
+    assert ended.is_set()
+
+
 async def test_a_calibration_process_that_dies_is_reported_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
