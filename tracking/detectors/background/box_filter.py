@@ -9,7 +9,12 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.background.height_model import HeightModel
-from tracking.detectors.background.scan_plan import STEPS_PER_HEIGHT, HeightPlan, plan_height
+from tracking.detectors.background.scan_plan import (
+    STEPS_PER_HEIGHT,
+    HeightPlan,
+    plan_height,
+    positive_extent,
+)
 from tracking.detectors.background.silhouette import (
     BODY_PARTS,
     Body,
@@ -109,7 +114,8 @@ class BoxFilter:
         if self._plans is None or height_range is not self._range:
             self._range, self._plans = height_range, self._plan_heights(height_range)
         sums = integral_image(gain)
-        found = [plan.peaks(sums) for plan in self._plans]
+        extent = positive_extent(gain)
+        found = [plan.peaks(sums, extent) for plan in self._plans]
         boxes = np.concatenate([np.empty((0, 4)), *(positions for positions, _ in found)])
         gains = np.concatenate([np.empty(0), *(values for _, values in found)])
         order = _best_first(boxes, gains)[: self._settings.max_peaks]
