@@ -41,6 +41,7 @@ BENCHMARKS = (
         "disturbances of the pictures, and recovery from them; 20 minutes",
         ("--scene", "terrace", "--scene", "pets09", "--strength", "middle"),
     ),
+    Benchmark("picture_condition", "seconds until a camera says that its lens is covered; 15 minutes"),
     Benchmark("rates", "frame rates from 2 to 60 a second; 40 minutes"),
     Benchmark("detectors.score_calibration", "fits the probabilities of installed networks; 10 minutes"),
     Benchmark("other_trackers", "MyView and trackers from PyPI on public detections; 5 minutes"),

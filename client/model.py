@@ -67,6 +67,10 @@ class Camera(msgspec.Struct, frozen=True):
     """Windows of tracks that came too late to be used."""
     fps: float
     message: str
+    condition: str = "clear"
+    """What is wrong with the picture: covered, turned, blurred, noisy or frozen."""
+    condition_since: float | None = None
+    """When that began, unix seconds."""
 
 
 class Choice(msgspec.Struct, frozen=True):

@@ -27,7 +27,7 @@ from server.config.sections import HttpSettings
 from server.http.api.schema import ObjectInfo, SiteInfo
 from server.http.app import make_app, serving
 from server.http.metrics.http_collector import METRICS
-from server.messaging import messages
+from server.messaging import camera_status, messages
 from server.service.facade.cameras import CameraInfo
 from server.service.facade.view_selection import ViewSelection
 from server.service.pipeline import BestViewPipeline
@@ -195,7 +195,7 @@ def test_every_field_of_a_message_is_described() -> None:
     zenoh = reference("messages")
     kinds = [
         kind
-        for kind in vars(messages).values()
+        for kind in [*vars(messages).values(), *vars(camera_status).values()]
         if isinstance(kind, type) and issubclass(kind, msgspec.Struct)
     ]
     assert len(kinds) > 5

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from bestview import shows_ground
@@ -31,6 +32,7 @@ from server.messaging.operator_messages import CORRECTIONS_MAX
 from server.system.errors import UserError
 from tracking import Detections, create_solver
 from tracking.interactive import PositionCorrection
+from tracking.picture_condition import PictureMonitor
 
 _NO_PEERS = PeerDetections()
 _REPORTED_GAP_MAX = 50_000
@@ -123,6 +125,8 @@ class CameraPipeline:
             tracker, self._detector.appearance_bins, config.window.stride
         )
         self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, config.window.stride)
+        self.picture = PictureMonitor(site.fps)
+        """Watches what the camera shows."""
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
             CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None
@@ -170,6 +174,7 @@ class CameraPipeline:
         if image is None:
             detections, has_detection = Detections.empty(self._detector.appearance_bins), False
         else:
+            self.picture.observe(image, pulse)
             detections = self._detector.detect(image, pulse)
             has_detection = not self._detector.warming_up
         message = (
@@ -216,7 +221,7 @@ class CameraPipeline:
             revised = self._tracker.apply_corrections(list(self._corrections))
             self._corrections.clear()
             result = result if revised is None else merge_correction(result, revised)
-        return self._add_sharpness(self._messages.regular(result), frame.image)
+        return self._add_picture(self._messages.regular(result), frame.image)
 
     def end_message(self, end: int) -> FrameDetections | None:
         """Return the message that ends this camera's detections; the recording has no frame ``end``."""
@@ -228,10 +233,11 @@ class CameraPipeline:
         A camera that was restarted after its recording had ended reports the end again.
         """
         last = end - 1 if self._last is None else self._last
-        return self._add_sharpness(self._messages.closing(self._tracker.flush(), last), None)
+        return self._add_picture(self._messages.closing(self._tracker.flush(), last), None)
 
-    def _add_sharpness(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
-        """Add each track's sharpness, where view quality uses it."""
+    def _add_picture(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
+        """Add the picture's condition, and each track's sharpness where view quality uses it."""
+        tracks = msgspec.structs.replace(tracks, condition=self.picture.condition)
         return tracks if self._sharpness is None else self._sharpness.measure(tracks, image)
 
     def close(self) -> None:

@@ -30,7 +30,8 @@ from server.camera.tracking_backlog import TrackingBacklog
 from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.messages import CameraState, CameraTracks, ZenohKeys
+from server.messaging.camera_status import CONDITION_TEXTS, CameraState, PictureCondition
+from server.messaging.messages import CameraTracks, ZenohKeys
 from server.system.address_redaction import redact_zenoh_endpoint
 
 log = logging.getLogger(__name__)
@@ -77,6 +78,8 @@ class CameraProcess:
         self._corrections = CorrectionInbox(camera_id, self._boot)
         self._meter = StatusMeter(fps)
         self._state: CameraState = "starting"
+        self._last_condition: PictureCondition = "clear"
+        self._condition_since = 0.0
         self._end = 0
         """The first pulse after the recording, once that has ended."""
 
@@ -242,14 +245,28 @@ class CameraProcess:
             await asyncio.sleep(_STATUS_EVERY_S)
 
     def _publish_status(self) -> None:
+        condition, since = self._condition()
         status = self._meter.status(self._id, self._boot, self._state, len(self._backlog), self._load)
         self._publisher.publish_status(
             msgspec.structs.replace(
                 status,
+                condition=condition,
+                condition_since=since,
                 position_corrections=self._corrections.count,
                 bad_messages=self._exchange.bad_messages + self._corrections.bad_messages,
             )
         )
+
+    def _condition(self) -> tuple[PictureCondition, float]:
+        """Return what is wrong with the picture and since when, unix seconds; log a change."""
+        picture, pulse = self._pipeline.picture, self._meter.pulse
+        condition = picture.condition
+        if condition != self._last_condition:
+            self._last_condition = condition
+            self._condition_since = self._clock() - (pulse - picture.since) / self._config.site.fps
+            level = logging.INFO if condition == "clear" else logging.WARNING
+            log.log(level, "camera %s: %s", self._id, CONDITION_TEXTS[condition])
+        return condition, 0.0 if condition == "clear" else self._condition_since
 
     @staticmethod
     async def _run_in(pool: ThreadPoolExecutor, work: Callable[[], T]) -> T:

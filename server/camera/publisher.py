@@ -10,9 +10,9 @@ from camsync import Pulse
 from server.camera.audio import EncodedAudioFrame, consecutive_runs
 from server.camera.encoder import AccessUnit
 from server.messaging.bus import Bus
+from server.messaging.camera_status import CameraStatus
 from server.messaging.messages import (
     AudioHeader,
-    CameraStatus,
     CameraTracks,
     FrameHeader,
     ThumbnailHeader,

@@ -7,7 +7,7 @@ from collections import deque
 
 from camsync import PulseClient
 from server.camera.load.load_monitor import LoadMonitor
-from server.messaging.messages import CameraState, CameraStatus
+from server.messaging.camera_status import CameraState, CameraStatus
 
 _SPAN_S = 2.0
 """Seconds over which the frame rate is measured."""
@@ -18,7 +18,8 @@ class StatusMeter:
 
     def __init__(self, fps: float) -> None:
         self._times: deque[float] = deque(maxlen=max(2, round(2 * _SPAN_S * fps)))
-        self._pulse = -1
+        self.pulse = -1
+        """The newest pulse."""
         self._missed = 0
         self._shed = 0
         self._client: PulseClient | None = None
@@ -29,13 +30,13 @@ class StatusMeter:
 
     def count_frame(self, pulse: int, missed: int) -> None:
         """Count a frame, and the pulses missed before it."""
-        self._pulse = pulse
+        self.pulse = pulse
         self._missed += missed
         self._times.append(time.monotonic())
 
     def count_missed(self, pulse: int, count: int) -> None:
         """Count pulses without a frame."""
-        self._pulse = pulse
+        self.pulse = pulse
         self._missed += count
 
     def count_skipped_detection(self) -> None:
@@ -52,7 +53,7 @@ class StatusMeter:
             camera=camera,
             boot=boot,
             state=state,
-            pulse=self._pulse,
+            pulse=self.pulse,
             fps=sum(moment >= since for moment in self._times) / _SPAN_S,
             missed=self._missed,
             shed=self._shed,

@@ -9,7 +9,7 @@ key                                              payload                        
 ===============================================  ===================================  =======================
 ``myview/SITE/camera/ID/video``                  one access unit, Annex B or VP8      :class:`FrameHeader`
 ``myview/SITE/camera/ID/tracks``                 :class:`CameraTracks`
-``myview/SITE/camera/ID/status``                 :class:`CameraStatus`
+``myview/SITE/camera/ID/status``                 :class:`~server.messaging.camera_status.CameraStatus`
 ``myview/SITE/camera/ID/thumbs/LOCAL``           JPEG of one person                   :class:`ThumbnailHeader`
 ``myview/SITE/camera/ID/detections``             :class:`FrameDetections`
 ``myview/SITE/camera/ID/position_corrections``   ``PositionCorrections``, to the camera
@@ -28,10 +28,11 @@ key                                              payload                        
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
+from server.messaging.camera_status import PictureCondition
 from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 
@@ -152,6 +153,8 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Mean seconds of detection per frame in this epoch; null offline."""
     solve_s: Duration | None = None
     """Seconds of tracking at the end of the window; null offline."""
+    condition: PictureCondition = "clear"
+    """What is wrong with the picture at the end of the window."""
     risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None
@@ -177,40 +180,6 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
     """Null: detection did not run."""
     ended: bool = False
     """Whether the recording has ended before this pulse: this is its last message."""
-
-
-CameraState = Literal["starting", "live", "away", "ended"]
-"""State of a camera; away: its source delivers no frames now."""
-
-
-class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """Status of a camera, once a second."""
-
-    camera: str
-    boot: Number
-    state: CameraState
-    pulse: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
-    fps: Duration
-    """Frames captured in about the last second."""
-    missed: Number
-    """Pulses without a frame since the start."""
-    shed: Number
-    """Frames without detection since the start."""
-    waiting: Number = 0
-    """Frames that are queued for detection."""
-    load_level: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
-    """Load-shedding level; 0: none."""
-    load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""
-    """The shed work as text for people: printable ASCII."""
-    position_corrections: Number = 0
-    """Position corrections that the tracker received since the start."""
-    bad_messages: Number = 0
-    """Invalid messages that the camera received since the start."""
-    synchronized: bool
-    """Pulses come from the server; otherwise the camera counts by itself."""
-    clock_offset: Time
-    """Server's clock minus the camera's, seconds."""
-    round_trip: Time
 
 
 class ThumbnailHeader(msgspec.Struct, frozen=True, kw_only=True):

@@ -14,6 +14,8 @@
  * @property {string} camera
  * @property {'live' | 'gone' | 'ended' | 'starting' | 'refused'} state
  * @property {string} message
+ * @property {'clear' | 'covered' | 'turned' | 'blurred' | 'noisy' | 'frozen'} condition what is wrong with the picture
+ * @property {number | null} condition_since unix seconds; null: nothing is wrong
  * @property {number} pulse
  * @property {number} fps
  * @property {number} missed

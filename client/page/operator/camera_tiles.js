@@ -14,6 +14,9 @@ const NO_VALUE = '–';
 /** @type {Record<CameraDiagnostics['state'], string>} */
 const STATES = { live: 'Live', gone: 'Gone', ended: 'Ended', starting: 'Starting', refused: 'Refused' };
 
+/** @type {Record<string, string>} what is wrong with the picture */
+const CONDITIONS = { covered: 'Covered', turned: 'Turned away', blurred: 'Blurred', noisy: 'Dark', frozen: 'Frozen' };
+
 /** @type {[string, string, (camera: CameraDiagnostics) => string][]} name, explanation, value */
 const ROWS = [
   ['Rate', 'Frames taken per second', ({ fps }) => `${fps.toFixed(1)} fps`],
@@ -96,19 +99,30 @@ class CameraTile {
   /** @param {CameraDiagnostics} camera */
   show(camera) {
     this.item.dataset.state = camera.state;
-    setText(this.state, STATES[camera.state] ?? camera.state);
+    this.item.classList.toggle('unclear', camera.state === 'live' && camera.condition in CONDITIONS);
+    setText(this.state, formatState(camera));
     ROWS.forEach(([, , format], at) => setText(this.values[at][1], format(camera)));
     setText(this.error, camera.message || formatLastError(camera));
   }
 }
 
 /** @param {CameraDiagnostics} camera */
+function formatState({ state, condition, condition_since: since }) {
+  const wrong = state === 'live' ? CONDITIONS[condition] : undefined;
+  if (wrong) return since ? `${wrong} since ${formatTime(since)}` : wrong;
+  return STATES[state] ?? state;
+}
+
+/** @param {CameraDiagnostics} camera */
 function formatLastError({ last_error: last }) {
-  if (!last) return '';
-  const at = new Date(last.at * 1000);
-  const now = new Date();
-  const day = at.toDateString() === now.toDateString() ? '' : `${at.toLocaleDateString()} `;
-  return `Last error, ${day}${at.toLocaleTimeString()}: ${last.text}`;
+  return last ? `Last error, ${formatTime(last.at)}: ${last.text}` : '';
+}
+
+/** @param {number} seconds unix */
+function formatTime(seconds) {
+  const at = new Date(seconds * 1000);
+  const day = at.toDateString() === new Date().toDateString() ? '' : `${at.toLocaleDateString()} `;
+  return `${day}${at.toLocaleTimeString()}`;
 }
 
 /** @param {Spread | null} spread */

@@ -42,6 +42,8 @@
  * @property {number} late
  * @property {number} fps
  * @property {string} message
+ * @property {'clear' | 'covered' | 'turned' | 'blurred' | 'noisy' | 'frozen'} condition what is wrong with the picture
+ * @property {number | null} condition_since unix seconds; null: nothing is wrong
  *
  * @typedef {object} Cut
  * @property {number} object

@@ -31,6 +31,10 @@ class CameraInfo(msgspec.Struct, frozen=True):
     synchronized: bool
     """Pulses come from the server; otherwise the camera counts by itself."""
     message: str
+    condition: str
+    """What is wrong with the picture: clear, covered, turned, blurred, noisy or frozen."""
+    condition_since: float | None
+    """When that began, unix seconds; null: nothing is wrong."""
 
 
 class ImagePlacement(msgspec.Struct, frozen=True):
@@ -136,6 +140,8 @@ class CameraService:
             load_level=status.load_level if status else 0,
             synchronized=status.synchronized if status else False,
             message=state.message,
+            condition=status.condition if status else "clear",
+            condition_since=(status.condition_since or None) if status else None,
         )
 
     def _diagnostics(self, camera: str, state: CameraState) -> CameraDiagnostics:

@@ -14,12 +14,12 @@ from camsync.lines import RateLimit
 from logthrottle import LogThrottle
 from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
+from server.messaging.camera_status import CONDITION_TEXTS, CameraStatus
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
     DECODE_ERRORS,
     AudioHeader,
-    CameraStatus,
     CameraTracks,
     FrameHeader,
     ThumbnailHeader,
@@ -80,7 +80,12 @@ class CameraState:
             return self.refused
         if self.alive and self.is_source_away:
             return "its source delivers no frames; retrying"
-        return self.status.load if self.alive and self.status is not None else ""
+        if not self.alive or self.status is None:
+            return ""
+        texts = [self.status.load]
+        if self.status.condition != "clear":
+            texts.insert(0, CONDITION_TEXTS[self.status.condition])
+        return "; ".join(filter(None, texts))
 
     def count_bad_message(self, reason: Exception | str) -> None:
         """Count an invalid message."""
@@ -239,9 +244,12 @@ class Ingest:
         except DECODE_ERRORS as error:
             state.count_bad_message(error)
         else:
-            was_away, state.status = state.is_source_away, status
+            was_away, before = state.is_source_away, state.status
+            state.status = status
             if state.is_source_away and not was_away:
                 state.metrics.record_problem(state.message)
+            elif status.condition not in {"clear", "clear" if before is None else before.condition}:
+                state.metrics.record_problem(CONDITION_TEXTS[status.condition])
 
     def thumbnail(self, message: Message) -> None:
         """Keep the newest thumbnail of a track."""

@@ -8,7 +8,7 @@ from prometheus_client import Metric
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
 from prometheus_client.registry import Collector
 
-from server.messaging.messages import CameraStatus
+from server.messaging.camera_status import CONDITION_TEXTS, CameraStatus
 from server.service.ingest.ingest import CameraState
 from server.service.metrics.camera_metrics import RecentSeconds
 from server.service.pipeline import BestViewPipeline
@@ -90,6 +90,9 @@ class CameraCollector(Collector):
             "Pulse server's clock minus the camera's.",
             labels=["camera"],
         )
+        condition = GaugeMetricFamily(
+            "myview_camera_condition", "1: this is wrong with the picture.", labels=["camera", "condition"]
+        )
         for camera, state in self._pipeline.ingest.states.items():
             labels = [camera]
             live.add_metric(labels, float(state.label == "live"))
@@ -101,7 +104,9 @@ class CameraCollector(Collector):
                 shed.add_metric(labels, state.status.shed)
                 bad.add_metric([camera, "received"], state.status.bad_messages)
                 offset.add_metric(labels, state.status.clock_offset)
-        return [live, frames, missed, shed, without_peers, bad, offset]
+                for name in CONDITION_TEXTS:
+                    condition.add_metric([camera, name], float(name == state.status.condition))
+        return [live, frames, missed, shed, without_peers, bad, offset, condition]
 
     def _stages(self) -> Metric:
         family = HistogramMetricFamily(

@@ -15,12 +15,12 @@ from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
+from server.messaging.camera_status import CameraStatus
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
     AppearanceHistogram,
     Box,
-    CameraStatus,
     CameraTracks,
     FrameHeader,
     ThumbnailHeader,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +14,7 @@ from bestview import QualitySettings
 from fakes.media.videos import HEIGHT, WIDTH, write_video
 from server.camera.encoder import AccessUnit
 from server.camera.pipeline import CameraPipeline
-from server.camera.sources import SourceEndedError
+from server.camera.sources import Image, SourceEndedError
 from server.cli.render.camera_workers import EpochBatch, run_camera
 from server.config.loader import build_config
 from server.config.sections import SiteSettings
@@ -223,6 +223,37 @@ def test_sharpness_is_measured_only_if_it_has_a_weight(recording: Path) -> None:
         assert tracks, "there are tracks"
         assert any(track.sharpness is not None for track in tracks) == measured
     assert live(weighted)[1] == [batch.tracks for batch in offline(weighted)]
+
+
+class CoveredLater:
+    """A camera whose lens is covered after some frames."""
+
+    size, recorded = (192, 108), True
+
+    def __init__(self, covered: int, frames: int) -> None:
+        self._covered, self._frames = covered, frames
+        self._room = (
+            np.random.default_rng(2).integers(0, 255, (27, 48, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+        )
+
+    def take(self, pulse: int) -> Image:
+        if pulse >= self._frames:
+            raise SourceEndedError
+        return self._room if pulse < self._covered else np.full_like(self._room, 20)
+
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
+        return (self.take(index) for index in indices if index < self._covered)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def test_track_messages_have_the_condition_of_the_picture(recording: Path) -> None:
+    source = CoveredLater(covered=75, frames=200)
+    pipeline = CameraPipeline(config_of(recording), "c0", source=source)
+    found = {batch.tracks.last: batch.tracks.condition for batch in run_camera(pipeline, "c0")}
+    assert {condition for last, condition in found.items() if last < 75} == {"clear"}
+    assert {condition for last, condition in found.items() if last >= 75 + 4 * 25} == {"covered"}
 
 
 def test_a_homography_without_floor_in_the_picture_is_refused(recording: Path) -> None:

@@ -24,7 +24,8 @@ from server.cli.render.camera_workers import run_camera
 from server.cli.render.renderer import Renderer
 from server.config.loader import build_config
 from server.config.site_config import Config
-from server.messaging.messages import CameraStatus, CameraTracks, FrameHeader, GopChoices
+from server.messaging.camera_status import CameraStatus
+from server.messaging.messages import CameraTracks, FrameHeader, GopChoices
 from server.service.bus_connection import BusConnection
 from synthetic import Scene, write_recording
 

@@ -25,8 +25,9 @@ from server.camera.sources.frame_reader import read_frames
 from server.camera.sources.recording import Recording
 from server.config.sections import SoundSettings
 from server.media.rendering_messages import RenderRequest
+from server.messaging.camera_status import CameraStatus
 from server.messaging.inbox import Message
-from server.messaging.messages import CameraStatus, FrameDetections, ZenohKeys
+from server.messaging.messages import FrameDetections, ZenohKeys
 from server.service.rendering import rendered_stream as stream_source
 from server.service.rendering.decided_boxes import NO_OVERLAY
 from server.service.rendering.worker import stream_renderer

@@ -101,6 +101,19 @@ class Registration:
         moved = agreement >= _MIN_AGREEMENT and _is_plausible(motion, size)
         return motion if moved and motion.distance(STILL, size) >= _SAME * size[0] / 360.0 else STILL
 
+    def search(self, image: Image) -> Motion | None:
+        """Return the motion of an image from anywhere, at any light; None: the background is not in it."""
+        points = self._points
+        if points is None or points.count < _MIN_POINTS:
+            return None
+        gray = _smooth_gray(image)
+        alignment = points.under(IDENTITY, None)
+        starts = (STILL, *alignment.coarse_starts(gray, STILL))
+        found = (alignment.refine(gray, start, _STEPS_OF_SEARCH) for start in starts)
+        motion, agreement = max(found, key=lambda each: each[1])
+        size = (image.shape[1], image.shape[0])
+        return motion if agreement >= _MIN_AGREEMENT and _is_plausible(motion, size) else None
+
     def _settle(self, motion: Motion, size: tuple[int, int], elapsed: float) -> Motion:
         """Return the motion, or the rest where they are the same; a lasting one becomes the rest."""
         self._motion = motion

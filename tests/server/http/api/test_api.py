@@ -93,10 +93,25 @@ async def test_the_cameras_are_listed_with_their_state(site_with_people: ServedS
         "load_level": 2,
         "synchronized": True,
         "message": "",
+        "condition": "clear",
+        "condition_since": None,
     }
     assert c1["state"] == "live"
     async with site_with_people.session.get("/readyz") as answer:
         assert (answer.status, await answer.text()) == (200, "2 of 2 cameras\n")
+
+
+async def test_the_condition_of_a_cameras_picture_is_listed_and_measured(
+    site_with_people: ServedSite,
+) -> None:
+    site_with_people.service.ingest.status(status(A, condition="frozen", condition_since=12.5))
+    c0, c1 = (await site_with_people.get_json("/api/cameras"))["cameras"]
+    assert (c0["condition"], c0["condition_since"], c1["condition"]) == ("frozen", 12.5, "clear")
+    assert c0["message"].startswith("the picture is frozen: ")
+    async with site_with_people.session.get("/metrics") as answer:
+        lines = (await answer.text()).splitlines()
+    assert f'myview_camera_condition{{camera="{A}",condition="frozen"}} 1.0' in lines
+    assert f'myview_camera_condition{{camera="{A}",condition="clear"}} 0.0' in lines
 
 
 async def test_a_refused_camera_is_listed_with_the_reason(site_with_people: ServedSite) -> None:

@@ -186,6 +186,17 @@ async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browse
         await expect(page).to_have_title(f"Person {first}, Ann · MyView")
 
 
+async def test_a_tile_says_what_is_wrong_with_the_picture(browser: Browser) -> None:
+    async with open_operator_page(browser, "#cameras") as (served, page):
+        show_people(served)
+        served.service.ingest.status(status(A, condition="turned", condition_since=1.0))
+        tile = page.locator(".camera-tile").first
+        await expect(tile.locator(".state")).to_contain_text("Turned away since ")
+        await expect(tile.locator(".last-error")).to_contain_text("the camera is turned away: ")
+        served.service.ingest.status(status(A))
+        await expect(tile.locator(".state")).to_have_text("Live")
+
+
 async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
     async with open_operator_page(browser, "#flags") as (served, page):
         await expect(page.locator("#no-flags")).to_have_text("None so far.")

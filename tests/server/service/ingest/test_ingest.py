@@ -103,6 +103,21 @@ def test_a_connected_cameras_load_text_is_its_message() -> None:
     assert state.message == ""
 
 
+def test_a_picture_that_is_not_clear_is_the_cameras_message_and_its_last_error() -> None:
+    served = IngestWithBuffers()
+    state = served.ingest.states["c0"]
+    served.handle("status", status("c0", condition="covered", condition_since=5.0, load_level=2, load="busy"))
+    assert state.message.startswith("the lens is covered: ")
+    assert state.message.endswith("; busy")
+    assert state.metrics.last_error is not None
+    first = state.metrics.last_error
+    assert first.text.startswith("the lens is covered: ")
+    served.handle("status", status("c0", condition="covered", condition_since=5.0))
+    assert state.metrics.last_error == first, "it is recorded once"
+    served.handle("status", status("c0"))
+    assert state.message == ""
+
+
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),

@@ -1,0 +1,120 @@
+"""Watches a camera's pictures, and says what is wrong with them once that has lasted.
+
+Several times a second a picture is compared with the camera's reference (`reference`), which follows slowly
+what is seen while nothing is wrong, and with the pictures before (`stillness`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+
+from tracking.detectors.base import Image
+from tracking.picture_condition.reference import Condition, Reference
+from tracking.picture_condition.stillness import StillnessMonitor
+from tracking.picture_condition.structure import Structure, reduce, structure_of
+
+# Seconds between the pictures that are looked at, and between those that enter the reference.
+_LOOK_EVERY_S, _LEARN_EVERY_S = 0.2, 1.0
+# Seconds from which the first reference is, and over which it is averaged then.
+_FIRST_S, _AVERAGE_S = 2.0, 30.0
+# Seconds after which another scene is accepted: somebody wants the camera there.
+_ACCEPT_S = 300.0
+# Seconds of signs until a condition is reported, and without them until it is taken back; the share of the
+# pictures that must agree.
+_REPORT_S, _RECOVER_S, _AGREE = 3.0, 2.0, 0.9
+# What covers a lens may look like another scene: the first report of either stands.
+_HIDING = {"covered", "turned"}
+# Seconds between the pictures that show whether something stands still.
+_APART_S = 1.0
+
+
+class PictureMonitor:
+    """Watches the pictures of one camera.
+
+    Args:
+        fps: frames per second.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self._fps = fps
+        self._frame = -1
+        self._looked: float | None = None
+        self._stillness = StillnessMonitor()
+        self._recent: deque[tuple[float, Structure]] = deque()
+        self._reference: Reference | None = None
+        self._learned_s = self._unlearned_s = 0.0
+        self._signs: deque[tuple[float, int, Condition]] = deque()
+        self.condition: Condition = "clear"
+        """What is wrong with the picture."""
+        self.since = 0
+        """The frame in which that began."""
+
+    def observe(self, image: Image, frame: int | None = None) -> Condition:
+        """Return the camera's condition up to the next frame.
+
+        Args:
+            image: `(H, W, 3)` uint8.
+            frame: its number; `None`: the one after the last.
+        """
+        self._frame = self._frame + 1 if frame is None else frame
+        seconds = self._frame / self._fps
+        if self._looked is not None and seconds - self._looked < _LOOK_EVERY_S - 0.5 / self._fps:
+            return self.condition
+        elapsed = 0.0 if self._looked is None else min(seconds - self._looked, _LEARN_EVERY_S)
+        self._looked = seconds
+        self._signs.append((seconds, self._frame, self._sign(image, seconds, elapsed)))
+        while self._signs[0][0] < seconds - _REPORT_S:
+            self._signs.popleft()
+        self._decide(seconds)
+        if self.condition == "turned" and seconds - self.since / self._fps >= _ACCEPT_S:
+            self._reference, self._learned_s = None, 0.0
+        return self.condition
+
+    def _sign(self, image: Image, seconds: float, elapsed: float) -> Condition:
+        """Return what seems to be wrong with a picture."""
+        still = self._stillness.is_frozen(image, seconds, elapsed)
+        structure = structure_of(reduce(image))
+        last = self._recent[-1][1] if self._recent else structure
+        before = _append(self._recent, seconds, structure)
+        if self._reference is None:
+            self._reference = Reference(structure)
+        if still and self._reference.is_seen(structure):
+            return "frozen"
+        if self._learned_s >= _FIRST_S:
+            sign = self._reference.sign(structure, before, structure.noise(last), seconds)
+            if sign != "clear" or still:
+                return "frozen" if sign == "clear" else sign
+        self._unlearned_s += elapsed
+        if self._learned_s < _FIRST_S or self._unlearned_s >= _LEARN_EVERY_S:
+            self._learned_s += self._unlearned_s
+            span = min(max(self._learned_s, self._unlearned_s), _AVERAGE_S)
+            self._reference.learn(structure, self._unlearned_s / span if span else 1.0)
+            self._unlearned_s = 0.0
+        return "clear"
+
+    def _decide(self, seconds: float) -> None:
+        """Report a condition that has lasted, or take it back."""
+        signs = [(frame, sign) for _, frame, sign in self._signs]
+        whole = self._signs[0][0] <= seconds - _REPORT_S + _LOOK_EVERY_S
+        if signs[-1][1] == "frozen":  # its stillness has been watched for seconds
+            if self.condition != "frozen":
+                self.condition, self.since = "frozen", self._frame
+        elif self.condition == "clear":
+            wrong = [each for each in signs if each[1] != "clear"]
+            if whole and len(wrong) >= _AGREE * len(signs):
+                self.condition = Counter(sign for _, sign in wrong).most_common(1)[0][0]
+                self.since = wrong[0][0]
+        else:
+            recent = [(frame, sign) for time, frame, sign in self._signs if time >= seconds - _RECOVER_S]
+            other, count = Counter(sign for _, sign in recent).most_common(1)[0]
+            changed = other == "clear" or (whole and {other, self.condition} != _HIDING)
+            if other != self.condition and changed and count >= _AGREE * len(recent):
+                self.condition, self.since = other, recent[0][0]
+
+
+def _append(pictures: deque[tuple[float, Structure]], seconds: float, structure: Structure) -> Structure:
+    """Append a picture; return the one of about a second before, or the first."""
+    pictures.append((seconds, structure))
+    while len(pictures) > 1 and pictures[1][0] <= seconds - _APART_S:
+        pictures.popleft()
+    return pictures[0][1]

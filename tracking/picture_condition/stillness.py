@@ -1,0 +1,70 @@
+"""Recognizes a frozen picture: one that changes less than the noise of that camera ever did.
+
+A sensor's noise changes some pixels everywhere. Cameras whose noise does not reach the picture (drawn ones,
+or those with an encoder that repeats what hardly changes) are not judged: an empty room would look frozen.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import cv2
+import numpy as np
+
+from tracking.detectors.base import Image
+
+# Pixels compared along the longer side, and the cells along both sides whose median counts: most of a picture
+# is background, and motion elsewhere does not matter.
+_SAMPLES = 96
+_CELLS = (8, 6)
+# Seconds between the pictures that are compared; over which the median is taken; and of pictures that are
+# needed to know the camera.
+_APART_S, _WINDOW_S, _KNOWN_S = 0.5, 3.0, 12.0
+# Share of changed pixels below which a picture stands still, and that a camera's noise must have exceeded.
+_STILL, _NOISE = 0.004, 0.04
+
+
+class StillnessMonitor:
+    """Compares the pictures of one camera with those of half a second before."""
+
+    def __init__(self) -> None:
+        self._pictures: deque[tuple[float, Image]] = deque()
+        self._changes: deque[tuple[float, float, float]] = deque()
+        """Times, and shares of the pixels that have changed: of all, and of the median cell."""
+        self._noises: deque[tuple[float, float]] = deque()
+        self._quietest = 1.0
+        self._known_s = 0.0
+
+    def is_frozen(self, image: Image, seconds: float, elapsed: float) -> bool:
+        """Return whether pictures have stood still for some seconds up to this one.
+
+        Args:
+            image: `(H, W, 3)`.
+            seconds: its time.
+            elapsed: since the picture before, 0 for the first.
+        """
+        step = max(max(image.shape[:2]) // _SAMPLES, 1)
+        pixels = np.ascontiguousarray(image[step // 2 :: step, step // 2 :: step, 1])
+        self._pictures.append((seconds, pixels))
+        while len(self._pictures) > 1 and self._pictures[1][0] <= seconds - _APART_S:
+            self._pictures.popleft()
+        before, other = self._pictures[0]
+        if before > seconds - _APART_S:
+            return False
+        changed = (cv2.absdiff(pixels, other) > 0).astype(np.float32)
+        cells = cv2.resize(changed, _CELLS, interpolation=cv2.INTER_AREA)
+        self._changes.append((seconds, float(changed.mean()), float(np.median(cells))))
+        while len(self._changes) > 1 and self._changes[1][0] <= seconds - _WINDOW_S:
+            self._changes.popleft()
+        if self._changes[0][0] > seconds - _WINDOW_S:
+            return False
+        _, change, noise = np.median(self._changes, axis=0).tolist()
+        if change < _STILL and self._quietest > _NOISE and self._known_s >= _KNOWN_S:
+            self._noises.clear()
+            return True
+        self._known_s += elapsed
+        # A picture that is about to freeze says nothing about the camera.
+        self._noises.append((seconds, noise))
+        while self._noises[0][0] <= seconds - _WINDOW_S:
+            self._quietest = min(self._quietest, self._noises.popleft()[1])
+        return False
