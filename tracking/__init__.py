@@ -11,6 +11,7 @@ from tracking.model.network import Network, build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import PAPER_COSTS, CostSettings
 from tracking.solvers.base import DEFAULT_SOLVER, Solution, Solver, SolveReport, create_solver, solver_names
+from tracking.solvers.budget import SolverBudget
 from tracking.template_tracker import TemplateTracker
 from tracking.tracker import OnlineTracker
 from tracking.types import Detections
@@ -35,6 +36,7 @@ __all__ = [
     "Solution",
     "SolveReport",
     "Solver",
+    "SolverBudget",
     "Template",
     "TemplateTracker",
     "WindowResult",

@@ -16,7 +16,7 @@ from server.camera.sources import SourceEndedError
 from server.camera.track_messages import TrackMessageBuilder
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks
-from tracking import Detections, OnlineTracker, create_solver
+from tracking import Detections, OnlineTracker
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow
 
@@ -120,7 +120,7 @@ class _Camera:
         track = config.track
         center = frames.size[0] / 2.0, frames.size[1] / 2.0
         self.tracker = OnlineTracker(
-            track.window, track.costs, create_solver(track.solver), config.site.fps, center
+            track.window, track.costs, track.create_solver(config.site.fps), config.site.fps, center
         )
         self.builder = TrackMessageBuilder(camera, 0, frames.size, config.window.stride)
         self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.peers_of(camera) else None

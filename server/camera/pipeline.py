@@ -30,7 +30,7 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
 from server.system.errors import UserError
-from tracking import Detections, create_solver
+from tracking import Detections
 from tracking.interactive import PositionCorrection
 from tracking.picture_condition import PictureMonitor
 
@@ -117,7 +117,7 @@ class CameraPipeline:
             track.tracker,
             camera,
             self.source,
-            lambda: create_solver(track.solver),
+            lambda: track.create_solver(site.fps),
             self._letterbox,
             prescan=warm_up,
         )

@@ -15,6 +15,7 @@ from typing import TypeVar
 import msgspec
 
 from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
+from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, open_site_audio
 from server.camera.end_confirmation import EndConfirmation
 from server.camera.load.load_monitor import LoadMonitor
@@ -69,6 +70,7 @@ class CameraProcess:
         fps = config.site.fps
         self._images_max = max(1, round(config.track.backlog_s * fps))
         self._backlog = TrackingBacklog(self._images_max)
+        self._limit_log = LogThrottle()
         # Passthrough frames depend on each other, and recordings are shown completely: neither drops frames.
         live = not (self._pipeline.source.recorded or self._pipeline.is_passthrough)
         self._load = LoadMonitor(config, camera_id, live=live)
@@ -224,6 +226,7 @@ class CameraProcess:
             if tracks is None:
                 continue
             solve_s = time.perf_counter() - began
+            self._report_limit(tracks)
             detection_s = fmean(detection_times) if detection_times else None
             detection_times.clear()
             self._publisher.publish_tracks(
@@ -234,6 +237,15 @@ class CameraProcess:
         await self._exchange.publish_end(self._pipeline.end_message(self._end))
         tracks = await self._run_in(self._tracking, lambda: self._pipeline.finish(self._end))
         self._publisher.publish_tracks(tracks)
+
+    def _report_limit(self, tracks: CameraTracks) -> None:
+        """Log windows that the clock has ended, after which tracks depend on the machine."""
+        if tracks.solve is not None and tracks.solve.limit == "time":
+            if (more := self._limit_log.record()) is not None:
+                text = "camera %s: the solver was stopped after track.solver_time_s; gap %.2g%s"
+                log.warning(text, self._id, tracks.solve.gap, more)
+        elif ended := self._limit_log.end():
+            log.info("camera %s: %d windows were stopped after track.solver_time_s", self._id, ended.count)
 
     async def _publish_thumbnails(self, image: Image, tracks: CameraTracks) -> None:
         thumbnails = await self._run_in(self._tracking, lambda: encode_thumbnails(image, tracks))

@@ -130,4 +130,5 @@ def _solver_report(report: SolveReport | None) -> SolverReport | None:
         gap=report.gap,
         integral=report.integral,
         rounds=report.rounds,
+        limit=report.limit,
     )

@@ -28,7 +28,7 @@ key                                              payload                        
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -115,6 +115,8 @@ class SolverReport(msgspec.Struct, frozen=True, kw_only=True):
     gap: Cost
     integral: bool
     rounds: Number
+    limit: Literal["work", "time"] | None = None
+    """The limit of the solver's budget that ended the search; null: none."""
 
 
 TRACKS_MAX = 1000

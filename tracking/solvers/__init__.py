@@ -11,6 +11,7 @@ from tracking.solvers.base import (
     create_solver,
     solver_names,
 )
+from tracking.solvers.budget import SolverBudget
 from tracking.solvers.warm_start import UNKNOWN_STATE, ConflictPrice, WarmStart
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Solution",
     "SolveReport",
     "Solver",
+    "SolverBudget",
     "WarmStart",
     "create_solver",
     "solver_names",

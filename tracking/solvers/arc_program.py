@@ -12,9 +12,16 @@ from scipy import sparse
 from tracking.boxes import BOX_SIDES
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, TimedSolver
-from tracking.solvers.programs.linear_program import LinearProgram, LinearProgramBuilder, solve_program
+from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
+from tracking.solvers.programs.linear_program import (
+    LinearProgram,
+    LinearProgramBuilder,
+    WorkLimitError,
+    solve_program,
+)
 from tracking.solvers.relaxation import RelaxedSolution
 from tracking.solvers.solution_builder import empty_solution, solution_from_relaxation
+from tracking.solvers.viterbi import Trellis, best_paths
 from tracking.solvers.warm_start import WarmStart
 
 Ints = NDArray[np.int64]
@@ -124,22 +131,33 @@ class ArcProgramSolver(TimedSolver):
 
     name = "arcs"
 
-    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
         """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
-        return solution_from_relaxation(self.name, network, solve_arc_relaxation(network))
+        try:
+            found = solve_arc_relaxation(network, meter)
+        except WorkLimitError:
+            alone = best_paths(Trellis.of(network))
+            usage = np.zeros(network.node.shape)
+            np.put_along_axis(usage, alone.nodes[:, :, None], 1.0, axis=2)
+            limit = meter.reached(RELAXATION_SHARE) or "work"
+            found = RelaxedSolution(usage, float(alone.costs.sum()), network.node, rounds=0, limit=limit)
+        return solution_from_relaxation(self.name, network, found, meter)
 
 
-def solve_arc_relaxation(network: Network) -> RelaxedSolution:
+def solve_arc_relaxation(network: Network, meter: BudgetMeter) -> RelaxedSolution:
     """Return the optimum of the full relaxation of a network with at least one object; no prices.
 
     The program is that of II.D with y replaced by the sums of arcs that define it, which halves the simplex
     iterations.
+
+    Raises:
+        WorkLimitError: the meter's budget is spent before.
     """
     built = build_arc_program(network)
     reduced = eliminate_nodes(built)
-    found = solve_program(reduced.program)
+    found = solve_program(reduced.program, meter=meter)
     usage = np.zeros(network.node.shape)
     usage[built.nodes >= 0] = reduced.sums @ found.values
     return RelaxedSolution(usage, found.objective, network.node, rounds=1)

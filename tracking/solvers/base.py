@@ -7,12 +7,13 @@ import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import ClassVar, Protocol, cast
+from typing import ClassVar, Literal, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracking.model.network import Network
+from tracking.solvers.budget import BudgetMeter, Limit, SolverBudget
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 OCCLUDED = -1
@@ -31,6 +32,11 @@ _SOLVERS = {
 
 DEFAULT_SOLVER = "columns"
 
+Status = Literal["optimal", "gap", "limit"]
+
+_OPTIMALITY_GAP = 1e-9
+"""The largest gap that counts as none."""
+
 
 @dataclass(frozen=True, slots=True)
 class SolveReport:
@@ -40,12 +46,14 @@ class SolveReport:
         solver: the name of the solver.
         objective: cost of the integer states returned (II.C).
         bound: proven lower bound of the cost of any states without conflicts.
-        integral: whether the relaxation was integral: nothing was rounded, and the solution is the global
-            optimum.
+        integral: whether the relaxation was integral, so that nothing was rounded. `exact` may find the
+            optimum where it was not; `extended-dp` and the baselines solve none. See `status`.
         conflicts: number of conflicting pairs of objects over all frames; only `separate-dp`, which ignores
             conflicts, leaves any.
         rounds: how often the linear program (or a dynamic program over all objects) was solved; 0 if the
             solution was proven without.
+        limit: the limit of the budget that was reached; None: the solver has ended by itself.
+        skipped: the steps that the budget has cut short.
         seconds: elapsed time; not part of comparisons.
     """
 
@@ -55,7 +63,16 @@ class SolveReport:
     integral: bool
     conflicts: int
     rounds: int
+    limit: Limit | None = None
+    skipped: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def status(self) -> Status:
+        """`optimal`: proven, up to rounding errors; `limit`: the budget was spent before; `gap`: the rest."""
+        if not self.conflicts and self.gap <= _OPTIMALITY_GAP:
+            return "optimal"
+        return "limit" if self.limit else "gap"
 
     @property
     def gap(self) -> float:
@@ -104,8 +121,11 @@ def solver_names() -> tuple[str, ...]:
     return tuple(sorted(_SOLVERS))
 
 
-def create_solver(name: str) -> Solver:
-    """Return the solver of that name.
+def create_solver(name: str, budget: SolverBudget | None = None) -> Solver:
+    """Return the solver of that name; `budget` limits each of its solves.
+
+    When a limit is reached, the solver rounds what it has and returns the cheapest answer and the best bound
+    that it knows. What remains to be done takes little: greedy paths, and the costs of some candidates.
 
     Raises:
         ValueError: no solver has that name; the message lists the names.
@@ -113,7 +133,7 @@ def create_solver(name: str) -> Solver:
     if name not in _SOLVERS:
         raise ValueError(f"no solver is called {name!r}; there are {', '.join(solver_names())}")
     module, factory = _SOLVERS[name]
-    return cast("Solver", getattr(import_module(module), factory)())
+    return cast("Solver", getattr(import_module(module), factory)(budget))
 
 
 class TimedSolver(ABC):
@@ -121,13 +141,16 @@ class TimedSolver(ABC):
 
     name: ClassVar[str]
 
+    def __init__(self, budget: SolverBudget | None = None) -> None:
+        self._budget = budget
+
     def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
         """Return the states of all objects in all frames; a warm start only makes it faster."""
         start = time.perf_counter()
-        solution = self._solve(network, warm_start)
+        solution = self._solve(network, warm_start, BudgetMeter(self._budget))
         seconds = time.perf_counter() - start
         return replace(solution, report=replace(solution.report, seconds=seconds))
 
     @abstractmethod
-    def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
-        """Solve the network, which may have no objects."""
+    def _solve(self, network: Network, warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
+        """Solve the network, which may have no objects, within the meter's budget."""

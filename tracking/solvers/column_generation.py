@@ -9,19 +9,22 @@ enter it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
-from tracking.solvers.arc_generation import ArcGeneration, start_arc_generation
+from tracking.solvers.arc_generation import ArcGeneration, generate_arcs
 from tracking.solvers.base import Solution, TimedSolver
+from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.programs.arc_master import ArcMaster, path_arcs
+from tracking.solvers.programs.linear_program import WorkLimitError
 from tracking.solvers.programs.path_master import PathMaster, PathMasterSolution
 from tracking.solvers.relaxation import (
     OPTIMALITY_TOLERANCE,
@@ -52,11 +55,14 @@ _MAX_ROUNDS_SMALL_GROUP, _MAX_ROUNDS_LARGE_GROUP = 50, 4
 class PathGeneration:
     """One search; `run` it once. The network has at least one object and no layout term."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, meter: BudgetMeter) -> None:
         self._network = network
+        self._meter = meter
         self._pricing = PathPricer(Trellis.of(network))
+        self._meter.add_passes(*network.node.shape)
         self._alone = self._pricing.alone
         self._bound = -np.inf
+        self._rounds = 0
         self._priced = network.node
         self._prices = np.empty(0)
         self._point = PathMasterSolution(0.0, np.empty(0), np.empty(0))
@@ -70,7 +76,15 @@ class PathGeneration:
         """Find the optimum of the relaxation."""
         if not conflict_count(self._network, self._alone.nodes):
             return RelaxedSolution(self._usage, float(self._alone.costs.sum()), self._priced, 0)
-        return self._resolve_conflicts(warm_start)
+        self._bound = float(self._alone.costs.sum())
+        try:
+            return self._resolve_conflicts(warm_start)
+        except WorkLimitError:
+            return self._stopped(self._meter.reached(RELAXATION_SHARE) or "work")
+
+    def _stopped(self, limit: Limit) -> RelaxedSolution:
+        """Return what is known: the last flow, and the best bound."""
+        return RelaxedSolution(self._usage, self._bound, self._priced, self._rounds, limit=limit)
 
     def _resolve_conflicts(self, warm_start: WarmStart | None) -> RelaxedSolution:
         rows = self._finder.find_new_violated(self._usage)
@@ -79,24 +93,27 @@ class PathGeneration:
             return warm.proven
         self._link_objects(rows)
         if self._largest_group() > _MAX_PATH_GROUP:
-            return start_arc_generation(self._network, self._pricing, ConflictSeparator(self._network)).run()
+            finder = ConflictSeparator(self._network)
+            return generate_arcs(self._network, self._pricing, finder, self._meter)
         self._add_rows([*rows, *self._finder.take_new(warm.rows)] if warm else rows)
         for paths in warm.paths if warm else ():
             active = np.flatnonzero(self._active)
             self._master.add_paths(active, paths.select(active))
         self._solve()
         self._add_violated_rows()
-        rounds = 0
-        while rounds < (
+        while self._rounds < (
             _MAX_ROUNDS_SMALL_GROUP if self._largest_group() <= _MAX_PATH_GROUP else _MAX_ROUNDS_LARGE_GROUP
         ):
-            rounds += 1
+            if limit := self._meter.reached(RELAXATION_SHARE):
+                return self._stopped(limit)
+            self._rounds += 1
             if not self._add_improving_paths():
-                prices = conflict_prices(self._network, self._master.rows, self._prices)
-                return RelaxedSolution(self._usage, self._bound, self._priced, rounds, prices)
+                rows = self._master.rows[: len(self._prices)]
+                prices = conflict_prices(self._network, rows, self._prices)
+                return RelaxedSolution(self._usage, self._bound, self._priced, self._rounds, prices)
             self._solve()
             self._add_violated_rows()
-        return self._switch_to_arcs(rounds)
+        return self._switch_to_arcs(self._rounds)
 
     @cached_property
     def _finder(self) -> ConflictSeparator:
@@ -104,7 +121,7 @@ class PathGeneration:
 
     @cached_property
     def _master(self) -> PathMaster:
-        return PathMaster(self._network)
+        return PathMaster(self._network, self._meter)
 
     def _switch_to_arcs(self, rounds: int) -> RelaxedSolution:
         """Continue with arcs, from those of the paths in use: large groups need parts of paths combined."""
@@ -113,8 +130,11 @@ class PathGeneration:
         starts = path_arcs(
             np.concatenate([owners, inactive]), np.concatenate([nodes, self._alone.nodes[inactive]])
         )
-        found = ArcGeneration(self._network, starts, self._master.rows, self._finder).run()
-        return RelaxedSolution(found.usage, found.bound, found.priced, found.rounds + rounds)
+        search = ArcGeneration(self._network, starts, self._master.rows, self._finder, self._meter)
+        found = search.run()
+        if found.bound < self._bound:
+            found = replace(found, bound=self._bound, priced=self._priced)
+        return replace(found, rounds=found.rounds + rounds, prices=())
 
     def _solve(self) -> None:
         self._point = self._master.solve()
@@ -173,11 +193,14 @@ class PathGeneration:
         found: list[Ints] = []
         gaps: list[float] = []
         for step in range(_SUBGRADIENT_STEPS):
-            self._priced = add_conflict_prices(self._network, self._master.rows, prices)
-            self._prices = prices
-            paths = self._pricing.best_paths(self._priced, active)
-            self._bound = inactive_cost + float(paths.costs.sum() - prices.sum())
-            gaps.append(cost - self._bound)
+            priced = add_conflict_prices(self._network, self._master.rows, prices)
+            paths = self._pricing.best_paths(priced, active)
+            self._meter.add_step()
+            self._meter.add_passes(len(active), *self._network.node.shape[1:])
+            bound = inactive_cost + float(paths.costs.sum() - prices.sum())
+            if bound >= self._bound:
+                self._bound, self._priced, self._prices = bound, priced, prices
+            gaps.append(cost - bound)
             if gaps[-1] <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost)):
                 return False
             found.append(paths.nodes)
@@ -203,24 +226,27 @@ class ColumnGenerationSolver(TimedSolver):
 
     name = "columns"
 
-    def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
         """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
-        found = solve_relaxation(network, warm_start)
-        return solution_from_relaxation(self.name, network, found, warm_start=warm_start)
+        found = solve_relaxation(network, warm_start, meter)
+        return solution_from_relaxation(self.name, network, found, meter, warm_start=warm_start)
 
 
-def solve_relaxation(network: Network, warm_start: WarmStart | None = None) -> RelaxedSolution:
+def solve_relaxation(
+    network: Network, warm_start: WarmStart | None = None, meter: BudgetMeter | None = None
+) -> RelaxedSolution:
     """Return the optimum of the relaxation of a network with at least one object.
 
     The columns are paths if only conflicts couple the objects, and arcs under the layout term, for which
     whole paths are unsuitable.
     """
-    network = allow_hiding(network)
+    network, meter = allow_hiding(network), meter or BudgetMeter()
     if not network.layout:
-        return PathGeneration(network).run(warm_start)
-    return start_arc_generation(network, PathPricer(Trellis.of(network)), ConflictSeparator(network)).run()
+        return PathGeneration(network, meter).run(warm_start)
+    pricing = PathPricer(Trellis.of(network))
+    return generate_arcs(network, pricing, ConflictSeparator(network), meter)
 
 
 _SQUARED_POWER = 2
@@ -234,17 +260,17 @@ class SquaredLayoutSolver(TimedSolver):
 
     name = "l2"
 
-    def _solve(self, network: Network, warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
         """Solve the relaxation, and round it if it is not integral."""
         if not network.objects:
             return empty_solution(self.name, network)
         if not network.layout:
-            return solution_from_relaxation(self.name, network, solve_relaxation(network))
+            return solution_from_relaxation(self.name, network, solve_relaxation(network, meter=meter), meter)
         solvable = allow_hiding(network)
-        start = LocalSearch(solvable, _SQUARED_POWER).improve(greedy_paths(solvable).nodes)
+        start = LocalSearch(solvable, _SQUARED_POWER, meter).improve(greedy_paths(solvable).nodes)
         starts = path_arcs(np.arange(network.objects), start)
-        found = _SquaredLayoutGeneration(solvable, starts, [], ConflictSeparator(network)).run()
-        return solution_from_relaxation(self.name, network, found, _SQUARED_POWER, warm_start)
+        found = _SquaredLayoutGeneration(solvable, starts, [], ConflictSeparator(network), meter).run()
+        return solution_from_relaxation(self.name, network, found, meter, _SQUARED_POWER, warm_start)
 
 
 class _SquaredLayoutGeneration(ArcGeneration):
@@ -253,4 +279,4 @@ class _SquaredLayoutGeneration(ArcGeneration):
     _tolerance = 1e-8
 
     def _new_master(self) -> ArcMaster:
-        return ArcMaster(self._network, squared=True)
+        return ArcMaster(self._network, squared=True, meter=self._meter)

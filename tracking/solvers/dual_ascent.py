@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.network import Network
+from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, best_paths
@@ -162,6 +163,12 @@ _FIRST_FORCE_STEP = 0.2
 _KEPT_PATHS = 8
 """Number of the last paths that are kept: they are near those of the optimum."""
 
+_SHARE = 0.3
+"""Largest share of the budget, if a program is solved after it."""
+
+_LAST_STEP, _MAX_STEPS = 0.05, 300
+"""Length of the last step over the first, and most steps, if no program is solved after it."""
+
 _EARLY_STEPS, _SEPARATION_INTERVAL = 10, 3
 """Violated rows are searched in each of the first steps, then in every few steps: later there are few."""
 
@@ -183,11 +190,24 @@ class DualGuess:
     paths: Ints
 
 
-def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator) -> DualGuess:
-    """Approximate the optimal duals of a network."""
+def guess_duals(
+    network: Network,
+    pricing: PathPricer,
+    finder: ConflictSeparator,
+    meter: BudgetMeter,
+    *,
+    is_last: bool = False,
+) -> DualGuess:
+    """Approximate the optimal duals of a network, with at least one step.
+
+    `is_last`: no program is solved after it, so that it takes as many steps as the budget allows.
+    """
     passes = MinMarginals.of(pricing.trellis, pricing.forward)
     schedule = _WITH_LAYOUT if network.layout else _CONFLICTS_ONLY
     packed = PrunedStates.cheapest(passes.through, schedule.states)
+    share = RELAXATION_SHARE if is_last else _SHARE
+    if is_last:
+        schedule = _schedule_until(schedule, packed, meter, share)
     trellis = packed.trellis(pricing.trellis)
     forces, prices = LayoutDuals(network), ConflictDuals(packed)
     locations = packed.states(network.locations[network.sets], 0.0) if network.layout else None
@@ -214,12 +234,30 @@ def guess_duals(network: Network, pricing: PathPricer, finder: ConflictSeparator
         moved = prices.ascend(paths.nodes, length * schedule.price * typical)
         if locations is not None:
             moved |= forces.ascend(locations[each, frames, paths.nodes], length * _FIRST_FORCE_STEP)
-        if not moved:
+        _add_step(meter, packed)
+        if not moved or meter.reached(share):
             break
     new = np.zeros(len(prices.prices) - len(best_prices))
     return DualGuess(
         prices.rows, np.concatenate([best_prices, new]), best_layout_prices, np.array(last_paths)
     )
+
+
+def _add_step(meter: BudgetMeter, packed: PrunedStates) -> None:
+    objects, frames, states = packed.index.shape
+    meter.add_step()
+    meter.add_passes(objects, frames, states)
+    meter.add_layout(objects * (objects + states), frames, 1)
+
+
+def _schedule_until(
+    schedule: _AscentSchedule, packed: PrunedStates, meter: BudgetMeter, share: float
+) -> _AscentSchedule:
+    """Return the schedule with as many steps as the budget's share allows, at least those it has."""
+    one = BudgetMeter()
+    _add_step(one, packed)
+    steps = int(min(max(meter.left(share) / one.work_s, schedule.steps), _MAX_STEPS))
+    return replace(schedule, steps=steps, decay=_LAST_STEP ** (1.0 / steps))
 
 
 def _typical_price(through: Floats, least: Floats) -> float:

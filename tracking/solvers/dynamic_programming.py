@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport, TimedSolver
+from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.objective import (
     Ints,
     block_conflicting_nodes,
@@ -25,7 +25,7 @@ class SeparateDpSolver(TimedSolver):
 
     name = "separate-dp"
 
-    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None, _meter: BudgetMeter) -> Solution:
         """Return the cheapest paths; the sum of their costs is the bound."""
         paths = best_paths(Trellis.of(network))
         conflicts = conflict_count(network, paths.nodes)
@@ -35,7 +35,7 @@ class SeparateDpSolver(TimedSolver):
             solver=self.name,
             objective=cost,
             bound=bound,
-            integral=conflicts == 0 and not network.layout,
+            integral=False,
             conflicts=conflicts,
             rounds=1,
         )
@@ -80,16 +80,15 @@ class GreedyDpSolver(TimedSolver):
 
     name = "greedy-dp"
 
-    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, _warm_start: WarmStart | None, _meter: BudgetMeter) -> Solution:
         """Return the greedy paths; the bound is the cost of all cheapest paths, conflicts ignored."""
         paths = greedy_paths(network)
         cost, conflicts = total_cost(network, paths.nodes), conflict_count(network, paths.nodes)
-        is_optimal = math.isfinite(cost) and cost - paths.bound <= 1e-9 * max(1.0, abs(cost))
         report = SolveReport(
             solver=self.name,
             objective=cost,
             bound=paths.bound,
-            integral=not conflicts and is_optimal,
+            integral=False,
             conflicts=conflicts,
             rounds=network.objects,
         )

@@ -7,7 +7,7 @@ bound on the cost from each of them to the end of the window; most joint states 
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -17,11 +17,11 @@ from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.arc_program import build_arc_program
 from tracking.solvers.base import Solution, TimedSolver
+from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.column_generation import solve_relaxation
 from tracking.solvers.objective import Ints, total_cost
-from tracking.solvers.programs.linear_program import solve_program
+from tracking.solvers.programs.linear_program import WorkLimitError, solve_program
 from tracking.solvers.relaxation import RelaxedSolution
-from tracking.solvers.rounding import is_integral
 from tracking.solvers.solution_builder import Certificate, build_solution, empty_solution, integer_nodes
 from tracking.solvers.viterbi import MinMarginals, Trellis, backward, forward
 from tracking.solvers.warm_start import WarmStart
@@ -31,6 +31,9 @@ _MAX_JOINT_STATES = 150_000
 
 _MAX_TRANSITIONS = 2_000_000_000
 """Most pairs of joint states of successive frames over the window: about half a minute."""
+
+_TRANSITION = 1.5e-8
+"""Seconds of work for such a pair."""
 
 _BLOCK_SIZE = 2_000_000
 """Numbers in memory at once: 16 MB."""
@@ -55,8 +58,9 @@ class _Frontier:
 class JointStateSearch:
     """Dynamic program over joint states of a network with layout term, pruned by its solved relaxation."""
 
-    def __init__(self, network: Network, found: RelaxedSolution) -> None:
+    def __init__(self, network: Network, found: RelaxedSolution, meter: BudgetMeter | None = None) -> None:
         self._network = network
+        self._meter = meter or BudgetMeter()
         self._bound = found.bound
         self._exclusions = network.exclusions()
         passes = MinMarginals.of(Trellis.of(network).with_node(found.priced))
@@ -72,6 +76,7 @@ class JointStateSearch:
 
         Raises:
             TooManyStatesError: the search would take too long.
+            WorkLimitError: the meter's budget does not allow it.
         """
         limit = cost + _TOLERANCE * max(1.0, abs(cost))
         network = self._network
@@ -84,6 +89,9 @@ class JointStateSearch:
             steps += len(nodes) * len(frontiers[-1].nodes)
             if steps > _MAX_TRANSITIONS:
                 raise TooManyStatesError
+            self._meter.work_s += _TRANSITION * len(nodes) * len(frontiers[-1].nodes)
+            if self._meter.reached():
+                raise WorkLimitError
             frontiers.append(self._prune(m, self._advance(m, frontiers[-1], nodes), limit))
         return self._trace_back(frontiers, cost)
 
@@ -170,36 +178,50 @@ class ExactSolver(TimedSolver):
 
     name = "exact"
 
-    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
-        """Return the cheapest states without conflicts; the bound is their cost."""
+    def _solve(self, network: Network, _warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
+        """Return the cheapest states without conflicts; the bound is their cost, if they are the optimum."""
         if not network.objects:
             return empty_solution(self.name, network)
-        found = solve_relaxation(network)
-        nodes = integer_nodes(network, found.usage)
-        rounds = found.rounds
-        if not is_integral(found.usage):
-            nodes = _integer_optimum(network, found, nodes)
-            rounds += 1
-        cost = total_cost(network, nodes)
-        return build_solution(network, nodes, Certificate(self.name, cost, integral=True, rounds=rounds))
+        found = solve_relaxation(network, meter=meter)
+        nodes = integer_nodes(network, found, meter=meter)
+        proof = Certificate.of(self.name, found, meter)
+        if proof.limit is None and not proof.integral:
+            try:
+                nodes = _integer_optimum(network, found, nodes, meter)
+                proof = replace(proof, rounds=proof.rounds + 1)
+            except WorkLimitError:
+                proof = replace(proof, limit=meter.reached() or "work", skipped=("branch and bound",))
+        if proof.limit is None:
+            proof = replace(proof, bound=total_cost(network, nodes))
+        return build_solution(network, nodes, replace(proof, prices=()))
 
 
-def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
-    """Return the cheapest states; `nodes` are states without conflicts."""
+def _integer_optimum(network: Network, found: RelaxedSolution, nodes: Ints, meter: BudgetMeter) -> Ints:
+    """Return the cheapest states; `nodes` are states without conflicts.
+
+    Raises:
+        WorkLimitError: the meter's budget is spent before.
+    """
     if network.layout:
         with suppress(TooManyStatesError):
-            better = JointStateSearch(network, found).cheaper_than(total_cost(network, nodes))
+            better = JointStateSearch(network, found, meter).cheaper_than(total_cost(network, nodes))
             return nodes if better is None else better
-    return branch_and_bound(network, found, nodes)
+    return branch_and_bound(network, found, nodes, meter)
 
 
-def branch_and_bound(network: Network, found: RelaxedSolution, nodes: Ints) -> Ints:
-    """Return the cheapest states by branch and bound, first over tight arcs, then over all remaining ones."""
+def branch_and_bound(
+    network: Network, found: RelaxedSolution, nodes: Ints, meter: BudgetMeter | None = None
+) -> Ints:
+    """Return the cheapest states by branch and bound, first over tight arcs, then over all remaining ones.
+
+    Raises:
+        WorkLimitError: the meter's budget is spent before.
+    """
     excess = arc_excess(network, found)
     tight = _TOLERANCE * max(1.0, abs(total_cost(network, nodes)))
-    nodes = _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= tight))
+    nodes = _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= tight, meter))
     gap = max(0.0, total_cost(network, nodes) - found.bound) + tight
-    return _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= gap))
+    return _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= gap, meter))
 
 
 def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
@@ -219,7 +241,7 @@ def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
     return excess
 
 
-def _solve_restricted(network: Network, nodes: Ints, allowed_arcs: Bools) -> Ints:
+def _solve_restricted(network: Network, nodes: Ints, allowed_arcs: Bools, meter: BudgetMeter | None) -> Ints:
     """Return the cheapest states on the allowed arcs and those of `nodes`."""
     each, steps = np.indices(nodes[:, 1:].shape)
     allowed_arcs = allowed_arcs.copy()
@@ -227,7 +249,7 @@ def _solve_restricted(network: Network, nodes: Ints, allowed_arcs: Bools) -> Int
     built = build_arc_program(network, allowed_arcs)
     integer = np.zeros(len(built.program.costs), dtype=np.bool_)
     integer[built.nodes[built.nodes >= 0]] = True
-    values = solve_program(built.program, integer).values
+    values = solve_program(built.program, integer, meter).values
     usage = np.where(built.nodes >= 0, values[built.nodes], 0.0)
     return np.asarray(usage.argmax(axis=2))
 

@@ -8,12 +8,24 @@ from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, TimedSolver
-from tracking.solvers.objective import Ints
-from tracking.solvers.solution_builder import Certificate, build_solution, empty_solution
+from tracking.solvers.budget import BudgetMeter
+from tracking.solvers.objective import Ints, conflict_count
+from tracking.solvers.relaxation import RelaxedSolution
+from tracking.solvers.solution_builder import (
+    Certificate,
+    build_solution,
+    empty_solution,
+    solution_from_relaxation,
+)
+from tracking.solvers.viterbi import Trellis, best_paths
 from tracking.solvers.warm_start import WarmStart
 
 _MAX_NUMBERS = 30_000_000
 """Numbers in memory at once: 240 MB, for example three objects with 70 places."""
+
+
+_JOINT_ARC = 1e-8
+"""Seconds of work for a pair of joint states, or for a joint state and a state of one object."""
 
 
 class JointDpSolver(TimedSolver):
@@ -25,8 +37,10 @@ class JointDpSolver(TimedSolver):
 
     name = "extended-dp"
 
-    def _solve(self, network: Network, _warm_start: WarmStart | None) -> Solution:
+    def _solve(self, network: Network, warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
         """Return the cheapest states without conflicts; the bound is their cost.
+
+        Where the budget does not allow all joint states, they are those of greedy paths and local search.
 
         Raises:
             ValueError: the objects have too many joint states.
@@ -39,8 +53,17 @@ class JointDpSolver(TimedSolver):
                 f"extended-dp cannot hold the joint states of {network.objects} objects in"
                 f" {network.max_places} places; columns or exact can"
             )
+        meter.work_s += _JOINT_ARC * network.frames * float(network.max_places + 1) ** power
+        if limit := meter.reached():
+            alone = best_paths(Trellis.of(network))
+            usage = np.zeros(network.node.shape)
+            np.put_along_axis(usage, alone.nodes[:, :, None], 1.0, axis=2)
+            found = RelaxedSolution(usage, float(alone.costs.sum()), network.node, rounds=0, limit=limit)
+            return solution_from_relaxation(self.name, network, found, meter, warm_start=warm_start)
         nodes = _JointStates(network).best()
-        return build_solution(network, nodes, Certificate(self.name, np.inf, integral=True, rounds=1))
+        # The optimum is its own bound, unless every answer has conflicts or a missing arc.
+        bound = -np.inf if conflict_count(network, nodes) else np.inf
+        return build_solution(network, nodes, Certificate(self.name, bound, integral=False, rounds=1))
 
 
 class _JointStates:

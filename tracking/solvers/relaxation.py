@@ -8,6 +8,7 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.model.network import Network
+from tracking.solvers.budget import Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis, best_paths
@@ -31,6 +32,8 @@ class RelaxedSolution:
         layout_prices: (n, M - 1, 4) the gain per pixel of movement; empty without layout term.
         bound_reductions: (M,) by how much the prices of each frame's rows reduce the bound; empty without
             layout term.
+        limit: the limit at which the search ended before the optimum, None if it is the optimum. Then y may
+            violate rows, and the bound is lower.
     """
 
     usage: Floats
@@ -40,6 +43,7 @@ class RelaxedSolution:
     prices: tuple[ConflictPrice, ...] = ()
     layout_prices: Floats = field(default_factory=lambda: np.empty(0))
     bound_reductions: Floats = field(default_factory=lambda: np.empty(0))
+    limit: Limit | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
+from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.objective import Ints, locations_at, path_cost, total_cost
 from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis, best_paths, trace_back
 
@@ -69,9 +70,12 @@ class LocalSearch:
         alone: the cheapest path of each object without regard to the others.
     """
 
-    def __init__(self, network: Network, power: int = 1) -> None:
+    def __init__(self, network: Network, power: int = 1, meter: BudgetMeter | None = None) -> None:
         self._network = network
         self._power = power
+        self._meter = meter or BudgetMeter()
+        self._meter.add_passes(*network.node.shape)
+        self._meter.add_passes(*network.node.shape)
         self._trellis = Trellis.of(network)
         self._passes = MinMarginals.of(self._trellis)
         self.alone = trace_back(self._trellis, self._passes.forward)
@@ -79,10 +83,11 @@ class LocalSearch:
     def improve(self, nodes: Ints) -> Ints:
         """Return nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
 
+        They are the same nodes if the meter's budget is spent.
         Repairs the effects of rounding each frame separately (II.D): missing arcs if arcs are gated, and
         jumps where the relaxation was fractional.
         """
-        descent = _CoordinateDescent(self._network, self._trellis, self._passes, self._power)
+        descent = _CoordinateDescent(self._network, self._trellis, self._passes, self._power, self._meter)
         descent.nodes = nodes.copy()
         cost = total_cost(self._network, nodes, self._power)
         for _ in range(_MAX_ROUNDS):
@@ -96,8 +101,11 @@ class LocalSearch:
 class _CoordinateDescent:
     """Reroutes one object after another; an object is skipped if no other has moved since its last turn."""
 
-    def __init__(self, network: Network, trellis: Trellis, passes: MinMarginals, power: int) -> None:
+    def __init__(
+        self, network: Network, trellis: Trellis, passes: MinMarginals, power: int, meter: BudgetMeter
+    ) -> None:
         self._network = network
+        self._meter = meter
         self._power = power
         self._exclusions = network.exclusions()
         self._trellis = trellis
@@ -107,7 +115,7 @@ class _CoordinateDescent:
 
     def reroute(self, owner: int) -> bool:
         """Move one object to its best path around the others; return whether it moved."""
-        if self._settled[owner]:
+        if self._settled[owner] or self._meter.reached():
             return False
         cost = self._own_cost(owner)
         if np.isfinite(cost) and cost <= self._least[owner] + _MIN_IMPROVEMENT * max(1.0, abs(cost)):
@@ -141,8 +149,12 @@ class _CoordinateDescent:
         node[:, :-1][self._excluded(owner)] = np.inf
         limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
         packed = PrunedStates.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
+        states = packed.index.shape[2]
+        self._meter.add_step()
+        self._meter.add_passes(1, network.frames, states)
         trellis = packed.trellis(self._trellis.select(np.array([owner])).with_node(node[None]))
         if network.layout:
+            self._meter.add_layout(network.objects - 1, network.frames, states)
             trellis.pair[0] += network.layout * self._layout_of_arcs(owner, packed)
         return np.asarray(packed.original_states(best_paths(trellis).nodes)[0])
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport
+from tracking.solvers.budget import BudgetMeter, Limit
 from tracking.solvers.candidates import candidate_nodes
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
@@ -22,30 +22,37 @@ def solution_from_relaxation(
     solver: str,
     network: Network,
     found: RelaxedSolution,
+    meter: BudgetMeter,
     power: int = 1,
     warm_start: WarmStart | None = None,
 ) -> Solution:
     """Return the solution for the optimum of the relaxation; `power` is that of the layout term."""
-    nodes = integer_nodes(network, found.usage, power, warm_start)
-    integral = is_integral(found.usage)
-    proof = Certificate(solver, found.bound, integral, found.rounds, found.prices)
-    return build_solution(network, nodes, proof, power)
+    nodes = integer_nodes(network, found, power, warm_start, meter)
+    return build_solution(network, nodes, Certificate.of(solver, found, meter), power)
 
 
 def integer_nodes(
-    network: Network, usage: Floats, power: int = 1, warm_start: WarmStart | None = None
+    network: Network,
+    found: RelaxedSolution,
+    power: int = 1,
+    warm_start: WarmStart | None = None,
+    meter: BudgetMeter | None = None,
 ) -> Ints:
-    """Return nodes (n, M) without conflicts for y = `usage` (n, M, S).
+    """Return nodes (n, M) without conflicts for the relaxation's y.
 
     If y is integral, they are its paths. Otherwise y is rounded (II.D) and improved by local search, and so
     are the greedy paths and the cheapest of `candidate_nodes`; the cheapest of the three are returned, the
     rounded ones if equal. So no answer is dearer than hiding everybody.
     """
-    nodes = round_relaxation(network, usage)
-    if is_integral(usage) and np.isfinite(total_cost(network, nodes, power)):
-        return nodes
+    if found.limit:
+        # The flow of a search that has not ended may violate rows; shares below 1 are rounded in each frame.
+        nodes = round_relaxation(network, 0.5 * found.usage)
+    else:
+        nodes = round_relaxation(network, found.usage)
+        if is_integral(found.usage) and np.isfinite(total_cost(network, nodes, power)):
+            return nodes
     network = allow_hiding(network)
-    improver = LocalSearch(network, power)
+    improver = LocalSearch(network, power, meter)
     candidates = candidate_nodes(network, improver.alone, warm_start)
     greedy = greedy_paths(network, improver.alone).nodes
     starts = [nodes, greedy, min(candidates, key=lambda found: total_cost(network, found, power))]
@@ -62,6 +69,19 @@ class Certificate:
     integral: bool
     rounds: int
     prices: tuple[ConflictPrice, ...] = ()
+    limit: Limit | None = None
+    skipped: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, solver: str, found: RelaxedSolution, meter: BudgetMeter) -> Certificate:
+        """Return what the relaxation has proven, and what the budget has cut after it."""
+        integral = found.limit is None and is_integral(found.usage)
+        skipped = ["relaxation"] if found.limit else []
+        limit = found.limit
+        if not integral and (rest := meter.reached()):
+            limit = limit or rest
+            skipped.append("local search")
+        return cls(solver, found.bound, integral, found.rounds, found.prices, limit, tuple(skipped))
 
 
 def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int = 1) -> Solution:
@@ -77,6 +97,8 @@ def build_solution(network: Network, nodes: Ints, proof: Certificate, power: int
         integral=proof.integral,
         conflicts=conflict_count(network, nodes),
         rounds=proof.rounds,
+        limit=proof.limit,
+        skipped=proof.skipped,
     )
     return Solution(states_from_nodes(network, nodes), report, proof.prices)
 

@@ -19,7 +19,7 @@ from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError
-from tracking import Detections, Solver, WindowResult, create_solver, solver_names
+from tracking import Detections, Solver, WindowResult, solver_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
 from tracking.registry import Tracker, needs_images, tracker_names
@@ -98,7 +98,7 @@ def solver_for(config: Config, name: str | None) -> Solver:
     """
     if name is not None and name not in solver_names():
         raise UserError(f"--solver: there is no solver {name!r}; there are {', '.join(solver_names())}")
-    return create_solver(name or config.track.solver)
+    return config.track.create_solver(config.site.fps, name)
 
 
 def config_for_video(video: Path | None, det: Path | None, config: Path | None) -> Config:

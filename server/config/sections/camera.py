@@ -11,7 +11,7 @@ from bestview import CrossViewSettings, validate_homography
 from server.config.ground_unit import check_unit_spelling
 from server.config.sections.base import Identifier, Polygon, Section
 from server.config.unknown_keys import no_unknown_keys
-from tracking import DEFAULT_SOLVER, CostSettings, WindowSettings, create_solver
+from tracking import DEFAULT_SOLVER, CostSettings, Solver, SolverBudget, WindowSettings, create_solver
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.interactive import InteractiveSettings
 from tracking.registry import DEFAULT_TRACKER, TEMPORAL_TRACKER, tracker_names
@@ -67,6 +67,10 @@ class TrackSettings(Section):
     tracker: str = DEFAULT_TRACKER
     """MyView's own tracker, or a baseline."""
     solver: str = DEFAULT_SOLVER
+    solver_share: PositiveFloat | None = 0.35
+    """Work of a solve at most, as a share of the stride on an ordinary machine; None: no limit."""
+    solver_time_s: PositiveFloat | None = None
+    """Seconds by the clock after which a solver stops; answers then depend on the machine. None: never."""
     backlog_s: PositiveFloat = 2.0
     """Seconds of frames that may wait on a busy machine; older ones are skipped and reported."""
     shed_load: bool = True
@@ -89,6 +93,12 @@ class TrackSettings(Section):
             if self.tracker == TEMPORAL_TRACKER
             else self.window.resolve(fps).min_final_lag
         )
+
+    def create_solver(self, fps: float, name: str | None = None) -> Solver:
+        """Create the solver, or that of another name, with its budget at so many frames per second."""
+        stride_s = self.window.resolve(fps).stride / fps
+        work_s = None if self.solver_share is None else self.solver_share * stride_s
+        return create_solver(name or self.solver, SolverBudget(work_s, self.solver_time_s))
 
     @field_validator("tracker")
     @classmethod

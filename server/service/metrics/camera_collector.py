@@ -93,7 +93,14 @@ class CameraCollector(Collector):
         condition = GaugeMetricFamily(
             "myview_camera_condition", "1: this is wrong with the picture.", labels=["camera", "condition"]
         )
+        limited = CounterMetricFamily(
+            "myview_camera_limited_windows",
+            "Windows whose solver was stopped by a limit of work or time.",
+            labels=["camera", "limit"],
+        )
         for camera, state in self._pipeline.ingest.states.items():
+            for limit, count in state.metrics.totals.limited.items():
+                limited.add_metric([camera, limit], count)
             labels = [camera]
             live.add_metric(labels, float(state.label == "live"))
             frames.add_metric(labels, state.frames)
@@ -106,7 +113,7 @@ class CameraCollector(Collector):
                 offset.add_metric(labels, state.status.clock_offset)
                 for name in CONDITION_TEXTS:
                     condition.add_metric([camera, name], float(name == state.status.condition))
-        return [live, frames, missed, shed, without_peers, bad, offset, condition]
+        return [live, frames, missed, shed, without_peers, bad, offset, limited, condition]
 
     def _stages(self) -> Metric:
         family = HistogramMetricFamily(

@@ -51,6 +51,7 @@ class StageTotals:
         windows: solved windows.
         optimal: those of them whose solution is proven optimal.
         gap: sum of the gaps of the others.
+        limited: windows whose solver has reached a limit, by the limit.
         corrected: windows that revised final frames after an operator's correction.
     """
 
@@ -59,6 +60,7 @@ class StageTotals:
         self.search, self.solve, self.track = _histogram(), _histogram(), _histogram()
         self.windows = self.optimal = self.corrected = 0
         self.gap = 0.0
+        self.limited = dict.fromkeys(("work", "time"), 0)
 
     @property
     def stages(self) -> dict[str, Histogram]:
@@ -79,6 +81,8 @@ class StageTotals:
             self.windows += 1
             self.optimal += optimal
             self.gap += 0.0 if optimal else tracks.solve.gap
+            if tracks.solve.limit:
+                self.limited[tracks.solve.limit] += 1
             if tracks.solve_s is not None:
                 self.solve.observe(tracks.solve_s)
         if due is not None and tracks.solved_at > 0:

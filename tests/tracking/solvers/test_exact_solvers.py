@@ -30,7 +30,7 @@ def test_the_optimum_is_found(name: str, case: Case) -> None:
     network = network_of(case)
     report = create_solver(name).solve(network).report
     assert report.objective == pytest.approx(exhaustive_optimum(network), rel=TOLERANCE)
-    assert (report.gap, report.conflicts, report.integral) == (0.0, 0, True)
+    assert (report.gap, report.conflicts, report.status) == (0.0, 0, "optimal")
 
 
 @settings(deadline=None, max_examples=60)
@@ -63,7 +63,7 @@ def test_too_many_joint_states_are_refused() -> None:
 def test_joint_states_and_branching_find_the_same_optimum(case: Case) -> None:
     network = network_of(case)
     found = solve_relaxation(network)
-    start = integer_nodes(network, found.usage)
+    start = integer_nodes(network, found)
     joint = JointStateSearch(network, found).cheaper_than(total_cost(network, start))
     branched = branch_and_bound(network, found, start)
     best = start if joint is None else joint
@@ -97,6 +97,14 @@ def test_a_program_wrongly_presolved_as_infeasible_is_solved() -> None:
     costs = replace(PAPER_COSTS, disappearance=1.0, conflict_distance=120.0, conflict_rows="star")
     network = network_of(Case(6, 4, 8, shared=False, settings=costs, seed=304))
     found = solve_relaxation(network)
-    rounded = integer_nodes(network, found.usage)
+    rounded = integer_nodes(network, found)
     report = create_solver("exact").solve(network).report
     assert found.bound <= report.objective <= total_cost(network, rounded)
+
+
+def test_integral_says_whether_the_relaxation_was_not_whether_the_optimum_was_found() -> None:
+    case = Case(3, 4, 4, shared=True, settings=replace(PAPER_COSTS, layout=0.002), seed=1)
+    network = network_of(case)
+    relaxed, exact = (create_solver(name).solve(network).report for name in ("columns", "exact"))
+    assert (relaxed.integral, relaxed.status) == (False, "gap")
+    assert (exact.integral, exact.status) == (False, "optimal")

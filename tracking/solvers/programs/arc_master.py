@@ -10,6 +10,7 @@ import numpy as np
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
+from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.cutting_planes import ConflictRow
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.layout_rows import LayoutConstraints
@@ -86,8 +87,9 @@ class ArcMaster:
     With `squared`, the layout term uses the squared L2 norm.
     """
 
-    def __init__(self, network: Network, *, squared: bool = False) -> None:
+    def __init__(self, network: Network, *, squared: bool = False, meter: BudgetMeter | None = None) -> None:
         self._network = network
+        self._meter = meter or BudgetMeter()
         self._squared = squared
         self._highs = create_highs(growing=True, presolve=True)
         objects, frames, states = network.node.shape
@@ -198,7 +200,11 @@ class ArcMaster:
             self._highs.addRow(-np.inf, 1.0, len(index), index, np.ones(len(index)))
 
     def solve(self) -> ArcMasterSolution:
-        """Solve the restricted program."""
+        """Solve the restricted program.
+
+        Raises:
+            WorkLimitError: the meter's budget is spent before; `usage` is the last solution's.
+        """
         found = self._run()
         self._values = found.values[self._columns]
         objects, frames = self._network.objects, self._network.frames
@@ -214,16 +220,18 @@ class ArcMaster:
 
     def _run(self) -> LinearSolution:
         if self._layout is None or not self._squared:
-            return run_highs(self._highs)
+            return run_highs(self._highs, self._meter)
         # Imported on demand: only the solver `l2` needs it.
         from tracking.solvers.programs.quadratic_program import solve_quadratic_program  # noqa: PLC0415
 
-        return solve_quadratic_program(self._highs.getLp(), self._layout.squares, self._network.layout)
+        return solve_quadratic_program(
+            self._highs.getLp(), self._layout.squares, self._network.layout, self._meter
+        )
 
     def usage(self) -> Floats:
         """Return y (n, M, S), the flow through each node."""
         usage = np.zeros(self._network.node.shape)
-        arcs = self._arcs
+        arcs = self._arcs.select(np.arange(len(self._arcs)) < len(self._values))
         np.add.at(usage, (arcs.owner, arcs.frame, arcs.target), self._values)
         return usage
 

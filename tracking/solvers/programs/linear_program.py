@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from tracking.boxes import Floats
+from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,14 +90,30 @@ _FALLBACKS: tuple[tuple[str, str], ...] = (("presolve", "off"),)
 were added may be ill-conditioned, and presolve has reported feasible integer programs as infeasible."""
 
 
-def run_highs(solver: highspy.Highs) -> LinearSolution:
+class WorkLimitError(Exception):
+    """A program was not solved within the budget."""
+
+
+_ANY_ITERATIONS = 2**31 - 1
+
+
+def run_highs(solver: highspy.Highs, meter: BudgetMeter | None = None) -> LinearSolution:
     """Run the solver and return its solution.
 
     Raises:
+        WorkLimitError: the relaxation's share of the meter's budget is spent before.
         RuntimeError: the solver finds no optimum; every network has one.
     """
+    meter = meter or BudgetMeter()
+    entries = solver.getNumNz()
+    left = meter.iterations_left(entries, RELAXATION_SHARE)
+    solver.setOptionValue("simplex_iteration_limit", _ANY_ITERATIONS if left is None else left)
     solver.run()
+    meter.add_step()
+    meter.add_iterations(int(solver.getInfo().simplex_iteration_count), entries)
     status = solver.getModelStatus()
+    if status == highspy.HighsModelStatus.kIterationLimit:
+        raise WorkLimitError
     for name, value in _FALLBACKS:
         if status == highspy.HighsModelStatus.kOptimal:
             break
@@ -118,8 +135,14 @@ def run_highs(solver: highspy.Highs) -> LinearSolution:
     )
 
 
-def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = None) -> LinearSolution:
-    """Solve one program; columns where `integer` is true take integer values."""
+def solve_program(
+    program: LinearProgram, integer: NDArray[np.bool_] | None = None, meter: BudgetMeter | None = None
+) -> LinearSolution:
+    """Solve one program; columns where `integer` is true take integer values.
+
+    Raises:
+        WorkLimitError: the meter's budget is spent before; of an integer program, before its first run.
+    """
     solver = create_highs()
     model = to_highs_model(program)
     if integer is not None:
@@ -130,7 +153,9 @@ def solve_program(program: LinearProgram, integer: NDArray[np.bool_] | None = No
         solver.setOptionValue("presolve", "on")
         solver.setOptionValue("solver", "choose")
     solver.passModel(model)
-    return run_highs(solver)
+    if integer is not None and meter is not None and meter.reached():
+        raise WorkLimitError
+    return run_highs(solver, None if integer is not None else meter)
 
 
 class LinearProgramBuilder:

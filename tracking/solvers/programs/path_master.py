@@ -10,6 +10,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
+from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.cutting_planes import ConflictRow
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.linear_program import create_highs, run_highs
@@ -34,8 +35,9 @@ class PathMasterSolution:
 class PathMaster:
     """Finds the cheapest convex combination of paths of its objects that satisfies the conflict rows."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, meter: BudgetMeter | None = None) -> None:
         self._network = network
+        self._meter = meter
         self._highs = create_highs(growing=True)
         self._known: set[tuple[int, bytes]] = set()
         self._owners = np.empty(0, dtype=np.int64)
@@ -96,8 +98,12 @@ class PathMaster:
             self._highs.addRow(-np.inf, 1.0, len(through), through.astype(np.int32), np.ones(len(through)))
 
     def solve(self) -> PathMasterSolution:
-        """Solve the restricted program."""
-        found = run_highs(self._highs)
+        """Solve the restricted program.
+
+        Raises:
+            WorkLimitError: the meter's budget is spent before; `write_usage` writes the last solution.
+        """
+        found = run_highs(self._highs, self._meter)
         self._values = found.values
         limits = np.full(self._network.objects, np.inf)
         limits[list(self._object_rows)] = found.duals[self._row_numbers()]

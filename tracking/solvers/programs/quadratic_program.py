@@ -11,25 +11,32 @@ import highspy
 import numpy as np
 from scipy import sparse
 
+from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
 from tracking.solvers.objective import Ints
-from tracking.solvers.programs.linear_program import LinearSolution
+from tracking.solvers.programs.linear_program import LinearSolution, WorkLimitError
 
 _ACCURACY = 1e-9
 """Relative and absolute accuracy of constraints, duals and gap."""
 
-_MAX_ITERATIONS = 100
-"""A window takes 10 to 20."""
+_USUAL_ITERATIONS, _MAX_ITERATIONS = 20, 100
 
 
-def solve_quadratic_program(model: highspy.HighsLp, squared: Ints, weight: float) -> LinearSolution:
+def solve_quadratic_program(
+    model: highspy.HighsLp, squared: Ints, weight: float, meter: BudgetMeter
+) -> LinearSolution:
     """Minimize the model's costs plus `weight` times the squares of the columns `squared`.
 
     The columns are not negative, free or fixed at 0; the rows are equations or have an upper side only.
 
     Raises:
+        WorkLimitError: the meter's budget does not allow the usual number of iterations.
         RuntimeError: the solver finds no point at all; every network has one.
     """
     matrix = _matrix_of(model)
+    expected = BudgetMeter()
+    expected.add_interior_iterations(_USUAL_ITERATIONS, matrix.nnz)
+    if expected.work_s > meter.left(RELAXATION_SHARE):
+        raise WorkLimitError
     columns = len(model.col_cost_)
     lower, upper = np.asarray(model.col_lower_), np.asarray(model.col_upper_)
     row_lower, row_upper = np.asarray(model.row_lower_), np.asarray(model.row_upper_)
@@ -55,6 +62,8 @@ def solve_quadratic_program(model: highspy.HighsLp, squared: Ints, weight: float
         ],
         _settings(),
     ).solve()
+    meter.add_step()
+    meter.add_interior_iterations(int(found.iterations), matrix.nnz)
     point, multipliers = np.asarray(found.x), np.asarray(found.z)
     if not np.isfinite(point).all() or not np.isfinite(multipliers).all():
         raise RuntimeError(f"the solver of the quadratic program ended with {found.status}")

@@ -49,7 +49,7 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(served: Serve
     served.service.ingest.video(
         Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
     )
-    solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3)
+    solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3, limit="work")
     message = camera_tracks(A, 3, {1: SMALL}, solve=solve, detection_s=0.02, solve_s=0.2, solved_at=100.5)
     served.service.ingest.tracks(tracks(msgspec.structs.replace(message, first=11, last=15, final_to=15)))
     served.service.ingest.tracks(tracks(message))
@@ -63,6 +63,8 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(served: Serve
     assert metrics["myview_camera_windows_total", A] == 1
     assert metrics["myview_camera_optimal_windows_total", A] == 0
     assert metrics["myview_camera_gap_total", A] == pytest.approx(0.2)
+    assert metrics["myview_camera_limited_windows_total", A, "work"] == 1
+    assert metrics["myview_camera_limited_windows_total", A, "time"] == 0
 
 
 async def test_metrics_of_a_cameras_status_appear_once_it_was_received(site_with_people: ServedSite) -> None:

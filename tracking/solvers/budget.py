@@ -1,0 +1,101 @@
+"""How long a solver may take: a deterministic amount of work, or time by the clock.
+
+Work is counted in what solvers do (arcs of Viterbi passes, simplex iterations), weighed by what each took
+on an ordinary machine, one thread at about 2.5 GHz. So a limit in seconds of work stops every machine at the
+same point, and the same input gives the same answer. A limit by the clock depends on the machine, and on what
+else it does.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+Limit = Literal["work", "time"]
+
+RELAXATION_SHARE = 0.6
+"""Share of the budget for the relaxation; the rest is for rounding and local search."""
+
+_PASS_ARC = 3e-9
+"""Seconds for an arc of a Viterbi pass."""
+_LAYOUT_ARC = 4e-9
+"""Seconds for an arc, a side of the box and another object of the layout term."""
+_ITERATION, _ITERATION_ENTRY = 1e-5, 5e-9
+"""Seconds for a simplex iteration, and more for each entry of the matrix."""
+_INTERIOR_ENTRY = 3e-7
+"""Seconds for an entry of the matrix in an iteration of the interior-point method."""
+_STEP = 5e-4
+"""Seconds for whatever else a step of a search does."""
+
+
+@dataclass(frozen=True, slots=True)
+class SolverBudget:
+    """Limits of one solve.
+
+    Attributes:
+        work_s: seconds of work on an ordinary machine; None: no limit.
+        time_s: seconds by the clock, after which answers differ from run to run; None: no limit.
+
+    Raises:
+        ValueError: a limit is not positive.
+    """
+
+    work_s: float | None = None
+    time_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if not min(self.work_s or 1.0, self.time_s or 1.0) > 0.0 or 0.0 in (self.work_s, self.time_s):
+            raise ValueError(f"limits of a solver are above 0 seconds, not {self.work_s} and {self.time_s}")
+
+
+class BudgetMeter:
+    """Adds up the work of one solve. Solvers ask it between steps whether they may go on."""
+
+    def __init__(self, budget: SolverBudget | None = None) -> None:
+        self._budget = budget or SolverBudget()
+        self._start = time.perf_counter() if self._budget.time_s else 0.0
+        self.work_s = 0.0
+        """Seconds of work so far."""
+
+    def reached(self, share: float = 1.0) -> Limit | None:
+        """Return the limit of which this share is spent; None: neither."""
+        work, clock = self._budget.work_s, self._budget.time_s
+        if work is not None and self.work_s >= share * work:
+            return "work"
+        if clock is not None and time.perf_counter() - self._start >= share * clock:
+            return "time"
+        return None
+
+    def left(self, share: float = 1.0) -> float:
+        """Return the seconds left until this share is spent; infinite without a limit."""
+        work, clock = self._budget.work_s, self._budget.time_s
+        left = float("inf") if work is None else share * work - self.work_s
+        if clock is not None:
+            left = min(left, share * clock - (time.perf_counter() - self._start))
+        return max(left, 0.0)
+
+    def add_step(self) -> None:
+        """Add a step of a search."""
+        self.work_s += _STEP
+
+    def add_passes(self, objects: int, frames: int, states: int) -> None:
+        """Add a Viterbi pass of each object."""
+        self.work_s += _PASS_ARC * objects * frames * states**2
+
+    def add_layout(self, others: int, frames: int, states: int) -> None:
+        """Add the layout term of one object's arcs with the others."""
+        self.work_s += 4.0 * _LAYOUT_ARC * others * frames * states**2
+
+    def add_iterations(self, iterations: int, entries: int) -> None:
+        """Add simplex iterations on a matrix of so many entries."""
+        self.work_s += iterations * (_ITERATION + _ITERATION_ENTRY * entries)
+
+    def iterations_left(self, entries: int, share: float = 1.0) -> int | None:
+        """Return how many simplex iterations are left; None: any number."""
+        left = self.left(share)
+        return None if left == float("inf") else int(left / (_ITERATION + _ITERATION_ENTRY * entries))
+
+    def add_interior_iterations(self, iterations: int, entries: int) -> None:
+        """Add iterations of the interior-point method."""
+        self.work_s += iterations * _INTERIOR_ENTRY * entries
