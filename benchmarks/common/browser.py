@@ -22,9 +22,13 @@ FLAGS = (
 )
 
 
+_PROGRAMS = ("chromium-headless-shell", "chromium", "chromium-browser")
+"""The shell first: without a desktop browser's windows and menus a page takes half of the processor time."""
+
+
 def chromium_path() -> Path | None:
     """Return the path of Chromium; None: it is not on the PATH."""
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    program = next(filter(None, map(shutil.which, _PROGRAMS)), None)
     return None if program is None else Path(program)
 
 

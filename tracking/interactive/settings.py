@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 from tracking.frame_rate import frames_in
 
-_MAX_S = 400.0
+_MAX_S = 1000.0
 """Limit of seconds back or ahead: message size and prediction time grow with them."""
 
 
