@@ -32,6 +32,7 @@ class QualitySettings:
     sharpness: float = 0.0  # detail of the picture inside the box
     facing: float = 0.0  # walking towards the camera; needs a homography
     confidence: float = 0.0  # mean detection score of the track over its window, 0 where hidden
+    clarity: float = 0.9  # whether the camera's picture is clear: not covered, turned, blurred, dark, frozen
     relative: bool = True  # cost relative to the best view of the same frame; false: as in the paper
 
     def __post_init__(self) -> None:
@@ -78,12 +79,14 @@ class TrackWindow:
         camera: (T,) index of each track's camera.
         confidence: (T,) in [0, 1], mean detection score.
         sharpness: (T,) in [0, 1]; NaN: not measured, counts as 1.
+        clarity: (T,) 1 where the camera's picture is clear, else 0; None: all are.
     """
 
     boxes: Floats
     camera: NDArray[np.int64]
     confidence: Floats
     sharpness: Floats
+    clarity: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +155,11 @@ def _facing(inputs: _TermInputs) -> Floats:
     return whole_window[:, None]
 
 
+def _clarity(inputs: _TermInputs) -> Floats:
+    clarity = inputs.tracks.clarity
+    return np.ones((len(inputs.boxes), 1)) if clarity is None else clarity[:, None]
+
+
 TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
     "size": lambda inputs: size_quality(inputs.boxes, *inputs.layout.site_size),
     "truncation": lambda inputs: untruncated_share(inputs.boxes, inputs.picture_boxes),
@@ -160,6 +168,7 @@ TERMS: dict[str, Callable[[_TermInputs], Floats]] = {
     "sharpness": lambda inputs: np.nan_to_num(inputs.tracks.sharpness, nan=1.0)[:, None],
     "facing": _facing,
     "confidence": lambda inputs: inputs.tracks.confidence[:, None],
+    "clarity": _clarity,
 }
 """The terms by name; each is (T, N), or (T, 1) where all frames are alike; any value where hidden."""
 
@@ -172,6 +181,7 @@ def _check(tracks: TrackWindow, layout: CameraLayout) -> None:
         ("camera", tracks.camera),
         ("confidence", tracks.confidence),
         ("sharpness", tracks.sharpness),
+        ("clarity", tracks.confidence if tracks.clarity is None else tracks.clarity),
     ):
         if values.shape != shape[:1]:
             raise ValueError(f"{name} has shape {values.shape}, not ({shape[0]},)")

@@ -16,6 +16,7 @@ from bestview import shows_ground
 from server.camera.audio import LiveAudioSource
 from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
+from server.camera.knocks import motion_message, noticeable
 from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
 from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
@@ -31,6 +32,7 @@ from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
 from server.system.errors import UserError
 from tracking import Detections
+from tracking.detectors.background.motion import STILL, Motion
 from tracking.interactive import PositionCorrection
 from tracking.picture_condition import PictureMonitor
 
@@ -49,6 +51,7 @@ class DetectedFrame:
         detections: empty where detection did not run.
         has_detection: whether detection ran.
         message: the detections as sent to the peer cameras; None without peers.
+        motion: how the picture has moved since the camera was calibrated, pixels of the site's image.
         skipped: whether load shedding left the frame out.
     """
 
@@ -57,6 +60,7 @@ class DetectedFrame:
     detections: Detections
     has_detection: bool
     message: FrameDetections | None
+    motion: Motion = STILL
     skipped: bool = False
 
     @property
@@ -157,6 +161,11 @@ class CameraPipeline:
         """Whether a live camera delivers no frames; passthrough may have to wait for a GOP to begin."""
         return not self.source.recorded and self._missing > (self._away_after if self.is_passthrough else 0)
 
+    @property
+    def motion(self) -> Motion:
+        """How the picture has moved since the background was learned, pixels of the site's image."""
+        return noticeable(getattr(self._detector, "camera_motion", STILL), self._letterbox.site_size)
+
     def encode(self, pulse: int, image: Image) -> AccessUnit:
         """Encode the image of a pulse, which was the last one taken."""
         return self._encoder.encode(pulse, image)
@@ -177,12 +186,13 @@ class CameraPipeline:
             self.picture.observe(image, pulse)
             detections = self._detector.detect(image, pulse)
             has_detection = not self._detector.warming_up
+        motion = self.motion
         message = (
-            self.cross_view.build_message(pulse, detections if has_detection else None)
+            self.cross_view.build_message(pulse, detections if has_detection else None, motion)
             if self.cross_view
             else None
         )
-        return DetectedFrame(pulse, image, detections, has_detection, message, skipped=skipped)
+        return DetectedFrame(pulse, image, detections, has_detection, message, motion, skipped)
 
     def track_detections(
         self,
@@ -208,7 +218,7 @@ class CameraPipeline:
         if frame.image is None and pulse >= self.first_pulse:
             self._messages.add_without_image([pulse])
         if self.cross_view is not None and frame.depends_on_peers:
-            detections = self.cross_view.rescore(detections, peers.messages)
+            detections = self.cross_view.rescore(detections, peers.messages, frame.motion)
             if peers.is_incomplete:
                 self._messages.add_without_peers(pulse)
         result = (
@@ -236,8 +246,9 @@ class CameraPipeline:
         return self._add_picture(self._messages.closing(self._tracker.flush(), last), None)
 
     def _add_picture(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
-        """Add the picture's condition, and each track's sharpness where view quality uses it."""
-        tracks = msgspec.structs.replace(tracks, condition=self.picture.condition)
+        """Add the picture's condition and motion, and each track's sharpness where view quality uses it."""
+        motion = motion_message(self.motion)
+        tracks = msgspec.structs.replace(tracks, condition=self.picture.condition, motion=motion)
         return tracks if self._sharpness is None else self._sharpness.measure(tracks, image)
 
     def close(self) -> None:

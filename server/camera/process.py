@@ -18,6 +18,7 @@ from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, open_site_audio
 from server.camera.end_confirmation import EndConfirmation
+from server.camera.knocks import KnockLog, motion_message
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_exchange import PeerDetectionExchange
@@ -81,7 +82,8 @@ class CameraProcess:
         self._meter = StatusMeter(fps)
         self._state: CameraState = "starting"
         self._last_condition: PictureCondition = "clear"
-        self._condition_since = 0.0
+        self._condition_since = self._moved_since = 0.0
+        self._knocks = KnockLog(camera_id)
         self._end = 0
         """The first pulse after the recording, once that has ended."""
 
@@ -258,12 +260,17 @@ class CameraProcess:
 
     def _publish_status(self) -> None:
         condition, since = self._condition()
+        motion = motion_message(self._pipeline.motion)
+        if self._knocks.update(motion):
+            self._moved_since = self._clock()
         status = self._meter.status(self._id, self._boot, self._state, len(self._backlog), self._load)
         self._publisher.publish_status(
             msgspec.structs.replace(
                 status,
                 condition=condition,
                 condition_since=since,
+                motion=motion,
+                motion_since=0.0 if motion is None else self._moved_since,
                 position_corrections=self._corrections.count,
                 bad_messages=self._exchange.bad_messages + self._corrections.bad_messages,
             )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import msgspec
 
-from server.messaging.number_types import PULSE_MAX, Duration, Number, Time
+from server.messaging.number_types import PULSE_MAX, Coordinate, Duration, Number, Time
 
 PictureCondition = Literal["clear", "covered", "turned", "blurred", "noisy", "frozen"]
 """What is wrong with a camera's picture, as `tracking.picture_condition` finds it; clear: nothing."""
@@ -24,6 +25,24 @@ CONDITION_TEXTS: Mapping[PictureCondition, str] = {
 
 CameraState = Literal["starting", "live", "away", "ended"]
 """State of a camera; away: its source delivers no frames now."""
+
+
+class PictureMotion(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a picture lies since its camera was knocked: moved, enlarged and turned at its center."""
+
+    x: Coordinate
+    """Pixels of the site's image."""
+    y: Coordinate
+    grow: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)]
+    """The scale less 1."""
+    turn: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)]
+    """Sine of the angle, clockwise."""
+
+
+def motion_text(motion: PictureMotion) -> str:
+    """Return a motion in words."""
+    degrees = abs(math.degrees(math.asin(motion.turn)))
+    return f"it has moved by {math.hypot(motion.x, motion.y):.0f} pixels and {degrees:.1f} degrees"
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,6 +64,10 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """What is wrong with the picture."""
     condition_since: Time = 0.0
     """When that began, unix seconds by the camera's clock; 0: nothing is wrong."""
+    motion: PictureMotion | None = None
+    """How the picture has moved; null: not noticeably."""
+    motion_since: Time = 0.0
+    """Since when, unix seconds by the camera's clock."""
     load_level: Annotated[int, msgspec.Meta(ge=0, le=100)] = 0
     """Load-shedding level; 0: none."""
     load: Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[ -~]*\Z")] = ""

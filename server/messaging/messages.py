@@ -32,7 +32,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from server.messaging.camera_status import PictureCondition
+from server.messaging.camera_status import PictureCondition, PictureMotion
 from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 
@@ -157,6 +157,8 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Seconds of tracking at the end of the window; null offline."""
     condition: PictureCondition = "clear"
     """What is wrong with the picture at the end of the window."""
+    motion: PictureMotion | None = None
+    """How it has moved by then; null: not noticeably. Moved back, boxes match the homography."""
     risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None

@@ -31,9 +31,9 @@ _EDGE, _LEAST_TEXTURED = 1.0, 0.1
 _SEEN, _STANDS = 0.4, 0.7
 # Squared gradient, as a share of the reference's, below which a cell that is not seen is plain.
 _PLAIN = 0.3
-# Shares of the cells: seen ones with which the scene is there, and without which it is not; plain or other
-# ones from which the lens is covered, and plain ones from which nothing is left.
-_SCENE, _NO_SCENE = 0.5, 0.25
+# Shares of the cells: seen ones with which the scene is there, without which it is not, and with which it is
+# found elsewhere; plain or other ones from which the lens is covered, plain ones from which nothing is left.
+_SCENE, _NO_SCENE, _FOUND = 0.5, 0.25, 0.35
 _COVERED, _COVERED_WHOLLY = 0.4, 0.75
 # Share of fine detail that is left, relative to that of the gradients, below which the picture is blurred.
 _BLURRED, _LEAST_DETAIL = 0.3, 1e-6
@@ -96,19 +96,24 @@ class Reference:
         if shares.seen < _SCENE:
             size = (structure.gray.shape[1], structure.gray.shape[0])
             motion = self._find(structure, seconds)
-            if motion.distance(STILL, size) > _TURNED * size[0]:
-                return "turned"
             if motion != STILL:
-                structure, before = self._aligned(structure, motion), self._aligned(before, motion)
-                shares = self._shares(structure, before, noise)
-        edges = np.maximum(structure.edges - noise, 0.0)[textured]
-        if shares.plain <= _COVERED_WHOLLY and np.median(edges) < _NOISY * noise:
+                aligned = self._aligned(structure, motion)
+                moved = self._shares(aligned, self._aligned(before, motion), noise)
+                if moved.seen >= max(_FOUND, shares.seen):
+                    if motion.distance(STILL, size) > _TURNED * size[0]:
+                        return "turned"
+                    structure, shares = aligned, moved
+        edges = np.maximum(structure.edges - noise, 0.0)
+        if shares.plain <= _COVERED_WHOLLY and np.median(edges[textured]) < _NOISY * noise:
             return "noisy"
         if hidden := shares.hidden():
             return hidden
-        sharp = np.median(detail[textured]) / max(float(np.median(self._detail[textured])), _LEAST_DETAIL)
-        contrast = np.median(edges / self._structure.edges[textured])
-        return "blurred" if shares.seen >= _NO_SCENE and sharp < _BLURRED * contrast else "clear"
+        seen = textured & (structure.agreement(self._structure) >= _SEEN)
+        if shares.seen < _NO_SCENE or not seen.any():
+            return "clear"
+        sharp = np.median(detail[seen] / np.maximum(self._detail[seen], _LEAST_DETAIL))
+        contrast = np.median(edges[seen] / self._structure.edges[seen])
+        return "blurred" if sharp < _BLURRED * contrast else "clear"
 
     def is_seen(self, structure: Structure) -> bool:
         """Return whether a picture shows the scene where it was."""

@@ -19,6 +19,7 @@ const FIELDS = [
   ['quality.truncation', 'Truncation', "How much of the person is inside the picture."],
   ['quality.occlusion', 'Occlusion', 'How much of the person is not occluded by others.'],
   ['quality.centering', 'Centering', 'How near the middle of the picture.'],
+  ['quality.clarity', 'Clear picture', 'Whether the picture is clear: not covered, turned away, blurred, dark or frozen.'],
   ['quality.sharpness', 'Sharpness', 'How much detail there is; cameras measure it only if the file has a weight for it.'],
   ['quality.facing', 'Facing', 'Walking towards the camera, not away from it; needs the ground.'],
   ['quality.confidence', 'Confidence', 'Confidence of the track.'],

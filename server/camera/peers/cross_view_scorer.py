@@ -14,6 +14,7 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections
 from server.messaging.number_types import COORDINATE_MAX
 from tracking import Detections
+from tracking.detectors.background.motion import STILL, Motion
 
 Floats = NDArray[np.float64]
 
@@ -40,14 +41,17 @@ class CrossViewScorer:
         """By peer: its image size, and its geometry; None: it sees none of this camera's ground."""
 
     def build_message(
-        self, pulse: int, detections: Detections | None, *, ended: bool = False
+        self, pulse: int, detections: Detections | None, motion: Motion = STILL, *, ended: bool = False
     ) -> FrameDetections:
-        """Build the message about a frame, in the camera's pixels; None: detection did not run."""
+        """Build the message about a frame, in the camera's pixels; None: detection did not run.
+
+        ``motion``: of the camera since it was calibrated; boxes are where they were before.
+        """
         boxes = None
         if detections is not None:
             # The most confident ones, in the detector's order.
             top = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
-            boxes_px = self._letterbox.boxes_site_to_camera(detections.boxes[top]).round(_PIXEL_DIGITS)
+            boxes_px = self._calibrated(detections.boxes[top], motion).round(_PIXEL_DIGITS)
             scores = detections.scores[top].round(_SCORE_DIGITS)
             rows = np.clip(np.column_stack([boxes_px, scores]), -COORDINATE_MAX, COORDINATE_MAX)
             boxes = [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
@@ -59,17 +63,25 @@ class CrossViewScorer:
         """Return whether the sender of a message sees ground that this camera sees."""
         return self._geometry_of(message) is not None
 
-    def rescore(self, detections: Detections, messages: Sequence[FrameDetections]) -> Detections:
+    def rescore(
+        self, detections: Detections, messages: Sequence[FrameDetections], motion: Motion = STILL
+    ) -> Detections:
         """Return the detections with scores corrected by the peers' detections of the same frame."""
         peers = [
             (geometry, _camera_detections(message.boxes))
             for message in messages
             if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]
-        found = CameraDetections(self._letterbox.boxes_site_to_camera(detections.boxes), detections.scores)
+        found = CameraDetections(self._calibrated(detections.boxes, motion), detections.scores)
         return replace(
             detections, scores=rescore_detections(self._geometry, found, peers, self._config.track.cross_view)
         )
+
+    def _calibrated(self, boxes: Floats, motion: Motion) -> Floats:
+        """Return boxes of the site's image in the camera's pixels, where they were before it moved."""
+        if motion != STILL:
+            boxes = motion.move_boxes_back(boxes, self._letterbox.site_size)
+        return self._letterbox.boxes_site_to_camera(boxes)
 
     def _geometry_of(self, message: FrameDetections) -> CameraGeometry | None:
         cached = self._peers.get(message.camera)

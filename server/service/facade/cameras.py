@@ -8,6 +8,7 @@ import numpy as np
 from server.media.letterbox import Letterbox
 from server.service.calibration.floor_map import floor_coverage
 from server.service.facade.errors import UnknownCameraError
+from server.service.identity.picture_motion import moved_homography
 from server.service.ingest.ingest import CameraState
 from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
 from server.service.pipeline import BestViewPipeline
@@ -121,10 +122,13 @@ class CameraService:
             size = self._pipeline.ingest.states[camera.id].metrics.size
             if camera.ground is not None and size is not None:
                 ground = np.array(camera.ground, dtype=np.float64)
-                coverage = floor_coverage(ground, size, (config.site.width, config.site.height))
-                cameras.append(
-                    FloorCamera(camera.id, coverage.site_homography.tolist(), coverage.outline.tolist())
+                site = (config.site.width, config.site.height)
+                coverage = floor_coverage(ground, size, site)
+                status = self._pipeline.ingest.states[camera.id].status
+                homography = moved_homography(
+                    coverage.site_homography, status.motion if status else None, site
                 )
+                cameras.append(FloorCamera(camera.id, homography.tolist(), coverage.outline.tolist()))
         return Floor(cameras, [camera.id for camera in config.cameras if camera.ground is None])
 
     def _info(self, camera: str, state: CameraState) -> CameraInfo:

@@ -13,6 +13,7 @@ from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
 from server.service.identity.local_numbers import LocalNumbers
+from server.service.identity.picture_motion import calibrated_boxes
 from server.service.ingest.box_arrays import boxes_array
 from server.service.ingest.epoch_aligner import Epoch
 
@@ -45,11 +46,15 @@ class CameraWindow:
         return self.message.first
 
     def fresh_tracks(self) -> list[TrackUpdate]:
-        """Return the newly final, visible parts of the tracks, boxes in the camera's own pixels."""
+        """Return the newly final, visible parts of the tracks, boxes in the camera's own pixels.
+
+        If the camera has been knocked, they are where its homography holds.
+        """
         _, height = self.message.size
         final = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, final, 0])
-        camera_boxes = self.letterbox.boxes_site_to_camera(self.boxes[:, final])
+        boxes = calibrated_boxes(self.boxes[:, final], self.message.motion, self.letterbox.site_size)
+        camera_boxes = self.letterbox.boxes_site_to_camera(boxes)
         return [
             TrackUpdate(
                 camera=key.camera,

@@ -7,6 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 
 import msgspec
 
@@ -14,7 +15,7 @@ from camsync.lines import RateLimit
 from logthrottle import LogThrottle
 from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
-from server.messaging.camera_status import CONDITION_TEXTS, CameraStatus
+from server.messaging.camera_status import CONDITION_TEXTS, CameraStatus, motion_text
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
@@ -85,6 +86,9 @@ class CameraState:
         texts = [self.status.load]
         if self.status.condition != "clear":
             texts.insert(0, CONDITION_TEXTS[self.status.condition])
+        if self.status.motion is not None:
+            since = datetime.fromtimestamp(self.status.motion_since).astimezone()
+            texts.insert(0, f"{motion_text(self.status.motion)} since {since:%H:%M}: calibrate it again")
         return "; ".join(filter(None, texts))
 
     def count_bad_message(self, reason: Exception | str) -> None:

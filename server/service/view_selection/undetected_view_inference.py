@@ -95,7 +95,8 @@ class UndetectedViewInference:
         touched = boxes_touching_others(
             expected, picture, samples.boxes, sample_picture, shape[1] * shape[2], self._size
         )
-        quality = _quality(expected, camera, floor.layout, self._quality_buffer.settings)
+        clarity = np.array([self._quality_buffer.clarity(self._cameras[at]) for at in floor.cameras])
+        quality = _quality(expected, camera, clarity[camera], floor.layout, self._quality_buffer.settings)
         quality *= probability[is_probable] * np.where(touched, 1.0, _NO_BOX_FACTOR)
         # Each view holds for the frames up to the next inference.
         frame = time * self._interval + np.arange(self._interval)[:, None]
@@ -189,12 +190,14 @@ def _detection_samples(
     return _DetectionSamples(people, tracks.boxes(boxes), place, time, camera, can_detect, detected)
 
 
-def _quality(boxes: Floats, camera: Ints, layout: CameraLayout, settings: QualitySettings) -> Floats:
+def _quality(
+    boxes: Floats, camera: Ints, clarity: Floats, layout: CameraLayout, settings: QualitySettings
+) -> Floats:
     """Return the quality of V views by their boxes (V, 4), each by itself, (V,).
 
     Occlusion is left out: where two boxes overlap and one is inferred, either may be in front.
     """
     if not any(weight for name, weight in settings.weights.items() if name != "occlusion"):
         return np.ones(len(boxes))
-    tracks = TrackWindow(boxes[:, None], camera, np.ones(len(boxes)), np.full(len(boxes), np.nan))
+    tracks = TrackWindow(boxes[:, None], camera, np.ones(len(boxes)), np.full(len(boxes), np.nan), clarity)
     return compute_view_quality(tracks, layout, replace(settings, occlusion=0.0)).quality[:, 0]

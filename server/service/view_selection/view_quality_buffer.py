@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from bestview.quality import CameraLayout, QualitySettings, TrackWindow, ViewQuality, compute_view_quality
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
+from server.messaging.camera_status import PictureMotion
 from server.service.identity.camera_window import CameraWindow
+from server.service.identity.picture_motion import moved_homography
 from server.service.ingest.window_history import HistorySpan, WindowHistory
 
 Floats = NDArray[np.float64]
@@ -49,10 +51,15 @@ class ViewQualityBuffer:
         self._fps = config.site.fps
         self._homographies, self.letterboxes = homographies, letterboxes
         self._overhead = config.overhead
+        self._clarity = dict.fromkeys(config.camera_ids, 1.0)
+        self._motion: dict[str, PictureMotion | None] = dict.fromkeys(config.camera_ids)
         self._histories = {camera: WindowHistory[WindowQuality]() for camera in config.camera_ids}
 
     def put(self, windows: Sequence[CameraWindow]) -> None:
         """Add the windows of an epoch."""
+        for window in windows:
+            self._clarity[window.message.camera] = _clarity(window)
+            self._motion[window.message.camera] = window.message.motion
         for quality in self._qualities(windows):
             first, frames = quality.window.first, len(quality.quality)
             self._histories[quality.window.message.camera].put(quality, first, first + frames - 1)
@@ -68,6 +75,10 @@ class ViewQualityBuffer:
     def over(self, camera: str, first: int, last: int) -> list[HistorySpan[WindowQuality]]:
         """Return the newest quality of a camera's frames from `first` to `last`."""
         return self._histories[camera].over(first, last)
+
+    def clarity(self, camera: str) -> float:
+        """Return 1 if a camera's newest picture is clear, else 0."""
+        return self._clarity[camera]
 
     def forget_before(self, pulse: int) -> None:
         """Drop the frames before a pulse."""
@@ -99,6 +110,7 @@ class ViewQualityBuffer:
                 np.clip(np.array([track.confidence for track in tracks], dtype=np.float64), 0.0, 1.0),
                 # None, not measured, becomes NaN.
                 np.array([track.sharpness for track in tracks], dtype=np.float64),
+                np.repeat([_clarity(window) for window in windows], [len(window.keys) for window in windows]),
             ),
             self.layout([window.message.camera for window in windows]),
             self.settings,
@@ -124,7 +136,12 @@ class ViewQualityBuffer:
             self.letterboxes[camera].scale,
         )
         to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
-        return np.asarray(homography @ to_camera)
+        size = self.letterboxes[camera].site_size
+        return moved_homography(np.asarray(homography @ to_camera), self._motion[camera], size)
+
+
+def _clarity(window: CameraWindow) -> float:
+    return float(window.message.condition == "clear")
 
 
 def _stacked_boxes(windows: Sequence[CameraWindow], start: int) -> Floats:

@@ -218,6 +218,13 @@ class BackgroundDetector:
             self._height_estimator = HeightModelEstimator(self.settings.height_model, self.fps)
 
     @property
+    def camera_motion(self) -> Motion:
+        """Where the camera has come to rest since the background was learned, in pixels of the images."""
+        if self._grid is None or not isinstance(self._background, MedianBackground):
+            return STILL
+        return self._background.rest.scaled(1.0 / self._grid.work_scale)
+
+    @property
     def appearance_bins(self) -> int:
         """The length of a row of the histograms."""
         return self._appearance.bins

@@ -83,6 +83,11 @@ class MedianBackground:
         self._last: Image | None = None
         """The last frame, where the background is."""
 
+    @property
+    def rest(self) -> Motion:
+        """Where the camera has come to rest since the background was learned."""
+        return self._registration.rest
+
     def prepare(self, images: Sequence[Image]) -> None:
         """Learn the background from images before the first frame; without any, learn it live."""
         for image in images:

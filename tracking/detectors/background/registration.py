@@ -102,7 +102,7 @@ class Registration:
         return motion if moved and motion.distance(STILL, size) >= _SAME * size[0] / 360.0 else STILL
 
     def search(self, image: Image) -> Motion | None:
-        """Return the motion of an image from anywhere, at any light; None: the background is not in it."""
+        """Return the likeliest motion of an image at any light, from anywhere; None: none is plausible."""
         points = self._points
         if points is None or points.count < _MIN_POINTS:
             return None
@@ -110,9 +110,8 @@ class Registration:
         alignment = points.under(IDENTITY, None)
         starts = (STILL, *alignment.coarse_starts(gray, STILL))
         found = (alignment.refine(gray, start, _STEPS_OF_SEARCH) for start in starts)
-        motion, agreement = max(found, key=lambda each: each[1])
-        size = (image.shape[1], image.shape[0])
-        return motion if agreement >= _MIN_AGREEMENT and _is_plausible(motion, size) else None
+        motion, _ = max(found, key=lambda each: each[1])
+        return motion if _is_plausible(motion, (image.shape[1], image.shape[0])) else None
 
     def _settle(self, motion: Motion, size: tuple[int, int], elapsed: float) -> Motion:
         """Return the motion, or the rest where they are the same; a lasting one becomes the rest."""

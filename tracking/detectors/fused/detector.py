@@ -107,6 +107,11 @@ class FusedDetector:
         return self._schedule.every
 
     @property
+    def camera_motion(self) -> Motion:
+        """Where the camera has come to rest since the background was learned, in pixels of the images."""
+        return self._background.camera_motion
+
+    @property
     def appearance_bins(self) -> int:
         """The length of a row of the histograms."""
         return self._background.appearance_bins

@@ -28,6 +28,7 @@ from fakes.service.scripted_cameras import (
     video,
 )
 from server.media.stream_format import StreamFormat
+from server.messaging.camera_status import PictureMotion
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 from server.service.identity.people import PersonTracker
@@ -116,6 +117,15 @@ def test_a_picture_that_is_not_clear_is_the_cameras_message_and_its_last_error()
     assert state.metrics.last_error == first, "it is recorded once"
     served.handle("status", status("c0"))
     assert state.message == ""
+
+
+def test_a_camera_that_was_knocked_is_to_be_calibrated_again() -> None:
+    served = IngestWithBuffers()
+    motion = PictureMotion(x=6.0, y=0.0, grow=0.0, turn=0.0175)
+    served.handle("status", status("c0", motion=motion, motion_since=60.0))
+    message = served.ingest.states["c0"].message
+    assert message.startswith("it has moved by 6 pixels and 1.0 degrees since ")
+    assert message.endswith(": calibrate it again")
 
 
 anything = st.recursive(
