@@ -16,8 +16,9 @@ from pathlib import Path
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.public_detections import Recording, TrackSettings, find_recordings, track
 from benchmarks.common.report import Report
-from tracking import PAPER_COSTS
+from tracking import PAPER, PAPER_COSTS, PAPER_CVPR
 from tracking.evaluation import Scores, average_scores
+from tracking.paper import MORE_THAN_75_PERCENT
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +54,19 @@ ABLATIONS = (
     Ablation("window of 0.2 seconds", {"window": {"length_s": 0.2, "birth_s": 0.2, "min_frames": 3}}),
     Ablation("no re-identification", {"window": {"reidentify_max_distance": 0.0}}),
     Ablation("fixed templates", {"window": {"template_update_rate": 0.0}}),
+    Ablation("the paper's layout term", {"costs": {"layout": PAPER.costs.layout}}),
+    Ablation("unknown appearance costs nothing", {"costs": {"unknown_appearance": 0.0}}),
+    Ablation("hiding costs c_b alone (CVPR)", {"costs": {"occlusion_adds_change": False}}),
+    Ablation(
+        "births in more than 75 % of the frames", {"window": {"birth_min_visible": MORE_THAN_75_PERCENT}}
+    ),
+    Ablation("windows overlap in one frame", {"window": {"stride_s": 0.6}}),
+    Ablation("duplicates are kept", {"window": {"duplicate_overlap": 1.0}}),
     Ablation("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
+    Ablation("the paper", {"costs": asdict(PAPER.costs), "window": asdict(PAPER.window)}),
+    Ablation("the CVPR paper", {"costs": asdict(PAPER_CVPR.costs), "window": asdict(PAPER_CVPR.window)}),
 )
-"""The parts that are switched off, one at a time."""
+"""The parts that are switched off, one at a time: each way in which MyView differs from the paper."""
 
 SCORES = ("idf1", "hota", "mota", "switches")
 _NAMES = {"idf1": "IDF1, %", "hota": "HOTA, %", "mota": "MOTA, %", "switches": "identity switches"}

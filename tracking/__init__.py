@@ -10,6 +10,7 @@ from tracking.interpolation import interpolate_detections
 from tracking.model.network import Network, build_network
 from tracking.model.object_state import Template
 from tracking.model.settings import PAPER_COSTS, CostSettings
+from tracking.paper import PAPER, PAPER_CVPR, PaperPreset
 from tracking.solvers.base import DEFAULT_SOLVER, Solution, Solver, SolveReport, create_solver, solver_names
 from tracking.solvers.budget import SolverBudget
 from tracking.template_tracker import TemplateTracker
@@ -26,12 +27,15 @@ from tracking.window import (
 
 __all__ = [
     "DEFAULT_SOLVER",
+    "PAPER",
     "PAPER_COSTS",
+    "PAPER_CVPR",
     "AppearanceHistogram",
     "CostSettings",
     "Detections",
     "Network",
     "OnlineTracker",
+    "PaperPreset",
     "ResolvedWindowSettings",
     "Solution",
     "SolveReport",

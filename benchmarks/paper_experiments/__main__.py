@@ -21,11 +21,11 @@ from benchmarks.paper_experiments.label_errors import LabelErrors, judge, per_fr
 from benchmarks.paper_experiments.plots import plot
 from benchmarks.paper_experiments.scene import ExperimentScene
 from benchmarks.paper_experiments.windowed_tracking import TrackedLabels, follow
-from tracking import create_solver
+from tracking import SolverBudget, create_solver
 
 _PLOTTED = ("columns", "greedy-dp", "separate-dp")
-_LINEAR = ("columns", "exact")
-"""Solvers that report whether the linear program was integral."""
+BUDGET = SolverBudget(work_s=60.0)
+"""Of each segment: branch and bound may take for ever under the layout term."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class SolverOutcome:
 
 def attempt(scene: ExperimentScene, setting: TrackerSetting, solver: str) -> SolverOutcome:
     """Track the objects of a scene, and count the errors of the labels."""
-    followed = follow(scene, setting.costs, setting.window, create_solver(solver))
+    followed = follow(scene, setting.costs, setting.window, create_solver(solver, BUDGET))
     return SolverOutcome(followed, judge(scene, followed.boxes))
 
 

@@ -9,27 +9,9 @@ from benchmarks.paper_experiments.drawn_toys import play_toys
 from benchmarks.paper_experiments.noisy_detections import SceneParameters, play
 from benchmarks.paper_experiments.scene import ExperimentScene
 from benchmarks.paper_experiments.walking_people import WalkParameters
-from tracking import PAPER_COSTS, CostSettings, WindowSettings
-
-_FOR_EVER = 1_000_000
-_FPS = 25.0
-"""The trackers' default: the paper counts in frames."""
-PAPER_WINDOW = WindowSettings(
-    length_s=19 / _FPS,
-    stride_s=18 / _FPS,
-    birth_s=19 / _FPS,
-    gate_heights=_FOR_EVER,
-    max_height_ratio=_FOR_EVER,
-    reidentify_after_s=_FOR_EVER,
-    forget_after_s=_FOR_EVER,
-    template_update_rate=0.0,
-)
-"""Segments of 20 frames, including the templates' one, with a stride of 18: so 1351 frames are 75 segments
-and 2431 are 135, as in the paper. No gating, and tracks are never terminated."""
+from tracking import PAPER, PAPER_CVPR, CostSettings, PaperPreset, WindowSettings
 
 SOLVERS = ("columns", "exact", "greedy-dp", "separate-dp")
-LAYOUT = 0.0005
-"""μ of the layout term: cost of a jump of one side of a box by a pixel, for each pair."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,34 +47,36 @@ class Experiment:
     scenes: int = 5
 
 
+def _paper(preset: PaperPreset, name: str = "paper", *solvers: str) -> TrackerSetting:
+    return TrackerSetting(name, preset.costs, preset.window, solvers or SOLVERS)
+
+
 def _settings(
-    paper: CostSettings, default: CostSettings, *more: TrackerSetting
+    preset: PaperPreset, default: CostSettings, *more: TrackerSetting
 ) -> tuple[TrackerSetting, ...]:
+    """Return the preset, it without layout term, further settings, and MyView's."""
+    no_layout = replace(preset, costs=replace(preset.costs, layout=0.0))
     return (
-        TrackerSetting("paper", paper, PAPER_WINDOW),
+        _paper(preset),
         *more,
+        _paper(no_layout, "paper, no layout term"),
         TrackerSetting("default", default, WindowSettings()),
     )
 
 
-def _layout(costs: CostSettings) -> TrackerSetting:
-    return TrackerSetting("paper, layout", replace(costs, layout=LAYOUT), PAPER_WINDOW, ("columns",))
-
-
-def _whole(frames: int, costs: CostSettings = PAPER_COSTS) -> TrackerSetting:
+def _whole(frames: int, preset: PaperPreset = PAPER, name: str = "paper, one segment") -> TrackerSetting:
     """Return settings that solve the whole sequence at once, as the paper does here."""
-    window = replace(PAPER_WINDOW, length_s=frames / _FPS, stride_s=frames / _FPS, birth_s=frames / _FPS)
-    return TrackerSetting("paper, one window", costs, window)
+    return _paper(preset.with_segments(frames - 1), name)
 
 
 # Sub-images differ less than histograms do, and by their mean difference: c_a and c_b are set between an
 # object's difference to itself and to others, as the paper asks (II.B).
-_TOYS = replace(PAPER_COSTS, measure="intersection", change=0.05, occlusion=0.12)
+_TOYS = replace(PAPER, costs=replace(PAPER.costs, measure="intersection", change=0.05, occlusion=0.12))
 _TOYS_DEFAULT = replace(CostSettings(), measure="intersection", change=0.1, occlusion=0.35)
 
 # The same for the three people, whose boxes are worse: 95 % of their own are nearer than 0.29, 95 % of the
 # others' further than 0.45. A larger c_b puts the label of who has left on the background.
-_THREE_COSTS = replace(PAPER_COSTS, occlusion=0.35)
+_THREE_PEOPLE = replace(PAPER, costs=replace(PAPER.costs, occlusion=0.35))
 
 _EXAMPLE_FRAMES, _TOYS_FRAMES, _TWO_FRAMES, _THREE_FRAMES, _FOUR_FRAMES = 340, 307, 1351, 2431, 500
 """The lengths of the paper's recordings."""
@@ -117,11 +101,10 @@ EXPERIMENTS = (
         "two people who meet (Example 1)",
         "Fig. 8",
         lambda seed: play(_EXAMPLE, seed),
-        _settings(
-            PAPER_COSTS,
-            CostSettings(),
+        (
             _whole(_EXAMPLE_FRAMES),
-            _layout(PAPER_COSTS),
+            _whole(_EXAMPLE_FRAMES, PAPER_CVPR, "CVPR paper, one segment"),
+            *_settings(PAPER, CostSettings()),
         ),
         "integral in one window of 340 frames; greedy DP wrong at two meetings",
     ),
@@ -130,7 +113,7 @@ EXPERIMENTS = (
         "two toys, template matching",
         "Fig. 12",
         lambda seed: play_toys(_TOYS_FRAMES, seed),
-        _settings(_TOYS, _TOYS_DEFAULT, _layout(_TOYS)),
+        _settings(_TOYS, _TOYS_DEFAULT),
         "LP right in all of 307 frames",
         scenes=3,
     ),
@@ -139,7 +122,7 @@ EXPERIMENTS = (
         "two fast players",
         "Fig. 14",
         lambda seed: play(_TWO, seed),
-        _settings(PAPER_COSTS, CostSettings()),
+        _settings(PAPER, CostSettings()),
         "LP 0.01 wrong per frame; 72 of 75 windows integral",
     ),
     Experiment(
@@ -147,7 +130,7 @@ EXPERIMENTS = (
         "three people leaving and returning",
         "Fig. 18",
         lambda seed: play(_THREE, seed),
-        _settings(_THREE_COSTS, CostSettings()),
+        _settings(_THREE_PEOPLE, CostSettings()),
         "LP 0.06 wrong per frame, greedy DP 0.17; 131 of 135 windows integral",
     ),
     Experiment(
@@ -155,7 +138,7 @@ EXPERIMENTS = (
         "four players in two kits",
         "Fig. 20",
         lambda seed: play(_FOUR, seed),
-        _settings(PAPER_COSTS, CostSettings(), _whole(_FOUR_FRAMES), _layout(PAPER_COSTS)),
+        _settings(PAPER, CostSettings(), _whole(_FOUR_FRAMES)),
         "branch and bound in one window of 500 frames: some exchanges in a kit",
     ),
 )

@@ -13,6 +13,9 @@ from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import Solution, create_solver
 
+COSTS = replace(PAPER_COSTS, conflict_rows="clique")
+"""The paper's costs with the rows of the live tracker."""
+
 GATE = 60.0
 """Pixels per frame: ten times what people move at 25 frames a second and CIF."""
 
@@ -33,7 +36,7 @@ class WindowCase:
 
     def network(self, seed: int, gate: float | None = None) -> Network:
         """Build the network of a window."""
-        return self.window(self.size, replace(PAPER_COSTS, layout=self.layout, gate=gate), seed)
+        return self.window(self.size, replace(COSTS, layout=self.layout, gate=gate), seed)
 
 
 CASES = (
@@ -76,7 +79,7 @@ def seconds(solver: str, network: Network, repeats: int = 1) -> float:
 
 def warm_up() -> None:
     """Solve once, so that solvers load their libraries."""
-    seconds("columns", random_window(WindowSize(2, 5, 3), PAPER_COSTS, 0))
+    seconds("columns", random_window(WindowSize(2, 5, 3), COSTS, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +109,7 @@ class LiveTimes:
 
 def live(size: WindowSize, steps: int, *, warm: bool) -> LiveTimes:
     """Solve windows at a stride of one frame; `warm`: each with the warm start of the previous one."""
-    solver, settings = create_solver("columns"), replace(PAPER_COSTS, gate=GATE)
+    solver, settings = create_solver("columns"), replace(COSTS, gate=GATE)
     times, rounds = [], []
     hint = None
     for templates, frames in moving_windows(size, steps, seed=0):

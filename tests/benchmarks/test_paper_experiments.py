@@ -11,14 +11,14 @@ import pytest
 from benchmarks.common.report import Report
 from benchmarks.paper_experiments.__main__ import run
 from benchmarks.paper_experiments.drawn_toys import TOYS, play_toys
-from benchmarks.paper_experiments.experiment_list import PAPER_WINDOW, Experiment, TrackerSetting
+from benchmarks.paper_experiments.experiment_list import EXPERIMENTS, Experiment, TrackerSetting
 from benchmarks.paper_experiments.label_errors import judge, named, per_frame
 from benchmarks.paper_experiments.noisy_detections import SceneParameters, play
 from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
 from benchmarks.paper_experiments.walking_people import WalkParameters
 from benchmarks.paper_experiments.windowed_tracking import follow
 from fakes.tracking.windows import window_of_frames
-from tracking import PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, create_solver
+from tracking import PAPER, PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, create_solver
 from tracking.boxes import iou
 
 FRAMES = 40
@@ -111,8 +111,8 @@ def test_people_who_are_not_known_are_found() -> None:
 
 def test_separate_paths_share_boxes_where_the_program_does_not() -> None:
     scene = play(SceneParameters((0, 0), FRAMES, WalkParameters(6.0, 0.25, side=140.0)), 3)
-    together = follow(scene, PAPER_COSTS, PAPER_WINDOW, create_solver("columns"))
-    apart = follow(scene, PAPER_COSTS, PAPER_WINDOW, create_solver("separate-dp"))
+    together = follow(scene, PAPER.costs, PAPER.window, create_solver("columns"))
+    apart = follow(scene, PAPER.costs, PAPER.window, create_solver("separate-dp"))
     assert sum(report.conflicts for report in together.reports) == 0
     assert sum(report.conflicts for report in apart.reports) > 0
 
@@ -127,7 +127,7 @@ def test_toys_in_full_view_are_among_their_own_peaks() -> None:
 
 
 def test_an_experiment_prints_its_table_and_saves_its_plot(tmp_path: Path) -> None:
-    settings = (TrackerSetting("paper", PAPER_COSTS, PAPER_WINDOW),)
+    settings = (TrackerSetting("paper", PAPER.costs, PAPER.window),)
     experiment = Experiment(
         "tiny", "two people", "Fig. 0", lambda seed: play(CAST, seed), settings, "nothing"
     )
@@ -138,3 +138,20 @@ def test_an_experiment_prints_its_table_and_saves_its_plot(tmp_path: Path) -> No
     assert "paper: separate-dp" in text
     assert "3 of 3" in text
     assert (tmp_path / "paper_experiments-tiny.png").stat().st_size > 10_000
+
+
+def test_the_papers_first_example_is_solved_to_the_letter_in_one_segment() -> None:
+    """340 frames, both objects known, layout term, corner rule and star rows.
+
+    The program is integral without the layout term, and nearly so with it.
+    """
+    [example] = [experiment for experiment in EXPERIMENTS if experiment.name == "example"]
+    scene, setting = example.play(1), example.settings[0]
+    costs = setting.costs
+    assert (costs.layout > 0.0, costs.conflict_rule, costs.conflict_rows) == (True, "corners", "star")
+    followed = follow(scene, costs, setting.window, create_solver("columns"))
+    [report] = followed.reports
+    assert report.gap < 0.003
+    assert followed.boxes.shape[1] == 340
+    [free] = follow(scene, replace(costs, layout=0.0), setting.window, create_solver("columns")).reports
+    assert (free.integral, free.status) == (True, "optimal")

@@ -154,7 +154,7 @@ class _BirthTest:
         found[1:] = solution.states[0]
         occluded = np.count_nonzero(found == OCCLUDED)
         # The cost of the visible frames: the path's cost minus that of occluded frames and of the sink.
-        constant = self.costs.change + self.costs.occlusion
+        constant = self.costs.hidden
         visible = len(later) - occluded
         cost = solution.report.objective - constant * (occluded + 1)
         if visible and cost / visible > self.window.birth_max_cost:

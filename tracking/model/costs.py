@@ -71,7 +71,7 @@ def node_costs(distances: Floats, places: ObservationArrays, settings: CostSetti
     score_costs = settings.confidence * (1.0 - places.scores)
     costs[:, :, :width] = distances + score_costs
     costs[:, :, :width][~np.broadcast_to(places.present, costs[:, :, :width].shape)] = np.inf
-    costs[:, :, width] = settings.change + settings.occlusion
+    costs[:, :, width] = settings.hidden
     return costs
 
 
@@ -121,7 +121,7 @@ def transition_costs(motion: MotionCosts | None, places: ObservationArrays, sett
 
 def sink_costs(objects: int, places: ObservationArrays, settings: CostSettings) -> Floats:
     """Return the constant costs of arcs to the sink, (n, S)."""
-    return np.full((objects, places.present.shape[2] + 1), settings.change + settings.occlusion)
+    return np.full((objects, places.present.shape[2] + 1), settings.hidden)
 
 
 def _displacement_costs(before: Floats, after: Floats, settings: CostSettings) -> Floats:

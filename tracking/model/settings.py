@@ -25,7 +25,8 @@ class CostSettings:
     """Costs of paths through the network, and rules for conflicting places.
 
     An arc between two observations costs g(template, target) + λ1 g(from, to) + λ2 d(from, to); an arc
-    out of an occlusion c_a + g(template, target); an arc into an occlusion or into the sink c_a + c_b.
+    out of an occlusion c_a + g(template, target); an arc into an occlusion or into the sink c_a + c_b, or c_b
+    alone (`occlusion_adds_change`).
 
     Raises:
         ValueError: a weight is negative, or a gate or threshold is not positive.
@@ -42,6 +43,9 @@ class CostSettings:
     change: float = 0.3
     # c_b: above the appearance difference of one object to itself, below that of two objects.
     occlusion: float = 0.8
+    # Whether an arc into an occlusion or into the sink costs c_a + c_b (the journal paper), or c_b alone (the
+    # CVPR paper).
+    occlusion_adds_change: bool = True
     # Cost of an observation of score 0, decreasing to 0 at score 1: a hypothesis without evidence costs
     # nearly as much as an occlusion. 0 is the paper.
     confidence: float = 0.7
@@ -107,6 +111,11 @@ class CostSettings:
         if not self.conflict_overlap > 0.0:
             raise ValueError(f"conflict_overlap must be positive, not {self.conflict_overlap}")
 
+    @property
+    def hidden(self) -> float:
+        """The cost of an arc into an occlusion or into the sink."""
+        return self.change + self.occlusion if self.occlusion_adds_change else self.occlusion
+
     def for_fps(self, fps: float) -> CostSettings:
         """Return the settings for so many frames per second.
 
@@ -135,5 +144,7 @@ PAPER_COSTS = CostSettings(
     occlusion=0.5,
     unknown_appearance=0.0,
     conflict_rule="corners",
+    conflict_rows="star",
 )
-"""The costs of paper II.B, in pixels of a CIF image (the defaults do not depend on the image size)."""
+"""The costs and rows of paper II.B to II.D without layout term, in pixels of a CIF image (the defaults do not
+depend on the image size). `tracking.paper` has the whole tracker."""

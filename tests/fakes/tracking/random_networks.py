@@ -15,7 +15,7 @@ from tracking.solvers.objective import conflict_count, total_cost
 from tracking.types import Detections
 
 BINS = 4
-SETTINGS = PAPER_COSTS
+SETTINGS = replace(PAPER_COSTS, conflict_rows="clique")
 SPARSE = 0.3
 """Share of windows and frames with fewer observations, down to none."""
 MOTION = {"motion": 0.2, "reappearance": 1.0, "disappearance": 1.0}

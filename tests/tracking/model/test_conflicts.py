@@ -16,7 +16,7 @@ from tracking.solvers.cutting_planes import ConflictSeparator
 from tracking.types import Detections
 
 PERSON = np.array([0.0, 0.0, 20.0, 50.0])
-CORNERS = replace(PAPER_COSTS, conflict_distance=60.0)
+CORNERS = replace(PAPER_COSTS, conflict_distance=60.0, conflict_rows="clique")
 random_networks = settings(deadline=None, max_examples=60)
 
 

@@ -103,7 +103,7 @@ def rival_network(first: int, frames: int = 6) -> Network:
 
 
 def costs() -> CostSettings:
-    return replace(PAPER_COSTS, displacement=0.003, conflict_distance=60.0)
+    return replace(PAPER_COSTS, displacement=0.003, conflict_distance=60.0, conflict_rows="clique")
 
 
 def test_if_the_old_prices_hold_no_program_is_solved() -> None:

@@ -135,13 +135,17 @@ def run_highs(solver: highspy.Highs, meter: BudgetMeter | None = None) -> Linear
     )
 
 
+_NODE_ENTRY = 2e-6
+"""Seconds of work for an entry of the matrix in a node of branch and bound."""
+
+
 def solve_program(
     program: LinearProgram, integer: NDArray[np.bool_] | None = None, meter: BudgetMeter | None = None
 ) -> LinearSolution:
     """Solve one program; columns where `integer` is true take integer values.
 
     Raises:
-        WorkLimitError: the meter's budget is spent before; of an integer program, before its first run.
+        WorkLimitError: the meter's budget is spent before.
     """
     solver = create_highs()
     model = to_highs_model(program)
@@ -153,9 +157,17 @@ def solve_program(
         solver.setOptionValue("presolve", "on")
         solver.setOptionValue("solver", "choose")
     solver.passModel(model)
-    if integer is not None and meter is not None and meter.reached():
+    if integer is None or meter is None or meter.left() == float("inf"):
+        return run_highs(solver, meter)
+    nodes = int(meter.left() / (_NODE_ENTRY * program.matrix.nnz))
+    if not nodes:
         raise WorkLimitError
-    return run_highs(solver, None if integer is not None else meter)
+    solver.setOptionValue("mip_max_nodes", nodes)
+    solver.run()
+    meter.work_s += _NODE_ENTRY * program.matrix.nnz * int(max(solver.getInfo().mip_node_count, 1))
+    if solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+        raise WorkLimitError
+    return run_highs(solver)
 
 
 class LinearProgramBuilder:
