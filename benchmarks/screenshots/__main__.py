@@ -1,8 +1,9 @@
-"""Takes the README's screenshots of the page on the demo, in a desktop's and a phone's window.
+"""Takes the README's screenshot of the page on the demo.
 
-    python -m benchmarks.screenshots --out docs/pictures
+    python -m benchmarks.screenshots --out docs/screenshots
 
-Lets the page play for a minute, then takes screenshots at several moments and keeps the best one.
+Lets the page play for a minute, then takes screenshots at several moments and keeps the best one. Those of
+all states in three widths are taken by `benchmarks.screenshots.page_states`.
 """
 
 from __future__ import annotations
@@ -13,11 +14,10 @@ import contextlib
 import io
 import sys
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from PIL import Image
-from playwright.async_api import Browser, Page
+from playwright.async_api import Page, ViewportSize
 
 from benchmarks.common.browser import check_chromium, chromium
 from benchmarks.common.environment import ROOT, CannotRunError, finish, one_thread_environment
@@ -49,16 +49,7 @@ _RATED = """async () => {
 _PLAYS = "myview.state === 'playing' && myview.camera !== null"
 
 
-@dataclass(frozen=True, slots=True)
-class Shot:
-    """A screenshot to take."""
-
-    name: str
-    width: int
-    height: int
-
-
-SHOTS = (Shot("page", 1280, 800), Shot("phone", 360, 740))
+_SIZE: ViewportSize = {"width": 1280, "height": 800}
 
 
 @contextlib.asynccontextmanager
@@ -93,32 +84,18 @@ async def _address(process: asyncio.subprocess.Process) -> str:
     raise RuntimeError("`myview demo` ended before it was ready")
 
 
-async def take(out: Path, fill_s: float) -> list[Path]:
-    """Run the demo, open the page in all sizes, let it play, and take the screenshots."""
+async def take(fill_s: float) -> bytes:
+    """Run the demo, open the page, let it play for so many seconds, and return a screenshot, PNG."""
     async with chromium() as browser, demo() as url:
-        pages = [await _open(browser, url, shot) for shot in SHOTS]
+        # The page's policy forbids eval, which Playwright needs.
+        page = await browser.new_page(viewport=_SIZE, bypass_csp=True)
+        await page.goto(url)
+        await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
         await asyncio.sleep(fill_s)
-        pictures = {shot.name: await _best_picture(page) for page, shot in pages}
-    return await asyncio.to_thread(_write, pictures, out)
+        return await _best_screenshot(page)
 
 
-def _write(pictures: dict[str, bytes], out: Path) -> list[Path]:
-    paths = []
-    for name, png in pictures.items():
-        paths.append(out / f"{name}.png")
-        paths[-1].write_bytes(small_png(png))
-    return paths
-
-
-async def _open(browser: Browser, url: str, shot: Shot) -> tuple[Page, Shot]:
-    # The page's policy forbids eval, which Playwright needs.
-    page = await browser.new_page(viewport={"width": shot.width, "height": shot.height}, bypass_csp=True)
-    await page.goto(url)
-    await page.wait_for_function("myview.state === 'playing'", timeout=_PLAYING_MS)
-    return page, shot
-
-
-async def _best_picture(page: Page) -> bytes:
+async def _best_screenshot(page: Page) -> bytes:
     """Take screenshots of the best visible person at several moments; return the best.
 
     Raises:
@@ -133,9 +110,9 @@ async def _best_picture(page: Page) -> bytes:
         await page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
         await asyncio.sleep(_LANDED_S)
         score = await _score(page)
-        picture = await page.screenshot()
+        screenshot = await page.screenshot()
         if score > best_score and await _score(page):
-            best, best_score = picture, score
+            best, best_score = screenshot, score
     if not best:
         raise RuntimeError("nobody was in view for long enough")
     return best
@@ -152,7 +129,7 @@ async def _score(page: Page) -> float:
 
 
 def small_png(png: bytes) -> bytes:
-    """Return the picture with as many colors as fit into the file size of a README's picture."""
+    """Return an image with as many colors as fit into the file size of a README's image."""
     image = Image.open(io.BytesIO(png)).convert("RGB")
     smaller = png
     for colors in _COLORS:
@@ -167,18 +144,21 @@ def small_png(png: bytes) -> bytes:
 
 
 def main() -> None:
-    """Take the screenshots."""
+    """Take the screenshot."""
     options = argparse.ArgumentParser(
         prog="python -m benchmarks.screenshots", description=__doc__.splitlines()[0]
     )
-    options.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures", help="folder to write into")
+    options.add_argument(
+        "--out", type=Path, default=ROOT / "docs" / "screenshots", help="folder to write into"
+    )
     options.add_argument("--fill", type=float, default=62.0, help="seconds to let the page play before")
     chosen = options.parse_args()
     try:
         check_chromium()
         chosen.out.mkdir(parents=True, exist_ok=True)
-        for path in asyncio.run(take(chosen.out, chosen.fill)):
-            print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+        path = chosen.out / "page.png"
+        path.write_bytes(small_png(asyncio.run(take(chosen.fill))))
+        print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
     except CannotRunError as problem:
         finish(problem, "screenshots")
 

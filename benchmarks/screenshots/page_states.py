@@ -1,6 +1,6 @@
 """Takes the documents' screenshots of both pages in each of their states, on the demo, in three widths.
 
-    python -m benchmarks.screenshots.page_states --out docs/pictures
+    python -m benchmarks.screenshots.page_states --out docs/screenshots
 
 The states are real: a person leaves, a camera process is stopped, the server is terminated. Only the state
 without any people is faked by this script: on the demo it is over within a moment.
@@ -97,7 +97,7 @@ class ScreenshotSession:
             else:
                 raise RuntimeError(f"{state}: not reached")
             png = await self.page.screenshot()
-            await asyncio.to_thread(_write, png, self.out / f"{state}-{width}.webp")
+            await asyncio.to_thread(_write, png, self.out / str(width) / f"{state}.webp")
 
     async def as_it_is(self) -> None:
         """Prepare nothing."""
@@ -207,6 +207,7 @@ def _write(png: bytes, path: Path) -> None:
     if image.width > _WIDEST:
         size = (_WIDEST, round(image.height * _WIDEST / image.width))
         image = image.resize(size, Image.Resampling.LANCZOS)
+    path.parent.mkdir(parents=True, exist_ok=True)
     image.save(path, "WEBP", quality=_QUALITY, method=6)
 
 
@@ -215,19 +216,21 @@ def main() -> None:
     options = argparse.ArgumentParser(
         prog="python -m benchmarks.screenshots.page_states", description=__doc__.splitlines()[0]
     )
-    options.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures", help="folder to write into")
+    options.add_argument(
+        "--out", type=Path, default=ROOT / "docs" / "screenshots", help="folder to write into"
+    )
     options.add_argument("--fps", type=float, default=25.0, help="frame rate; less on a machine that is busy")
     options.add_argument("--page", choices=("viewer", "operator"), help="only this one's")
     chosen = options.parse_args()
     try:
         check_chromium()
-        chosen.out.mkdir(parents=True, exist_ok=True)
+
         if chosen.page != "operator":
             asyncio.run(take_watching(chosen.out, chosen.fps))
         if chosen.page != "viewer":
             asyncio.run(take_operating(chosen.out, chosen.fps))
-        made = sorted(chosen.out.glob("*.webp"))
-        print(f"{len(made)} pictures, {sum(path.stat().st_size for path in made) / 1000:.0f} kB")
+        made = sorted(chosen.out.glob("*/*.webp"))
+        print(f"{len(made)} screenshots, {sum(path.stat().st_size for path in made) / 1000:.0f} kB")
     except CannotRunError as problem:
         finish(problem, "screenshots.page_states")
 
