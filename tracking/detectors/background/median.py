@@ -127,8 +127,9 @@ class MedianBackground:
         if self._flooded >= self._relearn_frames:
             self._invalidate(image, background)
             return None
-        # At the background's light people look the same whatever the camera's exposure is.
-        unlit = aligned if gain is None else unlight(aligned, gain)
+        # At the background's light, and without noise, people look the same whatever the exposure is.
+        unlit = _smoothed(aligned) if curves.noise > _NOISY else aligned
+        unlit = unlit if gain is None else unlight(unlit, gain)
         return replace(segmentation, image=curves.invert(unlit))
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
