@@ -9,7 +9,9 @@ import pytest
 from fakes.tracking.drawn_people import HEIGHT, SCENE, WIDTH, Figure, Picture, picture
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
+from tracking.detectors.background.frame_light import FrameLight
 from tracking.detectors.background.local_light import find_local_light, reduce_to_cells, relight
+from tracking.detectors.background.tone_curve import IDENTITY
 
 SURE = 0.4
 SHAPE = (HEIGHT, WIDTH)
@@ -25,7 +27,7 @@ def shine(image: Picture, factor: float, begin: float = 0.5) -> Picture:
 
 
 def light_over(image: Picture) -> npt.NDArray[np.float32] | None:
-    light = find_local_light(reduce_to_cells(image), reduce_to_cells(SCENE))
+    light = find_local_light(reduce_to_cells(image), FrameLight(IDENTITY), reduce_to_cells(SCENE))
     return None if light is None else light.gain(SHAPE)
 
 
@@ -52,7 +54,7 @@ def test_people_and_an_unchanged_picture_are_no_light() -> None:
 @pytest.mark.parametrize(("begin", "sign"), [(-1.0, 1), (0.25, 1), (0.5, 0)])
 def test_light_over_most_of_the_picture_is_the_exposure(begin: float, sign: int) -> None:
     lit = reduce_to_cells(shine(picture(CROWD, 0), 1.3, begin=begin))
-    light = find_local_light(lit, reduce_to_cells(SCENE))
+    light = find_local_light(lit, FrameLight(IDENTITY), reduce_to_cells(SCENE))
     assert light is not None
     assert light.exposure_sign == sign
 

@@ -8,6 +8,7 @@ Each pixel may be in either state, with the light or without it: the edge of the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -32,6 +33,18 @@ _REACH, _LEAST_SUPPORT = 0.12, 0.02
 
 # Share of the cells that must deviate at all before regions are sought.
 _MIN_SHARE = 0.05
+
+
+class GlobalLight(Protocol):
+    """The light of a frame apart from local light."""
+
+    def apply(self, background: Image) -> Image:
+        """Return a background as the frame shows it."""
+        ...
+
+    def remove(self, image: Image) -> Image:
+        """Return a frame at the background's light."""
+        ...
 
 
 def reduce_to_cells(image: Image) -> Image:
@@ -89,21 +102,24 @@ class LocalLight:
 _MOSTLY, _MIN_EXPOSED = 1.5, 0.25
 
 
-def find_local_light(cells: Image, expected: Image) -> LocalLight | None:
+def find_local_light(cells: Image, light_of_frame: GlobalLight, background: Image) -> LocalLight | None:
     """Return the local light of a frame; None: there is none.
 
     Args:
         cells: `(h, w, 3)`, the frame's cells.
-        expected: `(h, w, 3)`, the background's, as the frame should show them.
+        light_of_frame: the frame's light apart from the local light.
+        background: `(h, w, 3)`, the background's cells.
     """
-    ratios = _LOGARITHMS[cells] - _LOGARITHMS[expected]
+    ratios = _ratios(cells, light_of_frame.apply(background))
     light = np.ascontiguousarray(ratios.mean(axis=2))
     strong = np.abs(light) >= _MIN_LIGHT
     if np.count_nonzero(strong) < _MIN_SHARE * strong.size:
         return None
     chroma = ratios.max(axis=2) - ratios.min(axis=2)
     smooth = (chroma <= _MAX_CHROMA) & (np.abs(light - cv2.medianBlur(light, 5)) <= _MAX_ROUGHNESS)
-    candidates = smooth & strong & (np.abs(light) <= _MAX_LIGHT)
+    # In fog dark clothing is hardly darker than the ground: it is told apart at the background's contrast.
+    contrasted = _ratios(light_of_frame.remove(cells), background).mean(axis=2)
+    candidates = smooth & strong & (np.abs(light) <= _MAX_LIGHT) & (np.abs(contrasted) <= _MAX_LIGHT)
     side = max(round(_SIDE * light.shape[0]), 3)
     sign = np.zeros(light.shape, dtype=np.int8)
     for each in (1, -1):
@@ -112,6 +128,11 @@ def find_local_light(cells: Image, expected: Image) -> LocalLight | None:
         if filled.any():
             sign[_components_with(filled, region)] = each
     return LocalLight(ratios, sign, float(np.mean(smooth & ~strong))) if sign.any() else None
+
+
+def _ratios(cells: Image, expected: Image) -> Plane:
+    """Return the logarithms of ratios of levels."""
+    return np.asarray(_LOGARITHMS[cells] - _LOGARITHMS[expected])
 
 
 def _components_with(cores: npt.NDArray[np.bool_], region: Mask) -> npt.NDArray[np.bool_]:

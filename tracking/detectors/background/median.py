@@ -9,12 +9,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from tracking.detectors.background.local_light import find_local_light, reduce_to_cells, relight, unlight
+from tracking.detectors.background.frame_light import FrameLight, fit_frame_light
+from tracking.detectors.background.local_light import reduce_to_cells
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration, count_edges
 from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
-from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves, fit_tone_curves
+from tracking.detectors.background.tone_curve import IDENTITY, fit_tone_curves
 from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, require_positive
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 
@@ -73,8 +74,8 @@ class MedianBackground:
         self._rounded: Image | None = None
         self._reduced_from: Image | None = None
         self._reduced: Image = np.empty((0, 0, 3), dtype=np.uint8)
-        self._curves: ToneCurves | None = None
-        self._gain: Plane | None = None
+        self._light: FrameLight | None = None
+        """Of the last frame."""
         self._unlikely: Mask | None = None
         self._retired: Image | None = None
         """The background before this one."""
@@ -102,8 +103,7 @@ class MedianBackground:
             return None
         motion = self._registration.find_still(image)
         aligned = motion.align(image, self._rounded)
-        curves, gain = self._fit_light(aligned, self._rounded, None)
-        return self._compare(aligned, motion, self._rounded, curves, gain)
+        return self._compare(aligned, motion, self._rounded, self._fit_light(aligned, self._rounded))
 
     def segment(self, image: Image) -> Segmentation | None:
         """Segment the next frame; `None` while the background is unknown."""
@@ -112,25 +112,24 @@ class MedianBackground:
         background = self._rounded
         if background is None:
             return None
-        before, looks = self._curves, self._registration.is_due()
+        before, looks = self._light, self._registration.is_due()
         aligned, motion = self._align(image, background, before, looks=looks)
-        curves, gain = self._fit_light(aligned, background, before)
-        if not looks and before is not None and curves.agreement < before.agreement - _MOVED:
+        light = self._fit_light(aligned, background, before)
+        if not looks and before is not None and light.curves.agreement < before.curves.agreement - _MOVED:
             aligned, motion = self._align(image, background, before, looks=True)
             if motion != self._registration.rest:
-                curves, gain = self._fit_light(aligned, background, before)
-        self._last, self._curves, self._gain = aligned, curves, gain
-        if curves.contrast_of(self._cells_of(background)) < _BLIND:
+                light = self._fit_light(aligned, background, before)
+        self._last, self._light = aligned, light
+        if light.curves.contrast_of(self._cells_of(background)) < _BLIND:
             return None
-        segmentation = self._compare(aligned, motion, background, curves, gain)
+        segmentation = self._compare(aligned, motion, background, light)
         self._flooded = self._flooded + 1 if self._is_flooded(segmentation) else 0
         if self._flooded >= self._relearn_frames:
             self._invalidate(image, background)
             return None
         # At the background's light, and without noise, people look the same whatever the exposure is.
-        unlit = _smoothed(aligned) if curves.noise > _NOISY else aligned
-        unlit = unlit if gain is None else unlight(unlit, gain)
-        return replace(segmentation, image=curves.invert(unlit))
+        smooth = _smoothed(aligned) if light.noise > _NOISY else aligned
+        return replace(segmentation, image=light.remove(smooth))
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Update the background with the last frame, except where people are.
@@ -142,13 +141,12 @@ class MedianBackground:
         self._unlikely = occupied | foreground
         if 2 * cv2.countNonZero(self._unlikely) > self._unlikely.size:
             self._unlikely = None
-        if self._exact is None or self._rounded is None or self._last is None or self._curves is None:
+        if self._exact is None or self._rounded is None or self._last is None or self._light is None:
             return
         checks_static, updates = self._static_filter.is_due(), self._frames % self._learn_every == 0
         if not (checks_static or updates):
             return
-        leveled = self._last if self._gain is None else unlight(self._last, self._gain)
-        leveled = self._curves.invert(leveled, self._rounded)
+        leveled = self._light.remove(self._last, self._rounded)
         static = self._static_filter.find(leveled, self._rounded, foreground) if checks_static else None
         if static is not None:
             self._exact[static > 0] = leveled[static > 0]
@@ -162,51 +160,44 @@ class MedianBackground:
             self._registration.set_background(self._rounded)
 
     def _align(
-        self, image: Image, background: Image, before: ToneCurves | None, *, looks: bool
+        self, image: Image, background: Image, before: FrameLight | None, *, looks: bool
     ) -> tuple[Image, Motion]:
         """Return a frame where the background is, and its motion; without `looks` the camera is at rest."""
         motion = self._registration.rest
         if looks:
-            motion = self._registration.find(image, before or IDENTITY, self._unlikely)
+            motion = self._registration.find(
+                image, IDENTITY if before is None else before.curves, self._unlikely
+            )
         outside = background if motion == STILL or before is None else before.apply(background)
         return motion.align(image, outside), motion
 
-    def _fit_light(
-        self, image: Image, background: Image, before: ToneCurves | None
-    ) -> tuple[ToneCurves, Plane | None]:
-        """Return the tone curves of an aligned frame, and the gain of its local light, if there is one.
+    def _fit_light(self, image: Image, background: Image, before: FrameLight | None = None) -> FrameLight:
+        """Return the light of an aligned frame against a background."""
+        looks_for_haze = before is None or self._frames % self._learn_every == 0
+        return fit_frame_light(
+            image,
+            background,
+            self._cells_of(background),
+            self._unlikely,
+            before,
+            looks_for_haze=looks_for_haze,
+        )
 
-        What is left of the last frame's curves in a part of the picture is local light; it is taken away
-        before the curves are fitted, which would follow it otherwise.
-        """
-        cells, background_cells = reduce_to_cells(image), self._cells_of(background)
-        curves = before or fit_tone_curves(image, background)
-        light = find_local_light(cells, curves.apply(background_cells))
-        if light is not None and (sign := light.exposure_sign):
-            rest, outside = light.without(sign), light.outside(sign, image.shape)
-            unlit = unlight(image, rest.gain(image.shape)) if rest.sign.any() else image
-            curves = fit_tone_curves(unlit, background, outside)
-            light = find_local_light(cells, curves.apply(background_cells))
-        gain = None if light is None else light.gain(image.shape)
-        unlit = image if gain is None else unlight(image, gain)
-        return fit_tone_curves(unlit, background, self._unlikely, curves), gain
-
-    def _compare(
-        self, image: Image, motion: Motion, background: Image, curves: ToneCurves, gain: Plane | None = None
-    ) -> Segmentation:
+    def _compare(self, image: Image, motion: Motion, background: Image, light: FrameLight) -> Segmentation:
         """Return the segmentation of an aligned image against the background at the image's light."""
-        expected = curves.apply(background)
-        if curves.noise > _NOISY:
+        expected, noise = light.apply(background), light.noise
+        if noise > _NOISY:
             image, expected = _smoothed(image), _smoothed(expected)
         difference = _difference(image, expected)
-        if gain is not None:
-            lit = relight(expected, gain)
+        lit = light.apply_local(expected)
+        if lit is not None:
             lit_difference = _difference(image, lit)
             np.copyto(expected, lit, where=(lit_difference < difference)[..., None])
             difference = np.minimum(difference, lit_difference)
         # In a darker picture people differ by less, and so does what is not there: by the noise at least.
-        contrast = min(max(curves.contrast_of(self._cells_of(background)), _LEAST_CONTRAST), 1.0)
-        mask = self._exceeding(difference, max(contrast, _NOISES * curves.noise / self._settings.threshold))
+        contrast = np.maximum(light.contrast_of(self._cells_of(background)), _LEAST_CONTRAST)
+        thresholds = np.clip(contrast * self._settings.threshold, _NOISES * noise, self._settings.threshold)
+        mask = _exceeding(difference, np.asarray(thresholds, dtype=np.float32))
         shadow = shadow_mask(image, expected, mask, self._shadows)
         return Segmentation(mask & ~shadow, shadow, image, motion)
 
@@ -215,11 +206,6 @@ class MedianBackground:
         if background is not self._reduced_from:
             self._reduced_from, self._reduced = background, reduce_to_cells(background)
         return self._reduced
-
-    def _exceeding(self, difference: Mask, contrast: float) -> Mask:
-        threshold = min(contrast, 1.0) * self._settings.threshold
-        _, binary = cv2.threshold(difference, threshold, 255, cv2.THRESH_BINARY)
-        return np.asarray(binary, dtype=np.uint8)
 
     def _bootstrap(self, image: Image) -> None:
         frames, samples, done = self._bootstrap_frames, self._settings.samples, self._frames + 1
@@ -265,7 +251,7 @@ class MedianBackground:
         self._rounded, self._exact = background, background.astype(np.float32)
         self._registration = Registration(self._fps)
         self._registration.set_background(background)
-        self._curves = self._gain = self._unlikely = None
+        self._light = self._unlikely = None
 
     def _is_flooded(self, segmentation: Segmentation) -> bool:
         """Return whether so much of a frame is foreground that the background no longer explains it."""
@@ -282,13 +268,12 @@ class MedianBackground:
         self._flooded = 0
         retired, self._retired = self._retired, background
         if retired is not None:
-            curves, gain = self._fit_light(image, retired, None)
-            if not self._is_flooded(self._compare(image, STILL, retired, curves, gain)):
+            light = self._fit_light(image, retired)
+            if not self._is_flooded(self._compare(image, STILL, retired, light)):
                 self._use(retired)
                 return
         self._frames, self._samples = 0, []
-        self._exact = self._rounded = self._gain = None
-        self._unlikely = None
+        self._exact = self._rounded = self._light = self._unlikely = None
         self.views += 1
 
 
@@ -308,6 +293,16 @@ _COVERED = 0.25
 _SEEN = 0.2
 # Noise, in gray levels, from which frames are smoothed.
 _NOISY = 6.0
+
+
+def _exceeding(difference: Mask, thresholds: Plane) -> Mask:
+    """Return where a difference `(H, W)` is above a threshold, `()` or `(h,)` for as many bands of rows."""
+    if not thresholds.ndim:
+        return np.asarray(
+            cv2.threshold(difference, float(thresholds), 255, cv2.THRESH_BINARY)[1], dtype=np.uint8
+        )
+    rows = np.arange(len(difference)) * len(thresholds) // len(difference)
+    return np.asarray(np.where(difference > thresholds[rows][:, None], 255, 0), dtype=np.uint8)
 
 
 def _smoothed(image: Image) -> Image:
