@@ -30,7 +30,7 @@ from benchmarks.temporal_consistency.overhead_room import SIZE, BlobSequence, Ov
 from benchmarks.temporal_consistency.plots import PUBLISHED, PUBLISHED_EDGES, plot
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.baselines.temporal_consistency.graph import (
-    WindowGraph,
+    StageGraph,
     count_edges_without_pruning,
     count_joint_edges,
     prune_links,
@@ -98,7 +98,7 @@ def track_sequence(
     return [first, *(decision.blob_by_id for decision in tracked)]
 
 
-def _time(graph: WindowGraph, settings: TemporalSettings, counts: MergeCounts) -> None:
+def _time(graph: StageGraph, settings: TemporalSettings, counts: MergeCounts) -> None:
     """Time all methods on a window whose step costs are known."""
     unpruned = replace(graph, max_step_cost=np.inf)
     solve: tuple[Callable[[], object], ...] = (

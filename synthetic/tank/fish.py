@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from synthetic.cameras.pinhole import Floats, PinholeCamera
 from synthetic.drawing.figure import Figure
-from synthetic.tank.shoal import FishState
+from synthetic.tank.shoal import ShoalState
 from synthetic.tank.water import TILE, Bytes, attenuate_by_water, caustic_pixels, open_water
 
 LENGTH = 0.8  # meters, all of them, without the tail fin
@@ -126,7 +126,7 @@ def _eyes() -> Floats:
     return np.array(vertices)
 
 
-def fish_vertices(swimmers: FishState) -> Floats:
+def fish_vertices(swimmers: ShoalState) -> Floats:
     """Return all fish's vertices ``(P, V, 3)`` in meters, with bends and tail beats."""
     rest = _rest()
     along = rest[:, 0]

@@ -33,7 +33,7 @@ _EASE = 0.8  # seconds at a round's ends in which bodies straighten
 
 
 @dataclass(frozen=True, slots=True)
-class FishState:
+class ShoalState:
     """All fish at one instant."""
 
     places: Floats  # (P, 3) meters
@@ -60,7 +60,7 @@ class Shoal:
         self._seed = seed
         self._round = lru_cache(maxsize=3)(self._swim)
 
-    def at(self, seconds: float) -> FishState:
+    def at(self, seconds: float) -> ShoalState:
         """Return the state of all fish at a moment of the scene."""
         number = int(seconds // ROUND)
         path = self._round(number)
@@ -71,7 +71,7 @@ class Shoal:
             part[index] * (1 - share) + part[index + 1] * share
             for part in (path.places, path.ahead, path.beats, path.vigour, path.turn_rates)
         )
-        return FishState(places, _unit(ahead), beats, vigour, turn_rates)
+        return ShoalState(places, _unit(ahead), beats, vigour, turn_rates)
 
     def _waypoints(self, number: int) -> Waypoints:
         if number == 0:

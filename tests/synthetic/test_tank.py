@@ -17,7 +17,7 @@ from synthetic.drawing.figure import Figure
 from synthetic.ground_truth import FigureLayer, measure_visibility
 from synthetic.tank import VIEWPOINTS
 from synthetic.tank.fish import LENGTH, draw_fish, fish_vertices
-from synthetic.tank.shoal import ROUND, FishState, Shoal
+from synthetic.tank.shoal import ROUND, Shoal, ShoalState
 from synthetic.tank.water import attenuate_by_water, caustics, open_water
 
 SIZE = (320, 180)
@@ -29,13 +29,13 @@ def tank(cameras: int = 2, objects: int | None = None, seed: int = 1) -> Scene:
 
 
 @pytest.fixture(scope="module", params=range(3))
-def states(request: pytest.FixtureRequest) -> list[FishState]:
+def states(request: pytest.FixtureRequest) -> list[ShoalState]:
     """Return seventy seconds of nine fish: two rounds, and the start of a third."""
     shoal = Shoal(9, request.param)
     return [shoal.at(t / RATE) for t in range(70 * RATE)]
 
 
-def test_fish_never_swim_into_each_other(states: list[FishState]) -> None:
+def test_fish_never_swim_into_each_other(states: list[ShoalState]) -> None:
     along = np.linspace(-0.45, 0.45, 7) * LENGTH
     for state in states:
         spines = state.places[:, None] + along[:, None] * state.ahead[:, None]
@@ -43,7 +43,7 @@ def test_fish_never_swim_into_each_other(states: list[FishState]) -> None:
         assert gaps[np.triu_indices(9, 1)].min() > 0.15  # meters: bodies are 0.14 broad
 
 
-def test_fish_swim_forward_and_turn_plausibly(states: list[FishState]) -> None:
+def test_fish_swim_forward_and_turn_plausibly(states: list[ShoalState]) -> None:
     turns, slants = [], []
     for one, other in pairwise(states):
         step = other.places - one.places
@@ -66,7 +66,7 @@ def test_rounds_of_the_shoal_join_without_a_jump() -> None:
         assert np.abs(tails - np.rint(tails)).max() < 0.01
 
 
-def test_fish_stay_in_the_first_cameras_picture(states: list[FishState]) -> None:
+def test_fish_stay_in_the_first_cameras_picture(states: list[ShoalState]) -> None:
     view = PinholeCamera.at(VIEWPOINTS[0], *SIZE)
     outside = 0
     for state in states[::5]:
@@ -137,7 +137,7 @@ def test_of_two_fish_in_line_the_farther_one_is_occluded() -> None:
     for offsets in (2.0, 0.25, 0.0):
         places = np.array([[3.0 + offsets, 3.6, 1.4], [3.0, 1.0, 1.42]])
         side = np.tile([1.0, 0.0, 0.0], (2, 1))
-        two = FishState(places, side, np.zeros(2), np.ones(2), np.zeros(2))
+        two = ShoalState(places, side, np.zeros(2), np.ones(2), np.zeros(2))
         further, depth_offset = draw_fish(view, fish_vertices(two), caustics(0.0))
         assert further is not None
         assert depth_offset is not None

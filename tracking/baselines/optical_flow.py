@@ -31,7 +31,7 @@ _MAX_GROWTH = 1.1
 
 
 @dataclass(slots=True)
-class FlowTarget:
+class OpticalFlowTarget:
     """State of one target: its box."""
 
     box: Floats
@@ -46,11 +46,11 @@ class OpticalFlow:
     def __init__(self) -> None:
         self._before: Mask | None = None
 
-    def initialize(self, image: Image, box: Floats) -> FlowTarget:  # noqa: ARG002 — corners are detected in the next call
+    def initialize(self, image: Image, box: Floats) -> OpticalFlowTarget:  # noqa: ARG002 — corners are detected in the next call
         """Create a target; its corners are detected with the next image."""
-        return FlowTarget(box.copy())
+        return OpticalFlowTarget(box.copy())
 
-    def predict(self, image: Image | None, targets: Sequence[FlowTarget]) -> Floats:
+    def predict(self, image: Image | None, targets: Sequence[OpticalFlowTarget]) -> Floats:
         """Track the targets' corners: `(N, 4)`, NaN where too few returned to their start."""
         boxes = np.full((len(targets), BOX_SIDES), np.nan)
         if image is None:
@@ -65,7 +65,7 @@ class OpticalFlow:
                 boxes[row] = target.box = moved
         return boxes
 
-    def update(self, target: FlowTarget, _detection: Floats) -> Floats:
+    def update(self, target: OpticalFlowTarget, _detection: Floats) -> Floats:
         """Return the target's box; detections are not used."""
         return target.box
 

@@ -39,13 +39,13 @@ async def get_config(request: web.Request) -> web.Response:
 
 
 @routes.get(f"{OPERATOR_PATH}/view_selection")
-async def get_view_selection(request: web.Request) -> web.Response:
+async def get_view_selection_settings(request: web.Request) -> web.Response:
     """Return the view-selection settings in force, and the configured ones."""
     return json_response(_selection_settings(request.app[SERVICE]))
 
 
 @routes.put(f"{OPERATOR_PATH}/view_selection")
-async def put_view_selection(request: web.Request) -> web.Response:
+async def put_view_selection_settings(request: web.Request) -> web.Response:
     """Change view-selection settings until they are changed again or the service ends."""
     service = request.app[SERVICE]
     operations = service.operations
@@ -64,7 +64,7 @@ async def put_view_selection(request: web.Request) -> web.Response:
 
 
 @routes.delete(f"{OPERATOR_PATH}/view_selection")
-async def delete_view_selection(request: web.Request) -> web.Response:
+async def delete_view_selection_settings(request: web.Request) -> web.Response:
     """Restore the configured view-selection settings."""
     service = request.app[SERVICE]
     service.operations.reset_view_settings()

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from server.service.calibration.walk_samples import CameraWalk, WalkSamples
+from server.service.calibration.walk_samples import CalibrationWalk, WalkSamples
 
 _MIN_FEET = 10
 """Foot points below which no depth ratio is computed."""
@@ -49,7 +49,7 @@ class WalkCoverage:
     pairs: tuple[PairCoverage, ...] = ()
 
 
-def walk_coverage(walks: Sequence[CameraWalk], seconds: float) -> WalkCoverage:
+def walk_coverage(walks: Sequence[CalibrationWalk], seconds: float) -> WalkCoverage:
     """Return what a walk has covered; compared moments are ``seconds`` apart."""
     samples = [walk.samples for walk in walks]
     moments = 1 + max((int(sample.moment.max()) for sample in samples if sample.moment.size), default=-1)

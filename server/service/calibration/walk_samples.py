@@ -34,7 +34,7 @@ class WalkSamples:
     height: Floats
 
 
-class CameraWalk:
+class CalibrationWalk:
     """Collects one camera's final boxes.
 
     ``site`` is the size of the site's image, whose pixels boxes are in; every ``step``-th frame is sampled.
@@ -75,9 +75,9 @@ class CameraWalk:
         self._boxes.append(camera_boxes)
         self._sample(self._frames[-1], camera_boxes, message.size)
 
-    def pause(self, until_frame: int) -> None:
+    def ignore_before(self, frame: int) -> None:
         """Ignore boxes before a frame, counted from the walk's start."""
-        self._next = max(self._next, until_frame)
+        self._next = max(self._next, frame)
 
     @property
     def boxes(self) -> CameraBoxes | None:

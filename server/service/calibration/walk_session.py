@@ -11,7 +11,7 @@ from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
 from server.service.calibration.calibration_report import comparison_step
 from server.service.calibration.coverage import WalkCoverage, walk_coverage
-from server.service.calibration.walk_samples import CameraWalk
+from server.service.calibration.walk_samples import CalibrationWalk
 from server.service.calibration.worker import CalibrationResult, CalibrationTask, run_calibration
 from server.service.ingest.epoch_aligner import Epoch
 
@@ -38,7 +38,7 @@ class WalkSession:
     def __init__(self, config: Config, calibrate: Calibrate = run_calibration) -> None:
         self._config, self._run_calibration = config, calibrate
         self._fps = config.site.fps
-        self._walks: dict[str, CameraWalk] = {}
+        self._walks: dict[str, CalibrationWalk] = {}
         self._start = 0
         self._last = -1
         """The last pulse of the last epoch."""
@@ -69,7 +69,7 @@ class WalkSession:
         self.discard()
         site = (self._config.site.width, self._config.site.height)
         step = comparison_step(self._fps)
-        self._walks = {camera: CameraWalk(camera, site, step) for camera in self._config.camera_ids}
+        self._walks = {camera: CalibrationWalk(camera, site, step) for camera in self._config.camera_ids}
         self._start, self._epochs = self._last + 1, 0
         self.state = WalkState.WALKING
 
@@ -77,7 +77,7 @@ class WalkSession:
         """Continue the walk."""
         self._cancel_calibration()
         for walk in self._walks.values():
-            walk.pause(self._last + 1 - self._start)
+            walk.ignore_before(self._last + 1 - self._start)
         self.result, self.state = None, WalkState.WALKING
 
     def finish(self, person_height: float) -> None:

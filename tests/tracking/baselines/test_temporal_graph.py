@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracking.baselines.temporal_consistency.graph import (
-    WindowGraph,
+    StageGraph,
     count_edges_without_pruning,
     count_joint_edges,
     merge_costs,
@@ -26,7 +26,7 @@ from tracking.baselines.temporal_consistency.joint_path import (
 _MANY = 100_000
 
 
-def _cost(graph: WindowGraph, path: np.ndarray) -> float:
+def _cost(graph: StageGraph, path: np.ndarray) -> float:
     """Compute equation (1) over the stages; infinite along a pruned link."""
     total = 0.0
     for before, now, step, appearance, shared in zip(
@@ -45,26 +45,26 @@ def _cost(graph: WindowGraph, path: np.ndarray) -> float:
     return total / graph.people
 
 
-def _best(graph: WindowGraph) -> float:
+def _best(graph: StageGraph) -> float:
     """Return the cost of the cheapest of all joint paths."""
     nodes = [list(product(range(step.shape[1]), repeat=graph.people)) for step in graph.distance_costs]
     return min(_cost(graph, np.array(path)) for path in product(*nodes))
 
 
 @st.composite
-def graphs(draw: st.DrawFn, most_people: int = 3, most_stages: int = 3, most_blobs: int = 3) -> WindowGraph:
+def graphs(draw: st.DrawFn, most_people: int = 3, most_stages: int = 3, most_blobs: int = 3) -> StageGraph:
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     people, stages = draw(st.integers(1, most_people)), draw(st.integers(1, most_stages))
     blobs = [draw(st.integers(1, most_blobs)) for _ in range(stages + 1)]
     steps = tuple(np.round(rng.exponential(0.7, pair), 2) for pair in pairwise(blobs))
     appearance = tuple(np.round(rng.random((people, count)), 2) for count in blobs[1:])
     shared = tuple(rng.random(count) < 0.8 for count in blobs[1:])
-    return WindowGraph(rng.integers(0, blobs[0], people), steps, appearance, shared, 0.35, np.inf)
+    return StageGraph(rng.integers(0, blobs[0], people), steps, appearance, shared, 0.35, np.inf)
 
 
 @given(graphs(most_people=2))
 @settings(deadline=None, max_examples=80)
-def test_the_joint_path_is_the_cheapest_of_all(graph: WindowGraph) -> None:
+def test_the_joint_path_is_the_cheapest_of_all(graph: StageGraph) -> None:
     found = solve_joint_path(graph, prune_links(graph), _MANY)
     assert found.exact
     assert found.cost == pytest.approx(_best(graph))
@@ -73,13 +73,13 @@ def test_the_joint_path_is_the_cheapest_of_all(graph: WindowGraph) -> None:
 
 @given(graphs(most_stages=2))
 @settings(deadline=None, max_examples=30)
-def test_the_joint_path_is_the_cheapest_for_three_people(graph: WindowGraph) -> None:
+def test_the_joint_path_is_the_cheapest_for_three_people(graph: StageGraph) -> None:
     assert solve_joint_path(graph, prune_links(graph), _MANY).cost == pytest.approx(_best(graph))
 
 
 @given(graphs(most_people=4, most_stages=6, most_blobs=4), st.sampled_from([0.6, 1.5, np.inf]))
 @settings(deadline=None, max_examples=60)
-def test_solving_person_by_person_equals_solving_edge_by_edge(graph: WindowGraph, longest: float) -> None:
+def test_solving_person_by_person_equals_solving_edge_by_edge(graph: StageGraph, longest: float) -> None:
     graph = replace(graph, max_step_cost=longest)
     links = prune_links(graph)
     no_others = [np.zeros(len(shared), dtype=np.int64) for shared in graph.shared]
@@ -96,7 +96,7 @@ def test_solving_person_by_person_equals_solving_edge_by_edge(graph: WindowGraph
 
 @given(graphs(most_people=3, most_stages=4, most_blobs=4))
 @settings(deadline=None, max_examples=80)
-def test_pruning_keeps_the_best_path_if_all_its_steps_are_short_enough(graph: WindowGraph) -> None:
+def test_pruning_keeps_the_best_path_if_all_its_steps_are_short_enough(graph: StageGraph) -> None:
     whole = solve_joint_path(graph, prune_links(graph), _MANY)
     step_costs = [
         step[a, b]
@@ -115,7 +115,7 @@ def test_pruning_keeps_the_best_path_if_all_its_steps_are_short_enough(graph: Wi
 
 
 def test_without_pruning_the_edges_are_all_pairs_of_nodes() -> None:
-    graph = WindowGraph(
+    graph = StageGraph(
         np.array([0, 1, 2]),
         (np.zeros((3, 3)), np.zeros((3, 2))),
         (np.zeros((3, 3)), np.zeros((3, 2))),
@@ -129,7 +129,7 @@ def test_without_pruning_the_edges_are_all_pairs_of_nodes() -> None:
 
 def test_pruning_leaves_a_chain_where_all_people_are_far_apart() -> None:
     far = np.where(np.eye(3, dtype=bool), 0.0, 30.0)
-    graph = WindowGraph(
+    graph = StageGraph(
         np.arange(3),
         (far, far),
         (np.full((3, 3), 0.5),) * 2,
@@ -142,7 +142,7 @@ def test_pruning_leaves_a_chain_where_all_people_are_far_apart() -> None:
 
 
 def test_a_person_out_of_reach_of_all_blobs_is_assigned_the_nearest() -> None:
-    graph = WindowGraph(
+    graph = StageGraph(
         np.array([0]), (np.array([[40.0, 30.0]]),), (np.zeros((1, 2)),), (np.ones(2, dtype=bool),), 0.35, 2.0
     )
     assert solve_joint_path(graph, prune_links(graph), _MANY).blobs.tolist() == [[1]]
@@ -162,7 +162,7 @@ def test_a_merge_costs_for_each_person_but_one() -> None:
 
 @given(graphs(most_people=4, most_stages=3, most_blobs=3))
 @settings(deadline=None, max_examples=40)
-def test_too_many_people_for_one_table_are_solved_one_after_the_other(graph: WindowGraph) -> None:
+def test_too_many_people_for_one_table_are_solved_one_after_the_other(graph: StageGraph) -> None:
     found = solve_joint_path(graph, prune_links(graph), 1)
     whole = solve_joint_path(graph, prune_links(graph), _MANY)
     assert _cost(graph, found.blobs) == pytest.approx(found.cost)
@@ -176,7 +176,7 @@ def test_later_evidence_corrects_an_earlier_match() -> None:
     apart = np.array([[0.0, 9.0], [9.0, 0.0]])
     alone = (np.ones(2, dtype=bool),)
     wrong, right = np.array([[0.6, 0.4], [0.4, 0.6]]), np.array([[0.1, 0.9], [0.9, 0.1]])
-    at_once = WindowGraph(np.zeros(2, dtype=np.int64), (near,), (wrong,), alone, 0.35, 2.0)
+    at_once = StageGraph(np.zeros(2, dtype=np.int64), (near,), (wrong,), alone, 0.35, 2.0)
     assert solve_joint_path(at_once, prune_links(at_once), _MANY).blobs[0].tolist() == [1, 0]
     later = replace(at_once, distance_costs=(near, apart), appearance_costs=(wrong, right), shared=alone * 2)
     assert solve_joint_path(later, prune_links(later), _MANY).blobs.tolist() == [[0, 1], [0, 1]]

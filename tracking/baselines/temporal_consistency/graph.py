@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WindowGraph:
+class StageGraph:
     """A window of T stages after the last decided stage, for P people.
 
     Attributes:
@@ -72,7 +72,7 @@ PersonLinks = tuple[tuple[StepLinks, ...], ...]
 """For each person, their links stage by stage."""
 
 
-def prune_links(graph: WindowGraph) -> PersonLinks:
+def prune_links(graph: StageGraph) -> PersonLinks:
     """Prune the graph: keep the short links between reachable blobs.
 
     A person without any short link in a stage keeps all links of that stage.
@@ -80,7 +80,7 @@ def prune_links(graph: WindowGraph) -> PersonLinks:
     return tuple(_links_of(graph, person) for person in range(graph.people))
 
 
-def _links_of(graph: WindowGraph, person: int) -> tuple[StepLinks, ...]:
+def _links_of(graph: StageGraph, person: int) -> tuple[StepLinks, ...]:
     blobs: Indices = graph.start[person : person + 1]
     links = []
     for step, appearance in zip(graph.distance_costs, graph.appearance_costs, strict=True):
@@ -101,7 +101,7 @@ def count_joint_edges(links: Sequence[Sequence[StepLinks]]) -> list[int]:
     return [prod(step.count for step in stage) for stage in zip(*links, strict=True)]
 
 
-def count_edges_without_pruning(graph: WindowGraph) -> list[int]:
+def count_edges_without_pruning(graph: StageGraph) -> list[int]:
     """Count the links between joint nodes in the unpruned graph, stage by stage."""
     return count_joint_edges(prune_links(replace(graph, max_step_cost=np.inf)))
 

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from tracking.baselines.temporal_consistency.graph import (
     Indices,
     PersonLinks,
+    StageGraph,
     StepLinks,
-    WindowGraph,
     merge_costs,
 )
 from tracking.boxes import Floats
@@ -43,7 +43,7 @@ class JointPath:
     exact: bool
 
 
-def solve_joint_path(graph: WindowGraph, links: PersonLinks, most_states: int) -> JointPath:
+def solve_joint_path(graph: StageGraph, links: PersonLinks, most_states: int) -> JointPath:
     """Find the joint path of all people; `links` are the graph's pruned links.
 
     Only merges couple people, so those who can share no blob in any stage are independent. A group that is
@@ -69,7 +69,7 @@ def solve_joint_path(graph: WindowGraph, links: PersonLinks, most_states: int) -
     return JointPath(blobs, cost / max(people, 1), exact)
 
 
-def _groups(graph: WindowGraph, links: PersonLinks) -> list[list[int]]:
+def _groups(graph: StageGraph, links: PersonLinks) -> list[list[int]]:
     """Group the people who may share a blob in any stage, ordered by their first member."""
     group = list(range(graph.people))
     for row, shared in enumerate(graph.shared):

@@ -10,7 +10,7 @@ import numpy as np
 
 from tracking.baselines.temporal_consistency.blobs import Blob
 from tracking.baselines.temporal_consistency.distance import distance_cost, distance_costs
-from tracking.baselines.temporal_consistency.graph import PersonLinks, WindowGraph, prune_links
+from tracking.baselines.temporal_consistency.graph import PersonLinks, StageGraph, prune_links
 from tracking.baselines.temporal_consistency.joint_path import JointPath, solve_joint_path
 from tracking.baselines.temporal_consistency.regional_appearance import RegionalAppearance
 from tracking.baselines.temporal_consistency.settings import TemporalSettings
@@ -76,7 +76,7 @@ class TemporalWindow:
         self.decided: Stage | None = None
         self.pending: deque[Stage] = deque()
         self.path: JointPath | None = None
-        self.graph: WindowGraph | None = None
+        self.graph: StageGraph | None = None
         """The graph that `path` goes through; `links` are its links after pruning."""
         self.links: PersonLinks = ()
         self._steps: deque[Floats] = deque()
@@ -141,7 +141,7 @@ class TemporalWindow:
             return
         settings = self._settings
         max_cost = distance_cost(settings.prune_factor) if settings.prune_factor else np.inf
-        self.graph = WindowGraph(
+        self.graph = StageGraph(
             np.array([person.blob for person in self.people], dtype=np.int64),
             tuple(self._steps),
             tuple(self._appearance_costs(stage) for stage in self.pending),
