@@ -16,6 +16,7 @@ from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.solvers.random_windows import WindowSize
 from benchmarks.solvers.solver_times import (
+    BUDGET_CASES,
     CASES,
     EXACT_CASES,
     GATE,
@@ -34,6 +35,10 @@ from benchmarks.solvers.time_growth import (
     plot_table1,
     table1,
 )
+from tracking.solvers import SolverBudget
+
+BUDGETS = (0.07, 0.25, 1.0)
+"""Seconds of work; the first is that of a window of the live tracker."""
 
 LIVE = (WindowSize(8, 16, 15), WindowSize(10, 40, 15), WindowSize(20, 40, 15))
 
@@ -71,6 +76,16 @@ def exact(case: WindowCase, seeds: int) -> list[str]:
     return [*named(case), *shares]
 
 
+def budget(case: WindowCase, work_s: float, seeds: int) -> list[str]:
+    """Return a row: the time under a limit of work, how often it is reached, and the gaps."""
+    found = [timed("columns", case.network(seed, GATE), SolverBudget(work_s)) for seed in range(seeds)]
+    reports = [solved.solution.report for solved in found]
+    times, gaps = [1e3 * solved.seconds for solved in found], [100 * report.gap for report in reports]
+    stopped = sum(report.limit is not None for report in reports)
+    shares = [f"{np.median(times):.0f}", f"{max(times):.0f}", f"{stopped} of {seeds}", f"{max(gaps):.2f}"]
+    return [*named(case), f"{1e3 * work_s:.0f}", *shares]
+
+
 def live_row(size: WindowSize, steps: int, *, warm: bool) -> list[str]:
     """Return a row: windows at stride 1, including building the network from boxes and histograms."""
     found = live(size, steps, warm=warm)
@@ -106,6 +121,11 @@ def run(options: argparse.Namespace) -> None:
         "The integer optimum, and the largest gaps of columns' solution and bound, %; M = 20; ms",
         ["window", "n", "K", "μ", "median", "max", "answer", "bound"],
         [exact(case, options.seeds) for case in EXACT_CASES],
+    )
+    report.table(
+        "Under a limit of work, ms on an ordinary machine: time, ms, and the largest gap, %; M = 15",
+        ["window", "n", "K", "μ", "limit", "median", "max", "stopped", "gap"],
+        [budget(case, work_s, options.seeds) for case in BUDGET_CASES for work_s in BUDGETS],
     )
     growths = [grown(sweep, solver, options.seeds) for sweep in SWEEPS for solver in SOLVERS]
     rows = [[growth.sweep.label, growth.solver, f"{growth.exponent:.2f}"] for growth in growths]

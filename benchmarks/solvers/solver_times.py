@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.solvers.random_windows import WindowSize, moving_windows, random_window, walking_window
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.settings import PAPER_COSTS
-from tracking.solvers import Solution, create_solver
+from tracking.solvers import Solution, SolverBudget, create_solver
 
 COSTS = replace(PAPER_COSTS, conflict_rows="clique")
 """The paper's costs with the rows of the live tracker."""
@@ -56,6 +56,16 @@ EXACT_CASES = (
 )
 
 
+BUDGET_CASES = (
+    WindowCase("random", random_window, WindowSize(60, 60, 15)),
+    WindowCase("walking", walking_window, WindowSize(60, 60, 15)),
+    WindowCase("walking", walking_window, WindowSize(8, 20, 15), layout=0.001),
+    WindowCase("walking", walking_window, WindowSize(20, 40, 15), layout=0.001),
+    WindowCase("walking", walking_window, WindowSize(40, 60, 15), layout=0.001),
+)
+"""Windows that take longer than a stride."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedSolution:
     """A solution with its processor time."""
@@ -64,9 +74,9 @@ class TimedSolution:
     solution: Solution
 
 
-def timed(solver: str, network: Network) -> TimedSolution:
+def timed(solver: str, network: Network, budget: SolverBudget | None = None) -> TimedSolution:
     """Solve a network, and measure the time."""
-    found = create_solver(solver)
+    found = create_solver(solver, budget)
     start = time.process_time()
     solution = found.solve(network)
     return TimedSolution(time.process_time() - start, solution)
