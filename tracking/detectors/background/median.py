@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from tracking.detectors.background.flicker import FlickerFinder
 from tracking.detectors.background.frame_light import FrameLight, fit_frame_light
 from tracking.detectors.background.local_light import reduce_to_cells
 from tracking.detectors.background.motion import STILL, Motion
@@ -65,6 +66,9 @@ class MedianBackground:
         self._points_every = self._learn_every * frames_in(_POINTS_EVERY_S, fps / self._learn_every)
         self._relearn_frames = frames_in(settings.relearn_s, fps, _MIN_RELEARN_FRAMES)
         self._static_filter = GhostFinder(static, fps)
+        self._flicker = FlickerFinder(frames_in(static.check_every_s, fps) / fps)
+        self._differing: Mask | None = None
+        """Foreground of the last frame, flicker included."""
         self._shadows = shadows
         self._registration = Registration(fps)
         self._samples: list[Image] = []
@@ -129,7 +133,9 @@ class MedianBackground:
             return None
         # At the background's light, and without noise, people look the same whatever the exposure is.
         smooth = _smoothed(aligned) if light.noise > _NOISY else aligned
-        return replace(segmentation, image=light.remove(smooth))
+        self._differing, flicker = segmentation.foreground, self._flicker.mask
+        segmentation = replace(segmentation, image=light.remove(smooth))
+        return segmentation if flicker is None else segmentation.without(flicker)
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Update the background with the last frame, except where people are.
@@ -147,6 +153,8 @@ class MedianBackground:
         if not (checks_static or updates):
             return
         leveled = self._light.remove(self._last, self._rounded)
+        if checks_static and self._differing is not None:
+            self._flicker.check(leveled, self._differing)
         static = self._static_filter.find(leveled, self._rounded, foreground) if checks_static else None
         if static is not None:
             self._exact[static > 0] = leveled[static > 0]

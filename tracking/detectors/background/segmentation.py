@@ -6,7 +6,7 @@ against.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -31,6 +31,11 @@ class Segmentation:
     shadow: Mask
     image: Image
     motion: Motion = STILL
+
+    def without(self, unknown: Mask) -> Segmentation:
+        """Return the segmentation with foreground in an area as shadow: neither for a person nor against."""
+        shadow = self.shadow | (self.foreground & unknown)
+        return replace(self, foreground=self.foreground & ~unknown, shadow=shadow)
 
 
 @dataclass(frozen=True, slots=True)

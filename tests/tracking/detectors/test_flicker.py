@@ -1,0 +1,70 @@
+"""Flicker: leaves in the wind are no people; a crowd that walks is no flicker."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from fakes.tracking.drawn_people import HEIGHT, SCENE, WIDTH, Figure, Picture, picture
+from tracking.boxes import iou
+from tracking.detectors import BackgroundDetector
+from tracking.detectors.background.flicker import FlickerFinder
+
+CHECK_S, CHECKS = 0.2, 60
+CANVAS = np.full((HEIGHT, WIDTH, 3), 120, dtype=np.uint8)
+TREE = slice(20, 220), slice(0, 70)
+
+
+def with_tree(image: Picture, frame: int) -> Picture:
+    """Draw leaves that swing to and fro at the left side."""
+    random = np.random.default_rng(3)
+    canvas = image.copy()
+    for x, y, shade, phase in random.uniform(size=(260, 4)).tolist():
+        left = 70 * x + 8 * np.sin(2 * np.pi * (frame / 40 + phase))
+        leaf = tuple(int((0.4 + 0.6 * shade) * level) for level in (60, 140, 80))
+        cv2.ellipse(canvas, (round(left), round(20 + 200 * y)), (4, 8), 30.0, 0.0, 360.0, leaf, -1)
+    return canvas
+
+
+def test_what_keeps_changing_is_flicker_until_it_is_calm() -> None:
+    random, finder = np.random.default_rng(1), FlickerFinder(CHECK_S)
+    foreground = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
+    foreground[TREE] = 255
+    for _ in range(CHECKS):
+        image = CANVAS.copy()
+        image[TREE] = random.integers(0, 256, image[TREE].shape)
+        finder.check(image, foreground)
+    assert finder.mask is not None
+    inside = np.zeros_like(foreground)
+    inside[TREE] = 255
+    assert np.mean(finder.mask == inside) > 0.98
+    for _ in range(CHECKS):
+        finder.check(image, foreground)
+    assert finder.mask is None
+
+
+@pytest.mark.parametrize("spacing", [90, 140])
+def test_people_who_walk_by_and_one_who_stands_are_no_flicker(spacing: int) -> None:
+    finder = FlickerFinder(CHECK_S)
+    stands = Figure(200, 250)
+    for check in range(2 * CHECKS):
+        frame = 5 * check
+        walkers = [Figure(-400 - spacing * k + 2.0 * frame, 200) for k in range(12)]
+        image = picture([*walkers, stands], frame)
+        difference = cv2.absdiff(image, SCENE).max(axis=2)
+        finder.check(image, np.where(difference > 24, 255, 0).astype(np.uint8))
+        assert finder.mask is None
+
+
+def test_leaves_in_the_wind_are_no_people_after_some_seconds() -> None:
+    detector = BackgroundDetector()
+    detector.prepare([picture([], frame) for frame in range(20)], every_s=0.2)
+    walker, false = Figure(60, 270, speed=0.5), 0
+    for frame in range(400):
+        found = detector.detect(with_tree(picture([walker], frame), frame))
+        if frame >= 250:
+            overlaps = iou(found.boxes[found.scores > 0.4], walker.box(frame))
+            assert overlaps.max(initial=0.0) > 0.5
+            false += np.count_nonzero(overlaps < 0.1)
+    assert false <= 15
