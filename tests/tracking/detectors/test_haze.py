@@ -8,8 +8,8 @@ import pytest
 from fakes.tracking.drawn_people import HEIGHT, SCENE, Figure, Picture, picture
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
-from tracking.detectors.background.haze import find_haze
-from tracking.detectors.background.local_light import reduce_to_cells
+from tracking.detectors.background.light.haze import find_haze
+from tracking.detectors.background.light.local_light import reduce_to_cells
 
 SURE, VEIL = 0.4, 190.0
 DARK_COATS = [Figure(30 + 90 * k, 150 + 30 * k, color=(15, 18, 22)) for k in range(3)]

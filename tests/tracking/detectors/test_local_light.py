@@ -9,9 +9,9 @@ import pytest
 from fakes.tracking.drawn_people import HEIGHT, SCENE, WIDTH, Figure, Picture, picture
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
-from tracking.detectors.background.frame_light import FrameLight
-from tracking.detectors.background.local_light import find_local_light, reduce_to_cells, relight
-from tracking.detectors.background.tone_curve import IDENTITY
+from tracking.detectors.background.light.frame_light import FrameLight
+from tracking.detectors.background.light.local_light import find_local_light, reduce_to_cells, relight
+from tracking.detectors.background.light.tone_curve import IDENTITY
 
 SURE = 0.4
 SHAPE = (HEIGHT, WIDTH)

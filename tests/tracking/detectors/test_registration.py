@@ -9,9 +9,9 @@ import pytest
 from fakes.tracking.drawn_people import HEIGHT, SCENE, WIDTH, Figure, Picture, detect_all, picture
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
+from tracking.detectors.background.light.tone_curve import IDENTITY
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration
-from tracking.detectors.background.tone_curve import IDENTITY
 
 SIZE = (WIDTH, HEIGHT)
 CROWD = [

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tracking.detectors.background.tone_curve import IDENTITY, fit_tone_curves
+from tracking.detectors.background.light.tone_curve import IDENTITY, fit_tone_curves
 
 HEIGHT, WIDTH = 144, 180
 Levels = npt.NDArray[np.float64]

@@ -10,13 +10,19 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.detectors.background.flicker import FlickerFinder
-from tracking.detectors.background.frame_light import FrameLight, fit_frame_light
-from tracking.detectors.background.local_light import reduce_to_cells
+from tracking.detectors.background.light.frame_light import FrameLight, fit_frame_light
+from tracking.detectors.background.light.local_light import reduce_to_cells
+from tracking.detectors.background.light.tone_curve import IDENTITY
+from tracking.detectors.background.median_samples import MedianSamples
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration, count_edges
-from tracking.detectors.background.segmentation import Segmentation, ShadowSettings, shadow_mask
+from tracking.detectors.background.segmentation import (
+    Segmentation,
+    ShadowSettings,
+    largest_difference,
+    shadow_mask,
+)
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
-from tracking.detectors.background.tone_curve import IDENTITY, fit_tone_curves
 from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, require_positive
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 
@@ -71,7 +77,7 @@ class MedianBackground:
         """Foreground of the last frame, flicker included."""
         self._shadows = shadows
         self._registration = Registration(fps)
-        self._samples: list[Image] = []
+        self._samples = MedianSamples()
         self._frames = 0
         self._flooded = 0
         self._exact: npt.NDArray[np.float32] | None = None
@@ -96,10 +102,10 @@ class MedianBackground:
     def prepare(self, images: Sequence[Image]) -> None:
         """Learn the background from images before the first frame; without any, learn it live."""
         for image in images:
-            self._sample(image)
+            self._samples.add(image)
         if self._samples:
-            self._take_median()
-            self._frames, self._samples = self._bootstrap_frames, []
+            self._use(self._samples.median(self._retired))
+            self._frames, self._samples = self._bootstrap_frames, MedianSamples()
 
     def segment_still(self, image: Image) -> Segmentation | None:
         """Segment an image that is not the next frame."""
@@ -196,10 +202,10 @@ class MedianBackground:
         expected, noise = light.apply(background), light.noise
         if noise > _NOISY:
             image, expected = _smoothed(image), _smoothed(expected)
-        difference = _difference(image, expected)
+        difference = largest_difference(image, expected)
         lit = light.apply_local(expected)
         if lit is not None:
-            lit_difference = _difference(image, lit)
+            lit_difference = largest_difference(image, lit)
             np.copyto(expected, lit, where=(lit_difference < difference)[..., None])
             difference = np.minimum(difference, lit_difference)
         # In a darker picture people differ by less, and so does what is not there: by the noise at least.
@@ -221,38 +227,11 @@ class MedianBackground:
             return
         # Spread the samples evenly, the last one on the last frame.
         if done * samples // frames > self._frames * samples // frames:
-            self._sample(image)
+            self._samples.add(image)
         if done in {(frames + 1) // 2, frames} and self._samples:
-            self._take_median()
+            self._use(self._samples.median(self._retired))
         if done == frames:
-            self._samples = []
-
-    def _sample(self, image: Image) -> None:
-        """Add an image to the samples, at the light and the place of the first."""
-        if not self._samples:
-            self._samples.append(image)
-            self._sampling = Registration()
-            self._sampling.set_background(image)
-            return
-        first = self._samples[0]
-        aligned = self._sampling.find_still(image).align(image, first)
-        self._samples.append(fit_tone_curves(aligned, first).invert(aligned, first))
-
-    def _take_median(self) -> None:
-        samples = np.stack(self._samples)
-        ordered = np.sort(samples, axis=0)
-        median = np.asarray(ordered[len(ordered) // 2], dtype=np.uint8)
-        if self._retired is not None:
-            self._keep_seen(median, samples, self._retired)
-        self._use(median)
-
-    def _keep_seen(self, median: Image, samples: Image, retired: Image) -> None:
-        """Keep the old background where some of the samples show it: people hide it in the others."""
-        old = fit_tone_curves(self._samples[0], retired).apply(retired)
-        seen = np.mean(
-            [_difference(sample, old) < self._settings.threshold / 2.0 for sample in samples], axis=0
-        )
-        np.copyto(median, old, where=(seen >= _SEEN)[..., None])
+            self._samples = MedianSamples()
 
     def _use(self, background: Image) -> None:
         """Compare frames with this background from now on."""
@@ -280,7 +259,7 @@ class MedianBackground:
             if not self._is_flooded(self._compare(image, STILL, retired, light)):
                 self._use(retired)
                 return
-        self._frames, self._samples = 0, []
+        self._frames, self._samples = 0, MedianSamples()
         self._exact = self._rounded = self._light = self._unlikely = None
         self.views += 1
 
@@ -297,8 +276,6 @@ _BLIND = 0.1
 _LEAST_CONTRAST, _NOISES = 0.4, 4.0
 # Share of the background's edges below which the lens is covered.
 _COVERED = 0.25
-# Share of the samples that have to show the old background where it is kept.
-_SEEN = 0.2
 # Noise, in gray levels, from which frames are smoothed.
 _NOISY = 6.0
 
@@ -315,9 +292,3 @@ def _exceeding(difference: Mask, thresholds: Plane) -> Mask:
 
 def _smoothed(image: Image) -> Image:
     return np.asarray(cv2.GaussianBlur(image, (5, 5), 0.0), dtype=np.uint8)
-
-
-def _difference(image: Image, expected: Image) -> Mask:
-    """Return the largest difference of the channels, `(H, W)`."""
-    blue, green, red = cv2.split(cv2.absdiff(image, expected))
-    return np.asarray(cv2.max(cv2.max(blue, green), red), dtype=np.uint8)

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats
+from tracking.detectors.background.light.tone_curve import IDENTITY, ToneCurves
 from tracking.detectors.background.motion import STILL, Motion
-from tracking.detectors.background.tone_curve import IDENTITY, ToneCurves
 from tracking.detectors.base import Image, Mask, Plane
 from tracking.frame_rate import DEFAULT_FPS
 

@@ -38,6 +38,12 @@ class Segmentation:
         return replace(self, foreground=self.foreground & ~unknown, shadow=shadow)
 
 
+def largest_difference(image: Image, expected: Image) -> Mask:
+    """Return the largest difference of the channels, `(H, W)`."""
+    blue, green, red = cv2.split(cv2.absdiff(image, expected))
+    return np.asarray(cv2.max(cv2.max(blue, green), red), dtype=np.uint8)
+
+
 @dataclass(frozen=True, slots=True)
 class ShadowSettings:
     """Thresholds for shadows on the ratio of frame to background in each channel."""

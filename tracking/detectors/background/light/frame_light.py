@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from tracking.detectors.background.haze import Haze, find_haze
-from tracking.detectors.background.local_light import find_local_light, reduce_to_cells, relight, unlight
-from tracking.detectors.background.tone_curve import ToneCurves, fit_tone_curves
+from tracking.detectors.background.light.haze import Haze, find_haze
+from tracking.detectors.background.light.local_light import (
+    find_local_light,
+    reduce_to_cells,
+    relight,
+    unlight,
+)
+from tracking.detectors.background.light.tone_curve import ToneCurves, fit_tone_curves
 from tracking.detectors.base import Image, Mask, Plane
 
 

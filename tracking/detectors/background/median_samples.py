@@ -1,0 +1,48 @@
+"""The frames from which a background is learned, and their median."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.detectors.background.light.tone_curve import fit_tone_curves
+from tracking.detectors.background.registration import Registration
+from tracking.detectors.background.segmentation import largest_difference
+from tracking.detectors.base import Image
+
+# Share of the samples that have to show the old background where it is kept, and within how many gray levels.
+_SEEN, _SAME = 0.2, 12
+
+
+class MedianSamples:
+    """Frames of one view, each at the light and the place of the first."""
+
+    def __init__(self) -> None:
+        self._images: list[Image] = []
+        self._registration = Registration()
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self._images)
+
+    def add(self, image: Image) -> None:
+        """Add a frame `(H, W, 3)`."""
+        if not self._images:
+            self._registration.set_background(image)
+            self._images.append(image)
+            return
+        first = self._images[0]
+        aligned = self._registration.find_still(image).align(image, first)
+        self._images.append(fit_tone_curves(aligned, first).invert(aligned, first))
+
+    def median(self, retired: Image | None) -> Image:
+        """Return the median of the frames, at least one.
+
+        Where some of them show the `retired` background, it is kept: people hide it in the others.
+        """
+        samples = np.stack(self._images)
+        median = np.asarray(np.sort(samples, axis=0)[len(samples) // 2], dtype=np.uint8)
+        if retired is not None:
+            old = fit_tone_curves(self._images[0], retired).apply(retired)
+            seen = np.mean([largest_difference(sample, old) < _SAME for sample in samples], axis=0)
+            np.copyto(median, old, where=(seen >= _SEEN)[..., None])
+        return median
