@@ -52,8 +52,12 @@ class BenchmarkScene:
     disjoint: bool = False
 
     def config(self, *, ground: bool = True, **changes: Mapping[str, Any]) -> Config:
-        """Return the configuration, with some settings changed, and with or without homographies."""
+        """Return the configuration, with some settings changed, and with or without homographies.
+
+        Without a kind of detector it is the background, whatever networks are installed.
+        """
         content = {**self.content, **changes}
+        content["detect"] = {"kind": "background", **content.get("detect", {})}
         if not ground:
             content.pop("ground", None)
         return build_config(content, where=self.name, folder=Path())

@@ -118,7 +118,8 @@ def measure(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory(prefix="myview-render-") as folder:
         work = Path(folder)
         config = work / "views.yaml"
-        config.write_text(yaml.safe_dump({"site": views.site, "cameras": views.cameras}), encoding="utf-8")
+        content = {"site": views.site, "cameras": views.cameras, "detect": {"kind": "background"}}
+        config.write_text(yaml.safe_dump(content), encoding="utf-8")
         run = time_command(views, config, work / "best")
         describe(report, views.name, run)
         times = time_stages(views, config, work / "stages")
