@@ -23,7 +23,7 @@ import matplotlib as mpl
 from benchmarks.common.environment import CannotRunError, finish, parser
 from benchmarks.common.report import Report
 from benchmarks.other_trackers.plots import plot
-from server.cli.track.command import DetectedFrame, config_for_video, detect_frames, newly_final_rows
+from server.cli.track.command import RecordedFrame, config_for_video, detect_frames, newly_final_rows
 from tracking import CostSettings, WindowSettings, create_solver
 from tracking.evaluation import HEADINGS, Scores, evaluate, format_scores, oracle_association
 from tracking.motchallenge import MotRow, read_rows
@@ -42,7 +42,7 @@ class DetectedView:
     """One camera's frames with their detections, and the ground truth."""
 
     name: str
-    frames: Sequence[DetectedFrame]
+    frames: Sequence[RecordedFrame]
     truth: Sequence[MotRow]
     fps: float
 

@@ -26,7 +26,7 @@ from bestview import ViewScore
 from server.cli.evaluate.choices_file import Choice
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from server.cli.evaluate.view_scores import evaluate_views
-from server.cli.render.site_file import SiteInfo
+from server.cli.render.site_file import RenderedSite
 from server.service.view_selection.decider import camera_homographies
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
@@ -210,7 +210,7 @@ def score_choices(
 ) -> ViewScore:
     """Score choices against the truth, as `myview evaluate --views` does."""
     config = scene.config()
-    facts = SiteInfo(config.site.fps, config.view.switch_cost_s, scene.sizes)
+    facts = RenderedSite(config.site.fps, config.view.switch_cost_s, scene.sizes)
     return evaluate_views(truth, choices, person_of, facts).total
 
 

@@ -13,7 +13,7 @@ from benchmarks.detectors.compared_detectors import CONFIDENT
 from benchmarks.scene_runs.pipeline_run import SceneRun
 from server.cli.evaluate.ground_truth import build_truth, people_of_objects
 from server.cli.evaluate.view_scores import evaluate_views
-from server.cli.render.site_file import SiteInfo
+from server.cli.render.site_file import RenderedSite
 from server.config.site_config import Config
 from tracking.assignment import assign_pairs
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
@@ -76,7 +76,7 @@ def score_run(
         scene,
         [choice for choice in choices if choice.frame <= last],
         person_of,
-        SiteInfo(config.site.fps, config.view.switch_cost_s, sizes),
+        RenderedSite(config.site.fps, config.view.switch_cost_s, sizes),
     )
     return SceneScores(ScoredBoxes.joined(boxes), evaluate_cameras(recordings), views.total.visible)
 

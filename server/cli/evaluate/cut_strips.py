@@ -15,7 +15,7 @@ from server.camera.sources import open_source
 from server.cli.evaluate.ground_truth import SceneTruth
 from server.cli.evaluate.view_scores import ViewEvaluation
 from server.cli.render.plots import new_figure, save_figure
-from server.cli.render.site_file import SiteInfo
+from server.cli.render.site_file import RenderedSite
 from server.cli.track.command import read_frames
 from server.config.sections import CameraSettings, SiteSettings
 
@@ -51,7 +51,7 @@ def plot_strips(
     folder: Path,
     truth: SceneTruth,
     evaluation: ViewEvaluation,
-    site_info: SiteInfo,
+    site_info: RenderedSite,
     videos: Mapping[str, Path],
 ) -> None:
     """Write `person-K.png` for each person whose best view is cut; boxes are the ground truth's.
@@ -81,7 +81,7 @@ def _strips(views: NDArray[np.int64], fps: float) -> list[_Strip]:
     return strips
 
 
-def _read(video: Path, site_info: SiteInfo, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
+def _read(video: Path, site_info: RenderedSite, camera: str, numbers: Sequence[int]) -> dict[int, Image]:
     """Return frames of a camera's recording by number, in the camera's picture size."""
     images: dict[int, Image] = {}
     if not numbers:

@@ -14,7 +14,7 @@ from server.cli.evaluate.cut_strips import plot_strips
 from server.cli.evaluate.ground_truth import SceneTruth
 from server.cli.evaluate.view_scores import ViewEvaluation
 from server.cli.render.plots import new_figure, save_figure
-from server.cli.render.site_file import SiteInfo
+from server.cli.render.site_file import RenderedSite
 
 _ROW_INCHES, _WIDTH_INCHES = 1.1, 11.0
 _SEEN, _BEST, _CHOSEN = "#d9d9d9", "#d9822b", "#2a7f3f"
@@ -26,7 +26,7 @@ def plot_views(
     folder: Path,
     truth: SceneTruth,
     evaluation: ViewEvaluation,
-    site_info: SiteInfo,
+    site_info: RenderedSite,
     videos: Mapping[str, Path],
 ) -> None:
     """Write `choices.png`, and with videos `person-K.png` with the frames around each cut.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.cli.generated_config import camera_name
-from server.cli.render.site_file import SITE_FILE, SiteInfo, read_site
+from server.cli.render.site_file import SITE_FILE, RenderedSite, read_site
 from server.cli.render.video_info import Size, parse_size, read_video_info
 from server.config.sections import ViewSettings
 from server.system.errors import UserError
@@ -42,7 +42,7 @@ def videos_by_camera(videos: Sequence[Path], cameras: Sequence[str]) -> dict[str
 
 def collect_site_info(
     choices: Path, cameras: Sequence[str], videos: Mapping[str, Path], options: SiteOptions
-) -> SiteInfo:
+) -> RenderedSite:
     """Collect the site's properties from options, then videos, then `site.json` beside the choices.
 
     The rate of `site.json` takes precedence over that of videos: frames of choices are counted at it.
@@ -71,4 +71,4 @@ def collect_site_info(
         switch_cost_s = options.switch_cost_s
     else:
         switch_cost_s = rendering.switch_cost_s if rendering else ViewSettings().switch_cost_s
-    return SiteInfo(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})
+    return RenderedSite(fps, switch_cost_s, {camera: sizes[camera] for camera in cameras})

@@ -14,7 +14,7 @@ from rich.table import Table
 from bestview import ViewScore, optimal_views, score_views
 from server.cli.evaluate.choices_file import Choice, views_of
 from server.cli.evaluate.ground_truth import SceneTruth
-from server.cli.render.site_file import SiteInfo
+from server.cli.render.site_file import RenderedSite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class ViewEvaluation:
 
 
 def evaluate_views(
-    truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int], site_info: SiteInfo
+    truth: SceneTruth, choices: Sequence[Choice], person_of: Mapping[int, int], site_info: RenderedSite
 ) -> ViewEvaluation:
     """Score choices; ``person_of`` maps objects to people.
 
@@ -108,7 +108,7 @@ def _shares(score: ViewScore) -> tuple[float, ...]:
     return score.agreement, score.regret, score.visible, score.chosen
 
 
-def content_of_views(evaluation: ViewEvaluation, site_info: SiteInfo) -> dict[str, Any]:
+def content_of_views(evaluation: ViewEvaluation, site_info: RenderedSite) -> dict[str, Any]:
     """Return the evaluation for a JSON file; shares are in [0, 1], null if infinite."""
 
     def content(score: ViewScore) -> dict[str, Any]:

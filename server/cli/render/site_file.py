@@ -17,7 +17,7 @@ SITE_FILE = "site.json"
 
 
 @dataclass(frozen=True, slots=True)
-class SiteInfo:
+class RenderedSite:
     """Frame rate, switch cost and picture sizes of a rendering.
 
     Attributes:
@@ -48,7 +48,7 @@ def write_site(folder: Path, config: Config, sizes: Mapping[str, Size]) -> None:
     (folder / SITE_FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="ascii")
 
 
-def read_site(path: Path) -> SiteInfo:
+def read_site(path: Path) -> RenderedSite:
     """Read `site.json`.
 
     Raises:
@@ -57,7 +57,7 @@ def read_site(path: Path) -> SiteInfo:
     try:
         content = parse_json(path.read_text(encoding="ascii"))
         sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
-        info = SiteInfo(float(content["fps"]), float(content["switch_cost_s"]), sizes)
+        info = RenderedSite(float(content["fps"]), float(content["switch_cost_s"]), sizes)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:

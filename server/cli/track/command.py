@@ -28,7 +28,7 @@ _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DetectedFrame:
+class RecordedFrame:
     """A frame of a recording, counted from 0; without an image if only detections are given."""
 
     number: int
@@ -114,7 +114,7 @@ def config_for_video(video: Path | None, det: Path | None, config: Path | None) 
     return build_config({**base, "cameras": [placeholder]}, where=where, folder=folder)
 
 
-def detect_frames(config: Config) -> Iterator[DetectedFrame]:
+def detect_frames(config: Config) -> Iterator[RecordedFrame]:
     """Yield every frame of the video with its detections, in pixels of the video."""
     camera = config.cameras[0]
     source = open_source(camera, config.site)
@@ -123,7 +123,7 @@ def detect_frames(config: Config) -> Iterator[DetectedFrame]:
     for number, image in read_frames(source):
         if image is not None:
             detections = detector.detect(letterbox.image(image), number)
-            yield DetectedFrame(
+            yield RecordedFrame(
                 number, replace(detections, boxes=letterbox.boxes_site_to_camera(detections.boxes)), image
             )
     source.close()
@@ -139,7 +139,7 @@ def read_frames(source: FrameSource, first: int = 0) -> Iterator[tuple[int, Imag
         yield number, image
 
 
-def _from_detections(path: Path) -> Iterator[DetectedFrame]:
+def _from_detections(path: Path) -> Iterator[RecordedFrame]:
     try:
         detector = MotFileDetector(path)
     except OSError as error:
@@ -147,7 +147,7 @@ def _from_detections(path: Path) -> Iterator[DetectedFrame]:
     except ValueError as error:
         raise UserError(f"--det: {error}") from error
     for number in range(detector.last_frame + 1):
-        yield DetectedFrame(number, detector.detect(_NO_PICTURE, number), None)
+        yield RecordedFrame(number, detector.detect(_NO_PICTURE, number), None)
 
 
 def newly_final_rows(result: WindowResult | None) -> Iterator[MotRow]:

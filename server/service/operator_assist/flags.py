@@ -52,7 +52,7 @@ class Flag(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True, slots=True)
-class RiskEvent:
+class PersonRisk:
     """A risk event of one camera's tracker, with person numbers."""
 
     camera: str
@@ -93,7 +93,7 @@ class FlagQueue:
         """Flags that have ended, the newest first."""
         return list(reversed(self._ended))
 
-    def step(self, now: int, events: Iterable[RiskEvent], resolve: Callable[[int], int]) -> None:
+    def step(self, now: int, events: Iterable[PersonRisk], resolve: Callable[[int], int]) -> None:
         """Process the risk events at a pulse; ``resolve`` maps a merged number to its current one."""
         for flag in list(self._open.values()):
             self._put(self._resolved(flag, resolve))
@@ -130,7 +130,7 @@ class FlagQueue:
         self._publish()
         return [flag.id for flag in flags]
 
-    def _raise(self, now: int, event: RiskEvent) -> None:
+    def _raise(self, now: int, event: PersonRisk) -> None:
         self.counts["raised"] += 1
         self._budget.record_flag(now, frozenset(event.objects))
         self._put(
@@ -147,7 +147,7 @@ class FlagQueue:
             )
         )
 
-    def _update(self, flag: Flag, event: RiskEvent) -> None:
+    def _update(self, flag: Flag, event: PersonRisk) -> None:
         """Update a flag by a later event of its failure; once the operator points, its time stays."""
         cameras = flag.cameras if event.camera in flag.cameras else [*flag.cameras, event.camera]
         flag = msgspec.structs.replace(flag, cameras=cameras)
@@ -155,11 +155,11 @@ class FlagQueue:
             flag = msgspec.structs.replace(flag, pulse=event.pulse, margin=event.margin, risk=event.risk)
         self._put(flag)
 
-    def _open_flag_of(self, event: RiskEvent) -> Flag | None:
+    def _open_flag_of(self, event: PersonRisk) -> Flag | None:
         """Return the open flag of the same people."""
         return next((flag for flag in self.open if set(flag.objects) == set(event.objects)), None)
 
-    def _has_ended(self, event: RiskEvent) -> bool:
+    def _has_ended(self, event: PersonRisk) -> bool:
         """Return whether a flag that has ended was about the same event."""
         earliest = event.pulse - self._settings.answer_s * self._fps
         return any(set(flag.objects) == set(event.objects) and flag.pulse >= earliest for flag in self._ended)

@@ -11,7 +11,7 @@ from server.config.site_config import Config
 from server.messaging.operator_messages import CorrectedPosition, PositionCorrections
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.operator_assist.flags import FlagQueue, RiskEvent
+from server.service.operator_assist.flags import FlagQueue, PersonRisk
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class OperatorAssist:
             number, camera, [correction.pulse for correction in corrections.corrections]
         )
 
-    def _risk_events(self, epoch: Epoch) -> Iterator[RiskEvent]:
+    def _risk_events(self, epoch: Epoch) -> Iterator[PersonRisk]:
         """Yield the risk events of an epoch whose persons all have a number."""
         for camera, message in epoch.tracks.items():
             for event in message.risk_events:
@@ -98,4 +98,4 @@ class OperatorAssist:
                 ]
                 known = tuple(dict.fromkeys(number for number in numbers if number is not None))
                 if known and len(known) == len(numbers):
-                    yield RiskEvent(camera, known, event.reason, event.pulse, event.margin, event.risk)
+                    yield PersonRisk(camera, known, event.reason, event.pulse, event.margin, event.risk)

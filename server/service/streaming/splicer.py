@@ -23,7 +23,7 @@ _LATE_S = 2
 """How far a camera's stream may be behind the decisions before it is filled: pictures may still arrive."""
 
 
-class LiveStream:
+class CameraLiveStream:
     """A camera's own stream: every picture as soon as it arrives."""
 
     def __init__(
@@ -73,7 +73,7 @@ class Splicer:
         site, http = config.site, config.http
         self.layout = segment_layout(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
         self._live = {
-            camera: LiveStream(self._broadcaster(), self._timeline(), site.fps, audio_buffer)
+            camera: CameraLiveStream(self._broadcaster(), self._timeline(), site.fps, audio_buffer)
             for camera in frame_buffers
         }
         self._decided = {camera: self._stream() for camera in frame_buffers}

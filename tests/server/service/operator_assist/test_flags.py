@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.config.sections import FlagSettings
-from server.service.operator_assist.flags import Flag, FlagQueue, RiskEvent
+from server.service.operator_assist.flags import Flag, FlagQueue, PersonRisk
 
 FPS = 25.0
 STRIDE = 5
 
 
-def risk_event(*objects: int, pulse: int, camera: str = "c0", risk: float = 0.5) -> RiskEvent:
-    return RiskEvent(camera, objects, "crossing", pulse, margin=0.5, risk=risk)
+def risk_event(*objects: int, pulse: int, camera: str = "c0", risk: float = 0.5) -> PersonRisk:
+    return PersonRisk(camera, objects, "crossing", pulse, margin=0.5, risk=risk)
 
 
 class FlagRecorder:
@@ -28,7 +28,7 @@ class FlagRecorder:
         self.flags.on_flag.append(self.published.append)
         self.merged: dict[int, int] = {}
 
-    def step(self, now: int, *events: RiskEvent) -> None:
+    def step(self, now: int, *events: PersonRisk) -> None:
         self.flags.step(now, events, lambda number: self.merged.get(number, number))
 
     @property
@@ -68,7 +68,7 @@ def test_events_of_other_reasons_are_not_flagged() -> None:
     flags = FlagQueue(FlagSettings(reasons=["id_switch"]), FPS)
     flags.step(10, [risk_event(7, 9, pulse=40)], int)
     assert flags.open == []
-    flags.step(15, [RiskEvent("c0", (7, 9), "id_switch", 40, 0.5, 0.5)], int)
+    flags.step(15, [PersonRisk("c0", (7, 9), "id_switch", 40, 0.5, 0.5)], int)
     assert [flag.reason for flag in flags.open] == ["id_switch"]
 
 
