@@ -30,7 +30,7 @@ PREDICTION_METHODS = {
     "mcmc": ("tracking.baselines.mcmc", "McmcFilter"),
     "mean-shift": ("tracking.baselines.mean_shift", "MeanShift"),
     "separated-particles": ("tracking.baselines.separated_particles", "SeparatedParticles"),
-    "occlusion-cues": ("tracking.baselines.occlusion_cues", "OcclusionCues"),
+    "occlusion-cues": ("tracking.baselines.occlusion_cues", "OcclusionCueTracker"),
     "particle": ("tracking.baselines.particle_filter", "ParticleFilters"),
 }
 """Module and class of each frame-by-frame tracker's prediction method, by the tracker's name."""

@@ -33,7 +33,7 @@ def areas(boxes: Floats) -> Floats:
     return np.asarray(np.maximum(width, 0.0) * np.maximum(height, 0.0))
 
 
-def area_shares(parts: Floats, wholes: Floats) -> Floats:
+def area_ratios(parts: Floats, wholes: Floats) -> Floats:
     """Divide areas; 0 where the whole has no area."""
     return np.asarray(np.divide(parts, wholes, out=np.zeros(parts.shape), where=wholes > 0))
 
@@ -97,13 +97,13 @@ def untruncated_share(boxes: Floats, picture_boxes: Floats) -> Floats:
     Returns:
         (...) values in [0, 1].
     """
-    inside = area_shares(areas_inside_picture(boxes, picture_boxes), areas(boxes))
+    inside = area_ratios(areas_inside_picture(boxes, picture_boxes), areas(boxes))
     left, top, right, bottom = np.moveaxis((boxes - picture_boxes) * np.array([1.0, 1.0, -1.0, -1.0]), -1, 0)
     height = boxes[..., 3] - boxes[..., 1]
     at_top_or_bottom = _edge_proximity(np.minimum(top, bottom), height)
     at_side = np.minimum(left, right)
     at_side = np.where(at_side < 0.0, 0.0, _edge_proximity(at_side, height))
-    width_ratio = np.minimum(area_shares(boxes[..., 2] - boxes[..., 0], _UPRIGHT_ASPECT_RATIO * height), 1.0)
+    width_ratio = np.minimum(area_ratios(boxes[..., 2] - boxes[..., 0], _UPRIGHT_ASPECT_RATIO * height), 1.0)
     return np.asarray(
         inside * (1.0 - _EDGE_PENALTY * at_top_or_bottom) * (1.0 - at_side * (1.0 - width_ratio))
     )

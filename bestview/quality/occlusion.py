@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.quality.framing import Floats, area_shares
+from bestview.quality.framing import Floats, area_ratios
 
 Ints = NDArray[np.int64]
 
@@ -49,8 +49,8 @@ def occlusion_score(boxes: Floats, cameras: Ints) -> Floats:
     nearer = np.clip(0.5 + depth_order / (2.0 * _FOOT_TOLERANCE), 0.0, 1.0)
     visible = np.ones(area.shape)
     # Pairs are sorted by their first track, then their second, so each product is in the order of the tracks.
-    np.multiply.at(visible, second_box, 1.0 - (1.0 - nearer) * area_shares(intersection, area[second_box]))
-    np.multiply.at(visible, first_box, 1.0 - nearer * area_shares(intersection, area[first_box]))
+    np.multiply.at(visible, second_box, 1.0 - (1.0 - nearer) * area_ratios(intersection, area[second_box]))
+    np.multiply.at(visible, first_box, 1.0 - nearer * area_ratios(intersection, area[first_box]))
     return np.asarray(np.minimum(visible / _FULLY_VISIBLE_SHARE, 1.0).reshape(frames, tracks).T)
 
 

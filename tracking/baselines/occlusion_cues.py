@@ -128,7 +128,7 @@ class OcclusionCueTarget:
     box: Floats
 
 
-class OcclusionCues:
+class OcclusionCueTracker:
     """Coupled particle filters of position and occlusion."""
 
     name = "occlusion-cues"

@@ -23,8 +23,8 @@ from tracking.baselines.occluder_particles import OccluderParticles
 from tracking.baselines.occlusion_cues import (
     RING_AREA_RATIO,
     CenterSurroundIntegral,
-    OcclusionCues,
     OcclusionCueSettings,
+    OcclusionCueTracker,
     add_ring,
 )
 from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
@@ -128,7 +128,7 @@ def test_a_share_stays_with_its_occluder_when_others_come_and_go() -> None:
 def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_filter_fails() -> None:
     scenes = [Crossing((GRAY, BLUE), seed=seed) for seed in SEEDS]
     assert count_tracked_scenes(
-        [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes
+        [OcclusionCueTracker(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes
     ) == len(SEEDS)
     plain = [ParticleFilters(ParticleSettings(seed=seed)) for seed in SEEDS]
     assert count_tracked_scenes(plain, scenes) <= len(SEEDS) - 2
@@ -137,10 +137,11 @@ def test_a_person_colored_like_the_wall_is_kept_behind_another_where_the_plain_f
 def test_a_hidden_person_moves_with_the_occluder_past_a_distractor() -> None:
     scenes = [WalkTogether((RED, BLUE), seed=seed) for seed in SEEDS]
     with_cues = count_tracked_scenes(
-        [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes
+        [OcclusionCueTracker(OcclusionCueSettings(seed=seed)) for seed in SEEDS], scenes
     )
     alone = [
-        OcclusionCues(OcclusionCueSettings(seed=seed, occlusion_noise=0.0, jump_share=0.0)) for seed in SEEDS
+        OcclusionCueTracker(OcclusionCueSettings(seed=seed, occlusion_noise=0.0, jump_share=0.0))
+        for seed in SEEDS
     ]
     assert with_cues >= len(SEEDS) - 1
     assert count_tracked_scenes(alone, scenes) <= 1
@@ -148,12 +149,12 @@ def test_a_hidden_person_moves_with_the_occluder_past_a_distractor() -> None:
 
 def test_two_people_who_pass_behind_a_third_keep_their_ids() -> None:
     scenes = [ThreeMeet((RED, BLUE, GREEN), seed=seed) for seed in SEEDS]
-    methods = [OcclusionCues(OcclusionCueSettings(seed=seed)) for seed in SEEDS]
+    methods = [OcclusionCueTracker(OcclusionCueSettings(seed=seed)) for seed in SEEDS]
     assert count_tracked_scenes(methods, scenes) >= len(SEEDS) - 1
 
 
 def test_the_hidden_share_is_large_only_during_the_occlusion() -> None:
-    scene, method = Crossing((RED, BLUE)), OcclusionCues()
+    scene, method = Crossing((RED, BLUE)), OcclusionCueTracker()
     people = [method.initialize(scene.picture(0), scene.where(person, 0)) for person in range(2)]
     hidden = []
     for frame in range(1, FRAMES):
@@ -168,7 +169,7 @@ def test_the_same_seed_gives_the_same_predictions() -> None:
     scene = Crossing((RED, BLUE))
     runs = []
     for _ in range(2):
-        method = OcclusionCues()
+        method = OcclusionCueTracker()
         people = [method.initialize(scene.picture(0), scene.where(person, 0)) for person in range(2)]
         runs.append([method.predict(scene.picture(frame), people).tobytes() for frame in range(1, 12)])
     assert runs[0] == runs[1]
