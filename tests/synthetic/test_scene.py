@@ -62,7 +62,7 @@ def test_cameras_frames_and_seeds_differ(room: Scene) -> None:
     assert not np.allclose(room.ground_positions(200), scene(seed=1).ground_positions(200))
 
 
-def test_time_is_in_seconds_at_every_fps(room: Scene) -> None:
+def test_time_is_in_seconds_at_every_frame_rate(room: Scene) -> None:
     assert np.allclose(room.ground_positions(250), scene(fps=10.0).ground_positions(100))
 
 

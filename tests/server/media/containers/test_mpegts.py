@@ -116,4 +116,4 @@ def test_a_decoder_shows_the_cameras_own_pixels_across_cuts() -> None:
 @needs_ffprobe
 def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
     (tmp_path / "best.ts").write_bytes(spliced([0, 1, 1, 0])[0])
-    assert probed(tmp_path / "best.ts", "nb_read_frames,r_fps") == [["25/1", f"{4 * GOP}"]]
+    assert probed(tmp_path / "best.ts", "nb_read_frames,r_frame_rate") == [["25/1", f"{4 * GOP}"]]

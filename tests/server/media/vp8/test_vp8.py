@@ -198,7 +198,7 @@ def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
     data = header(64, 48, FPS, FRAMES) + b"".join(picture.fragment for picture in pictures_of(units))
     file = tmp_path / "film.webm"
     file.write_bytes(data)
-    entries = "stream=codec_name,width,height,avg_fps:format=format_name,duration"
+    entries = "stream=codec_name,width,height,avg_frame_rate:format=format_name,duration"
     command = ["ffprobe", "-v", "warning", "-of", "default=nw=1", "-show_entries", entries, str(file)]
     result = subprocess.run(command, capture_output=True, text=True, check=True)
     assert result.stderr == ""
@@ -206,7 +206,7 @@ def test_ffprobe_reports_no_errors(tmp_path: Path) -> None:
         "codec_name=vp8",
         "width=64",
         "height=48",
-        "avg_fps=25/1",
+        "avg_frame_rate=25/1",
         "format_name=matroska,webm",
         "duration=0.800000",
     }
