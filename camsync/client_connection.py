@@ -29,6 +29,8 @@ _log = logging.getLogger(__name__)
 # In the kernel: a slow client is noticed within seconds, not after an hour of pulses.
 _SEND_BUFFER = 4096  # bytes
 _KEEPALIVE = 5  # seconds of silence before TCP keepalive probes
+# Seconds for a client to read why it is disconnected, except if it does not read, or the server ends.
+_LINGER_S, _AT_ONCE = 2.0, ("slow", "stopped")
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,19 +199,20 @@ class ClientConnection(asyncio.Protocol):
             self.end("slow", "pulses were not read")
 
     def end(self, code: str, text: str) -> None:
-        """Close the connection with an ERROR line, if the client reads."""
+        """Close the connection with an ERROR line, for which a client that is behind has a moment."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return
         if self._handshake is not None and not self._handshake.done():
             transport.abort()  # no line can be sent before TLS is ready
             return
-        if not transport.get_write_buffer_size():
-            transport.write(encode(ErrorMessage(code, text)))
-        if transport.get_write_buffer_size():
-            transport.abort()  # the client does not read: close() would wait for it
-        else:
-            transport.close()
+        transport.write(encode(ErrorMessage(code, text)))
+        transport.close()
+        if transport.get_write_buffer_size():  # close() would wait for the client, whether it reads or not
+            if code in _AT_ONCE:
+                transport.abort()
+            else:
+                asyncio.get_running_loop().call_later(_LINGER_S, transport.abort)
 
     @property
     def _is_closing(self) -> bool:

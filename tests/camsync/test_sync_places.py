@@ -119,6 +119,22 @@ async def test_at_an_open_server_a_crowd_from_one_address_locks_no_expected_name
         assert len(server.clients()) <= 6
 
 
+async def test_an_evicted_client_that_is_behind_reads_why(connect: Connect) -> None:
+    loop, received = asyncio.get_running_loop(), b""
+    async with PulseServer(FPS, limits=ServerLimits(clients=1, cut_off=PATIENCE)) as server:
+        with socket.socket() as behind:
+            behind.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+            behind.setblocking(False)  # noqa: FBT003
+            async with asyncio.timeout(PATIENCE):
+                await loop.sock_connect(behind, (LOCALHOST, server.port))
+                while not any(client.dropped for client in server.clients()):  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+                await connect(server.port)
+                while part := await loop.sock_recv(behind, 1 << 16):
+                    received += part
+    assert received.splitlines()[-1].startswith(b"ERROR full ")
+
+
 async def test_at_an_open_server_the_oldest_of_the_address_with_most_is_evicted(connect: Connect) -> None:
     limits = ServerLimits(clients=2)
     async with PulseServer(FPS, limits=limits) as server:
