@@ -406,7 +406,7 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
         await expect(page.locator("#selection-state")).to_have_text("3 changed from the file.")
         assert decider.view.lookahead == 15
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
-        for name in ("Truncation", "Occlusion", "Centering"):
+        for name in ("Truncation", "Occlusion", "Centering", "Clear picture"):
             await page.get_by_label(name).fill("0")
         await page.get_by_role("button", name="Apply").click()
         await expect(page.locator("#error-message")).to_contain_text("all weights are 0")
