@@ -10,7 +10,7 @@ from collections import Counter, deque
 
 from tracking.detectors.base import Image
 from tracking.picture_condition.reference import Condition, Reference
-from tracking.picture_condition.stillness import StillnessMonitor
+from tracking.picture_condition.stillness import StillnessMonitor, forget_before
 from tracking.picture_condition.structure import Structure, reduce, structure_of
 
 # Seconds between the pictures that are looked at, and between those that enter the reference.
@@ -75,7 +75,9 @@ class PictureMonitor:
         still = self._stillness.is_frozen(image, seconds, elapsed)
         structure = structure_of(reduce(image))
         last = self._recent[-1][1] if self._recent else structure
-        before = _append(self._recent, seconds, structure)
+        self._recent.append((seconds, structure))
+        forget_before(self._recent, seconds - _APART_S)
+        _, before = self._recent[0]
         if self._reference is None:
             self._reference = Reference(structure)
         if still and self._reference.is_seen(structure):
@@ -110,11 +112,3 @@ class PictureMonitor:
             changed = other == "clear" or (whole and {other, self.condition} != _HIDING)
             if other != self.condition and changed and count >= _AGREE * len(recent):
                 self.condition, self.since = other, recent[0][0]
-
-
-def _append(pictures: deque[tuple[float, Structure]], seconds: float, structure: Structure) -> Structure:
-    """Append a picture; return the one of about a second before, or the first."""
-    pictures.append((seconds, structure))
-    while len(pictures) > 1 and pictures[1][0] <= seconds - _APART_S:
-        pictures.popleft()
-    return pictures[0][1]

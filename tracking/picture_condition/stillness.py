@@ -7,6 +7,7 @@ or those with an encoder that repeats what hardly changes) are not judged: an em
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,6 +23,12 @@ _CELLS = (8, 6)
 _APART_S, _WINDOW_S, _KNOWN_S = 0.5, 3.0, 12.0
 # Share of changed pixels below which a picture stands still, and that a camera's noise must have exceeded.
 _STILL, _NOISE = 0.004, 0.04
+
+
+def forget_before(timed: deque[Any], seconds: float) -> None:
+    """Drop the oldest of some tuples that begin with a time, except the last one up to a time."""
+    while len(timed) > 1 and timed[1][0] <= seconds:
+        timed.popleft()
 
 
 class StillnessMonitor:
@@ -46,16 +53,14 @@ class StillnessMonitor:
         step = max(max(image.shape[:2]) // _SAMPLES, 1)
         pixels = np.ascontiguousarray(image[step // 2 :: step, step // 2 :: step, 1])
         self._pictures.append((seconds, pixels))
-        while len(self._pictures) > 1 and self._pictures[1][0] <= seconds - _APART_S:
-            self._pictures.popleft()
+        forget_before(self._pictures, seconds - _APART_S)
         before, other = self._pictures[0]
         if before > seconds - _APART_S:
             return False
         changed = (cv2.absdiff(pixels, other) > 0).astype(np.float32)
         cells = cv2.resize(changed, _CELLS, interpolation=cv2.INTER_AREA)
         self._changes.append((seconds, float(changed.mean()), float(np.median(cells))))
-        while len(self._changes) > 1 and self._changes[1][0] <= seconds - _WINDOW_S:
-            self._changes.popleft()
+        forget_before(self._changes, seconds - _WINDOW_S)
         if self._changes[0][0] > seconds - _WINDOW_S:
             return False
         _, change, noise = np.median(self._changes, axis=0).tolist()

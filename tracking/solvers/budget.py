@@ -45,7 +45,7 @@ class SolverBudget:
     time_s: float | None = None
 
     def __post_init__(self) -> None:
-        if not min(self.work_s or 1.0, self.time_s or 1.0) > 0.0 or 0.0 in (self.work_s, self.time_s):
+        if any(limit is not None and not limit > 0.0 for limit in (self.work_s, self.time_s)):
             raise ValueError(f"limits of a solver are above 0 seconds, not {self.work_s} and {self.time_s}")
 
 
