@@ -59,6 +59,11 @@ RiskReason = Literal["crossing", "id_switch", "track_loss", "optimality_gap"]
 `track_loss`: an object's scores decline, or it stays occluded; `optimality_gap`: the solution is not proven
 optimal."""
 
+PictureCondition = Literal["clear", "covered", "turned", "blurred", "noisy", "frozen"]
+"""What is wrong with a camera's picture. covered: something plain is before the lens; turned: another scene;
+blurred: out of focus, or a film on the lens; noisy: noise as strong as the edges, as in the dark; frozen: the
+same picture again and again."""
+
 
 @dataclass(frozen=True, slots=True)
 class RiskEvent:

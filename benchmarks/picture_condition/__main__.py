@@ -31,7 +31,8 @@ from benchmarks.scene_runs.options import add_options, selected_scenes
 from benchmarks.scene_runs.pipeline_run import length_in_frames, open_frames
 from server.camera.sources import Image
 from server.media.letterbox import Letterbox
-from tracking.picture_condition import Condition, PictureMonitor
+from tracking.picture_condition import PictureMonitor
+from tracking.types import PictureCondition
 
 FAULTS = ("covered", "sprayed", "turned-away", "blur", "night", "frozen")
 HARMLESS = (
@@ -54,7 +55,7 @@ LASTS_S = 12.0
 class FirstReport:
     """What a camera reported first, and after how many seconds."""
 
-    condition: Condition
+    condition: PictureCondition
     seconds: float
 
 

@@ -32,9 +32,10 @@ from server.camera.tracking_backlog import TrackingBacklog
 from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.camera_status import CONDITION_TEXTS, CameraState, PictureCondition
+from server.messaging.camera_status import CONDITION_TEXTS, CameraState
 from server.messaging.messages import CameraTracks, ZenohKeys
 from server.system.address_redaction import redact_zenoh_endpoint
+from tracking.types import PictureCondition
 
 log = logging.getLogger(__name__)
 

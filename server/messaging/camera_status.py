@@ -9,9 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from server.messaging.number_types import PULSE_MAX, Coordinate, Duration, Number, Time
-
-PictureCondition = Literal["clear", "covered", "turned", "blurred", "noisy", "frozen"]
-"""What is wrong with a camera's picture, as `tracking.picture_condition` finds it; clear: nothing."""
+from tracking.types import PictureCondition
 
 CONDITION_TEXTS: Mapping[PictureCondition, str] = {
     "clear": "the picture is clear",

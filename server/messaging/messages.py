@@ -32,9 +32,10 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from server.messaging.camera_status import PictureCondition, PictureMotion
+from server.messaging.camera_status import PictureMotion
 from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
+from tracking.types import PictureCondition
 
 DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """The exceptions of a decoder: invalid JSON, invalid UTF-8, nested too deeply."""

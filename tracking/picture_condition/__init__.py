@@ -1,6 +1,6 @@
 """What is wrong with a camera's picture: it is covered, turned away, blurred, noisy or frozen."""
 
 from tracking.picture_condition.monitor import PictureMonitor
-from tracking.picture_condition.reference import CONDITIONS, Condition
+from tracking.picture_condition.reference import CONDITIONS
 
-__all__ = ["CONDITIONS", "Condition", "PictureMonitor"]
+__all__ = ["CONDITIONS", "PictureMonitor"]

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections import Counter, deque
 
 from tracking.detectors.base import Image
-from tracking.picture_condition.reference import Condition, Reference
+from tracking.picture_condition.reference import Reference
 from tracking.picture_condition.stillness import StillnessMonitor, forget_before
 from tracking.picture_condition.structure import Structure, reduce, structure_of
+from tracking.types import PictureCondition
 
 # Seconds between the pictures that are looked at, and between those that enter the reference.
 _LOOK_EVERY_S, _LEARN_EVERY_S = 0.2, 1.0
@@ -43,13 +44,13 @@ class PictureMonitor:
         self._recent: deque[tuple[float, Structure]] = deque()
         self._reference: Reference | None = None
         self._learned_s = self._unlearned_s = 0.0
-        self._signs: deque[tuple[float, int, Condition]] = deque()
-        self.condition: Condition = "clear"
+        self._signs: deque[tuple[float, int, PictureCondition]] = deque()
+        self.condition: PictureCondition = "clear"
         """What is wrong with the picture."""
         self.since = 0
         """The frame in which that began."""
 
-    def observe(self, image: Image, frame: int | None = None) -> Condition:
+    def observe(self, image: Image, frame: int | None = None) -> PictureCondition:
         """Return the camera's condition up to the next frame.
 
         Args:
@@ -70,7 +71,7 @@ class PictureMonitor:
             self._reference, self._learned_s = None, 0.0
         return self.condition
 
-    def _sign(self, image: Image, seconds: float, elapsed: float) -> Condition:
+    def _sign(self, image: Image, seconds: float, elapsed: float) -> PictureCondition:
         """Return what seems to be wrong with a picture."""
         still = self._stillness.is_frozen(image, seconds, elapsed)
         structure = structure_of(reduce(image))

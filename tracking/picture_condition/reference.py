@@ -8,7 +8,7 @@ still; the rest moves: people, a bus.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -18,11 +18,9 @@ from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration
 from tracking.detectors.base import Image, Plane
 from tracking.picture_condition.structure import Structure, reduce, structure_of
+from tracking.types import PictureCondition
 
-Condition = Literal["clear", "covered", "turned", "blurred", "noisy", "frozen"]
-"""covered: something plain is before the lens; turned: another scene; blurred: out of focus, or a film on the
-lens; noisy: noise as strong as the edges, as in the dark; frozen: the same picture again and again."""
-CONDITIONS: tuple[Condition, ...] = get_args(Condition)
+CONDITIONS: tuple[PictureCondition, ...] = get_args(PictureCondition)
 
 # Squared gradient, gray levels per pixel, from which a cell has edges; and the least share of such cells
 # without which nothing is said.
@@ -51,7 +49,7 @@ class _Shares:
     plain: float
     other: float
 
-    def hidden(self) -> Condition | None:
+    def hidden(self) -> PictureCondition | None:
         """Return what hides the scene; None: nothing does."""
         if self.plain + self.other < _COVERED:
             return None
@@ -79,7 +77,7 @@ class Reference:
         self._detail = self._detail + share * (structure.detail - self._detail)
         self._structure = structure_of(self._gray)
 
-    def sign(self, structure: Structure, before: Structure, noise: float, seconds: float) -> Condition:
+    def sign(self, structure: Structure, before: Structure, noise: float, seconds: float) -> PictureCondition:
         """Return what seems to be wrong with a picture.
 
         Args:

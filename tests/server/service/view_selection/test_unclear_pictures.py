@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, TrackNumbers, camera_tracks, epoch_of, small_config
-from server.messaging.camera_status import CONDITION_TEXTS, PictureCondition
+from server.messaging.camera_status import CONDITION_TEXTS
 from server.messaging.messages import Box
 from server.service.view_selection.decider import ViewDecider
+from tracking.types import PictureCondition
 
 A, B = CAMERAS
 LARGE, SMALL = (10.0, 4.0, 26.0, 44.0), (20.0, 20.0, 28.0, 40.0)
