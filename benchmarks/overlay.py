@@ -37,6 +37,8 @@ _START = 200
 _MANY = 10
 _POLL_S = 0.003
 """Seconds between two checks for a rendered GOP: too seldom to matter."""
+_PATIENCE_S = 120.0
+"""Timeout of a rendered GOP, and of the worker's start, on a busy machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +121,13 @@ async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCos
     chunks = [room.next_gop() for _ in range(gops + 1)]
     run, began = asyncio.create_task(source.run()), time.perf_counter()
     stream.publish(chunks[0])
-    await source.still("plain", _last_pulse(room, chunks[0]))
+    await _wait_until_rendered(source, _last_pulse(room, chunks[0]))
     start, pid = time.perf_counter() - began, source.pid
     assert pid is not None  # noqa: S101 — the worker is running
     worker_before, service_before = _processor_seconds(pid), time.process_time()
     for chunk in chunks[1:]:
         stream.publish(chunk)
-        while source.newest < _last_pulse(room, chunk):  # noqa: ASYNC110 — only the benchmark polls
-            await asyncio.sleep(_POLL_S)
+        await _wait_until_rendered(source, _last_pulse(room, chunk))
     frames = gops * room.gop
     cost = RenderingCost(
         start,
@@ -143,6 +144,12 @@ async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCos
 async def _read(viewer: Subscriber) -> None:
     async for data in viewer:
         del data
+
+
+async def _wait_until_rendered(source: RenderedStream, pulse: int) -> None:
+    async with asyncio.timeout(_PATIENCE_S):
+        while source.newest < pulse:  # noqa: ASYNC110 — only the benchmark polls
+            await asyncio.sleep(_POLL_S)
 
 
 def _last_pulse(room: RoomStream, chunk: BytesChunk) -> int:

@@ -20,13 +20,13 @@ import zenoh
 from playwright.async_api import Browser, Page
 
 from benchmarks.common.browser import chromium
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium
 from fakes.prometheus.monitoring_files import BUILT_IN_METRICS, EXPRESSIONS
 from fakes.prometheus.promql_series import ExportedMetrics, select_series, selectors
 from fakes.running.beeps import sample_and_beep_times, write_beeps
 from fakes.running.site import CAMERAS, RunningSite, configuration, running, with_timeout
 from fakes.running.stream_frames import FPS, display_intervals, pictures, record
-from fakes.timeouts import PATIENCE
 
 pytestmark = [
     pytest.mark.live,
@@ -67,9 +67,8 @@ async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
     """Open the page; an error in it fails the test."""
     errors: list[str] = []
     # Waiting for a condition in the page evaluates it as a string, which the page's policy forbids.
-    page = await browser.new_page(bypass_csp=True)
+    page = await new_page(browser, bypass_csp=True)
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.set_default_timeout(1000 * PATIENCE)
     await page.goto(site.url)
     yield page
     await page.close()

@@ -21,8 +21,10 @@ RECORD_CAMERAS = f"""
     window.cameras = [];
     const record = () => {{
       requestAnimationFrame(record);
+      small.clearRect(0, 0, {WIDTH}, {HEIGHT});
       small.drawImage(document.querySelector('#boxes'), 0, 0, {WIDTH}, {HEIGHT});
-      const [red, green, blue] = small.getImageData(2, 2, 1, 1).data;
+      const [red, green, blue, opaque] = small.getImageData(2, 2, 1, 1).data;
+      if (!opaque) return; // the page did not paint the frame: the video behind the canvas may be ahead
       const distances = grounds.map(([r, g, b]) => Math.hypot(r - red, g - green, b - blue));
       cameras.push([myview.camera, myview.site.cameras[distances.indexOf(Math.min(...distances))]]);
     }};

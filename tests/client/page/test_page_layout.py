@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from playwright.async_api import Browser, expect
 
-from fakes.page.browser import visiting
+from fakes.page.browser import new_page, visiting
 from fakes.page.site import FakeSite, serving
 from fakes.page.video_pattern import HEIGHT, WIDTH
 from fakes.programs import needs_chromium
@@ -88,7 +88,7 @@ async def test_every_control_has_an_accessible_name(browser: Browser) -> None:
 
 async def test_all_requests_go_to_the_server_within_its_content_policy(browser: Browser) -> None:
     async with serving(FakeSite()) as server:
-        page = await browser.new_page()
+        page = await new_page(browser)
         messages: list[str] = []
         requests: list[str] = []
         page.on("console", lambda message: messages.append(message.text))

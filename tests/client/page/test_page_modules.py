@@ -9,6 +9,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page
 
+from fakes.page.browser import new_page
 from fakes.page.site import FIRST_PULSE, FakeSite, SiteServer, serving
 from fakes.page.video_pattern import FPS, GOP
 from fakes.programs import needs_chromium
@@ -26,7 +27,7 @@ async def server() -> AsyncIterator[SiteServer]:
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def page(browser: Browser, server: SiteServer) -> AsyncIterator[Page]:
-    opened = await browser.new_page(bypass_csp=True)
+    opened = await new_page(browser, bypass_csp=True)
     await opened.goto(server.url)
     yield opened
     await opened.close()

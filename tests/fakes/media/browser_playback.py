@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.common.browser import chromium
+from fakes.page.browser import new_page
 from fakes.timeouts import PATIENCE
 from server.service.streaming.splicer import Splicer
 
@@ -49,7 +50,7 @@ async def play_in_chromium(
 ) -> dict[str, Any]:
     """Run a script that reads a stream, and publish GOPs once it is connected; return its result."""
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
+        page = await new_page(browser, bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{port}/healthz")
         playing = asyncio.create_task(page.evaluate(script, list(arguments)))
         while not splicer.viewers:  # noqa: ASYNC110 — the browser connects at any time

@@ -49,6 +49,13 @@ class Visit:
             return next(container.decode(video=0)).to_ndarray(format="rgb24").astype(np.int16)
 
 
+async def new_page(browser: Browser, **options: Any) -> Page:
+    """Open an empty page that waits for as long as a busy machine takes."""
+    page = await browser.new_page(**options)
+    page.set_default_timeout(PATIENCE_MS)
+    return page
+
+
 @contextlib.asynccontextmanager
 async def visiting(
     browser: Browser,
@@ -62,7 +69,7 @@ async def visiting(
     failures: list[str] = []
     async with serving(site or FakeSite()) as server:
         # The site's policy forbids eval, which evaluates the conditions of these tests.
-        page = await browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
+        page = await new_page(browser, viewport={"width": width, "height": height}, bypass_csp=True)
         page.on("pageerror", lambda error: failures.append(str(error)))
         if script:
             await page.add_init_script(script)

@@ -11,9 +11,9 @@ import yaml
 from playwright.async_api import Page
 
 from benchmarks.common.browser import chromium
+from fakes.page.browser import new_page
 from fakes.running.site import PATIENT_CAMERAS, RunningSite, running
 from fakes.running.stream_frames import FPS
-from fakes.timeouts import PATIENCE_MS
 from server.cli.generated_config import DEMO, free_port
 
 GOP = 10
@@ -58,9 +58,8 @@ async def open_page(site: RunningSite) -> AsyncIterator[Page]:
     """Open the page; an error in it fails the test."""
     errors: list[str] = []
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
+        page = await new_page(browser, bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
-        page.set_default_timeout(PATIENCE_MS)
         await page.goto(site.url)
         yield page
     assert errors == []

@@ -20,6 +20,7 @@ from benchmarks.common.browser import chromium
 from client.model import Box, Site
 from client.sidecar import write_sidecars
 from client.stream_events import Frame
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffprobe
 from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, LARGE, SMALL, WIDTH
@@ -93,7 +94,7 @@ async def test_a_browser_plays_the_recording_with_its_duration(served: ServedSit
     await watched(served, tmp_path / "one.mp4")
     (tmp_path / "page.html").write_text("<video src=one.mp4 muted></video>")
     async with chromium() as browser:
-        page = await browser.new_page()
+        page = await new_page(browser)
         await page.goto(f"file://{tmp_path}/page.html")
         played = await page.evaluate("""async () => {
             const video = document.querySelector('video');

@@ -31,6 +31,7 @@ from fakes.media.audio import (
 )
 from fakes.media.browser_playback import PLAY_JS
 from fakes.media.ffprobe import probed
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffprobe
 from fakes.service.fed_site import A, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, NO_REASON, video
@@ -240,7 +241,7 @@ async def test_chromium_plays_opus(served: ServedSite, recording: Path) -> None:
     parameters = served.service.stream_format.parameters
     assert parameters is not None
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
+        page = await new_page(browser, bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{served.port}/healthz")
         url = f"/objects/1/best.mp4?from=p0&to=p{FRAMES}"
         played = await page.evaluate(PLAY_JS, [url, f'video/mp4; codecs="{parameters.codec},opus"', 4])

@@ -12,10 +12,10 @@ from playwright.async_api import Browser, Page, expect
 
 from benchmarks.common.browser import chromium
 from fakes.http.tokens import serve_with_tokens, token_entry, token_of, write_tokens
+from fakes.page.browser import new_page
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
 from fakes.service.fed_site import ServedSite, show_people
-from fakes.timeouts import PATIENCE_MS
 
 pytestmark = [
     needs_chromium,
@@ -25,7 +25,6 @@ pytestmark = [
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def browser() -> AsyncIterator[Browser]:
-    expect.set_options(timeout=PATIENCE_MS)
     async with chromium() as running:
         yield running
 
@@ -37,8 +36,7 @@ async def open_page(
     """Open the page of a site with tokens and two people; also yield the requests that it received."""
     async with serve_with_tokens(folder) as served:
         show_people(served)
-        page = await browser.new_page(viewport={"width": 1000, "height": 800})
-        page.set_default_timeout(PATIENCE_MS)
+        page = await new_page(browser, viewport={"width": 1000, "height": 800})
         await page.add_init_script(AXE.read_text(encoding="utf-8") if AXE.exists() else "")
         complaints: list[str] = []
         addresses: list[str] = []

@@ -29,6 +29,7 @@ from fakes.http.hls_recording import (
 from fakes.media.audio import FRAMES as SOUNDING
 from fakes.media.audio import decode_audio, send_audio, write_flashes
 from fakes.media.browser_playback import NATIVE_HLS_JS
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg
 from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP
@@ -223,7 +224,7 @@ async def test_ffmpeg_plays_a_time_range_with_sound_to_the_end(tmp_path: Path) -
 async def test_chromium_plays_a_time_range_to_the_end(served: ServedSite) -> None:
     decide_gops(served, range(20))
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
+        page = await new_page(browser, bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{served.port}/healthz")
         playback = await page.evaluate(NATIVE_HLS_JS, "/objects/1/hls/index.m3u8?from=-2.4&to=-0.4")
     if playback is None:

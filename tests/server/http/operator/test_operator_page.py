@@ -22,6 +22,7 @@ from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
 from fakes.cli.calibration_walk import SITE, curved_path, errors_on_floor, walk_epochs
 from fakes.http.tokens import token_entry, token_of, write_tokens
+from fakes.page.browser import new_page
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
 from fakes.service.fed_site import A, B, ServedSite, serve_site, show_people
@@ -35,7 +36,6 @@ from fakes.service.scripted_cameras import (
     status,
     tracks,
 )
-from fakes.timeouts import PATIENCE_MS
 from server.cli.calibrate.points_file import read_points
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
@@ -45,7 +45,6 @@ SECTIONS += ["zones", "calibration", "view-selection", "configuration"]
 PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
 """Of a camera that looks straight down: ten pixels are one unit of the floor."""
 
-expect.set_options(timeout=PATIENCE_MS)
 
 pytestmark = [
     needs_chromium,
@@ -67,9 +66,8 @@ async def open_operator_page(
     complaints: list[str] = []
     async with aclosing(serve_site(patience=patience, **changes)) as sites:
         served = await anext(sites)
-        page = await browser.new_page(viewport={"width": 1000, "height": 800})
+        page = await new_page(browser, viewport={"width": 1000, "height": 800})
         await page.add_init_script(axe)  # without the site's content policy
-        page.set_default_timeout(PATIENCE_MS)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
             "console",

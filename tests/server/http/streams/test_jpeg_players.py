@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from benchmarks.common.browser import chromium
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg
 from fakes.service.drawn_site import DrawnSite, drawn_room
 from fakes.service.scripted_cameras import FPS, GOP
@@ -51,7 +52,7 @@ async def moving_site() -> AsyncIterator[DrawnSite]:
 async def test_chromium_shows_moving_pictures_in_an_img_and_boxes_in_a_video() -> None:
     async with chromium() as browser:
         async for drawn in drawn_room():
-            page = await browser.new_page()
+            page = await new_page(browser)
             await page.goto(f"http://127.0.0.1:{drawn.port}/healthz")
             sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
             await page.evaluate(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.common.browser import chromium
 from fakes.media.browser_playback import NATIVE_HLS_JS
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv, needs_vlc
 from fakes.service.fed_site import A, B, ServedSite, serve_site
 from fakes.service.scripted_cameras import (
@@ -224,7 +225,7 @@ async def test_vlc_plays_across_cuts_without_a_warning(ending_site: ServedSite, 
 @needs_chromium
 async def test_chromium_plays_hls_natively_to_the_end(ending_site: ServedSite) -> None:
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
+        page = await new_page(browser, bypass_csp=True)
         await page.goto(f"http://127.0.0.1:{ending_site.port}/healthz")
         playing = asyncio.create_task(page.evaluate(NATIVE_HLS_JS, "/objects/1/hls/index.m3u8"))
         async with asyncio.timeout(PATIENCE):

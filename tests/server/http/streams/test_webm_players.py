@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.common.browser import chromium
 from fakes.media.browser_playback import PLAY_JS, play_in_chromium
+from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
 from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import (
@@ -29,7 +30,6 @@ from fakes.service.scripted_cameras import (
     video,
 )
 from fakes.service.vp8_site import EPOCHS, decoded_alone, feed
-from fakes.timeouts import PATIENCE_MS
 from server.messaging.epochs import end_of_epoch
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
@@ -145,9 +145,8 @@ async def feed_in_real_time(served: ServedSite) -> None:
 async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_site: ServedSite) -> None:
     errors: list[str] = []
     async with chromium() as browser:
-        page = await browser.new_page(bypass_csp=True)
+        page = await new_page(browser, bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
-        page.set_default_timeout(PATIENCE_MS)
         feeding = asyncio.create_task(feed_in_real_time(vp8_site))
         await page.goto(f"http://127.0.0.1:{vp8_site.port}/?object=1")
         await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")
