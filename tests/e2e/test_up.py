@@ -75,6 +75,12 @@ async def page(site: RunningSite, browser: Browser) -> AsyncIterator[Page]:
     assert errors == []
 
 
+def gaps(film: Path) -> list[tuple[float, float]]:
+    """Return the intervals, in pulses, in which a film shows nothing; a picture may be held for long."""
+    shown = display_intervals(film)
+    return [(before[1], after[0]) for before, after in pairwise(shown) if round(after[0] - before[1])]
+
+
 async def test_a_site_has_five_processes(site: RunningSite) -> None:
     assert sorted(site.children()) == ["bestview", *CAMERAS, "sync"]
 
@@ -234,9 +240,7 @@ async def test_a_killed_camera_is_replaced_and_comes_back(site: RunningSite, tmp
         await with_timeout(viewer)
     # Buffered video is shown first; a busy machine takes longer, also in pulses.
     assert first_without - decided < 10 * (LOOKAHEAD + GOP)
-    pulses = sorted(pictures(tmp_path / "viewer"))
-    gaps = [(a, b) for a, b in pairwise(pulses) if b != a + 1]
-    assert not gaps, f"the viewer's stream has gaps: {gaps}"
+    assert gaps(tmp_path / "viewer") == []
 
 
 @pytest.mark.slow
@@ -261,10 +265,8 @@ async def test_streams_freeze_while_all_cameras_are_down_and_then_continue(
         files = [await with_timeout(viewer) for viewer in viewers]
         await site.until(lambda: {site.state(camera) for camera in CAMERAS} == {"live"}, "all are back")
     for file in files:
-        moments = display_intervals(file)
-        assert len(moments) > 50
-        gaps = [(a, b) for a, b in pairwise(moments) if round(b[0] - a[1])]
-        assert not gaps, f"{file.name}: {gaps}"
+        assert len(display_intervals(file)) > 50
+        assert gaps(file) == [], file.name
 
 
 async def test_the_monitoring_endpoints_answer(site: RunningSite) -> None:

@@ -122,4 +122,5 @@ class RenderWorker:
             await self._process.wait()
         except asyncio.CancelledError:  # as the event loop ends: nobody else would close the pipes
             self._process._transport.close()  # type: ignore[attr-defined]  # noqa: SLF001 — no public way
+            await self._process.wait()  # soon, since it was killed and the pipes are closed
             raise

@@ -135,17 +135,16 @@ def _order(batch: EpochBatch) -> tuple[str, int]:
 async def test_a_camera_that_never_connects_is_logged_and_does_not_delay_others(
     recording: Path, tmp_path: Path, running: list[SiteInOneLoop]
 ) -> None:
-    config = config_of(recording, wait=0.5)
+    # A wait for every frame would exceed the timeout.
+    config = config_of(recording, wait=1.2 * PATIENCE / FRAMES)
     whole_site = SiteInOneLoop(config, tmp_path / "out")
     whole_site.pulses = type(whole_site.pulses)(
         50, expect={"bestview", "c0", "c1"}, start_timeout=PATIENCE, port=config.sync.port
     )
     running.append(whole_site)
     await whole_site.start()
-    began = asyncio.get_running_loop().time()
     async with asyncio.timeout(PATIENCE):
         await asyncio.gather(whole_site.camera("c0"), whole_site.camera("c1"))
-    assert asyncio.get_running_loop().time() - began < FRAMES * 0.5, "not a wait for every frame"
     with (tmp_path / "out" / "late.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["camera"] for row in rows if row["reason"] == "no peer detections"} <= {"c0", "c1"}
