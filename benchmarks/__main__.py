@@ -48,6 +48,11 @@ BENCHMARKS = (
     Benchmark("baselines", "the survey's trackers beside the network program; 7 minutes"),
     Benchmark("temporal_consistency", "overhead view: identity errors after merges, pruning; 6 minutes"),
     Benchmark("survey_table", "the survey's Table 1, measured: occlusion, identity, real time; 10 minutes"),
+    Benchmark(
+        "ground_plane",
+        "one program over all cameras on a floor beside a tracker in each; 30 minutes",
+        ("--scene", "wildtrack true", "--scene", "wildtrack mild", "--scene", "wildtrack strong"),
+    ),
     Benchmark("bestview", "identities and views beside simpler methods and ground truth; 20 minutes"),
     Benchmark(
         "operator_assist",

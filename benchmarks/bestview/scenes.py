@@ -62,6 +62,10 @@ class BenchmarkScene:
             content.pop("ground", None)
         return build_config(content, where=self.name, folder=Path())
 
+    def with_detector(self, detect: Mapping[str, Any]) -> BenchmarkScene:
+        """Return the scene with another section `detect`."""
+        return replace(self, content={**self.content, "detect": dict(detect)})
+
     @property
     def calibrated(self) -> bool:
         """Whether there are homographies."""

@@ -1,0 +1,105 @@
+"""Hypotheses of one frame: likelihoods against brute force, groups, and where a miss says something."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
+from tracking.ground_plane import GroundSettings
+from tracking.ground_plane.camera import BoxSizes
+from tracking.ground_plane.foot_noise import FootNoise
+from tracking.ground_plane.gaussians import fuse, negative_log_densities
+from tracking.ground_plane.hypotheses import agglomerate, find_places, group_cost
+from tracking.ground_plane.measurements import Measurements, measure
+from tracking.ground_plane.visibility import detection_probabilities
+
+VIEWS = floor_views()
+CAMERAS = [view.camera for view in VIEWS.values()]
+SETTINGS = GroundSettings()
+seeds = st.integers(0, 2**31 - 1)
+few = settings(deadline=None, max_examples=25)
+
+
+def measurements_of(places: list[list[float]], noise: FloorNoise, seed: int = 0) -> Measurements:
+    found = detect_walkers(np.array([places]), VIEWS, noise, seed)[0]
+    return measure(CAMERAS, list(found.values()), [SETTINGS.foot_noise] * 3, SETTINGS)
+
+
+@few
+@given(seeds)
+def test_the_cost_of_a_group_is_the_integral_over_its_place(seed: int) -> None:
+    measurements = measurements_of([[4.0, 6.0]], FloorNoise(deviation=0.02), seed)
+    group = tuple(range(len(measurements)))
+    mean, covariance = fuse(measurements.places, measurements.covariances)
+    axis = np.arange(-2.0, 2.0, 0.02)
+    grid = mean + np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    log_densities = sum(
+        -negative_log_densities(grid - place, spread)
+        for place, spread in zip(measurements.places, measurements.covariances, strict=True)
+    )
+    integral = np.log(np.exp(log_densities).sum() * 0.02**2)
+    expected = -integral + measurements.rates.sum() - len(group) * np.log(0.9)
+    assert group_cost(measurements, group, mean, covariance, 0.9) == pytest.approx(expected, abs=0.02)
+
+
+@few
+@given(seeds)
+def test_groups_have_one_detection_of_a_camera_at_most(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    measurements = measurements_of(
+        random.uniform(2.0, 8.0, (6, 2)).tolist(), FloorNoise(0.2, 0.02, 1.0), seed
+    )
+    for group in agglomerate(measurements, SETTINGS.people_density):
+        cameras = measurements.camera[list(group)]
+        assert len(set(cameras.tolist())) == len(group)
+
+
+def test_people_far_apart_are_a_place_each() -> None:
+    true = [[2.0, 3.0], [5.0, 5.0], [8.0, 3.0]]
+    measurements = measurements_of(true, FloorNoise(deviation=0.005))
+    sizes = [BoxSizes() for _ in CAMERAS]
+    places = find_places(measurements, [], CAMERAS, sizes, SETTINGS)
+    best = sorted(range(len(places)), key=lambda k: places.costs[k])[:3]
+    found = sorted(places.means[best].round(0).tolist())
+    assert found == sorted(true)
+    assert not places.conflicts[np.ix_(best, best)][~np.eye(3, dtype=bool)].any()
+
+
+def test_a_miss_says_nothing_where_somebody_nearer_hides_the_person() -> None:
+    camera = np.array([-4.0, -4.0])
+    near = np.array([3.0, 3.0])
+    behind = near + 1.5 * (near - camera) / np.linalg.norm(near - camera)
+    measurements = measurements_of([near.tolist()], FloorNoise())
+    sizes = [BoxSizes() for _ in CAMERAS]
+    random = np.random.default_rng(0)
+    for frame in detect_walkers(random.uniform(1.0, 9.0, (20, 4, 2)), VIEWS, FloorNoise()):
+        for size, found in zip(sizes, frame.values(), strict=True):
+            size.update(found.boxes)
+    probabilities = detection_probabilities(
+        np.array([behind, [7.0, 3.0]]), CAMERAS, sizes, measurements, [(), ()], 0.9
+    )
+    hidden, free = probabilities[:, 0]
+    assert hidden < 0.3
+    assert free == pytest.approx(0.9)
+    assert probabilities[0, 2] == pytest.approx(0.9), "from the other side"
+
+
+def test_the_noise_of_the_feet_is_learned() -> None:
+    noise = FootNoise(3, SETTINGS.foot_noise)
+    random = np.random.default_rng(1)
+    for seed in range(60):
+        people = random.uniform(2.0, 8.0, (3, 2)).tolist()
+        found = detect_walkers(np.array([people]), VIEWS, FloorNoise(deviation=0.04), seed)[0]
+        measurements = measure(CAMERAS, list(found.values()), list(noise.deviations), SETTINGS)
+        places = find_places(measurements, [], CAMERAS, [BoxSizes()] * 3, SETTINGS)
+        order = np.argsort(places.costs)
+        free, chosen = np.ones(len(places), dtype=bool), []
+        for k in order:
+            if free[k]:
+                chosen.append(int(k))
+                free &= ~places.conflicts[k]
+        noise.update(places, chosen)
+    assert noise.deviations.mean() > 1.5 * SETTINGS.foot_noise

@@ -1,0 +1,39 @@
+"""Gaussians on the ground plane, for arrays of covariances (2, 2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.boxes import Floats
+
+LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+def determinants(matrices: Floats) -> Floats:
+    """Return the determinants of matrices (..., 2, 2)."""
+    return np.asarray(matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0])
+
+
+def inverses(matrices: Floats) -> Floats:
+    """Return the inverses of matrices (..., 2, 2)."""
+    adjugate = np.empty_like(matrices)
+    adjugate[..., 0, 0], adjugate[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
+    adjugate[..., 0, 1], adjugate[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
+    return np.asarray(adjugate / determinants(matrices)[..., None, None])
+
+
+def squared_distances(offsets: Floats, covariances: Floats) -> Floats:
+    """Return the squared Mahalanobis distances of offsets (..., 2) under covariances (..., 2, 2)."""
+    return np.asarray(np.einsum("...i,...ij,...j", offsets, inverses(covariances), offsets))
+
+
+def negative_log_densities(offsets: Floats, covariances: Floats) -> Floats:
+    """Return -log N(offset; 0, covariance), where the density is per unit of area."""
+    return 0.5 * (squared_distances(offsets, covariances) + np.log(determinants(covariances))) + LOG_2PI
+
+
+def fuse(places: Floats, covariances: Floats) -> tuple[Floats, Floats]:
+    """Return the place (2,) and covariance (2, 2) that independent measurements (N, 2) of it determine."""
+    weights = inverses(covariances)
+    covariance = inverses(weights.sum(axis=0))
+    return np.asarray(covariance @ np.einsum("nij,nj->i", weights, places)), covariance

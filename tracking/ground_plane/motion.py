@@ -1,0 +1,127 @@
+"""How people move on the plane: they walk on, or start, stop and turn.
+
+A walking person's velocity changes by a random acceleration (a Kalman filter of constant velocity). In a
+share of the frames people do anything else: then any velocity is possible. Costs are negative log densities
+of the mixture of both, so that a turn costs more than walking on, but less than leaving and arriving again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.ground_plane.gaussians import negative_log_densities, squared_distances
+from tracking.ground_plane.settings import GroundSettings
+
+_GATE = 16.0
+"""Squared Mahalanobis distance, the quantile .9997, beyond which both ways of moving are impossible."""
+_MAX_TURN_S = 1.5
+"""Seconds after which the place of somebody who may have turned is not searched further away."""
+_TURN_NOISE_M = 0.1
+"""Standard deviation of the place from which somebody has turned, metres."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionState:
+    """Place and velocity of a person.
+
+    Attributes:
+        mean: (4,) x, y in metres, and velocities in metres per second.
+        covariance: (4, 4).
+    """
+
+    mean: Floats
+    covariance: Floats
+
+    @classmethod
+    def at(cls, place: Floats, covariance: Floats, speed: float) -> MotionState:
+        """Return the state of a person at a place whose velocity is unknown."""
+        joint = np.zeros((4, 4))
+        joint[:2, :2], joint[2:, 2:] = covariance, speed**2 * np.eye(2)
+        return cls(np.concatenate([place, np.zeros(2)]), joint)
+
+    @property
+    def place(self) -> Floats:
+        """Its place, (2,)."""
+        return self.mean[:2]
+
+    @property
+    def velocity(self) -> Floats:
+        """Its velocity, (2,)."""
+        return self.mean[2:]
+
+    @property
+    def place_covariance(self) -> Floats:
+        """The covariance of the place, (2, 2)."""
+        return self.covariance[:2, :2]
+
+    @property
+    def velocity_covariance(self) -> Floats:
+        """The covariance of the velocity, (2, 2)."""
+        return self.covariance[2:, 2:]
+
+    def predict(self, seconds: float, acceleration: float) -> MotionState:
+        """Return the state of somebody who walks on."""
+        step = np.eye(4)
+        step[0, 2] = step[1, 3] = seconds
+        noise = np.concatenate([0.5 * seconds**2 * np.eye(2), seconds * np.eye(2)])
+        return MotionState(
+            step @ self.mean, step @ self.covariance @ step.T + acceleration**2 * noise @ noise.T
+        )
+
+    def update(self, place: Floats, covariance: Floats) -> MotionState:
+        """Return the state after a measurement of the place."""
+        gain = self.covariance[:, :2] @ np.linalg.inv(self.place_covariance + covariance)
+        return MotionState(
+            self.mean + gain @ (place - self.place), self.covariance - gain @ self.covariance[:2]
+        )
+
+
+def move_costs(
+    walked: Floats, walked_covariances: Floats, turned: Floats, turned_covariances: Floats, turns: float
+) -> Floats:
+    """Return the negative log densities of offsets from where somebody walks on to, and from where they were.
+
+    Offsets are (..., 2), covariances (..., 2, 2); infinite where both are impossible.
+    """
+    walking = np.log1p(-turns) - negative_log_densities(walked, walked_covariances)
+    turning = np.log(turns) - negative_log_densities(turned, turned_covariances)
+    possible = (squared_distances(walked, walked_covariances) < _GATE) | (
+        squared_distances(turned, turned_covariances) < _GATE
+    )
+    return np.where(possible, -np.logaddexp(walking, turning), np.inf)
+
+
+def reach_costs(
+    state: MotionState, seconds: float, means: Floats, covariances: Floats, settings: GroundSettings
+) -> Floats:
+    """Return the costs of a person being at places (K, 2) after so many seconds, (K,)."""
+    ahead = state.predict(seconds, settings.acceleration)
+    spread = (settings.speed * min(seconds, _MAX_TURN_S)) ** 2 * np.eye(2)
+    return move_costs(
+        means - ahead.place,
+        covariances + ahead.place_covariance,
+        means - state.place,
+        covariances + state.place_covariance + spread,
+        settings.turn_probability,
+    )
+
+
+def follow(
+    state: MotionState, seconds: float, place: Floats, covariance: Floats, settings: GroundSettings
+) -> MotionState:
+    """Return the state of a person who was found at a place; after a turn the velocity is unknown again."""
+    ahead = state.predict(seconds, settings.acceleration)
+    walking = np.log1p(-settings.turn_probability) - negative_log_densities(
+        place - ahead.place, covariance + ahead.place_covariance
+    )
+    spread = (settings.speed * seconds) ** 2 * np.eye(2)
+    turning = np.log(settings.turn_probability) - negative_log_densities(
+        place - state.place, covariance + state.place_covariance + spread
+    )
+    if turning > walking:
+        turned = MotionState.at(state.place, _TURN_NOISE_M**2 * np.eye(2), settings.speed)
+        ahead = turned.predict(seconds, settings.acceleration)
+    return ahead.update(place, covariance)

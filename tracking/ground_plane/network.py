@@ -1,0 +1,142 @@
+"""The network program of a window on the ground plane, in the form that all solvers take (paper II.B).
+
+Its objects are the people known, and some who have not arrived yet. Each takes one of the places of a frame,
+is hidden, or is gone for good: the last place of every frame, which any number can take. All costs are
+negative log likelihoods, so that a known person takes a place only where an arrival there is less likely.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tracking.boxes import BOX_SIDES, Floats
+from tracking.ground_plane.gaussians import negative_log_densities, squared_distances
+from tracking.ground_plane.hypotheses import Places
+from tracking.ground_plane.motion import MotionState, move_costs, reach_costs
+from tracking.ground_plane.settings import GroundSettings
+from tracking.model.network import Network
+
+_MIN_HIDDEN_COST = 0.3
+"""Of a frame in which no camera should see the person: being seen is always likelier."""
+_GATE = 16.0
+"""Squared Mahalanobis distance of two places of somebody who has just arrived."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownPerson:
+    """A person in the frame before the window.
+
+    Attributes:
+        state: in the frame in which they were seen last.
+        seconds: from that frame to the window's first one.
+        hidden: (M,) costs of being missed by all cameras in each frame.
+        appearance: (K,) costs of the places of each frame, by appearance.
+    """
+
+    state: MotionState
+    seconds: float
+    hidden: Floats
+    appearance: Sequence[Floats]
+
+
+def build_ground_network(
+    people: Sequence[KnownPerson],
+    unborn: int,
+    frames: Sequence[Places],
+    seconds: float,
+    arrival_cost: float,
+    settings: GroundSettings,
+) -> Network:
+    """Build the network of M frames that are `seconds` apart, of the people known and of `unborn` others.
+
+    `arrival_cost`: negative log of the people who arrive per m² and frame.
+    """
+    objects, length = len(people) + unborn, len(frames)
+    gone = max(len(places) for places in frames)
+    hidden = gone + 1
+    departure = -float(np.log(min(settings.departure_rate * seconds, 1.0)))
+    node = np.full((objects, length, hidden + 1), np.inf)
+    source = np.full((objects, hidden + 1), np.inf)
+    pair = np.full((objects, length - 1, hidden + 1, hidden + 1), np.inf)
+    node[:, :, gone] = 0.0
+    pair[:, :, gone, gone] = pair[:, :, hidden, hidden] = 0.0
+    source[:, hidden] = 0.0
+    for m, places in enumerate(frames):
+        node[:, m, : len(places)] = places.costs
+    for n, person in enumerate(people):
+        node[n, :, hidden] = np.maximum(person.hidden, _MIN_HIDDEN_COST)
+        source[n, gone] = departure
+        pair[n, :, :gone, gone] = pair[n, :, hidden, gone] = departure
+        pair[n, :, :gone, hidden] = 0.0
+        for m, places in enumerate(frames):
+            reach = reach_costs(
+                person.state, person.seconds + m * seconds, places.means, places.covariances, settings
+            )
+            node[n, m, : len(places)] += person.appearance[m]
+            (source[n] if m == 0 else pair[n, m - 1, hidden])[: len(places)] = reach
+            if m:
+                pair[n, m - 1, : len(frames[m - 1]), : len(places)] = _step_costs(
+                    person, m, seconds, frames[m - 1], places, settings
+                )
+    for n in range(len(people), objects):
+        node[n, :, hidden] = 0.0
+        source[n, : len(frames[0])] = arrival_cost
+        pair[n, :, :gone, gone] = departure
+        for m, (before, after) in enumerate(pairwise(frames)):
+            pair[n, m, hidden, : len(after)] = arrival_cost
+            pair[n, m, : len(before), : len(after)] = _arrival_step_costs(before, after, seconds, settings)
+    return _network(node, source, pair, frames)
+
+
+def _network(node: Floats, source: Floats, pair: Floats, frames: Sequence[Places]) -> Network:
+    length, states = node.shape[1:]
+    places = states - 1
+    boxes = np.zeros((1, length, places, BOX_SIDES))
+    present = np.zeros((1, length, places), dtype=np.bool_)
+    present[:, :, -1] = True
+    conflicts = np.zeros((length, places, places), dtype=np.bool_)
+    for m, found in enumerate(frames):
+        present[0, m, : len(found)] = True
+        conflicts[m, : len(found), : len(found)] = found.conflicts
+    return Network(
+        boxes=boxes,
+        present=present,
+        source=source,
+        node=node,
+        pair=pair,
+        sink=np.zeros((len(node), states)),
+        conflicts=conflicts,
+        conflict_rows="clique",
+        locations=np.zeros((1, length, states, BOX_SIDES)),
+        layout=0.0,
+    )
+
+
+def _step_costs(
+    person: KnownPerson, m: int, seconds: float, before: Places, after: Places, settings: GroundSettings
+) -> Floats:
+    """Return the costs of going from the places of frame m - 1 to those of frame m."""
+    ahead = person.state.predict(person.seconds + (m - 1) * seconds, settings.acceleration)
+    offsets = after.means[None] - before.means[:, None]
+    spread = before.covariances[:, None] + after.covariances[None]
+    uncertain = ahead.velocity_covariance * seconds**2
+    uncertain = uncertain + (0.5 * settings.acceleration * seconds**2) ** 2 * np.eye(2)
+    return move_costs(
+        offsets - seconds * ahead.velocity,
+        spread + uncertain,
+        offsets,
+        spread + (settings.speed * seconds) ** 2 * np.eye(2),
+        settings.turn_probability,
+    )
+
+
+def _arrival_step_costs(before: Places, after: Places, seconds: float, settings: GroundSettings) -> Floats:
+    offsets = after.means[None] - before.means[:, None]
+    spread = before.covariances[:, None] + after.covariances[None]
+    spread = spread + (settings.speed * seconds) ** 2 * np.eye(2)
+    possible = squared_distances(offsets, spread) < _GATE
+    return np.where(possible, negative_log_densities(offsets, spread), np.inf)

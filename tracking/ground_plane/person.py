@@ -1,0 +1,81 @@
+"""A person who is tracked on the ground plane: motion, appearance and size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tracking.appearance import appearance_distance_matrix
+from tracking.boxes import Floats
+from tracking.ground_plane.camera import BoxSizes
+from tracking.ground_plane.hypotheses import Places
+from tracking.ground_plane.motion import MotionState, follow
+from tracking.ground_plane.predicted_boxes import PersonBoxes
+from tracking.ground_plane.settings import GroundSettings
+
+_TEMPLATE_UPDATE_RATE = 0.05
+
+
+class GroundPerson:
+    """The state of a person after the last final frame.
+
+    Attributes:
+        id: from 1, never reused.
+        state: place and velocity in the frame in which they were seen last.
+        seen: that frame.
+        boxes: their size.
+    """
+
+    __slots__ = ("_histograms", "_seconds", "_settings", "boxes", "id", "seen", "state")
+
+    def __init__(
+        self, number: int, frame: int, places: Places, k: int, seconds: float, settings: GroundSettings
+    ) -> None:
+        """Create a person who arrives at place `k` of a frame; frames are `seconds` apart."""
+        self.id = number
+        self.seen = frame
+        self.state = MotionState.at(places.means[k], places.covariances[k], settings.speed)
+        self.boxes = PersonBoxes()
+        self._seconds, self._settings = seconds, settings
+        self._histograms: dict[int, Floats] = {}
+
+    def ahead(self, frame: int) -> MotionState:
+        """Return the predicted state in a frame after the last one seen."""
+        return self.state.predict(self.seconds_unseen(frame), self._settings.acceleration)
+
+    def seconds_unseen(self, frame: int) -> float:
+        """Return the seconds from the frame in which they were seen last to another."""
+        return self._seconds * (frame - self.seen)
+
+    def move(self, frame: int, places: Places, k: int) -> None:
+        """Move to place `k` of a frame."""
+        seconds = self.seconds_unseen(frame)
+        mean, covariance = places.means[k], places.covariances[k]
+        self.state = follow(self.state, seconds, mean, covariance, self._settings)
+        self.seen = frame
+
+    def learn(self, places: Places, k: int, sizes: Sequence[BoxSizes]) -> None:
+        """Learn appearance and size from the detections of place `k`."""
+        measurements = places.measurements
+        for index in places.groups[k]:
+            camera, histogram = int(measurements.camera[index]), measurements.histograms[index]
+            known = self._histograms.get(camera)
+            if known is not None and len(known) == len(histogram):
+                histogram = (1.0 - _TEMPLATE_UPDATE_RATE) * known + _TEMPLATE_UPDATE_RATE * histogram
+            if len(histogram):
+                self._histograms[camera] = histogram
+            self.boxes.update(measurements.boxes[index], sizes[camera])
+
+    def appearance_costs(self, places: Places) -> Floats:
+        """Return the costs of the places by the person's appearance in the cameras that see them, (K,)."""
+        measurements = places.measurements
+        costs = np.zeros(len(measurements))
+        if not self._histograms:
+            return np.zeros(len(places))
+        for index, histogram in enumerate(measurements.histograms):
+            template = self._histograms.get(int(measurements.camera[index]))
+            if template is not None and len(template) == len(histogram):
+                distance = appearance_distance_matrix(template[None], histogram[None])[0, 0]
+                costs[index] = self._settings.appearance * (distance - self._settings.unknown_appearance)
+        return np.array([costs[list(group)].sum() for group in places.groups])

@@ -1,0 +1,37 @@
+"""Settings of joint tracking on a ground plane. Lengths are in the plane's unit, metres by default."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True, slots=True)
+class GroundSettings:
+    """Probabilities and rates from which all costs of the program follow; none is tuned to a scene.
+
+    Raises:
+        ValueError: a setting is out of range.
+    """
+
+    lag_s: float = 0.2  # seconds that a frame waits for later ones before it is final; at least one frame
+    detection_probability: float = 0.9  # of a person that nothing hides, in one camera and frame
+    false_per_frame: float = 0.5  # false detections per picture
+    people_density: float = 0.05  # people per square metre, before anybody is known
+    arrival_rate: float = 0.004  # people who appear per square metre and second, later
+    departure_rate: float = 0.1  # share of the people that leaves per second
+    foot_noise: float = 0.012  # standard deviation of a foot, box heights, before it is known per camera
+    calibration_noise: float = 0.1  # standard deviation by which cameras disagree about a place, metres
+    speed: float = 1.3  # standard deviation of the velocity of people who start, stop and turn, metres/s
+    acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, metres/s²
+    turn_probability: float = 0.03  # share of the frames in which somebody starts, stops or turns
+    forget_after_s: float = 2.0  # seconds unseen after which a person's number is retired
+    appearance: float = 4.0  # weight of the distance to a person's appearance in a camera
+    unknown_appearance: float = 0.3  # distance at which an appearance says nothing
+
+    def __post_init__(self) -> None:
+        for name in ("detection_probability", "turn_probability"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ValueError(f"{name} is a probability between 0 and 1, not {getattr(self, name)}")
+        for field in fields(self):
+            if field.name not in {"appearance", "unknown_appearance"} and not getattr(self, field.name) > 0.0:
+                raise ValueError(f"{field.name} must be above 0, not {getattr(self, field.name)}")

@@ -1,0 +1,257 @@
+"""Online tracking of everybody on a ground plane by all cameras at once, with a fixed lag.
+
+Each frame's detections become hypotheses of places, the network program over the last frames chooses among
+them, and the oldest frame becomes final. Who arrives is decided in the same program: a person is known from
+their first final place on.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats
+from tracking.frame_rate import DEFAULT_FPS, frames_in
+from tracking.ground_plane.camera import BoxSizes, GroundCamera
+from tracking.ground_plane.foot_noise import FootNoise
+from tracking.ground_plane.hypotheses import Places, find_places
+from tracking.ground_plane.measurements import measure, units_per_metre
+from tracking.ground_plane.motion import MotionState
+from tracking.ground_plane.network import KnownPerson, build_ground_network
+from tracking.ground_plane.person import GroundPerson
+from tracking.ground_plane.settings import GroundSettings
+from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
+from tracking.ground_plane.visibility import detection_probabilities
+from tracking.solvers.base import OCCLUDED, Solver, SolveReport
+from tracking.types import Detections
+
+_UNBORN = 4
+"""People who may arrive in one window; doubled as long as all of them do."""
+_MAX_DETECTION_PROBABILITY = 0.97
+_GONE = OCCLUDED - 1
+"""State of a person who has left for good."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    number: int
+    places: Places
+    offsets: NDArray[np.int64]
+    """(C,) index of each camera's first measurement."""
+
+
+class GroundPlaneTracker:
+    """Tracks the people on a plane that several cameras see. Deterministic; memory bounded by the window."""
+
+    def __init__(
+        self,
+        cameras: Mapping[str, GroundCamera],
+        settings: GroundSettings,
+        solver: Solver,
+        fps: float = DEFAULT_FPS,
+        metre: float | None = None,
+    ) -> None:
+        """Create a tracker of frames that are 1 / `fps` seconds apart.
+
+        `metre`: units of the plane per metre; None: estimated from the heights of the first boxes.
+        """
+        self._names = tuple(cameras)
+        self._given = tuple(cameras.values())
+        self._settings = settings
+        self._solver = solver
+        self._seconds = 1.0 / fps
+        self._lag = frames_in(settings.lag_s, fps)
+        self._metre = metre
+        self._cameras = tuple(camera.scaled(metre) for camera in self._given) if metre else ()
+        self._sizes = [BoxSizes() for _ in cameras]
+        self._noise = FootNoise(len(cameras), settings.foot_noise)
+        self._people: list[GroundPerson] = []
+        self._next_id = 1
+        self._window: deque[_Frame] = deque()
+        self._last: int | None = None
+        self._states = np.zeros((0, 0), dtype=np.int64)
+        self._report: SolveReport | None = None
+        self._started = False
+
+    def push(self, frame: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
+        """Add the detections of a frame by camera; return the frames that become final, in order.
+
+        Skipped frame numbers are frames without detections; after a gap longer than `forget_after_s`
+        everybody is new.
+
+        Raises:
+            ValueError: the frame number is not larger than the last one, or a camera is not known.
+        """
+        unknown = sorted(set(detections) - set(self._names))
+        if unknown:
+            raise ValueError(f"no camera is called {unknown[0]!r}; there are {', '.join(self._names)}")
+        if self._last is not None and frame <= self._last:
+            raise ValueError(f"frame {frame} came after frame {self._last}")
+        final = []
+        first = frame if self._last is None else self._last + 1
+        if (frame - first) * self._seconds > self._settings.forget_after_s:
+            final, first = self.flush(), frame
+        for number in range(first, frame):
+            final += self._add(number, {})
+        self._last = frame
+        return final + self._add(frame, detections)
+
+    def flush(self) -> list[GroundFrame]:
+        """End the recording: return the remaining frames; everybody is forgotten."""
+        final = []
+        while self._window:
+            final.append(self._finish_oldest())
+            if self._window:
+                self._solve()
+        self._people, self._states = [], np.zeros((0, 0), dtype=np.int64)
+        return final
+
+    def _add(self, number: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
+        found = [detections.get(name, Detections.empty(0)) for name in self._names]
+        if self._metre is None:
+            self._metre = units_per_metre(self._given, {k: part.boxes for k, part in enumerate(found)})
+            if self._metre is None:
+                return [GroundFrame(number, (), None)]
+            self._cameras = tuple(camera.scaled(self._metre) for camera in self._given)
+        for sizes, part in zip(self._sizes, found, strict=True):
+            sizes.update(part.boxes)
+        measurements = measure(self._cameras, found, list(self._noise.deviations), self._settings)
+        places = find_places(measurements, self._predictions(), self._cameras, self._sizes, self._settings)
+        counts = np.array([0, *(len(part) for part in found)])
+        self._window.append(_Frame(number, places, np.cumsum(counts)[:-1]))
+        self._solve()
+        return [self._finish_oldest()] if len(self._window) > self._lag else []
+
+    def _predictions(self) -> list[tuple[Floats, Floats]]:
+        """Return mean and covariance of the place of each person, known or arriving, in the next frame."""
+        predictions = []
+        for n, row in enumerate(self._states):
+            seen = [m for m, state in enumerate(row) if 0 <= state < len(self._window[m].places)]
+            known = self._people[n].state if n < len(self._people) else None
+            seconds = self._seconds * (len(self._window) - seen[-1] if seen else len(self._window) + 1)
+            if seen:
+                places = self._window[seen[-1]].places
+                state = MotionState.at(
+                    places.means[row[seen[-1]]], places.covariances[row[seen[-1]]], self._settings.speed
+                )
+                if known is not None:
+                    joint = state.covariance.copy()
+                    joint[2:, 2:] = known.velocity_covariance
+                    state = MotionState(np.concatenate([state.place, known.velocity]), joint)
+            elif known is not None:
+                state = known
+                seconds += self._seconds * (self._window[0].number - 1 - self._people[n].seen)
+            else:
+                continue
+            ahead = state.predict(seconds, self._settings.acceleration)
+            predictions.append((ahead.place, ahead.place_covariance))
+        return predictions
+
+    def _solve(self) -> None:
+        """Solve the window's program, with as many possible arrivals as it takes."""
+        frames = [frame.places for frame in self._window]
+        people = self._known()
+        rate = self._settings.arrival_rate * self._seconds if self._started else self._settings.people_density
+        unborn = _UNBORN
+        while True:
+            network = build_ground_network(
+                people, unborn, frames, self._seconds, -float(np.log(rate)), self._settings
+            )
+            solution = self._solver.solve(network)
+            gone = network.max_places - 1
+            states = np.where(solution.states == gone, _GONE, solution.states)
+            arrived = (states[len(people) :] >= 0).any(axis=1)
+            if not arrived.all():
+                break
+            unborn *= 2
+        rows = np.concatenate([np.ones(len(people), dtype=np.bool_), arrived])
+        self._states, self._report = states[rows], solution.report
+
+    def _known(self) -> list[KnownPerson]:
+        """Return the people known, with what the window's frames say of each."""
+        people = self._people
+        if not people:
+            return []
+        hidden = []
+        for frame in self._window:
+            ahead = [person.ahead(frame.number).place for person in people]
+            probabilities = detection_probabilities(
+                np.array(ahead),
+                self._cameras,
+                self._sizes,
+                frame.places.measurements,
+                [()] * len(people),
+                self._settings.detection_probability,
+            )
+            hidden.append(-np.log1p(-np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)).sum(axis=1))
+        return [
+            KnownPerson(
+                person.state,
+                person.seconds_unseen(self._window[0].number),
+                np.array([costs[n] for costs in hidden]),
+                [person.appearance_costs(frame.places) for frame in self._window],
+            )
+            for n, person in enumerate(people)
+        ]
+
+    def _finish_oldest(self) -> GroundFrame:
+        """Make the oldest frame final: people move, arrive and leave."""
+        frame = self._window.popleft()
+        people, rows, arriving, tracks = [], [], [], []
+        for n, row in enumerate(self._states):
+            state = int(row[0])
+            if n < len(self._people):
+                person = self._people[n]
+                if state == _GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
+                    continue
+                if state >= 0:
+                    person.move(frame.number, frame.places, state)
+            elif state >= 0:
+                person = self._arrive(frame, state)
+            else:
+                arriving.append(n)
+                continue
+            people.append(person)
+            rows.append(n)
+            if state >= 0:
+                person.learn(frame.places, state, self._sizes)
+            if state >= 0 or (row[1:] >= 0).any():
+                tracks.append(self._track(person, frame, state))
+        chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
+        self._noise.update(frame.places, chosen)
+        self._people = people
+        self._states = self._states[rows + arriving, 1:]
+        self._started = self._started or bool(people)
+        return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)
+
+    def _arrive(self, frame: _Frame, state: int) -> GroundPerson:
+        number, self._next_id = self._next_id, self._next_id + 1
+        return GroundPerson(number, frame.number, frame.places, state, self._seconds, self._settings)
+
+    def _track(self, person: GroundPerson, frame: _Frame, state: int) -> GroundTrack:
+        """Return the person's place and boxes: detections, and predicted boxes in the other cameras."""
+        ahead = person.ahead(frame.number)
+        boxes = {}
+        measurements = frame.places.measurements
+        for k in frame.places.groups[state] if state >= 0 else ():
+            camera = int(measurements.camera[k])
+            boxes[self._names[camera]] = GroundBox(measurements.boxes[k], k - int(frame.offsets[camera]))
+        for camera, name in enumerate(self._names):
+            if name not in boxes:
+                box = person.boxes.predict(ahead.place, self._cameras[camera], self._sizes[camera])
+                if box is not None:
+                    boxes[name] = GroundBox(box, None)
+        metre = self._metre or 1.0
+        return GroundTrack(person.id, metre * ahead.place, metre**2 * ahead.place_covariance, boxes)
+
+
+def track_ground_plane(
+    tracker: GroundPlaneTracker, frames: Iterable[tuple[int, Mapping[str, Detections]]]
+) -> list[GroundFrame]:
+    """Return the final frames of a whole recording."""
+    final = [found for number, detections in frames for found in tracker.push(number, detections)]
+    return final + tracker.flush()

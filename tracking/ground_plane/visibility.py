@@ -1,0 +1,69 @@
+"""How probably each camera detects a person at a place: a miss is evidence only where they should be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.boxes import Floats, areas, heights, intersections
+from tracking.ground_plane.camera import BoxSizes, GroundCamera
+from tracking.ground_plane.measurements import Measurements
+
+_FREE_SHARE, _HIDDEN_SHARE = 0.3, 0.9
+"""Shares of a box that others hide, up to which nothing and from which nearly everything is lost."""
+_HIDDEN_FACTOR = 0.15
+_NEARER = 0.02
+"""Box heights by which a foot must be lower to be of somebody nearer to the camera."""
+_MAX_CUT = 0.7
+"""Share of a box's height that may be outside of the picture."""
+
+
+def detection_probabilities(
+    places: Floats,
+    cameras: Sequence[GroundCamera],
+    sizes: Sequence[BoxSizes],
+    measurements: Measurements,
+    groups: Sequence[tuple[int, ...]],
+    probability: float,
+) -> Floats:
+    """Return the probability that each camera detects a person at each place (N, 2), (N, C).
+
+    Detections hide places behind them, except those of the place's own group: `groups[n]` are indices of
+    measurements. `probability` is that of a person whom nobody hides.
+    """
+    own = np.zeros((len(places), len(measurements)), dtype=np.bool_)
+    for n, group in enumerate(groups):
+        own[n, list(group)] = True
+    found = np.zeros((len(places), len(cameras)))
+    for index, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
+        points = camera.to_image(places)
+        if not size.known:
+            found[:, index] = probability * camera.contains(points)
+            continue
+        boxes = size.boxes(points)
+        of_camera = measurements.camera == index
+        hidden = _hidden_shares(boxes, measurements.boxes[of_camera], own[:, of_camera])
+        lost = np.clip((hidden - _FREE_SHARE) / (_HIDDEN_SHARE - _FREE_SHARE), 0.0, 1.0 - _HIDDEN_FACTOR)
+        found[:, index] = np.where(in_picture(boxes, camera), probability * (1.0 - lost), 0.0)
+    return found
+
+
+def in_picture(boxes: Floats, camera: GroundCamera) -> NDArray[np.bool_]:
+    """Return which boxes (N, 4) are in the picture to a large part; NaN is not."""
+    tall = heights(boxes)
+    middle = (boxes[:, 0] + boxes[:, 2]) / 2.0
+    inside = np.minimum(boxes[:, 3], camera.height) - np.maximum(boxes[:, 1], 0.0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((middle >= 0) & (middle < camera.width) & (inside > (1.0 - _MAX_CUT) * tall))
+
+
+def _hidden_shares(boxes: Floats, others: Floats, own: NDArray[np.bool_]) -> Floats:
+    """Return the largest share of each box (N, 4) that one of the others (K, 4), nearer, hides, (N,)."""
+    if not len(others):
+        return np.zeros(len(boxes))
+    with np.errstate(invalid="ignore"):
+        shares = intersections(boxes[:, None], others[None]) / np.maximum(areas(boxes), 1.0)[:, None]
+        nearer = others[None, :, 3] > (boxes[:, 3] + _NEARER * heights(boxes))[:, None]
+    return np.asarray(np.nan_to_num(np.where(nearer & ~own, shares, 0.0)).max(axis=1))
