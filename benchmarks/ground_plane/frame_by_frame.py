@@ -48,14 +48,9 @@ def track_frame_by_frame(
         found = [detections.get(name, Detections.empty(0)) for name in cameras]
         for size, part in zip(sizes, found, strict=True):
             size.update(part.boxes)
-        noise = [settings.foot_noise] * len(found)
-        places = find_places(
-            measure(list(cameras.values()), found, noise, settings),
-            [],
-            list(cameras.values()),
-            sizes,
-            settings,
-        )
+        views = list(cameras.values())
+        measured = measure(views, found, np.ones(len(found)), settings)
+        places = find_places(measured, [], views, sizes, settings, 1.0 / fps)
         chosen = _cheapest(places)
         links = _link(walkers, places.means[chosen], frame, fps)
         for k, place in enumerate(chosen):

@@ -1,6 +1,6 @@
 """Hypotheses of one frame: groups of detections, at most one per camera, that may be of one person.
 
-Groups are alternatives: those that share a person exclude each other, and the network program chooses.
+Groups are alternatives: those that share a detection exclude each other, and the network program chooses.
 The cost of a place is the negative log likelihood ratio of its detections being of one person to all of them
 being false; it integrates over the unknown place.
 """
@@ -47,7 +47,7 @@ class Places:
         means: (K, 2) metres.
         covariances: (K, 2, 2) m².
         costs: (K,) of the place being a person, against its detections being false.
-        conflicts: (K, K) bool, places that share a detection, or have alternatives of one person.
+        conflicts: (K, K) bool, places that share a detection.
     """
 
     measurements: Measurements
@@ -67,10 +67,12 @@ def find_places(
     cameras: Sequence[GroundCamera],
     sizes: Sequence[BoxSizes],
     settings: GroundSettings,
+    seconds: float,
 ) -> Places:
     """Return the hypotheses of a frame.
 
-    `predictions`: means (2,) and covariances (2, 2) of the places of people known before.
+    `predictions`: means (2,) and covariances (2, 2) of the places of people known before. `seconds` from one
+    frame to the next: frames that follow each other closely err alike, so that each says less.
     """
     candidates = dict.fromkeys(agglomerate(measurements, settings.people_density))
     for mean, covariance in predictions:
@@ -95,6 +97,7 @@ def find_places(
         members[k, list(group)] = True
         probabilities[k, measurements.camera[list(group)]] = 0.0
     costs -= np.log1p(-probabilities).sum(axis=1)
+    costs *= min(seconds / settings.correlation_s, 1.0)
     kept = np.flatnonzero(costs < _MAX_COST)
     shared = members[kept].astype(np.float64)
     return Places(
@@ -103,7 +106,7 @@ def find_places(
         means[kept],
         covariances[kept],
         costs[kept],
-        np.asarray(shared @ measurements.conflicts.astype(np.float64) @ shared.T > 0.0),
+        np.asarray(shared @ shared.T > 0.0),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import Floats, dice_overlap, heights
+from tracking.boxes import Floats, heights
 from tracking.ground_plane.camera import GroundCamera, feet
 from tracking.ground_plane.gaussians import determinants
 from tracking.ground_plane.settings import GroundSettings
@@ -16,10 +16,8 @@ from tracking.types import Detections
 
 _PERSON_M = 1.7
 """Height of a person in metres, from which the unit of a ground plane follows."""
-_SAME_PERSON_OVERLAP = 0.8
-"""Share of two boxes of a camera from which they are alternatives: in a crowd people overlap by less."""
 _MAX_LOG_ODDS = 3.0
-"""Scores are not certain: log odds that they count for at most."""
+"""Scores are not certain: log odds for which they count at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +32,6 @@ class Measurements:
         covariances: (D, 2, 2) of the places, m²: the noise of a foot carried through the homography, so that
             distant feet are long ellipses, and that of the calibration.
         rates: (D,) log of the expected false detections per m² at that place, less the log odds of the score.
-        conflicts: (D, D) bool, boxes of one camera that show the same person, also each with itself.
     """
 
     camera: NDArray[np.int64]
@@ -43,7 +40,6 @@ class Measurements:
     places: Floats
     covariances: Floats
     rates: Floats
-    conflicts: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.camera)
@@ -52,43 +48,38 @@ class Measurements:
 def measure(
     cameras: Sequence[GroundCamera],
     detections: Sequence[Detections],
-    foot_noise: Sequence[float],
+    noise: Floats,
     settings: GroundSettings,
 ) -> Measurements:
     """Locate the detections of each camera on the plane.
 
-    `foot_noise`: standard deviation of the feet of each camera, in box heights.
+    `noise`: (C,) factors of the assumed standard deviations of the places.
     """
     parts = [
-        _measure_camera(camera, found, noise, settings)
-        for camera, found, noise in zip(cameras, detections, foot_noise, strict=True)
+        _measure_camera(camera, found, float(factor), settings)
+        for camera, found, factor in zip(cameras, detections, noise, strict=True)
     ]
-    camera = np.repeat(np.arange(len(cameras)), [len(found) for found in detections])
-    boxes = np.concatenate([found.boxes for found in detections])
-    same = dice_overlap(boxes[:, None], boxes[None]) > _SAME_PERSON_OVERLAP
-    np.fill_diagonal(same, val=True)
     return Measurements(
-        camera,
-        boxes,
+        np.repeat(np.arange(len(cameras)), [len(found) for found in detections]),
+        np.concatenate([found.boxes for found in detections]),
         tuple(histogram for found in detections for histogram in found.histograms),
         np.concatenate([places for places, _, _ in parts]),
         np.concatenate([covariances for _, covariances, _ in parts]),
         np.concatenate([rates for _, _, rates in parts]),
-        same & (camera[:, None] == camera),
     )
 
 
 def _measure_camera(
-    camera: GroundCamera, found: Detections, noise: float, settings: GroundSettings
+    camera: GroundCamera, found: Detections, factor: float, settings: GroundSettings
 ) -> tuple[Floats, Floats, Floats]:
     points = feet(found.boxes)
     jacobians = camera.jacobians(points)
-    deviations = noise * np.maximum(heights(found.boxes), 1.0)
+    deviations = settings.foot_noise * np.maximum(heights(found.boxes), 1.0)
     covariances = deviations[:, None, None] ** 2 * jacobians @ np.swapaxes(jacobians, 1, 2)
-    covariances += settings.calibration_noise**2 * np.eye(2)
+    covariances = factor**2 * (covariances + settings.calibration_noise**2 * np.eye(2))
     per_pixel = settings.false_per_frame / (camera.width * camera.height)
     scores = np.clip(found.scores, 1e-6, 1.0 - 1e-6)
-    odds = np.clip(np.log(scores / (1.0 - scores)), -_MAX_LOG_ODDS, _MAX_LOG_ODDS)
+    odds = np.minimum(np.log(scores / (1.0 - scores)), _MAX_LOG_ODDS)
     rates = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - odds
     return camera.to_ground(points), covariances, rates
 

@@ -13,7 +13,9 @@ class GroundSettings:
         ValueError: a setting is out of range.
     """
 
-    lag_s: float = 0.2  # seconds that a frame waits for later ones before it is final; at least one frame
+    lag_s: float = 0.4  # seconds that a frame waits for later ones before it is final; at least one frame
+    stride_s: float = 0.2  # seconds between two solutions
+    correlation_s: float = 0.2  # seconds in which detections err alike: all frames in them count as one
     detection_probability: float = 0.9  # of a person that nothing hides, in one camera and frame
     false_per_frame: float = 0.5  # false detections per picture
     people_density: float = 0.05  # people per square metre, before anybody is known

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
-from tracking.ground_plane.foot_noise import FootNoise
 from tracking.ground_plane.hypotheses import Places, find_places
 from tracking.ground_plane.measurements import measure, units_per_metre
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.network import KnownPerson, build_ground_network
 from tracking.ground_plane.person import GroundPerson
+from tracking.ground_plane.place_noise import PlaceNoise
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
 from tracking.ground_plane.visibility import detection_probabilities
@@ -65,10 +65,11 @@ class GroundPlaneTracker:
         self._solver = solver
         self._seconds = 1.0 / fps
         self._lag = frames_in(settings.lag_s, fps)
+        self._stride = frames_in(settings.stride_s, fps)
         self._metre = metre
         self._cameras = tuple(camera.scaled(metre) for camera in self._given) if metre else ()
         self._sizes = [BoxSizes() for _ in cameras]
-        self._noise = FootNoise(len(cameras), settings.foot_noise)
+        self._noise = PlaceNoise(len(cameras))
         self._people: list[GroundPerson] = []
         self._next_id = 1
         self._window: deque[_Frame] = deque()
@@ -103,10 +104,9 @@ class GroundPlaneTracker:
     def flush(self) -> list[GroundFrame]:
         """End the recording: return the remaining frames; everybody is forgotten."""
         final = []
-        while self._window:
-            final.append(self._finish_oldest())
-            if self._window:
-                self._solve()
+        if self._window:
+            self._solve()
+            final = [self._finish_oldest() for _ in range(len(self._window))]
         self._people, self._states = [], np.zeros((0, 0), dtype=np.int64)
         return final
 
@@ -119,12 +119,16 @@ class GroundPlaneTracker:
             self._cameras = tuple(camera.scaled(self._metre) for camera in self._given)
         for sizes, part in zip(self._sizes, found, strict=True):
             sizes.update(part.boxes)
-        measurements = measure(self._cameras, found, list(self._noise.deviations), self._settings)
-        places = find_places(measurements, self._predictions(), self._cameras, self._sizes, self._settings)
+        measurements = measure(self._cameras, found, self._noise.factors, self._settings)
+        places = find_places(
+            measurements, self._predictions(), self._cameras, self._sizes, self._settings, self._seconds
+        )
         counts = np.array([0, *(len(part) for part in found)])
         self._window.append(_Frame(number, places, np.cumsum(counts)[:-1]))
+        if (number + 1) % self._stride or len(self._window) <= self._lag:
+            return []
         self._solve()
-        return [self._finish_oldest()] if len(self._window) > self._lag else []
+        return [self._finish_oldest() for _ in range(len(self._window) - self._lag)]
 
     def _predictions(self) -> list[tuple[Floats, Floats]]:
         """Return mean and covariance of the place of each person, known or arriving, in the next frame."""

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.camera import BoxSizes
-from tracking.ground_plane.foot_noise import FootNoise
 from tracking.ground_plane.gaussians import fuse, negative_log_densities
 from tracking.ground_plane.hypotheses import agglomerate, find_places, group_cost
 from tracking.ground_plane.measurements import Measurements, measure
+from tracking.ground_plane.place_noise import PlaceNoise
 from tracking.ground_plane.visibility import detection_probabilities
 
 VIEWS = floor_views()
@@ -25,7 +25,7 @@ few = settings(deadline=None, max_examples=25)
 
 def measurements_of(places: list[list[float]], noise: FloorNoise, seed: int = 0) -> Measurements:
     found = detect_walkers(np.array([places]), VIEWS, noise, seed)[0]
-    return measure(CAMERAS, list(found.values()), [SETTINGS.foot_noise] * 3, SETTINGS)
+    return measure(CAMERAS, list(found.values()), np.ones(3), SETTINGS)
 
 
 @few
@@ -61,7 +61,7 @@ def test_people_far_apart_are_a_place_each() -> None:
     true = [[2.0, 3.0], [5.0, 5.0], [8.0, 3.0]]
     measurements = measurements_of(true, FloorNoise(deviation=0.005))
     sizes = [BoxSizes() for _ in CAMERAS]
-    places = find_places(measurements, [], CAMERAS, sizes, SETTINGS)
+    places = find_places(measurements, [], CAMERAS, sizes, SETTINGS, 1.0)
     best = sorted(range(len(places)), key=lambda k: places.costs[k])[:3]
     found = sorted(places.means[best].round(0).tolist())
     assert found == sorted(true)
@@ -87,14 +87,14 @@ def test_a_miss_says_nothing_where_somebody_nearer_hides_the_person() -> None:
     assert probabilities[0, 2] == pytest.approx(0.9), "from the other side"
 
 
-def test_the_noise_of_the_feet_is_learned() -> None:
-    noise = FootNoise(3, SETTINGS.foot_noise)
+def test_the_noise_of_the_places_is_learned() -> None:
+    noise = PlaceNoise(3)
     random = np.random.default_rng(1)
     for seed in range(60):
         people = random.uniform(2.0, 8.0, (3, 2)).tolist()
         found = detect_walkers(np.array([people]), VIEWS, FloorNoise(deviation=0.04), seed)[0]
-        measurements = measure(CAMERAS, list(found.values()), list(noise.deviations), SETTINGS)
-        places = find_places(measurements, [], CAMERAS, [BoxSizes()] * 3, SETTINGS)
+        measurements = measure(CAMERAS, list(found.values()), noise.factors, SETTINGS)
+        places = find_places(measurements, [], CAMERAS, [BoxSizes()] * 3, SETTINGS, 1.0)
         order = np.argsort(places.costs)
         free, chosen = np.ones(len(places), dtype=bool), []
         for k in order:
@@ -102,4 +102,4 @@ def test_the_noise_of_the_feet_is_learned() -> None:
                 chosen.append(int(k))
                 free &= ~places.conflicts[k]
         noise.update(places, chosen)
-    assert noise.deviations.mean() > 1.5 * SETTINGS.foot_noise
+    assert noise.factors.mean() > 1.3

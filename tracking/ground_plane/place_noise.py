@@ -1,4 +1,4 @@
-"""The noise of each camera's feet, learned from how well the cameras agree about where people stand."""
+"""The noise of the places of each camera, learned from how well cameras agree about where people stand."""
 
 from __future__ import annotations
 
@@ -20,18 +20,16 @@ _RANGE = (1.0, 5.0)
 """Factors of the assumed noise between which it is learned: too small a noise loses people."""
 
 
-class FootNoise:
-    """Standard deviation of the feet of each camera, box heights."""
+class PlaceNoise:
+    """Factors of the standard deviations that are assumed for the feet and the calibration of each camera.
 
-    def __init__(self, cameras: int, assumed: float) -> None:
-        self._assumed = assumed
-        self._factors = np.ones(cameras)
+    Attributes:
+        factors: (C,) of each camera.
+    """
+
+    def __init__(self, cameras: int) -> None:
+        self.factors: Floats = np.ones(cameras)
         self._sums = np.full((cameras, 2), _PRIOR)
-
-    @property
-    def deviations(self) -> Floats:
-        """The standard deviation of each camera, (C,)."""
-        return self._assumed * self._factors
 
     def update(self, places: Places, chosen: Sequence[int]) -> None:
         """Learn from the chosen places of a final frame that more than one camera sees."""
@@ -49,5 +47,5 @@ class FootNoise:
                 measurements.camera[group], distances, expected, strict=True
             ):
                 self._sums[camera] *= 1.0 - 1.0 / _MEMORY
-                self._sums[camera] += min(distance, _MAX_DISTANCE) * self._factors[camera] ** 2, freedom
-        self._factors = np.clip(np.sqrt(self._sums[:, 0] / self._sums[:, 1]), *_RANGE)
+                self._sums[camera] += min(distance, _MAX_DISTANCE) * self.factors[camera] ** 2, freedom
+        self.factors = np.clip(np.sqrt(self._sums[:, 0] / self._sums[:, 1]), *_RANGE)
