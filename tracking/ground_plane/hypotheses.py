@@ -97,7 +97,7 @@ def find_places(
         members[k, list(group)] = True
         probabilities[k, measurements.camera[list(group)]] = 0.0
     costs -= np.log1p(-probabilities).sum(axis=1)
-    costs *= min(seconds / settings.correlation_s, 1.0)
+    costs *= settings.evidence_weight(seconds)
     kept = np.flatnonzero(costs < _MAX_COST)
     shared = members[kept].astype(np.float64)
     return Places(

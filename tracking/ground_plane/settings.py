@@ -37,3 +37,7 @@ class GroundSettings:
         for field in fields(self):
             if field.name not in {"appearance", "unknown_appearance"} and not getattr(self, field.name) > 0.0:
                 raise ValueError(f"{field.name} must be above 0, not {getattr(self, field.name)}")
+
+    def evidence_weight(self, seconds: float) -> float:
+        """Return for how much a frame counts beside one that errs on its own; frames are `seconds` apart."""
+        return min(seconds / self.correlation_s, 1.0)

@@ -210,10 +210,10 @@ class GroundPlaneTracker:
             state = int(row[0])
             if n < len(self._people):
                 person = self._people[n]
-                if state == _GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
-                    continue
                 if state >= 0:
                     person.move(frame.number, frame.places, state)
+                elif state == _GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
+                    continue
             elif state >= 0:
                 person = self._arrive(frame, state)
             else:
