@@ -80,7 +80,7 @@ def plot(joint: Mapping[str, Mapping[str, float]], out: Path) -> None:
         values = [scores.get(way, np.nan) for scores in joint.values()]
         axis.barh(places - 0.16 * (index - (len(ways) - 1) / 2), values, 0.15, label=way)
     axis.set(xlim=(0, 100), xlabel="joint IDF1", yticks=places, yticklabels=list(joint))
-    axis.legend(fontsize="small", loc="lower right")
+    axis.legend(fontsize="small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     out.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, out)
 
