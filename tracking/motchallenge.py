@@ -46,6 +46,12 @@ class MotRow:
     confidence: float = 1.0
     visible: float = -1.0
 
+    @classmethod
+    def of_box(cls, frame: int, number: int, box: Iterable[float], confidence: float = 1.0) -> MotRow:
+        """Return the row of a box, `left, top, right, bottom` in pixels, of the object `number`."""
+        left, top, right, bottom = box
+        return cls(frame, number, left, top, right - left, bottom - top, confidence)
+
     @property
     def box(self) -> tuple[float, float, float, float]:
         """The box as `left, top, right, bottom` in pixels."""

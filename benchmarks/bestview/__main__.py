@@ -30,7 +30,6 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -98,7 +97,7 @@ def scenes(options: argparse.Namespace, folder: Path, report: Report) -> Iterato
 
 def as_live(scene: BenchmarkScene) -> BenchmarkScene:
     """Return the scene without prescan: nothing is known before its first frame."""
-    return replace(scene, content={**scene.content, "detect": {"prescan_s": 0}})
+    return scene.with_detector({"prescan_s": 0})
 
 
 def score_row(scores: MethodScores) -> list[str]:

@@ -46,8 +46,7 @@ def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
                 for frame in range(max(done + 1, message.first), final_to + 1):
                     box = track.boxes[frame - message.first]
                     if box is not None:
-                        left, top, right, bottom = box
-                        rows.append(MotRow(frame + 1, track.id, left, top, right - left, bottom - top))
+                        rows.append(MotRow.of_box(frame + 1, track.id, box))
             done = max(done, final_to)
         tracks[camera] = sorted(rows, key=lambda row: (row.frame, row.id))
     return tracks

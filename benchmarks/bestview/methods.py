@@ -27,7 +27,6 @@ from server.cli.evaluate.choices_file import Choice
 from server.cli.evaluate.ground_truth import SceneTruth, people_of_objects
 from server.cli.evaluate.view_scores import evaluate_views
 from server.cli.render.site_file import RenderedSite
-from server.service.view_selection.decider import camera_homographies
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.motchallenge import MotRow, format_rows
 
@@ -161,11 +160,7 @@ def run_methods(
             )
         yield MethodResult(f"{name}, final ids", select(result.tracks))
         yield MethodResult(f"{name}, largest", select_largest(result.tracks))
-        ground = {
-            camera: homography
-            for camera, homography in camera_homographies(calibrated_scene.config()).items()
-            if homography is not None
-        }
+        ground = calibrated_scene.homographies
         name_of_nearest = "nearest feet" if calibrated_scene is scene else "nearest feet, calibr."
         yield MethodResult(
             name_of_nearest, select_largest(by_nearest_feet(own_tracks(without_peers), ground))

@@ -20,7 +20,9 @@ from server.cli.evaluate.ground_truth import SceneTruth, build_truth
 from server.cli.render.video_info import Size
 from server.config.loader import build_config
 from server.config.site_config import Config
+from server.service.view_selection.decider import camera_homographies
 from synthetic import Scene, write_recording
+from tracking.boxes import Floats
 from tracking.motchallenge import read_rows
 
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
@@ -70,6 +72,12 @@ class BenchmarkScene:
     def calibrated(self) -> bool:
         """Whether there are homographies."""
         return "ground" in self.content
+
+    @property
+    def homographies(self) -> dict[str, Floats]:
+        """The homography of each camera that has one."""
+        found = camera_homographies(self.config())
+        return {camera: homography for camera, homography in found.items() if homography is not None}
 
     @property
     def sizes(self) -> dict[str, Size]:

@@ -36,9 +36,7 @@ def own_tracklets(config: Config, messages: Messages) -> dict[str, list[MotRow]]
             rows, _ = tracklets.update(seen, {track.key: track.appearance for track in tracks})
             for track, column in zip(*np.nonzero(rows >= 0), strict=True):
                 camera = seen.keys[track].camera
-                left, top, right, bottom = (
-                    reader.letterboxes[camera].boxes_camera_to_site(seen.boxes[track, column]).tolist()
-                )
+                box = reader.letterboxes[camera].boxes_camera_to_site(seen.boxes[track, column])
                 frame, number = seen.first_frame + int(column) + 1, int(rows[track, column]) + 1
-                parts[camera].append(MotRow(frame, number, left, top, right - left, bottom - top))
+                parts[camera].append(MotRow.of_box(frame, number, box.tolist()))
     return parts

@@ -124,8 +124,8 @@ def run_detector(detector_spec: ComparedDetector, view: ScoredView, frames: int 
 def rows_of(number: int, found: Detections) -> list[MotRow]:
     """Return a frame's detections as MOTChallenge rows."""
     return [
-        MotRow(number + 1, -1, left, top, right - left, bottom - top, score)
-        for (left, top, right, bottom), score in zip(found.boxes.tolist(), found.scores.tolist(), strict=True)
+        MotRow.of_box(number + 1, -1, box, score)
+        for box, score in zip(found.boxes.tolist(), found.scores.tolist(), strict=True)
     ]
 
 
@@ -135,6 +135,6 @@ def newly_final_rows(result: WindowResult | None) -> Iterable[MotRow]:
         return
     for track in result.tracks:
         for number in range(result.first, result.final_to + 1):
-            left, top, right, bottom = track.boxes[number - result.first].tolist()
-            if not np.isnan(left):
-                yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)
+            box = track.boxes[number - result.first].tolist()
+            if not np.isnan(box[0]):
+                yield MotRow.of_box(number + 1, track.id, box)

@@ -150,3 +150,9 @@ def test_a_broken_gzip_file_is_refused_in_one_line(tmp_path: Path, cut: int) -> 
 def test_the_public_files_are_read(shared_data: Path) -> None:
     assert len(read_rows(shared_data / "mot15" / "TUD-Campus" / "det.txt")) > 100
     assert {row.visible for row in read_rows(shared_data / "terrace" / "gt" / "c0.txt")} == {0.0, 1.0}
+
+
+def test_a_row_of_a_box_has_that_box() -> None:
+    row = MotRow.of_box(3, 7, [10.0, 20.0, 30.0, 60.0], 0.5)
+    assert (row.frame, row.id, row.width, row.height, row.confidence) == (3, 7, 20.0, 40.0, 0.5)
+    assert row.box == (10.0, 20.0, 30.0, 60.0)

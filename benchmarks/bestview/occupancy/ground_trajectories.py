@@ -74,7 +74,6 @@ def rows_of(
         area = np.nan_to_num((boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1]), nan=np.inf)
         inside = (whole[:, 2] - whole[:, 0]) * (whole[:, 3] - whole[:, 1])
         for place in np.flatnonzero((inside > 0.0) & (inside >= settings.min_visible * area)).tolist():
-            left, top, right, bottom = whole[place].tolist()
             frame = trajectory.first + place + 1
-            rows.append(MotRow(frame, int(number[place]), left, top, right - left, bottom - top))
+            rows.append(MotRow.of_box(frame, int(number[place]), whole[place].tolist()))
     return sorted(rows, key=lambda row: (row.frame, row.id))

@@ -28,7 +28,6 @@ from benchmarks.bestview.occupancy.occupancy_map import ForegroundObservation, O
 from benchmarks.bestview.occupancy.shortest_paths import Lattice, shortest_paths
 from benchmarks.bestview.scenes import BenchmarkScene
 from server.config.site_config import Config
-from server.service.view_selection.decider import camera_homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow
 
@@ -77,12 +76,7 @@ def track_by_occupancy(
     """
     settings, config = settings or ReferenceSettings(), scene.config()
     masks = {camera: compute_masks(config, camera) for camera in scene.gt}
-    ground = {
-        camera: homography
-        for camera, homography in camera_homographies(config).items()
-        if homography is not None
-    }
-    views = aligned_views(masks, ground, boxes)
+    views = aligned_views(masks, scene.homographies, boxes)
     floor = build_grid(list(views.values()), settings.floor)
     q = occupancy(floor, list(masks.values()), settings.map)
     reach = round(settings.trajectories.smooth_s * config.site.fps)

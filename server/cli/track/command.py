@@ -156,6 +156,6 @@ def newly_final_rows(result: WindowResult | None) -> Iterator[MotRow]:
         return
     for track in result.tracks:
         for number in range(result.first, result.final_to + 1):
-            left, top, right, bottom = (float(side) for side in track.interpolated[number - result.first])
-            if not np.isnan(left):
-                yield MotRow(number + 1, track.id, left, top, right - left, bottom - top)
+            box = track.interpolated[number - result.first].tolist()
+            if not np.isnan(box[0]):
+                yield MotRow.of_box(number + 1, track.id, box)

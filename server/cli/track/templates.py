@@ -62,10 +62,7 @@ def track_templates(
         tracker = TemplateTracker(
             image, boxes, TemplateSettings(), settings.window, settings.costs, solver_for(loaded, solver)
         )
-        rows = [
-            MotRow(1, number, left, top, right - left, bottom - top)
-            for number, (left, top, right, bottom) in enumerate(boxes.tolist(), 1)
-        ]
+        rows = [MotRow.of_box(1, number, box) for number, box in enumerate(boxes.tolist(), 1)]
         with atomic_file(out, video) as draft:
             for number, picture in read_frames(source, 1):
                 if picture is not None:

@@ -101,8 +101,8 @@ class DecisionWriter:
         camera_boxes = self._letterboxes[camera].boxes_site_to_camera(
             np.array([box for _, *box in boxes], dtype=np.float64)
         )
-        for (number, *_), (left, top, right, bottom) in zip(boxes, camera_boxes.tolist(), strict=True):
-            yield format_row(MotRow(frame, number, left, top, right - left, bottom - top)) + "\n"
+        for (number, *_), box in zip(boxes, camera_boxes.tolist(), strict=True):
+            yield format_row(MotRow.of_box(frame, number, box)) + "\n"
 
 
 def _line(correction: Merge | Split) -> str:
