@@ -40,6 +40,7 @@ def track_frame_by_frame(
 ) -> dict[str, list[MotRow]]:
     """Return each camera's boxes with ids; the cameras' homographies are to metres."""
     settings = GroundSettings()
+    names, views = list(cameras), list(cameras.values())
     sizes = [BoxSizes() for _ in cameras]
     rows: dict[str, list[MotRow]] = {name: [] for name in cameras}
     walkers: list[_Walker] = []
@@ -48,7 +49,6 @@ def track_frame_by_frame(
         found = [detections.get(name, Detections.empty(0)) for name in cameras]
         for size, part in zip(sizes, found, strict=True):
             size.update(part.boxes)
-        views = list(cameras.values())
         measured = measure(views, found, np.ones(len(found)), settings)
         places = find_places(measured, [], views, sizes, settings, 1.0 / fps)
         chosen = _cheapest(places)
@@ -65,9 +65,8 @@ def track_frame_by_frame(
                 walker = _Walker(arrived, mean, np.zeros(2), frame)
                 walkers.append(walker)
             for index in places.groups[place]:
-                left, top, right, bottom = places.measurements.boxes[index]
-                name = list(cameras)[int(places.measurements.camera[index])]
-                rows[name].append(MotRow(frame + 1, walker.id, left, top, right - left, bottom - top))
+                name = names[int(places.measurements.camera[index])]
+                rows[name].append(MotRow.of_box(frame + 1, walker.id, places.measurements.boxes[index]))
         walkers = [walker for walker in walkers if (frame - walker.frame) / fps < _FORGET_S]
     return rows
 

@@ -11,9 +11,7 @@ from benchmarks.bestview.camera_tracks import Rows, SceneDetections, track_scene
 from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import decide
 from benchmarks.ground_plane.frame_by_frame import track_frame_by_frame
-from server.service.view_selection.decider import camera_homographies
 from tracking import Detections, create_solver
-from tracking.boxes import Floats
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.ground_plane import (
     GroundCamera,
@@ -22,7 +20,7 @@ from tracking.ground_plane import (
     GroundSettings,
     track_ground_plane,
 )
-from tracking.ground_plane.measurements import units_per_metre
+from tracking.ground_plane.measurements import estimate_units_per_metre
 from tracking.motchallenge import MotRow
 
 MIN_IOU = 0.5
@@ -51,11 +49,7 @@ def run_ways(
     """Run the selected ways on a scene."""
     config = scene.config()
     length = max(len(found.detections) for found in detections.frames.values())
-    homographies: dict[str, Floats] = {
-        camera: homography
-        for camera, homography in camera_homographies(config).items()
-        if homography is not None
-    }
+    homographies = scene.homographies
     cameras = {
         camera: GroundCamera(homography, *detections.frames[camera].size)
         for camera, homography in homographies.items()
@@ -103,8 +97,7 @@ def rows_of(frames: list[GroundFrame], cameras: Mapping[str, GroundCamera]) -> d
     for frame in frames:
         for track in frame.tracks:
             for camera, found in track.boxes.items():
-                left, top, right, bottom = (float(side) for side in found.box)
-                rows[camera].append(MotRow(frame.frame + 1, track.id, left, top, right - left, bottom - top))
+                rows[camera].append(MotRow.of_box(frame.frame + 1, track.id, found.box.tolist()))
     return rows
 
 
@@ -114,7 +107,7 @@ def _in_metres(
     """Return the cameras with homographies to metres, by the heights of the first people."""
     for detections in frames:
         boxes = {index: detections[name].boxes for index, name in enumerate(cameras) if name in detections}
-        metre = units_per_metre(list(cameras.values()), boxes)
-        if metre is not None:
-            return {name: camera.scaled(metre) for name, camera in cameras.items()}
+        units = estimate_units_per_metre(list(cameras.values()), boxes)
+        if units is not None:
+            return {name: camera.scaled(units) for name, camera in cameras.items()}
     return dict(cameras)

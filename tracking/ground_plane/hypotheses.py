@@ -19,7 +19,6 @@ from tracking.ground_plane.gaussians import (
     LOG_2PI,
     determinants,
     fuse,
-    inverses,
     negative_log_densities,
     squared_distances,
 )
@@ -89,12 +88,13 @@ def find_places(
             for group, (mean, covariance) in zip(groups, fused, strict=True)
         ]
     )
-    probabilities = detection_probabilities(
-        means, cameras, sizes, measurements, groups, settings.detection_probability
-    )
     members = np.zeros((len(groups), len(measurements)), dtype=np.bool_)
     for k, group in enumerate(groups):
         members[k, list(group)] = True
+    probabilities = detection_probabilities(
+        means, cameras, sizes, measurements, members, settings.detection_probability
+    )
+    for k, group in enumerate(groups):
         probabilities[k, measurements.camera[list(group)]] = 0.0
     costs -= np.log1p(-probabilities).sum(axis=1)
     costs *= settings.evidence_weight(seconds)
@@ -123,7 +123,7 @@ def group_cost(
     consistency = negative_log_densities(offsets, measurements.covariances[chosen]).sum()
     # The integral of the product of the densities over the place.
     consistency -= 0.5 * np.log(determinants(covariance)) + LOG_2PI
-    return float(consistency + measurements.rates[chosen].sum() - len(chosen) * np.log(probability))
+    return float(consistency + measurements.log_clutter[chosen].sum() - len(chosen) * np.log(probability))
 
 
 def agglomerate(measurements: Measurements, density: float) -> list[tuple[int, ...]]:
@@ -181,11 +181,9 @@ def _group_near(measurements: Measurements, mean: Floats, covariance: Floats) ->
     for _ in range(2):
         if not group:
             break
-        weights = inverses(measurements.covariances[group])
-        prior = inverses(covariance)
-        information = weights.sum(axis=0) + prior
-        place = inverses(information) @ (
-            np.einsum("nij,nj->i", weights, measurements.places[group]) + prior @ mean
+        place, _ = fuse(
+            np.concatenate([measurements.places[group], mean[None]]),
+            np.concatenate([measurements.covariances[group], covariance[None]]),
         )
         fits = (
             squared_distances(measurements.places[group] - place, measurements.covariances[group])

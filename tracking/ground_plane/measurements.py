@@ -26,20 +26,22 @@ class Measurements:
 
     Attributes:
         camera: (D,) index of the camera.
+        index: (D,) of the detection among those of its camera.
         boxes: (D, 4) pixels.
         histograms: appearance of each, (B,); B = 0: unknown.
         places: (D, 2) of the feet, metres.
         covariances: (D, 2, 2) of the places, m²: the noise of a foot carried through the homography, so that
             distant feet are long ellipses, and that of the calibration.
-        rates: (D,) log of the expected false detections per m² at that place, less the log odds of the score.
+        log_clutter: (D,) log of the expected false detections per m² there, less the log odds of the score.
     """
 
     camera: NDArray[np.int64]
+    index: NDArray[np.int64]
     boxes: Floats
     histograms: tuple[Floats, ...]
     places: Floats
     covariances: Floats
-    rates: Floats
+    log_clutter: Floats
 
     def __len__(self) -> int:
         return len(self.camera)
@@ -61,11 +63,12 @@ def measure(
     ]
     return Measurements(
         np.repeat(np.arange(len(cameras)), [len(found) for found in detections]),
+        np.concatenate([np.arange(len(found)) for found in detections]),
         np.concatenate([found.boxes for found in detections]),
         tuple(histogram for found in detections for histogram in found.histograms),
         np.concatenate([places for places, _, _ in parts]),
         np.concatenate([covariances for _, covariances, _ in parts]),
-        np.concatenate([rates for _, _, rates in parts]),
+        np.concatenate([clutter for _, _, clutter in parts]),
     )
 
 
@@ -80,11 +83,11 @@ def _measure_camera(
     per_pixel = settings.false_per_frame / (camera.width * camera.height)
     scores = np.clip(found.scores, 1e-6, 1.0 - 1e-6)
     odds = np.minimum(np.log(scores / (1.0 - scores)), _MAX_LOG_ODDS)
-    rates = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - odds
-    return camera.to_ground(points), covariances, rates
+    log_clutter = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - odds
+    return camera.to_ground(points), covariances, log_clutter
 
 
-def units_per_metre(cameras: Sequence[GroundCamera], boxes: Mapping[int, Floats]) -> float | None:
+def estimate_units_per_metre(cameras: Sequence[GroundCamera], boxes: Mapping[int, Floats]) -> float | None:
     """Return how many units of the plane a metre has, by the heights of people's boxes; None without boxes.
 
     `boxes` (K, 4) by the index of the camera. Where somebody stands, a pixel to the side is as long as one

@@ -15,8 +15,8 @@ from tracking.boxes import Floats
 from tracking.ground_plane.gaussians import negative_log_densities, squared_distances
 from tracking.ground_plane.settings import GroundSettings
 
-_GATE = 16.0
-"""Squared Mahalanobis distance, the quantile .9997, beyond which both ways of moving are impossible."""
+MOTION_GATE = 16.0
+"""Squared Mahalanobis distance, the quantile .9997, beyond which a move is impossible."""
 _MAX_TURN_S = 1.5
 """Seconds after which the place of somebody who may have turned is not searched further away."""
 _TURN_NOISE_M = 0.1
@@ -86,10 +86,9 @@ def move_costs(
 
     Offsets are (..., 2), covariances (..., 2, 2); infinite where both are impossible.
     """
-    walking = np.log1p(-turns) - negative_log_densities(walked, walked_covariances)
-    turning = np.log(turns) - negative_log_densities(turned, turned_covariances)
-    possible = (squared_distances(walked, walked_covariances) < _GATE) | (
-        squared_distances(turned, turned_covariances) < _GATE
+    walking, turning = _log_densities(walked, walked_covariances, turned, turned_covariances, turns)
+    possible = (squared_distances(walked, walked_covariances) < MOTION_GATE) | (
+        squared_distances(turned, turned_covariances) < MOTION_GATE
     )
     return np.where(possible, -np.logaddexp(walking, turning), np.inf)
 
@@ -114,14 +113,24 @@ def follow(
 ) -> MotionState:
     """Return the state of a person who was found at a place; after a turn the velocity is unknown again."""
     ahead = state.predict(seconds, settings.acceleration)
-    walking = np.log1p(-settings.turn_probability) - negative_log_densities(
-        place - ahead.place, covariance + ahead.place_covariance
-    )
     spread = (settings.speed * seconds) ** 2 * np.eye(2)
-    turning = np.log(settings.turn_probability) - negative_log_densities(
-        place - state.place, covariance + state.place_covariance + spread
+    walking, turning = _log_densities(
+        place - ahead.place,
+        covariance + ahead.place_covariance,
+        place - state.place,
+        covariance + state.place_covariance + spread,
+        settings.turn_probability,
     )
     if turning > walking:
         turned = MotionState.at(state.place, _TURN_NOISE_M**2 * np.eye(2), settings.speed)
         ahead = turned.predict(seconds, settings.acceleration)
     return ahead.update(place, covariance)
+
+
+def _log_densities(
+    walked: Floats, walked_covariances: Floats, turned: Floats, turned_covariances: Floats, turns: float
+) -> tuple[Floats, Floats]:
+    """Return the log densities of having walked on and of having turned, each with its probability."""
+    walking = np.log1p(-turns) - negative_log_densities(walked, walked_covariances)
+    turning = np.log(turns) - negative_log_densities(turned, turned_covariances)
+    return walking, turning

@@ -16,14 +16,12 @@ import numpy as np
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.ground_plane.gaussians import negative_log_densities, squared_distances
 from tracking.ground_plane.hypotheses import Places
-from tracking.ground_plane.motion import MotionState, move_costs, reach_costs
+from tracking.ground_plane.motion import MOTION_GATE, MotionState, move_costs, reach_costs
 from tracking.ground_plane.settings import GroundSettings
 from tracking.model.network import Network
 
 _MIN_HIDDEN_COST = 0.3
 """Of a frame in which no camera should see the person: being seen is always likelier."""
-_GATE = 16.0
-"""Squared Mahalanobis distance of two places of somebody who has just arrived."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,17 +43,17 @@ class KnownPerson:
 
 def build_ground_network(
     people: Sequence[KnownPerson],
-    unborn: int,
+    newcomers: int,
     frames: Sequence[Places],
     seconds: float,
     arrival_cost: float,
     settings: GroundSettings,
 ) -> Network:
-    """Build the network of M frames that are `seconds` apart, of the people known and of `unborn` others.
+    """Build the network of M frames, `seconds` apart, of the people known and `newcomers` who may arrive.
 
     `arrival_cost`: negative log of the people who arrive per m² and frame.
     """
-    objects, length = len(people) + unborn, len(frames)
+    objects, length = len(people) + newcomers, len(frames)
     gone = max(len(places) for places in frames)
     hidden = gone + 1
     departure = -float(np.log(min(settings.departure_rate * seconds, 1.0)))
@@ -138,5 +136,5 @@ def _arrival_step_costs(before: Places, after: Places, seconds: float, settings:
     offsets = after.means[None] - before.means[:, None]
     spread = before.covariances[:, None] + after.covariances[None]
     spread = spread + (settings.speed * seconds) ** 2 * np.eye(2)
-    possible = squared_distances(offsets, spread) < _GATE
+    possible = squared_distances(offsets, spread) < MOTION_GATE
     return np.where(possible, negative_log_densities(offsets, spread), np.inf)

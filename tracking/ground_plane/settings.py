@@ -1,4 +1,4 @@
-"""Settings of joint tracking on a ground plane. Lengths are in the plane's unit, metres by default."""
+"""Settings of joint tracking on a ground plane, in metres and seconds whatever the unit of the plane is."""
 
 from __future__ import annotations
 

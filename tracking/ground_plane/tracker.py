@@ -12,13 +12,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tracking.boxes import Floats
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.hypotheses import Places, find_places
-from tracking.ground_plane.measurements import measure, units_per_metre
+from tracking.ground_plane.measurements import estimate_units_per_metre, measure
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.network import KnownPerson, build_ground_network
 from tracking.ground_plane.person import GroundPerson
@@ -29,7 +28,7 @@ from tracking.ground_plane.visibility import detection_probabilities
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport
 from tracking.types import Detections
 
-_UNBORN = 4
+_NEWCOMERS = 4
 """People who may arrive in one window; doubled as long as all of them do."""
 _MAX_DETECTION_PROBABILITY = 0.97
 _GONE = OCCLUDED - 1
@@ -40,8 +39,6 @@ _GONE = OCCLUDED - 1
 class _Frame:
     number: int
     places: Places
-    offsets: NDArray[np.int64]
-    """(C,) index of each camera's first measurement."""
 
 
 class GroundPlaneTracker:
@@ -53,11 +50,11 @@ class GroundPlaneTracker:
         settings: GroundSettings,
         solver: Solver,
         fps: float = DEFAULT_FPS,
-        metre: float | None = None,
+        units_per_metre: float | None = None,
     ) -> None:
         """Create a tracker of frames that are 1 / `fps` seconds apart.
 
-        `metre`: units of the plane per metre; None: estimated from the heights of the first boxes.
+        `units_per_metre`: of the plane; None: estimated from the heights of the first boxes.
         """
         self._names = tuple(cameras)
         self._given = tuple(cameras.values())
@@ -66,8 +63,10 @@ class GroundPlaneTracker:
         self._seconds = 1.0 / fps
         self._lag = frames_in(settings.lag_s, fps)
         self._stride = frames_in(settings.stride_s, fps)
-        self._metre = metre
-        self._cameras = tuple(camera.scaled(metre) for camera in self._given) if metre else ()
+        self._units_per_metre = units_per_metre
+        self._cameras = (
+            tuple(camera.scaled(units_per_metre) for camera in self._given) if units_per_metre else ()
+        )
         self._sizes = [BoxSizes() for _ in cameras]
         self._noise = PlaceNoise(len(cameras))
         self._people: list[GroundPerson] = []
@@ -76,7 +75,6 @@ class GroundPlaneTracker:
         self._last: int | None = None
         self._states = np.zeros((0, 0), dtype=np.int64)
         self._report: SolveReport | None = None
-        self._started = False
 
     def push(self, frame: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
         """Add the detections of a frame by camera; return the frames that become final, in order.
@@ -112,19 +110,20 @@ class GroundPlaneTracker:
 
     def _add(self, number: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
         found = [detections.get(name, Detections.empty(0)) for name in self._names]
-        if self._metre is None:
-            self._metre = units_per_metre(self._given, {k: part.boxes for k, part in enumerate(found)})
-            if self._metre is None:
+        if self._units_per_metre is None:
+            self._units_per_metre = estimate_units_per_metre(
+                self._given, {k: part.boxes for k, part in enumerate(found)}
+            )
+            if self._units_per_metre is None:
                 return [GroundFrame(number, (), None)]
-            self._cameras = tuple(camera.scaled(self._metre) for camera in self._given)
+            self._cameras = tuple(camera.scaled(self._units_per_metre) for camera in self._given)
         for sizes, part in zip(self._sizes, found, strict=True):
             sizes.update(part.boxes)
         measurements = measure(self._cameras, found, self._noise.factors, self._settings)
         places = find_places(
             measurements, self._predictions(), self._cameras, self._sizes, self._settings, self._seconds
         )
-        counts = np.array([0, *(len(part) for part in found)])
-        self._window.append(_Frame(number, places, np.cumsum(counts)[:-1]))
+        self._window.append(_Frame(number, places))
         if (number + 1) % self._stride or len(self._window) <= self._lag:
             return []
         self._solve()
@@ -134,7 +133,7 @@ class GroundPlaneTracker:
         """Return mean and covariance of the place of each person, known or arriving, in the next frame."""
         predictions = []
         for n, row in enumerate(self._states):
-            seen = [m for m, state in enumerate(row) if 0 <= state < len(self._window[m].places)]
+            seen = [m for m, state in enumerate(row) if state >= 0]
             known = self._people[n].state if n < len(self._people) else None
             seconds = self._seconds * (len(self._window) - seen[-1] if seen else len(self._window) + 1)
             if seen:
@@ -159,11 +158,12 @@ class GroundPlaneTracker:
         """Solve the window's program, with as many possible arrivals as it takes."""
         frames = [frame.places for frame in self._window]
         people = self._known()
-        rate = self._settings.arrival_rate * self._seconds if self._started else self._settings.people_density
-        unborn = _UNBORN
+        anybody_known = self._next_id > 1
+        rate = self._settings.arrival_rate * self._seconds if anybody_known else self._settings.people_density
+        newcomers = _NEWCOMERS
         while True:
             network = build_ground_network(
-                people, unborn, frames, self._seconds, -float(np.log(rate)), self._settings
+                people, newcomers, frames, self._seconds, -float(np.log(rate)), self._settings
             )
             solution = self._solver.solve(network)
             gone = network.max_places - 1
@@ -171,7 +171,7 @@ class GroundPlaneTracker:
             arrived = (states[len(people) :] >= 0).any(axis=1)
             if not arrived.all():
                 break
-            unborn *= 2
+            newcomers *= 2
         rows = np.concatenate([np.ones(len(people), dtype=np.bool_), arrived])
         self._states, self._report = states[rows], solution.report
 
@@ -188,7 +188,7 @@ class GroundPlaneTracker:
                 self._cameras,
                 self._sizes,
                 frame.places.measurements,
-                [()] * len(people),
+                np.zeros((len(people), len(frame.places.measurements)), dtype=np.bool_),
                 self._settings.detection_probability,
             )
             hidden.append(-np.log1p(-np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)).sum(axis=1))
@@ -229,7 +229,6 @@ class GroundPlaneTracker:
         self._noise.update(frame.places, chosen)
         self._people = people
         self._states = self._states[rows + arriving, 1:]
-        self._started = self._started or bool(people)
         return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)
 
     def _arrive(self, frame: _Frame, state: int) -> GroundPerson:
@@ -243,14 +242,14 @@ class GroundPlaneTracker:
         measurements = frame.places.measurements
         for k in frame.places.groups[state] if state >= 0 else ():
             camera = int(measurements.camera[k])
-            boxes[self._names[camera]] = GroundBox(measurements.boxes[k], k - int(frame.offsets[camera]))
+            boxes[self._names[camera]] = GroundBox(measurements.boxes[k], int(measurements.index[k]))
         for camera, name in enumerate(self._names):
             if name not in boxes:
                 box = person.boxes.predict(ahead.place, self._cameras[camera], self._sizes[camera])
                 if box is not None:
                     boxes[name] = GroundBox(box, None)
-        metre = self._metre or 1.0
-        return GroundTrack(person.id, metre * ahead.place, metre**2 * ahead.place_covariance, boxes)
+        units = self._units_per_metre or 1.0
+        return GroundTrack(person.id, units * ahead.place, units**2 * ahead.place_covariance, boxes)
 
 
 def track_ground_plane(

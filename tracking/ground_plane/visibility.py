@@ -25,17 +25,14 @@ def detection_probabilities(
     cameras: Sequence[GroundCamera],
     sizes: Sequence[BoxSizes],
     measurements: Measurements,
-    groups: Sequence[tuple[int, ...]],
+    own: NDArray[np.bool_],
     probability: float,
 ) -> Floats:
     """Return the probability that each camera detects a person at each place (N, 2), (N, C).
 
-    Detections hide places behind them, except those of the place's own group: `groups[n]` are indices of
-    measurements. `probability` is that of a person whom nobody hides.
+    Detections hide places behind them, except the place's own: (N, D). `probability` is that of a person whom
+    nobody hides.
     """
-    own = np.zeros((len(places), len(measurements)), dtype=np.bool_)
-    for n, group in enumerate(groups):
-        own[n, list(group)] = True
     found = np.zeros((len(places), len(cameras)))
     for index, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
         points = camera.to_image(places)

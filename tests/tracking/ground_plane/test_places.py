@@ -41,7 +41,7 @@ def test_the_cost_of_a_group_is_the_integral_over_its_place(seed: int) -> None:
         for place, spread in zip(measurements.places, measurements.covariances, strict=True)
     )
     integral = np.log(np.exp(log_densities).sum() * 0.02**2)
-    expected = -integral + measurements.rates.sum() - len(group) * np.log(0.9)
+    expected = -integral + measurements.log_clutter.sum() - len(group) * np.log(0.9)
     assert group_cost(measurements, group, mean, covariance, 0.9) == pytest.approx(expected, abs=0.02)
 
 
@@ -79,7 +79,12 @@ def test_a_miss_says_nothing_where_somebody_nearer_hides_the_person() -> None:
         for size, found in zip(sizes, frame.values(), strict=True):
             size.update(found.boxes)
     probabilities = detection_probabilities(
-        np.array([behind, [7.0, 3.0]]), CAMERAS, sizes, measurements, [(), ()], 0.9
+        np.array([behind, [7.0, 3.0]]),
+        CAMERAS,
+        sizes,
+        measurements,
+        np.zeros((2, len(measurements)), dtype=bool),
+        0.9,
     )
     hidden, free = probabilities[:, 0]
     assert hidden < 0.3
