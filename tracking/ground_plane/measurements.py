@@ -14,7 +14,7 @@ from tracking.ground_plane.gaussians import determinants
 from tracking.ground_plane.settings import GroundSettings
 from tracking.types import Detections
 
-_PERSON_M = 1.7
+PERSON_M = 1.7
 """Height of a person in metres, from which the unit of a ground plane follows."""
 _MAX_LOG_ODDS = 3.0
 """Scores are not certain: log odds for which they count at most."""
@@ -25,6 +25,7 @@ class Measurements:
     """The D detections of a frame.
 
     Attributes:
+        looked: (C,) bool, the cameras that have searched this frame: only these can miss anybody.
         camera: (D,) index of the camera.
         index: (D,) of the detection among those of its camera.
         boxes: (D, 4) pixels.
@@ -35,6 +36,7 @@ class Measurements:
         log_clutter: (D,) log of the expected false detections per m² there, less the log odds of the score.
     """
 
+    looked: NDArray[np.bool_]
     camera: NDArray[np.int64]
     index: NDArray[np.int64]
     boxes: Floats
@@ -49,23 +51,26 @@ class Measurements:
 
 def measure(
     cameras: Sequence[GroundCamera],
-    detections: Sequence[Detections],
+    detections: Sequence[Detections | None],
     noise: Floats,
     settings: GroundSettings,
 ) -> Measurements:
-    """Locate the detections of each camera on the plane.
+    """Locate the detections of each camera on the plane; None: it has not searched the frame.
 
     `noise`: (C,) factors of the assumed standard deviations of the places.
     """
+    looked = np.array([found is not None for found in detections])
+    all_found = [Detections.empty(0) if found is None else found for found in detections]
     parts = [
         _measure_camera(camera, found, float(factor), settings)
-        for camera, found, factor in zip(cameras, detections, noise, strict=True)
+        for camera, found, factor in zip(cameras, all_found, noise, strict=True)
     ]
     return Measurements(
-        np.repeat(np.arange(len(cameras)), [len(found) for found in detections]),
-        np.concatenate([np.arange(len(found)) for found in detections]),
-        np.concatenate([found.boxes for found in detections]),
-        tuple(histogram for found in detections for histogram in found.histograms),
+        looked,
+        np.repeat(np.arange(len(cameras)), [len(found) for found in all_found]),
+        np.concatenate([np.arange(len(found)) for found in all_found]),
+        np.concatenate([found.boxes for found in all_found]),
+        tuple(histogram for found in all_found for histogram in found.histograms),
         np.concatenate([places for places, _, _ in parts]),
         np.concatenate([covariances for _, covariances, _ in parts]),
         np.concatenate([clutter for _, _, clutter in parts]),
@@ -98,4 +103,4 @@ def estimate_units_per_metre(cameras: Sequence[GroundCamera], boxes: Mapping[int
         for index, found in boxes.items()
         if len(found)
     ]
-    return float(np.median(np.concatenate(lengths)) / _PERSON_M) if lengths else None
+    return float(np.median(np.concatenate(lengths)) / PERSON_M) if lengths else None

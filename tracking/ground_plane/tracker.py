@@ -17,7 +17,7 @@ from tracking.boxes import Floats
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.hypotheses import Places, find_places
-from tracking.ground_plane.measurements import estimate_units_per_metre, measure
+from tracking.ground_plane.measurements import PERSON_M, estimate_units_per_metre, measure
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.network import KnownPerson, build_ground_network
 from tracking.ground_plane.person import GroundPerson
@@ -79,8 +79,8 @@ class GroundPlaneTracker:
     def push(self, frame: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
         """Add the detections of a frame by camera; return the frames that become final, in order.
 
-        Skipped frame numbers are frames without detections; after a gap longer than `forget_after_s`
-        everybody is new.
+        Cameras that are left out have not searched the frame, as none has in a skipped one; after a gap
+        longer than `forget_after_s` everybody is new.
 
         Raises:
             ValueError: the frame number is not larger than the last one, or a camera is not known.
@@ -99,6 +99,48 @@ class GroundPlaneTracker:
         self._last = frame
         return final + self._add(frame, detections)
 
+    def set_camera(self, name: str, camera: GroundCamera) -> None:
+        """Replace a camera's calibration from the next frame on.
+
+        Raises:
+            KeyError: no camera has this name.
+        """
+        index = dict(zip(self._names, range(len(self._names)), strict=True))[name]
+        self._given = (*self._given[:index], camera, *self._given[index + 1 :])
+        if self._units_per_metre is not None:
+            self._cameras = tuple(given.scaled(self._units_per_metre) for given in self._given)
+
+    @property
+    def person_height(self) -> float | None:
+        """How tall people are, in the unit of the plane; None before the first detections."""
+        return None if self._units_per_metre is None else PERSON_M * self._units_per_metre
+
+    def provisional(self) -> list[GroundFrame]:
+        """Return the frames that are not final yet, as the last solution has them.
+
+        Valid after a `push` that returned frames. Who has arrived since the last final frame has no number
+        yet, and is left out.
+        """
+        return [
+            GroundFrame(frame.number, self._provisional_tracks(frame, m), self._report)
+            for m, frame in enumerate(self._window)
+            if m < self._states.shape[1]
+        ]
+
+    def _provisional_tracks(self, frame: _Frame, m: int) -> tuple[GroundTrack, ...]:
+        tracks = []
+        for person, row in zip(self._people, self._states, strict=False):
+            if row[m] >= 0:
+                places = frame.places
+                place, covariance = places.means[row[m]], places.covariances[row[m]]
+            elif (row[m:] >= 0).any():
+                ahead = person.ahead(frame.number)
+                place, covariance = ahead.place, ahead.place_covariance
+            else:
+                continue
+            tracks.append(self._track(person, frame, int(row[m]), place, covariance))
+        return tuple(sorted(tracks, key=lambda track: track.id))
+
     def flush(self) -> list[GroundFrame]:
         """End the recording: return the remaining frames; everybody is forgotten."""
         final = []
@@ -109,16 +151,17 @@ class GroundPlaneTracker:
         return final
 
     def _add(self, number: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
-        found = [detections.get(name, Detections.empty(0)) for name in self._names]
+        found = [detections.get(name) for name in self._names]
         if self._units_per_metre is None:
             self._units_per_metre = estimate_units_per_metre(
-                self._given, {k: part.boxes for k, part in enumerate(found)}
+                self._given, {k: part.boxes for k, part in enumerate(found) if part is not None}
             )
             if self._units_per_metre is None:
                 return [GroundFrame(number, (), None)]
             self._cameras = tuple(camera.scaled(self._units_per_metre) for camera in self._given)
         for sizes, part in zip(self._sizes, found, strict=True):
-            sizes.update(part.boxes)
+            if part is not None:
+                sizes.update(part.boxes)
         measurements = measure(self._cameras, found, self._noise.factors, self._settings)
         places = find_places(
             measurements, self._predictions(), self._cameras, self._sizes, self._settings, self._seconds
@@ -224,7 +267,8 @@ class GroundPlaneTracker:
             if state >= 0:
                 person.learn(frame.places, state, self._sizes)
             if state >= 0 or (row[1:] >= 0).any():
-                tracks.append(self._track(person, frame, state))
+                ahead = person.ahead(frame.number)
+                tracks.append(self._track(person, frame, state, ahead.place, ahead.place_covariance))
         chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
         self._noise.update(frame.places, chosen)
         self._people = people
@@ -235,9 +279,10 @@ class GroundPlaneTracker:
         number, self._next_id = self._next_id, self._next_id + 1
         return GroundPerson(number, frame.number, frame.places, state, self._seconds, self._settings)
 
-    def _track(self, person: GroundPerson, frame: _Frame, state: int) -> GroundTrack:
+    def _track(
+        self, person: GroundPerson, frame: _Frame, state: int, place: Floats, covariance: Floats
+    ) -> GroundTrack:
         """Return the person's place and boxes: detections, and predicted boxes in the other cameras."""
-        ahead = person.ahead(frame.number)
         boxes = {}
         measurements = frame.places.measurements
         for k in frame.places.groups[state] if state >= 0 else ():
@@ -245,11 +290,11 @@ class GroundPlaneTracker:
             boxes[self._names[camera]] = GroundBox(measurements.boxes[k], int(measurements.index[k]))
         for camera, name in enumerate(self._names):
             if name not in boxes:
-                box = person.boxes.predict(ahead.place, self._cameras[camera], self._sizes[camera])
+                box = person.boxes.predict(place, self._cameras[camera], self._sizes[camera])
                 if box is not None:
                     boxes[name] = GroundBox(box, None)
         units = self._units_per_metre or 1.0
-        return GroundTrack(person.id, units * ahead.place, units**2 * ahead.place_covariance, boxes)
+        return GroundTrack(person.id, units * place, units**2 * covariance, boxes)
 
 
 def track_ground_plane(

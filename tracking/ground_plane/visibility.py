@@ -31,10 +31,12 @@ def detection_probabilities(
     """Return the probability that each camera detects a person at each place (N, 2), (N, C).
 
     Detections hide places behind them, except the place's own: (N, D). `probability` is that of a person whom
-    nobody hides.
+    nobody hides. A camera that has not searched the frame detects nobody.
     """
     found = np.zeros((len(places), len(cameras)))
     for index, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
+        if not measurements.looked[index]:
+            continue
         points = camera.to_image(places)
         if not size.known:
             found[:, index] = probability * camera.contains(points)

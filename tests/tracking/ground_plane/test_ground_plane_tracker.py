@@ -186,3 +186,39 @@ def test_wrong_calls_are_refused() -> None:
         GroundSettings(turn_probability=1.0)
     with pytest.raises(ValueError, match="speed must be above 0, not -1"):
         GroundSettings(speed=-1.0)
+
+
+def test_cameras_that_have_not_searched_say_nothing_about_who_is_there() -> None:
+    walks = crossing_walks(3)
+    frames = []
+    for number, found in enumerate(detect_walkers(walks, VIEWS, FloorNoise())):
+        frames.append(found if number < 15 or number % 2 else {"c0": found["c0"]})
+    ids = true_ids(track_ground_plane(tracker(), enumerate(frames)), walks)
+    assert all(len(found) == 1 for found in ids), ids
+
+
+def test_frames_that_are_not_final_yet_show_the_same_people() -> None:
+    walks, tracking = crossing_walks(3), tracker()
+    provisional: dict[int, GroundFrame] = {}
+    final: dict[int, GroundFrame] = {}
+    for number, found in enumerate(detect_walkers(walks, VIEWS, FloorNoise())):
+        done = tracking.push(number, found)
+        final |= {frame.frame: frame for frame in done}
+        if done:
+            ahead = tracking.provisional()
+            assert [frame.frame for frame in ahead] == list(range(done[-1].frame + 1, number + 1))
+            provisional |= {frame.frame: frame for frame in ahead}
+    for number in range(10, max(final)):
+        places = {track.id: track.place for track in provisional[number].tracks}
+        assert places.keys() == {track.id for track in final[number].tracks}
+        for track in final[number].tracks:
+            assert np.linalg.norm(places[track.id] - track.place) < 0.3
+
+
+def test_a_camera_that_was_calibrated_anew_counts_by_its_new_homography() -> None:
+    walks = crossing_walks(3)
+    wrong = GroundCamera(np.diag([1.0, 1.0, 0.5]) @ CAMERAS["c2"].homography, 640.0, 480.0)
+    tracking = tracker(CAMERAS | {"c2": wrong})
+    tracking.set_camera("c2", CAMERAS["c2"])
+    ids = true_ids(track_ground_plane(tracking, enumerate(detect_walkers(walks, VIEWS, FloorNoise()))), walks)
+    assert all(len(found) == 1 for found in ids), ids
