@@ -9,7 +9,7 @@ import pytest
 from fakes.running.stream_frames import FPS
 from synthetic import Scene, write_recording
 
-SECONDS = 20.0
+SECONDS = 12.0
 
 
 @pytest.fixture(scope="session")

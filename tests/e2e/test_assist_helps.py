@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import aiohttp
 import pytest
 from playwright.async_api import Page
 
@@ -15,7 +16,7 @@ from fakes.running.assist_page import PERSON_POSITION_JS, assisted_site, check_e
 from fakes.running.lookalikes import FRAMES, MEETING, STANDING, write_camera
 from fakes.running.site import RunningSite
 from fakes.running.stream_frames import FPS
-from fakes.timeouts import PATIENCE_MS
+from fakes.timeouts import PATIENCE, PATIENCE_MS
 
 pytestmark = [
     pytest.mark.live,
@@ -82,3 +83,22 @@ async def point(site: RunningSite, page: Page) -> None:
     assert await page.evaluate(left)
     assert await page.evaluate("document.querySelector('video').dataset.same") == "yes"
     check_every_gop_once(site)
+    await check_report(site)
+
+
+async def check_report(site: RunningSite) -> None:
+    """Check that the flag counts as answered, and that service and camera count the corrections."""
+    async with aiohttp.ClientSession(site.url) as session:
+        async with session.get("api/flags") as answer:
+            states = {flag["state"] for flag in (await answer.json())["flags"]}
+        assert states & {"followed", "answered"}
+        async with asyncio.timeout(PATIENCE):  # the camera reports once a second
+            while not await corrections(session, "myview_camera_position_corrections_total"):
+                await site.next_gop()
+        assert await corrections(session, "myview_position_corrections_total") >= 1
+
+
+async def corrections(session: aiohttp.ClientSession, metric: str) -> float:
+    async with session.get("metrics") as answer:
+        lines = (await answer.text()).splitlines()
+    return sum(float(line.split()[-1]) for line in lines if line.startswith(metric))

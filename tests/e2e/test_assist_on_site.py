@@ -18,6 +18,7 @@ from server.cli.generated_config import DEMO
 
 pytestmark = [
     pytest.mark.live,
+    pytest.mark.slow,
     pytest.mark.asyncio(loop_scope="module"),
     needs_chromium,
 ]

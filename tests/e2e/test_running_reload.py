@@ -48,7 +48,8 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
         processes = site.children()
         path = f"objects/{min(site.gops[-1].choices)}/best.mp4"
-        viewer = asyncio.create_task(record(session, path, site.pulse + 100, tmp_path / "viewer"))
+        end = site.pulse + 100
+        viewer = asyncio.create_task(record(session, path, lambda: end, tmp_path / "viewer"))
 
         await reload(site, config, site={"fps": "banana"})
         await wait_for_log(site, "site.fps: Input should be a valid number")

@@ -44,6 +44,6 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) 
         assert live.read_bytes() == offline.read_bytes(), f"{name} differs\n" + "\n".join(site.lines)
     assert (tmp_path / "live" / "late.csv").read_text() == "frame,camera,reason\n"
     choices = (tmp_path / "live" / "choices.csv").read_text().splitlines()
-    assert len(choices) > 400, "people were detected"
+    assert len(choices) > 240, "more than two people per frame were detected"
     assert {line.rsplit(",")[2] for line in choices[1:]} <= set(CAMERAS)
     assert sorted(path.name for path in (tmp_path / "offline" / "best").iterdir()), "a film per person"

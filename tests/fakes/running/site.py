@@ -98,6 +98,11 @@ class RunningSite:
         except TimeoutError:
             raise AssertionError(f"{what}: not within {PATIENCE} s\n" + "\n".join(self.lines[-40:])) from None
 
+    async def next_gop(self) -> None:
+        """Wait until another GOP is decided."""
+        known = len(self.gops)
+        await self.until(lambda: len(self.gops) > known, "another GOP")
+
     async def wait_for_exit(self) -> int:
         """Wait until `myview up` exits; return the exit code."""
         async with asyncio.timeout(PATIENCE):

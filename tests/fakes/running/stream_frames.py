@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import aiohttp
@@ -14,15 +15,17 @@ FPS = 10
 """Frame rate of the sites in these tests, low enough for a busy machine."""
 
 
-async def record(session: aiohttp.ClientSession, url: str, until_pulse: int, out: Path) -> Path:
-    """Save a stream up to a pulse."""
+async def record(
+    session: aiohttp.ClientSession, url: str, until_pulse: Callable[[], float], out: Path
+) -> Path:
+    """Save a stream up to a pulse, which may be known only while it is saved."""
     data = bytearray()
     async with session.get(url) as answer:
         assert answer.status == 200, await answer.text()
         assert answer.content_type == "video/mp4"
         async for piece, _ in answer.content.iter_chunks():
             data += piece
-            if newest_pulse(data) >= until_pulse:
+            if newest_pulse(data) >= until_pulse():
                 break
     out.write_bytes(data)
     return out
