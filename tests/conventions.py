@@ -17,6 +17,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 PRODUCT = ("camsync", "tracking", "bestview", "synthetic", "server", "client")
 _SOURCES = (".py", ".js")
+_PUBLIC_CLASS = re.compile(r"^class ([^_\W]\w*)", re.MULTILINE)
 _WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
 
 
@@ -75,32 +76,34 @@ def flat_folders(limit: int) -> dict[str, int]:
     return {folder: count for folder, count in counts.items() if count > limit}
 
 
-def parsed(*folders: str) -> Iterator[tuple[Path, ast.Module]]:
-    """Parse every Python file of some folders."""
+def parsed(*folders: str, having: str = "") -> Iterator[tuple[Path, ast.Module]]:
+    """Parse the Python files of some folders whose text has a match of a regular expression."""
     for path in tracked(*folders):
         if path.suffix == ".py":
-            yield path, ast.parse((ROOT / path).read_text(encoding="utf-8"))
+            text = (ROOT / path).read_text(encoding="utf-8")
+            if re.search(having, text):
+                yield path, ast.parse(text)
 
 
 def shared_class_names() -> dict[str, list[str]]:
     """Return the public classes that share a name within a room: paths by room and name."""
     places: dict[str, list[str]] = defaultdict(list)
-    for path, tree in parsed(*PRODUCT):
-        for node in tree.body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                places[f"{room_of(path)}: {node.name}"].append(str(path))
+    for path in tracked(*PRODUCT):
+        if path.suffix == ".py":
+            for name in _PUBLIC_CLASS.findall((ROOT / path).read_text(encoding="utf-8")):
+                places[f"{room_of(path)}: {name}"].append(str(path))
     return {name: paths for name, paths in places.items() if len(paths) > 1}
 
 
 def docstrings_beginning_with(words: Iterable[str], *folders: str) -> list[str]:
     """Return where docstrings begin with one of some words."""
-    begins = re.compile(rf"(?:{'|'.join(words)})\b")
+    first = rf"(?:{'|'.join(words)})\b"
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     return [
         f"{path}:{getattr(node, 'lineno', 1)}"
-        for path, tree in parsed(*folders)
+        for path, tree in parsed(*folders, having=rf"""[\"'][\s\\]*{first}""")
         for node in ast.walk(tree)
-        if isinstance(node, documented) and begins.match(ast.get_docstring(node) or "")
+        if isinstance(node, documented) and re.match(first, ast.get_docstring(node) or "")
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from conventions import PRODUCT, parsed
 
@@ -16,12 +16,15 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 def stale_names() -> list[str]:
     """Return names under Args, Attributes or Raises, or in a role, that do not exist, with their places."""
-    modules = list(parsed(*PRODUCT, "logthrottle", "expbackoff", "benchmarks"))
-    defined = {name for path, tree in modules for name in (*path.with_suffix("").parts, *_defined_in(tree))}
+    modules = [
+        (path, list(ast.walk(tree)))
+        for path, tree in parsed(*PRODUCT, "logthrottle", "expbackoff", "benchmarks")
+    ]
+    defined = {name for path, nodes in modules for name in (*path.with_suffix("").parts, *_defined_in(nodes))}
     return [
         f"{path}:{getattr(node, 'lineno', 1)} {name}"
-        for path, tree in modules
-        for node in ast.walk(tree)
+        for path, nodes in modules
+        for node in nodes
         for name in _stale_in(node, defined)
     ]
 
@@ -39,11 +42,11 @@ def _stale_in(node: ast.AST, defined: set[str]) -> Iterator[str]:
     docstring = ast.get_docstring(node) or ""
     yield from (name for name in _entries(docstring, "Raises") if not _is_known(name, defined))
     if isinstance(node, ast.ClassDef):
-        attributes = set(_defined_in(node))
-        yield from (name for name in _entries(docstring, "Attributes") if name not in attributes)
-    elif not isinstance(node, ast.Module):
+        if attributes := list(_entries(docstring, "Attributes")):
+            yield from set(attributes).difference(_defined_in(ast.walk(node)))
+    elif not isinstance(node, ast.Module) and (listed := list(_entries(docstring, "Args"))):
         arguments = {argument.arg for argument in ast.walk(node.args) if isinstance(argument, ast.arg)}
-        yield from (name for name in _entries(docstring, "Args") if name.strip("*") not in arguments)
+        yield from (name for name in listed if name.strip("*") not in arguments)
 
 
 def _entries(docstring: str, section: str) -> Iterator[str]:
@@ -57,9 +60,9 @@ def _is_known(name: str, defined: set[str]) -> bool:
     return hasattr(builtins, name) or name.split(".", maxsplit=1)[0] in defined
 
 
-def _defined_in(tree: ast.AST) -> Iterator[str]:
-    """Yield all names defined, assigned or imported in a module or class, at any depth."""
-    for node in ast.walk(tree):
+def _defined_in(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield all names that some syntax nodes define, assign or import."""
+    for node in nodes:
         match node:
             case ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():
                 yield node.name
