@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import multivariate_normal
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Plane
@@ -49,10 +49,21 @@ class GaussianMixture:
     def densities(self, colors: Floats) -> Floats:
         """Return the densities p(I) of colors `(..., 3)`."""
         components = [
-            weight * multivariate_normal.pdf(colors, mean, covariance)
+            weight * _normal_density(colors - mean, covariance)
             for weight, mean, covariance in zip(self.weights, self.means, self.covariances, strict=True)
         ]
         return np.asarray(np.sum(components, axis=0))
+
+
+def _normal_density(deviations: Floats, covariance: Floats) -> Floats:
+    """Return the density of a normal distribution at deviations `(..., 3)` from its mean.
+
+    `scipy.stats` gives the same to the last digit, but takes half a second to load.
+    """
+    variances, axes = scipy.linalg.eigh(covariance)
+    distances = np.square(deviations @ (axes * np.sqrt(1 / variances))).sum(axis=-1)
+    constant = len(variances) * np.log(2 * np.pi) + np.log(variances).sum()
+    return np.asarray(np.exp(-0.5 * (constant + distances)))
 
 
 def fit_mixture(pixels: Image, components: int) -> GaussianMixture:
