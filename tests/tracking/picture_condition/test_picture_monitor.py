@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import cv2
 import numpy as np
@@ -21,6 +22,7 @@ Change = Callable[[Image, float], Image]
 """Changes a picture; the seconds are those since the change began."""
 
 
+@cache
 def scene(seed: int = 1) -> Image:
     """Return a room full of furniture."""
     random = np.random.default_rng(seed)
