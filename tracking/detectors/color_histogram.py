@@ -96,10 +96,17 @@ def color_histograms(
         columns = slice(round(box[0]), round(box[2]))
         for half, (begin, end) in enumerate(_HALVES):
             lines = slice(round(box[1] + begin * height), round(box[1] + end * height))
-            pixels = codes[lines, columns][mask[lines, columns] != 0]
-            if len(pixels) >= _MIN_PIXELS:
-                counts[k, half] = np.bincount(pixels.ravel(), minlength=_CHANNELS * bins_per_histogram)
+            if cv2.countNonZero(mask[lines, columns]) >= _MIN_PIXELS:
+                counts[k, half] = _count(codes[lines, columns], mask[lines, columns])[: counts.shape[2]]
     return _rows(counts.reshape(len(boxes), len(_HALVES) * _CHANNELS, bins_per_histogram))
+
+
+def _count(codes: npt.NDArray[np.uint8], mask: Mask) -> Floats:
+    """Return how often each code occurs in any channel inside a mask, `(256,)`."""
+    counts = np.zeros((_LEVELS, 1))
+    for channel in range(_CHANNELS):
+        counts += cv2.calcHist([codes], [channel], mask, [_LEVELS], [0, _LEVELS])
+    return counts[:, 0]
 
 
 def _rows(counts: Floats) -> Floats:
@@ -125,7 +132,9 @@ def _coded(image: Image, bins: int, mask: Mask) -> npt.NDArray[np.uint8]:
     where = np.flatnonzero(mask)
     codes = np.zeros(image.shape, dtype=np.uint8)
     if where.size:
-        codes.reshape(-1, _CHANNELS)[where] = _codes_of(image.reshape(-1, _CHANNELS)[where], bins)
+        codes.reshape(-1, _CHANNELS)[where] = _codes_of(
+            image.reshape(-1, _CHANNELS).take(where, axis=0), bins
+        )
     return codes
 
 

@@ -37,7 +37,12 @@ def configuration(folder: Path, recording: Path, **sections: Any) -> Path:
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
         "track": PATIENT_CAMERAS,
-        "detect": {"work_width": 192},  # half of the processor time
+        # Half of the processor time.
+        "detect": {
+            "work_width": 192,
+            "box_filter": {"height_step": 1.16},
+            "foreground_fit": {"max_hypotheses": 8},
+        },
         "view": {"switch_cost_s": 0.1, "late_after_s": 10},  # enough cuts in a short recording
         "ground": str(recording / "ground.json"),
         "cameras": [{"id": name, "source": str(recording / f"{name}.mp4")} for name in CAMERAS],
