@@ -1,4 +1,4 @@
-# make demo: run a synthetic site.  make test: run all tests.  make lint, make bench: for development.
+# make demo: run a synthetic site.  make test: run the tests.  make lint, make bench: for development.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
