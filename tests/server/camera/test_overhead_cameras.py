@@ -72,7 +72,7 @@ def _turned(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
 def seen_by_two() -> NDArray[np.float64]:
     """The boxes of three people in both cameras, `(2, 3, F, 4)`."""
     scene = Scene("overhead", 2, 3, 2, *SIZE, 25.0)
-    boxes = np.full((2, 3, 300, 4), np.nan)
+    boxes = np.full((2, 3, 200, 4), np.nan)
     for frame in range(boxes.shape[2]):
         for camera, truth in enumerate(scene.truth(frame)):
             boxes[camera, truth.ids - 1, frame] = _turned(truth.boxes) if camera else truth.boxes
