@@ -31,7 +31,7 @@ from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections, Zen
 from synthetic import Scene, write_recording
 from tracking import Detections
 
-FRAMES = 60
+FRAMES = 40
 FPS = 50.0
 WAIT = 1.0  # seconds that cameras wait for peers; the third one never connects
 
