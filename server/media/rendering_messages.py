@@ -1,8 +1,6 @@
-"""Messages between the service and a render worker, over the worker's pipes.
+"""Messages between the service and a render worker (:mod:`server.system.worker`).
 
-Each request has one response; both are length-prefixed msgpack messages. The first message is
-:class:`RenderSettings`; the response is :data:`READY`. This module does not import the configuration: a
-worker must start fast.
+This module does not import the configuration: a worker must start fast.
 """
 
 from __future__ import annotations
@@ -16,10 +14,6 @@ Boxes = list[list[tuple[int, float, float, float, float]]]
 
 StillKind = Literal["plain", "boxed"]
 
-LENGTH_BYTES = 4
-"""Bytes of the length before every message, big-endian."""
-READY = bytes(LENGTH_BYTES)
-"""An empty message, sent by a worker that has loaded its libraries."""
 TIMESCALE = 90_000
 """Ticks per second in MP4 fragments: divisible by 24, 25, 30 and 50 frames per second."""
 
@@ -95,9 +89,3 @@ def is_at_rate(pulse: int, rate: float, fps: float) -> bool:
     among those of its multiples.
     """
     return rate >= fps or pulse * rate // fps != (pulse - 1) * rate // fps
-
-
-def encode_message(message: msgspec.Struct) -> bytes:
-    """Return a message encoded for the pipe, preceded by its length."""
-    body = msgspec.msgpack.encode(message)
-    return len(body).to_bytes(LENGTH_BYTES, "big") + body

@@ -11,15 +11,23 @@ from typing import NoReturn
 
 from expbackoff import Backoff
 from logthrottle import LogThrottle
-from server.media.rendering_messages import JpegPicture, RenderRequest, RenderSettings, StillKind
+from server.media.rendering_messages import (
+    JpegPicture,
+    RenderRequest,
+    RenderResult,
+    RenderSettings,
+    StillKind,
+)
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
 from server.service.rendering.overlay_video import OverlayVideoPublisher
-from server.service.rendering.worker_process import START_S, RenderWorker, WorkerDiedError
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.streaming.media_chunk import MediaChunk
 from server.service.streaming.subscriber_queue import Chunk, Subscriber
+from server.system.worker.process import START_S, WorkerDiedError, WorkerProcess
+
+_WORKER = "server.service.rendering.worker"
 
 
 @dataclass(slots=True)
@@ -214,7 +222,7 @@ class RenderedStream:
 
     async def _run_worker(self) -> None:
         self.newest, self._has_rendered = -1, False
-        worker = await RenderWorker.start(self._settings)
+        worker = await WorkerProcess.start(_WORKER, self._settings, RenderResult)
         self.pid = worker.pid
         jobs = (self._feed(worker), self._answer_stills(worker), self._watch(worker))
         tasks = [asyncio.create_task(job) for job in jobs]
@@ -232,13 +240,13 @@ class RenderedStream:
                 await worker.kill()
                 self.pid = None
 
-    async def _watch(self, worker: RenderWorker) -> NoReturn:
+    async def _watch(self, worker: WorkerProcess[RenderResult]) -> NoReturn:
         """Notify requests when the worker is ready, and wait until it dies."""
         await worker.wait_until_ready()
         self._is_ready.set()
         await worker.wait_until_dead()
 
-    async def _feed(self, worker: RenderWorker) -> None:
+    async def _feed(self, worker: WorkerProcess[RenderResult]) -> None:
         """Render the stream's chunks while there are users, until the stream ends."""
         while True:
             await self._has_users.wait()
@@ -254,10 +262,10 @@ class RenderedStream:
                 self._broadcaster.unsubscribe(subscriber)
                 self._lost, self._subscriber = self.lost, None
 
-    async def _render(self, worker: RenderWorker, chunk: Chunk) -> None:
+    async def _render(self, worker: WorkerProcess[RenderResult], chunk: Chunk) -> None:
         fragments = chunk.data
         overlay = self._overlay_of(fragments)
-        result = await worker.render(
+        result = await worker.ask(
             RenderRequest(
                 fragments=fragments,
                 first=overlay.first,
@@ -274,12 +282,12 @@ class RenderedStream:
         self._has_pictures.set()
         self._stills.changed.set()
 
-    async def _answer_stills(self, worker: RenderWorker) -> None:
+    async def _answer_stills(self, worker: WorkerProcess[RenderResult]) -> None:
         while True:
             await self._stills.changed.wait()
             self._stills.changed.clear()
             for kind in self._stills.answerable(self.newest):
-                result = await worker.render(RenderRequest(still=kind))
+                result = await worker.ask(RenderRequest(still=kind))
                 self._stills.answer(kind, result.still)
 
     async def _publish_pictures(self) -> None:

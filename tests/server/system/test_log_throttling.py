@@ -31,9 +31,9 @@ from server.messaging.messages import FrameDetections, ZenohKeys
 from server.service.rendering import rendered_stream as stream_source
 from server.service.rendering.decided_boxes import NO_OVERLAY
 from server.service.rendering.worker import stream_renderer
-from server.service.rendering.worker_process import WorkerDiedError
 from server.service.streaming.broadcaster import Broadcaster
 from server.supervisor.site import _write_active_config
+from server.system.worker.process import WorkerDiedError
 
 KEYS = ZenohKeys("hall")
 

@@ -18,13 +18,14 @@ from fakes.service.rendering import RENDER_SETTINGS, decoded_frames, fragments
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from fakes.timeouts import PATIENCE
 from server.media.containers.fmp4 import FragmentSample, fragment
-from server.media.rendering_messages import READY, RenderRequest, RenderResult, encode_message, is_at_rate
+from server.media.rendering_messages import RenderRequest, RenderResult, is_at_rate
 from server.service.rendering.decided_boxes import first_pulse
 from server.service.rendering.worker.__main__ import serve
 from server.service.rendering.worker.box_overlay import CHOSEN_COLOR, OTHER_COLOR, Image, draw_boxes
 from server.service.rendering.worker.demuxers import demux_mp4
 from server.service.rendering.worker.stream_renderer import StreamRenderer
-from server.service.rendering.worker_process import RenderWorker
+from server.system.worker.process import WorkerProcess
+from server.system.worker.protocol import READY, encode_message
 
 rates = st.floats(0.1, 60)
 
@@ -202,13 +203,13 @@ async def test_a_worker_that_is_ended_while_it_answers_leaves_nothing_open() -> 
     async with asyncio.timeout(PATIENCE):
         while not getattr(process.stdout, "_paused"):  # noqa: ASYNC110, B009 — the buffer is full
             await asyncio.sleep(0)
-        await RenderWorker(process).kill()
+        await WorkerProcess(process, RenderResult).kill()
         while not before.issuperset(Path("/proc/self/fd").iterdir()):  # noqa: ASYNC110
             await asyncio.sleep(0)
 
 
 async def test_a_worker_whose_killing_is_cancelled_leaves_nothing_open() -> None:
-    worker = await RenderWorker.start(RENDER_SETTINGS)
+    worker = await WorkerProcess.start("server.service.rendering.worker", RENDER_SETTINGS, RenderResult)
     killing = asyncio.create_task(worker.kill())
     await asyncio.sleep(0)
     killing.cancel()

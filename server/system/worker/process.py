@@ -1,57 +1,58 @@
-"""The parent side of a render worker process: starts it, sends requests, ends it."""
+"""The parent's side of a worker process: starts it, sends requests, ends it."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import NoReturn, Self
+from typing import Generic, NoReturn, Self, TypeVar
 
 import msgspec
 
-from server.media.rendering_messages import (
-    LENGTH_BYTES,
-    READY,
-    RenderRequest,
-    RenderResult,
-    RenderSettings,
-    encode_message,
-)
 from server.system.child_process import start_worker
+from server.system.worker.protocol import LENGTH_BYTES, READY, encode_message
+
+Answer = TypeVar("Answer", bound=msgspec.Struct)
 
 START_S = 30.0
 """How long a worker may take to load its libraries, even on a busy machine."""
-_ANSWER_S = 5.0
-"""A worker that takes longer to answer counts as hung."""
 _READ_BYTES = 1 << 16
 
 
 class WorkerDiedError(Exception):
-    """The render worker has ended, or hangs and was killed."""
+    """The worker has ended, or hangs and was killed."""
 
 
-class RenderWorker:
-    """A running worker process; the caller of :meth:`start` calls :meth:`kill`."""
+class WorkerProcess(Generic[Answer]):
+    """A running worker process; the caller of :meth:`start` calls :meth:`kill`.
 
-    def __init__(self, process: asyncio.subprocess.Process) -> None:
+    A worker that takes longer than ``answer_s`` to answer counts as hung.
+    """
+
+    def __init__(
+        self, process: asyncio.subprocess.Process, answer_type: type[Answer], answer_s: float = 5.0
+    ) -> None:
         assert process.stdin is not None  # noqa: S101 — tells mypy that there are pipes
         assert process.stdout is not None  # noqa: S101
         self._process, self._requests, self._answers = process, process.stdin, process.stdout
         self._lock = asyncio.Lock()
         self._is_ready = False
-        self._decoder = msgspec.msgpack.Decoder(RenderResult)
+        self._decoder = msgspec.msgpack.Decoder(answer_type)
+        self._answer_s = answer_s
 
     @classmethod
-    async def start(cls, settings: RenderSettings) -> Self:
-        """Start a worker; :meth:`wait_until_ready` waits for it.
+    async def start(
+        cls, module: str, settings: msgspec.Struct, answer_type: type[Answer], answer_s: float = 5.0
+    ) -> Self:
+        """Start a module as a worker with its settings; :meth:`wait_until_ready` waits for it.
 
         Raises:
             WorkerDiedError: the process cannot be started.
         """
         try:
-            process = await start_worker("server.service.rendering.worker")
+            process = await start_worker(module)
         except OSError as error:
             raise WorkerDiedError(f"cannot be started: {error.strerror}") from error
-        started = cls(process)
+        started = cls(process, answer_type, answer_s)
         started._requests.write(encode_message(settings))
         return started
 
@@ -78,7 +79,7 @@ class RenderWorker:
                 raise WorkerDiedError("died") from error
             self._is_ready = True
 
-    async def render(self, request: RenderRequest) -> RenderResult:
+    async def ask(self, request: msgspec.Struct) -> Answer:
         """Send a request and return the answer; requests are answered one at a time.
 
         A caller that is cancelled must kill the worker: the next caller would read its answer.
@@ -89,13 +90,13 @@ class RenderWorker:
         await self.wait_until_ready()
         async with self._lock:
             try:
-                async with asyncio.timeout(_ANSWER_S):
+                async with asyncio.timeout(self._answer_s):
                     self._requests.write(encode_message(request))
                     await self._requests.drain()
                     size = int.from_bytes(await self._answers.readexactly(LENGTH_BYTES), "big")
                     return self._decoder.decode(await self._answers.readexactly(size))
             except TimeoutError as error:
-                raise WorkerDiedError(f"gave no answer within {_ANSWER_S:g} s") from error
+                raise WorkerDiedError(f"gave no answer within {self._answer_s:g} s") from error
             except (OSError, asyncio.IncompleteReadError) as error:
                 raise WorkerDiedError("died") from error
             except msgspec.DecodeError as error:
