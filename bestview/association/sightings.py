@@ -28,11 +28,13 @@ class AppearanceHistogram:
         first_frame: the first of these frames.
         last_frame: the last one.
         histogram: (B,) the mean of these frames' histograms.
+        camera: that saw them; None: the track's own. A track on the ground is seen by several.
     """
 
     first_frame: int
     last_frame: int
     histogram: NDArray[np.float64]
+    camera: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,7 +93,8 @@ class TrackletSplitter:
                     sample.last_frame - observations.first_frame,
                 )
                 if run.start <= last < run.stop and not crowded[run.track, first : last + 1].any():
-                    tracklet.appearance.add(key.camera, MeanHistogram.of(sample.histogram, last - first + 1))
+                    histogram = MeanHistogram.of(sample.histogram, last - first + 1)
+                    tracklet.appearance.add(sample.camera or key.camera, histogram)
         return ObservedTracklets(rows, settled_ids)
 
     def _start_tracklet(self, key: TrackKey, at: TrackletEndpoint, predecessor: Tracklet | None) -> Tracklet:

@@ -87,7 +87,8 @@ class AffinityFusion:
         by_camera: dict[str, list[tuple[int, MeanHistogram]]] = {camera: [] for camera in self._calibrated}
         rows_by_camera: dict[str, list[int]] = {camera: [] for camera in self._calibrated}
         for row, tracklet in enumerate(tracklets):
-            rows_by_camera[tracklet.key.camera].append(row)
+            for camera in tracklet.appearance.by_camera:
+                rows_by_camera[camera].append(row)
         for row, appearance in enumerate(
             [tracklet.appearance for tracklet in tracklets] + [person.appearance for person in people]
         ):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -33,6 +34,13 @@ _SWAP_MARGIN = 0.4
 """Share of the gate by which any exchange of partners must be worse for a pair to count."""
 
 
+class TrackletInCamera(NamedTuple):
+    """A tracklet in one of the cameras that see it."""
+
+    key: TrackletKey
+    camera: str
+
+
 class CrossCameraAppearance:
     """Collects appearance evidence about tracklets of cameras without common ground.
 
@@ -47,7 +55,7 @@ class CrossCameraAppearance:
         self._settings, self._calibrated = settings, calibrated
         self._minimum_frames = max(round(_MINIMUM_HISTOGRAM_S * settings.fps), _MINIMUM_HISTOGRAM_FRAMES)
         self.equalizer = HistogramEqualizer()
-        self._learned: set[TrackletKey] = set()
+        self._learned: set[TrackletInCamera] = set()
 
     @property
     def same_person_gate(self) -> float:
@@ -70,7 +78,8 @@ class CrossCameraAppearance:
             rows: (P,) those that the update has observed.
             affinity: receives the evidence.
         """
-        self._learned &= {tracklet.key for tracklet in tracklets}
+        active = {tracklet.key for tracklet in tracklets}
+        self._learned = {seen for seen in self._learned if seen.key in active}
         observed = sorted(rows.tolist(), key=lambda row: tracklets[row].key)
         names = [tracklets[row].key.camera for row in observed]
         starts = [i for i, name in enumerate(names) if i == 0 or names[i - 1] != name]
@@ -104,30 +113,33 @@ class CrossCameraAppearance:
         curves = np.full((len(tracklets), CDF_POINTS), np.nan)
         for camera in cameras:
             for tracklet in tracklets[camera]:
-                histogram = _stable_histogram(tracklet, self._minimum_frames)
-                # Once per tracklet: a person who stays must not weigh more than one who walks through.
-                if histogram is not None and tracklet.key not in self._learned:
-                    self._learned.add(tracklet.key)
-                    self.equalizer.learn(tracklet.key.camera, histogram.mean)
-            bins: dict[int, list[int]] = {}
+                self._learn(tracklet)
+            alike: dict[tuple[str, int], list[tuple[int, Floats]]] = {}
             for index in range(camera.start, camera.stop):
-                histogram = _stable_histogram(tracklets[index], self._minimum_frames)
-                if histogram is not None:
-                    bins.setdefault(histogram.histogram_sum.size, []).append(index)
-            for rows in bins.values():
-                means = np.array(
-                    [
-                        tracklets[index].appearance.by_camera[tracklets[index].key.camera].mean
-                        for index in rows
-                    ]
-                )
-                curves[rows] = self.equalizer.equalize(tracklets[camera.start].key.camera, means)
+                best = self._best_histogram(tracklets[index])
+                if best is not None:
+                    name, histogram = best
+                    alike.setdefault((name, histogram.histogram_sum.size), []).append((index, histogram.mean))
+            for (name, _), rows in alike.items():
+                means = np.array([mean for _, mean in rows])
+                curves[[index for index, _ in rows]] = self.equalizer.equalize(name, means)
         return curves
 
+    def _learn(self, tracklet: Tracklet) -> None:
+        """Learn how cameras render people, once per tracklet: who stays must not weigh more."""
+        for name, histogram in tracklet.appearance.by_camera.items():
+            seen = TrackletInCamera(tracklet.key, name)
+            if histogram.frame_count >= self._minimum_frames and seen not in self._learned:
+                self._learned.add(seen)
+                self.equalizer.learn(name, histogram.mean)
 
-def _stable_histogram(tracklet: Tracklet, minimum_frames: int) -> MeanHistogram | None:
-    histogram = tracklet.appearance.by_camera.get(tracklet.key.camera)
-    return histogram if histogram is not None and histogram.frame_count >= minimum_frames else None
+    def _best_histogram(self, tracklet: Tracklet) -> tuple[str, MeanHistogram] | None:
+        """Return the histogram with the most frames, and its camera; None: too few frames in every camera."""
+        frames, name = max(
+            ((histogram.frame_count, name) for name, histogram in tracklet.appearance.by_camera.items()),
+            default=(0, ""),
+        )
+        return (name, tracklet.appearance.by_camera[name]) if frames >= self._minimum_frames else None
 
 
 @dataclass(frozen=True, slots=True)

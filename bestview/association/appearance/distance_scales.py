@@ -53,10 +53,13 @@ class DistanceScales:
         self, settled_rows: Collection[int], tracklets: Sequence[Tracklet], affinity: AffinityMatrix
     ) -> None:
         """Store the distances of tracklets that are about to be settled, given by their rows."""
-        rows_of: dict[str, list[int]] = {tracklets[row].key.camera: [] for row in settled_rows}
+        rows_of: dict[str, list[int]] = {
+            camera: [] for row in settled_rows for camera in tracklets[row].appearance.by_camera
+        }
         for row, tracklet in enumerate(tracklets):
-            if tracklet.key.camera in rows_of:
-                rows_of[tracklet.key.camera].append(row)
+            for camera in tracklet.appearance.by_camera:
+                if camera in rows_of:
+                    rows_of[camera].append(row)
         for camera, rows in sorted(rows_of.items()):
             same_person, different_people = self._distances(camera, rows, tracklets, affinity, settled_rows)
             self._same_person[camera] = _extended(self._same_person, camera, same_person)[-_HISTORY_LIMIT:]
