@@ -18,6 +18,7 @@ from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
 from server.camera.knocks import motion_message, noticeable
 from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
+from server.camera.observations import ObservationCollector
 from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
@@ -135,6 +136,9 @@ class CameraPipeline:
         self.cross_view = (
             CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None
         )
+        self._observations = (
+            ObservationCollector(self._letterbox) if camera_id in config.joint_cameras else None
+        )
         self.first_pulse = camera.offset if self.source.recorded else 0
         """The pulse of the first frame."""
         self._last: int | None = None
@@ -217,6 +221,8 @@ class CameraPipeline:
             self._messages.add_without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
             self._messages.add_without_image([pulse])
+        if self._observations is not None and frame.has_detection:
+            self._observations.add(pulse, detections, frame.motion)
         if self.cross_view is not None and frame.depends_on_peers:
             detections = self.cross_view.rescore(detections, peers.messages, frame.motion)
             if peers.is_incomplete:
@@ -246,9 +252,14 @@ class CameraPipeline:
         return self._add_picture(self._messages.closing(self._tracker.flush(), last), None)
 
     def _add_picture(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
-        """Add the picture's condition and motion, and each track's sharpness where view quality uses it."""
-        motion = motion_message(self.motion)
-        tracks = msgspec.structs.replace(tracks, condition=self.picture.condition, motion=motion)
+        """Add the picture's condition and motion, and what the site uses: detections and sharpness."""
+        observations = [] if self._observations is None else self._observations.take()
+        tracks = msgspec.structs.replace(
+            tracks,
+            condition=self.picture.condition,
+            motion=motion_message(self.motion),
+            observations=observations,
+        )
         return tracks if self._sharpness is None else self._sharpness.measure(tracks, image)
 
     def close(self) -> None:

@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-from numpy.typing import NDArray
-
-import tracking
 from server.messaging.epochs import epoch_of_recording_end, epoch_of_window
-from server.messaging.messages import AppearanceHistogram, Box, CameraTracks, SolverReport, TrackMessage
-from server.messaging.number_types import COORDINATE_MAX
+from server.messaging.messages import CameraTracks
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
-from tracking import SolveReport, WindowResult, WindowTrack, types
-
-_SHARE_DIGITS = 5
-"""Decimals of histogram values."""
+from server.messaging.track_conversion import solver_report, track_message
+from tracking import WindowResult, types
 
 
 class TrackMessageBuilder:
@@ -77,8 +70,8 @@ class TrackMessageBuilder:
             shed=_pop_all(self._shed),
             without_detection=_pop_all(self._without_detection),
             without_peers=_pop_all(self._without_peers),
-            tracks=[_track(track) for track in result.tracks],
-            solve=_solver_report(result.report),
+            tracks=[track_message(track) for track in result.tracks],
+            solve=solver_report(result.report),
             risk_events=[_risk_event(event) for event in result.risk_events[:RISK_EVENTS_MAX]],
             revised_from=result.revised_from,
         )
@@ -91,16 +84,6 @@ def _pop_all(frames: list[int]) -> list[int]:
     return popped
 
 
-def _track(track: WindowTrack) -> TrackMessage:
-    # Interpolated boxes: a short occlusion should not cause a cut to another camera.
-    return TrackMessage(
-        id=track.id,
-        boxes=[_box(row) for row in track.interpolated],
-        confidence=float(track.confidence),
-        appearance=[_appearance_message(histogram) for histogram in track.appearance_histograms],
-    )
-
-
 def _risk_event(event: types.RiskEvent) -> RiskEvent:
     return RiskEvent(
         reason=event.reason,
@@ -108,27 +91,4 @@ def _risk_event(event: types.RiskEvent) -> RiskEvent:
         pulse=max(event.frame, 0),
         margin=float(event.margin),
         risk=float(event.risk),
-    )
-
-
-def _appearance_message(appearance: tracking.AppearanceHistogram) -> AppearanceHistogram:
-    shares = [round(float(share), _SHARE_DIGITS) for share in appearance.histogram]
-    return AppearanceHistogram(first=appearance.first, last=appearance.last, histogram=shares)
-
-
-def _box(row: NDArray[np.float64]) -> Box | None:
-    left, top, right, bottom = (float(side) for side in np.clip(row, -COORDINATE_MAX, COORDINATE_MAX))
-    return None if np.isnan(left) else (left, top, right, bottom)
-
-
-def _solver_report(report: SolveReport | None) -> SolverReport | None:
-    if report is None:
-        return None
-    return SolverReport(
-        objective=report.objective,
-        bound=report.bound,
-        gap=report.gap,
-        integral=report.integral,
-        rounds=report.rounds,
-        limit=report.limit,
     )

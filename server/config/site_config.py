@@ -139,6 +139,14 @@ class Config(BaseSettings):
         return self
 
     @model_validator(mode="after")
+    def _operators_correct_single_cameras(self) -> Self:
+        if self.track.joint and self.track.assist.enabled:
+            raise ValueError(
+                "track.joint: an operator corrects the tracks of single cameras; leave out track.assist"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _streams_can_be_of_this_codec(self) -> Self:
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:
@@ -155,11 +163,27 @@ class Config(BaseSettings):
         return source if source is None or source in self.camera_ids else self.camera_ids[0]
 
     def peers_of(self, camera_id: str) -> Sequence[str]:
-        """Return the cameras whose detections a camera uses: calibrated, not overhead; none if disabled."""
-        calibrated = {camera.id for camera in self.cameras if camera.ground is not None} - self.overhead
-        if not self.track.cross_view.enabled or camera_id not in calibrated:
+        """Return the cameras whose detections a camera uses: of the common ground; none if disabled.
+
+        Where people are tracked jointly, detections are joined there instead.
+        """
+        calibrated = self._calibrated
+        if not self.track.cross_view.enabled or self.track.joint or camera_id not in calibrated:
             return ()
-        return tuple(peer for peer in self.camera_ids if peer in calibrated and peer != camera_id)
+        return tuple(peer for peer in calibrated if peer != camera_id)
+
+    @property
+    def joint_cameras(self) -> Sequence[str]:
+        """The cameras whose people are tracked jointly on the common ground; none with fewer than two."""
+        calibrated = self._calibrated if self.track.joint else ()
+        return calibrated if len(calibrated) > 1 else ()
+
+    @property
+    def _calibrated(self) -> Sequence[str]:
+        """The cameras with a homography in which people stand upright."""
+        return tuple(
+            camera.id for camera in self.cameras if camera.ground is not None and camera.kind == "upright"
+        )
 
     @property
     def overhead(self) -> frozenset[str]:

@@ -34,6 +34,7 @@ import msgspec
 
 from server.messaging.camera_status import PictureMotion
 from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
+from server.messaging.observations import FRAME_DETECTIONS_MAX, FrameObservations, ScoredBox
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
 from tracking.types import PictureCondition
 
@@ -164,13 +165,8 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None
     """The first final frame that an operator's correction has changed; null: none."""
-
-
-ScoredBox = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Annotated[float, msgspec.Meta(ge=0, le=1)]]
-"""Left, top, right, bottom in pixels of the camera's image, and the detection score."""
-
-FRAME_DETECTIONS_MAX = 100
-"""Detections of one frame, at most; those with the highest scores."""
+    observations: list[FrameObservations] = []
+    """The searched frames of this epoch, where cameras of a common ground are tracked jointly."""
 
 
 class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):

@@ -24,6 +24,7 @@ from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch, EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.ingest.loss_recorder import LossRecorder
+from server.service.joint_tracking.worker import JointWorker
 from server.service.metrics.stage_timers import StageTimers
 from server.service.operator_assist.operator_assist import OperatorAssist
 from server.service.pulse_follower import PulseFollower
@@ -92,6 +93,8 @@ class BestViewPipeline:
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
+        self._joint = JointWorker(config)
+        _log_joint_cameras(config)
         self.decision_state = DecisionState(config.site.fps)
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
@@ -161,6 +164,7 @@ class BestViewPipeline:
             first_pulse_timeout.cancel()
             follow.cancel()
             await asyncio.gather(follow, return_exceptions=True)
+            await self._joint.close()
 
     def finish(self) -> list[GopDecision]:
         """Decide the remaining GOPs after the end of every recording."""
@@ -172,9 +176,9 @@ class BestViewPipeline:
         self._changed.set()
 
     def decide(self) -> None:
-        """Decide and publish all epochs that are ready."""
-        while self._decide_next():
-            pass
+        """Decide and publish all epochs that are ready, where no cameras are tracked jointly."""
+        while (epoch := self._next_epoch()) is not None:
+            self._step(epoch)
 
     async def decide_or_skip(self) -> None:
         """Decide and publish the epochs that are ready, or skip those that would be decided too late.
@@ -182,7 +186,8 @@ class BestViewPipeline:
         Inboxes and tasks are served between two epochs: on an overloaded machine another epoch may always be
         ready. Frames are received first: a lost frame cannot be shown.
         """
-        while self._decide_next():
+        while (epoch := self._next_epoch()) is not None:
+            self._step(await self._joint.step(epoch))
             await asyncio.sleep(0)
             for _ in range(_INBOX_TURNS):
                 if not self.bus.has_waiting_messages:
@@ -200,11 +205,8 @@ class BestViewPipeline:
             text = "decisions are %.1f s behind and do not catch up%s: skipping to the present"
             log.warning(text, backlog / self.config.site.fps, more)
 
-    def _decide_next(self) -> bool:
-        epoch = self.aligner.take_next_ready(self.pulses.newest)
-        if epoch is not None:
-            self._step(epoch)
-        return epoch is not None
+    def _next_epoch(self) -> Epoch | None:
+        return self.aligner.take_next_ready(self.pulses.newest)
 
     def _open_decision_files(self, out: Path) -> LiveDecisionWriter:
         try:
@@ -297,3 +299,11 @@ class BestViewPipeline:
             self._decision_writer.write_or_skip(decision)
         self.loss_recorder.record_gop(decision)
         self.ingest.forget_thumbnails_before(decision.first - self.decider.people.forget_after)
+
+
+def _log_joint_cameras(config: Config) -> None:
+    """Log which cameras are tracked jointly, if any should be."""
+    if config.joint_cameras:
+        log.info("cameras %s are tracked jointly on their common ground", ", ".join(config.joint_cameras))
+    elif config.track.joint:
+        log.warning("track.joint: fewer than two upright cameras are calibrated: each is tracked alone")

@@ -18,6 +18,7 @@ from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_source_opens
 from server.supervisor.startup_signal import signal_started
+from server.supervisor.synthetic_homographies import add_joint_homographies
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
@@ -80,7 +81,7 @@ async def _create(
 
 
 def _open(config: Config, camera_id: str) -> CameraProcess:
-    return CameraProcess(fill_in_password(config, camera_id), camera_id)
+    return CameraProcess(fill_in_password(add_joint_homographies(config), camera_id), camera_id)
 
 
 async def _run(camera: CameraProcess, restart: asyncio.Event) -> bool:

@@ -13,7 +13,7 @@ _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """Settings that the best view applies at the next GOP."""
 _CAMERA_KEYS = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
 """Settings that only the camera's own process uses."""
-_TRACK = tuple(name for name in TrackSettings.model_fields if name != "backlog_s")
+_TRACK = tuple(name for name in TrackSettings.model_fields if name not in {"backlog_s", "joint"})
 _SHARED_KEYS = ("detect", *(f"track.{name}" for name in _TRACK))
 """Settings that only camera processes use."""
 _EPOCHS = ("track.window.length_s", "track.window.stride_s", "track.window.min_frames")

@@ -18,6 +18,15 @@ def add_synthetic_homographies(config: Config) -> Config:
     )
 
 
+def add_joint_homographies(config: Config) -> Config:
+    """Return the configuration with them where people are tracked jointly: then every process needs them.
+
+    Raises:
+        UserError: there is no such scene.
+    """
+    return add_synthetic_homographies(config) if config.track.joint else config
+
+
 def _calibrated(camera: CameraSettings, site: SiteSettings) -> CameraSettings:
     if camera.ground is not None or source_kind(camera.source) is not SourceKind.SCENE:
         return camera

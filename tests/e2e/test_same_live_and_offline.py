@@ -27,12 +27,13 @@ async def rendered(config: Path, recording: Path, out: Path) -> None:
     assert await with_timeout(process.wait()) == 0
 
 
-async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("joint", [False, pytest.param(True, marks=pytest.mark.slow)])
+async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path, *, joint: bool) -> None:
     # Long timeouts, so that no frame is skipped on a busy machine.
     config = configuration(
         tmp_path,
         recording,
-        track={"cross_view_wait_s": 60},
+        track={"cross_view_wait_s": 60, "joint": joint},
         view={"late_after_s": 60},
         zenoh={"lease_s": 60},
     )

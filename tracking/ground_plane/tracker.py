@@ -115,6 +115,11 @@ class GroundPlaneTracker:
         """How tall people are, in the unit of the plane; None before the first detections."""
         return None if self._units_per_metre is None else PERSON_M * self._units_per_metre
 
+    @property
+    def first_open(self) -> int | None:
+        """The first frame that is not final; None: all are."""
+        return self._window[0].number if self._window else None
+
     def provisional(self) -> list[GroundFrame]:
         """Return the frames that are not final yet, as the last solution has them.
 

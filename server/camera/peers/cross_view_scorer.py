@@ -6,19 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bestview import CameraDetections, CameraGeometry, rescore_detections, views_overlap
+from server.camera.observations import calibrated_boxes, most_confident, scored_boxes
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
-from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections
-from server.messaging.number_types import COORDINATE_MAX
+from server.messaging.messages import FrameDetections
 from tracking import Detections
 from tracking.detectors.background.motion import STILL, Motion
-
-Floats = NDArray[np.float64]
-
-_PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +44,7 @@ class CrossViewScorer:
         """
         boxes = None
         if detections is not None:
-            # The most confident ones, in the detector's order.
-            top = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
-            boxes_px = self._calibrated(detections.boxes[top], motion).round(_PIXEL_DIGITS)
-            scores = detections.scores[top].round(_SCORE_DIGITS)
-            rows = np.clip(np.column_stack([boxes_px, scores]), -COORDINATE_MAX, COORDINATE_MAX)
-            boxes = [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
+            boxes = scored_boxes(detections, most_confident(detections), self._letterbox, motion)
         return FrameDetections(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
@@ -72,16 +62,11 @@ class CrossViewScorer:
             for message in messages
             if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]
-        found = CameraDetections(self._calibrated(detections.boxes, motion), detections.scores)
+        own = calibrated_boxes(detections.boxes, self._letterbox, motion)
+        found = CameraDetections(own, detections.scores)
         return replace(
             detections, scores=rescore_detections(self._geometry, found, peers, self._config.track.cross_view)
         )
-
-    def _calibrated(self, boxes: Floats, motion: Motion) -> Floats:
-        """Return boxes of the site's image in the camera's pixels, where they were before it moved."""
-        if motion != STILL:
-            boxes = motion.move_boxes_back(boxes, self._letterbox.site_size)
-        return self._letterbox.boxes_site_to_camera(boxes)
 
     def _geometry_of(self, message: FrameDetections) -> CameraGeometry | None:
         cached = self._peers.get(message.camera)

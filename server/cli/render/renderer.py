@@ -16,6 +16,7 @@ from server.config.site_config import Config
 from server.media.codec import stream_format_for
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.joint_tracking.stage import JointStage
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 
@@ -44,6 +45,7 @@ class Renderer:
         self._decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self._frame_buffers[camera].has(pulse)
         )
+        self._joint = JointStage(config)
         self._recorder = DecisionWriter(folder, cameras, self._decider.people.letterboxes)
         self._soundtrack = Soundtrack(config)
         audio_buffer = self._soundtrack.audio_buffer
@@ -67,7 +69,7 @@ class Renderer:
             if batch.ended:
                 self.ended[batch.camera] = batch.tracks.last
         for epoch in self._aligner.take_ready(now=-1):
-            for decision in self._decider.step(epoch):
+            for decision in self._decider.step(self._joint.step(epoch)):
                 self._write(decision)
 
     def finish(self) -> list[int]:

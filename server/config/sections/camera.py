@@ -66,6 +66,8 @@ class TrackSettings(Section):
 
     tracker: str = DEFAULT_TRACKER
     """MyView's own tracker, or a baseline."""
+    joint: bool = False
+    """Track people on the common ground of calibrated cameras in all of them at once."""
     solver: str = DEFAULT_SOLVER
     solver_share: PositiveFloat | None = 0.35
     """Work of a solve at most, as a share of the stride on an ordinary machine; None: no limit."""
@@ -94,11 +96,15 @@ class TrackSettings(Section):
             else self.window.resolve(fps).min_final_lag
         )
 
-    def create_solver(self, fps: float, name: str | None = None) -> Solver:
-        """Create the solver, or that of another name, with its budget at so many frames per second."""
+    def solver_budget(self, fps: float) -> SolverBudget:
+        """Return the limits of a solve at so many frames per second."""
         stride_s = self.window.resolve(fps).stride / fps
         work_s = None if self.solver_share is None else self.solver_share * stride_s
-        return create_solver(name or self.solver, SolverBudget(work_s, self.solver_time_s))
+        return SolverBudget(work_s, self.solver_time_s)
+
+    def create_solver(self, fps: float, name: str | None = None) -> Solver:
+        """Create the solver, or that of another name, with its budget at so many frames per second."""
+        return create_solver(name or self.solver, self.solver_budget(fps))
 
     @field_validator("tracker")
     @classmethod

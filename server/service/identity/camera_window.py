@@ -12,10 +12,10 @@ from bestview import AppearanceHistogram, TrackKey, TrackUpdate
 from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
-from server.service.identity.local_numbers import LocalNumbers
+from server.service.identity.local_numbers import GROUND, LocalNumbers
 from server.service.identity.picture_motion import calibrated_boxes
 from server.service.ingest.box_arrays import boxes_array
-from server.service.ingest.epoch_aligner import Epoch
+from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 
 Floats = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class WindowReader:
 
     def read(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Decode the messages of all cameras, in the order of the epoch."""
-        windows = [self._window(message) for message in epoch.tracks.values()]
+        windows = [self._window(message, epoch.joint) for message in epoch.tracks.values()]
         self._final |= {window.message.camera: window.message.final_to for window in windows}
         return windows
 
@@ -119,11 +119,15 @@ class WindowReader:
         for message in epoch.late_revisions:
             yield self._window(message)
 
-    def _window(self, message: CameraTracks) -> CameraWindow:
+    def _window(self, message: CameraTracks, joint: JointEpoch | None = None) -> CameraWindow:
         letterbox = self.letterboxes.get(message.camera)
         if letterbox is None or letterbox.camera_size != message.size:
             letterbox = self.letterboxes[message.camera] = Letterbox(message.size, self._site_size)
-        keys = self.local_numbers.of(message)
+        if joint is not None and message.camera in joint.own:
+            ids = [track.id for track in message.tracks]
+            keys = self.local_numbers.keys(GROUND, joint.tracks.run, ids)
+        else:
+            keys = self.local_numbers.of(message)
         frames = max(0, message.last - message.first + 1)
         boxes = boxes_array(track.boxes for track in message.tracks)
         local_ids = np.array([key.local_id for key in keys], dtype=np.int64)

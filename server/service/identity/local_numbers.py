@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import msgspec
 
 from bestview import TrackKey
 from server.messaging.messages import CameraTracks
+
+GROUND = "(ground)"
+"""Stands for all cameras that are tracked jointly; no camera can have this id."""
 
 
 class TrackName(msgspec.Struct, frozen=True, array_like=True):
@@ -32,13 +37,17 @@ class LocalNumbers:
 
     def of(self, message: CameraTracks) -> tuple[TrackKey, ...]:
         """Return the keys of a message's tracks, new ones for new tracks."""
-        if not message.tracks:
+        return self.keys(message.camera, message.boot, [track.id for track in message.tracks])
+
+    def keys(self, camera: str, boot: int, tracks: Sequence[int]) -> tuple[TrackKey, ...]:
+        """Return the keys of tracks, new ones for new tracks."""
+        if not tracks:
             return ()
-        keys = self._keys.setdefault((message.camera, message.boot), {})
-        for track in message.tracks:
-            if track.id not in keys:
-                keys[track.id] = self._new(message.camera, message.boot, track.id)
-        return tuple([keys[track.id] for track in message.tracks])
+        keys = self._keys.setdefault((camera, boot), {})
+        for track in tracks:
+            if track not in keys:
+                keys[track] = self._new(camera, boot, track)
+        return tuple([keys[track] for track in tracks])
 
     def known(self, camera: str, boot: int, track: int) -> TrackKey | None:
         """Return the key of a track; None: it is unknown or forgotten."""

@@ -8,11 +8,12 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
+from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey, TrackUpdate
 from server.config.sections import ShareSettings
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.identity.camera_window import CameraWindow, WindowReader
+from server.service.identity.common_ground import CommonGround
 from server.service.identity.id_switch_repair import IdSwitchRepair
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.manual_overrides import ManualOverrides
@@ -44,7 +45,8 @@ class PersonTracker:
     ``homographies`` map each camera's image to the ground; None where there is none. ``share`` is
     this service's shard; identities are computed for all people, identically in every service. Tracks are
     final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
-    cameras that look straight down; ``fps`` are the site's frames a second.
+    cameras that look straight down, ``joint_cameras`` those whose people are tracked jointly on the ground;
+    ``fps`` are the site's frames a second.
     """
 
     def __init__(
@@ -57,15 +59,17 @@ class PersonTracker:
         share: ShareSettings = ALL,
         overhead: Collection[str] = (),
         fps: float = 25.0,
+        joint_cameras: Sequence[str] = (),
     ) -> None:
-        self._registry = IdentityRegistry(settings, homographies, overhead, fps)
+        self._reader = WindowReader(site_size)
+        self._ground = CommonGround(joint_cameras, self._reader.local_numbers)
+        self._registry = IdentityRegistry(settings, self._ground.homographies(homographies), overhead, fps)
         self.forget_after = settings.resolve(fps).forget_after
         """Frames unseen after which people are forgotten."""
         self.registry = PersonRegistry(settings.maximum_departed_people)
         """All people, those of other shards included."""
         self._share = share
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
-        self._reader = WindowReader(site_size)
         self._lag = lag
         self._id_switch_repair = IdSwitchRepair(self._registry, self._reader)
         self.undetected = UndetectedFrames()
@@ -87,8 +91,8 @@ class PersonTracker:
         """Associate an epoch's tracks; return its windows, late revisions first."""
         late = [self._store(window) for window in self._reader.read_late(epoch)]
         windows = [self._store(window) for window in self._reader.read(epoch)]
-        self._recall(windows)
-        tracks = [track for window in windows for track in window.fresh_tracks()]
+        self._recall(windows, epoch)
+        tracks = self._fresh_tracks(windows, epoch)
         since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
         image_sizes = self._detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
@@ -164,10 +168,11 @@ class PersonTracker:
         Returns:
             The new number; None: none of the cameras shows the person now.
         """
+        shown_by = self._ground.seen_as(cameras)
         tracks = [
             key
             for key, parts in self._parts.items()
-            if key.camera in cameras
+            if key.camera in shown_by
             and parts[-1].number == number
             and self._last_reported.get(key) == self._newest
         ]
@@ -195,12 +200,12 @@ class PersonTracker:
 
     def person_of(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
         """Return the person of a tracker's track in a frame; None: unknown or not confirmed."""
-        key = self._reader.local_numbers.known(camera, boot, track)
+        key = self._ground.key(TrackName(camera, boot, track))
         return None if key is None else self.number(key.camera, key.local_id, pulse)
 
     def is_known(self, track: TrackName) -> bool:
         """Return whether a camera has reported this track recently."""
-        return self._reader.local_numbers.known(track.camera, track.boot, track.track) is not None
+        return self._ground.key(track) is not None
 
     def tracks_of(self, numbers: Collection[int], since: int) -> dict[int, list[TrackName]]:
         """Return these people's tracks that were reported since a pulse; people without any are omitted."""
@@ -208,7 +213,7 @@ class PersonTracker:
         selected = set(numbers)
         for key, parts in self._parts.items():
             if parts[-1].number in selected and self._last_reported.get(key, -1) >= since:
-                tracks.setdefault(parts[-1].number, []).append(self._reader.local_numbers.origin(key))
+                tracks.setdefault(parts[-1].number, []).extend(self._ground.own_tracks(key))
         return dict(sorted(tracks.items()))
 
     def numbers(self, keys: Sequence[TrackKey], first: int, frames: int) -> NDArray[np.int64]:
@@ -217,7 +222,7 @@ class PersonTracker:
 
     def take_corrections(self) -> tuple[Merge | Split, ...]:
         """Return the merges and splits since the last call, in order."""
-        corrections, self._corrections = tuple(self._corrections), []
+        corrections, self._corrections = self._ground.in_cameras(self._corrections), []
         return corrections
 
     def forget_before(self, pulse: int) -> None:
@@ -235,12 +240,25 @@ class PersonTracker:
     def _detecting_cameras(
         self, windows: Sequence[CameraWindow], first: int, last: int
     ) -> dict[str, tuple[int, int]]:
-        """Return the image sizes of the cameras that ran detection in any of these frames."""
+        """Return the image sizes of the cameras that ran detection in any of these frames.
+
+        Joint tracking has weighed already who should have been seen.
+        """
         return {
             window.message.camera: window.message.size
             for window in windows
-            if not self.undetected.over(window.message.camera, first, last + 1 - first).all()
+            if window.message.camera not in self._ground.cameras
+            and not self.undetected.over(window.message.camera, first, last + 1 - first).all()
         }
+
+    def _fresh_tracks(self, windows: Sequence[CameraWindow], epoch: Epoch) -> list[TrackUpdate]:
+        """Return the new final frames of all tracks: on the ground, and of cameras that track alone."""
+        own = [window for window in windows if not epoch.is_joint(window.message.camera)]
+        tracks = [track for window in own for track in window.fresh_tracks()]
+        if epoch.joint is not None:
+            messages = [window.message for window in windows if epoch.is_joint(window.message.camera)]
+            tracks += self._ground.updates(epoch.joint.tracks, messages)
+        return tracks
 
     def _store(self, window: CameraWindow) -> CameraWindow:
         """Store a window, after repairing identity switches where it revises the past."""
@@ -253,10 +271,18 @@ class PersonTracker:
         history.put(window, window.first, window.message.last)
         return window
 
-    def _recall(self, windows: Iterable[CameraWindow]) -> None:
+    def _recall(self, windows: Sequence[CameraWindow], epoch: Epoch) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
-        for key in chain.from_iterable(window.keys for window in windows) if self._expected else ():
-            number, pulse = self._expected.pop(self._reader.local_numbers.origin(key), (0, 0))
+        own = [window for window in windows if not epoch.is_joint(window.message.camera)]
+        joint = [window for window in windows if epoch.is_joint(window.message.camera)]
+        linked = {} if epoch.joint is None else self._ground.link(epoch.joint, joint)
+        if not self._expected:
+            return
+        origin = self._reader.local_numbers.origin
+        appeared = {origin(key): key for window in own for key in window.keys}
+        appeared |= {name: key for name, key in linked.items() if key not in self._parts}
+        for name, key in appeared.items():
+            number, pulse = self._expected.pop(name, (0, 0))
             if number:
                 self._registry.recall(key, self.registry.current(number), pulse)
 
@@ -274,4 +300,5 @@ class PersonTracker:
             del self._last_reported[key]
             self._parts.pop(key, None)
             self._reader.local_numbers.forget(key)
+        self._ground.keep_only(self._last_reported)
         self.registry.forget_unseen_since(now - self.forget_after)

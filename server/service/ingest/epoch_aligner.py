@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import CameraTracks
+from server.service.joint_tracking.joint_messages import JointTracks
 
 _MAX_LATE_REVISIONS = 16
 """Late windows that revise the past, kept until the next epoch."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointEpoch:
+    """The people on the common ground."""
+
+    tracks: JointTracks
+    own: Mapping[str, CameraTracks]
+    """The windows of the cameras that are tracked jointly, as they came: with their own tracks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +38,12 @@ class Epoch:
     """Windows that arrived too late for their own epoch, but revise track identities of the past."""
     skipped: int = 0
     """Epochs before it that are skipped: no camera reported them, and they are too old."""
+    joint: JointEpoch | None = None
+    """Set once the cameras of the common ground have been tracked jointly."""
+
+    def is_joint(self, camera: str) -> bool:
+        """Return whether a camera's window has tracks on the ground instead of its own."""
+        return self.joint is not None and camera in self.joint.own
 
 
 @dataclass(slots=True)

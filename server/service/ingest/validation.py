@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import CameraTracks
+from server.messaging.observations import holds_histograms
 
 _WINDOW_MAX = 100_000
 """Limit of frames in one message: far more than any window, or any gap that a tracker bridges."""
@@ -29,6 +31,17 @@ def is_plausible(message: CameraTracks, stride: int) -> bool:
         and all(len(track.boxes) == frames for track in message.tracks)
         and (message.revised_from is None or message.first <= message.revised_from <= message.final_to)
         and all(message.first <= sample.first <= sample.last <= message.final_to for sample in samples)
+        and _are_valid_observations(message, end)
+    )
+
+
+def _are_valid_observations(message: CameraTracks, end: int) -> bool:
+    """Return whether observations are of an epoch's frames, in order, and can be unpacked."""
+    pulses = [frame.pulse for frame in message.observations]
+    return (
+        _are_valid_frames(pulses, end)
+        and all(before < pulse for before, pulse in pairwise(pulses))
+        and all(holds_histograms(frame) for frame in message.observations)
     )
 
 

@@ -93,6 +93,7 @@ class ViewDecider:
             share,
             config.overhead,
             fps,
+            config.joint_cameras,
         )
         stride, gop = config.window.stride, config.encode.gop
         self._max_gops_per_epoch = -(-stride // gop) + 1

@@ -54,6 +54,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "track.costs.occlusion": (ALL_CAMERAS, 0.9),
     "track.window.birth_max_cost": (ALL_CAMERAS, 0.6),
     "track.backlog_s": (SITE, 3.0),
+    "track.joint": (SITE, True),
     "site.fps": (SITE, 12.5),
     "encode.crf": (SITE, 30),
     "zenoh.lease_s": (SITE, 2.0),

@@ -1,0 +1,61 @@
+"""A camera's detections in its own pixels, as they were before it moved: what other cameras can use."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.media.letterbox import Letterbox
+from server.messaging.number_types import COORDINATE_MAX
+from server.messaging.observations import (
+    FRAME_DETECTIONS_MAX,
+    FrameObservations,
+    ScoredBox,
+    pack_histograms,
+)
+from tracking import Detections
+from tracking.detectors.background.motion import STILL, Motion
+
+_PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
+
+
+def calibrated_boxes(boxes: NDArray[np.float64], letterbox: Letterbox, motion: Motion) -> NDArray[np.float64]:
+    """Return boxes (K, 4) of the site's image in the camera's pixels, where they were before it moved."""
+    if motion != STILL:
+        boxes = motion.move_boxes_back(boxes, letterbox.site_size)
+    return letterbox.boxes_site_to_camera(boxes)
+
+
+def most_confident(detections: Detections) -> NDArray[np.int64]:
+    """Return the indices of the detections with the highest scores, in the detector's order."""
+    return np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
+
+
+def scored_boxes(
+    detections: Detections, chosen: NDArray[np.int64], letterbox: Letterbox, motion: Motion
+) -> list[ScoredBox]:
+    """Return the chosen detections as a message has them, rounded."""
+    boxes = calibrated_boxes(detections.boxes[chosen], letterbox, motion).round(_PIXEL_DIGITS)
+    scores = detections.scores[chosen].round(_SCORE_DIGITS)
+    rows = np.clip(np.column_stack([boxes, scores]), -COORDINATE_MAX, COORDINATE_MAX)
+    return [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
+
+
+class ObservationCollector:
+    """Collects the detections of the frames of an epoch for joint tracking."""
+
+    def __init__(self, letterbox: Letterbox) -> None:
+        self._letterbox = letterbox
+        self._frames: list[FrameObservations] = []
+
+    def add(self, pulse: int, detections: Detections, motion: Motion) -> None:
+        """Add the detections of a frame that was searched."""
+        chosen = most_confident(detections)
+        boxes = scored_boxes(detections, chosen, self._letterbox, motion)
+        histograms = pack_histograms(detections.histograms[chosen])
+        self._frames.append(FrameObservations(pulse=pulse, boxes=boxes, histograms=histograms))
+
+    def take(self) -> list[FrameObservations]:
+        """Return the frames since the last call."""
+        frames, self._frames = self._frames, []
+        return frames

@@ -1,0 +1,118 @@
+"""Tracks the people on the common ground, epoch by epoch.
+
+It has no clock: the same epochs give the same tracks.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from server.media.letterbox import Letterbox
+from server.messaging.observations import unpack_observations
+from server.messaging.track_conversion import solver_report
+from server.service.joint_tracking.camera_track_builder import CameraTrackBuilder
+from server.service.joint_tracking.joint_messages import GroundPath, JointSetup, JointTask, JointTracks
+from tracking import Detections, SolverBudget, create_solver
+from tracking.ground_plane import GroundCamera, GroundFrame, GroundPlaneTracker, GroundSettings
+
+
+class JointTracker:
+    """Turns the observations of each epoch into tracks with one id in all cameras."""
+
+    def __init__(self, setup: JointSetup) -> None:
+        self._run, self._site_size = setup.run, setup.site_size
+        self._homographies = {camera: np.array(rows) for camera, rows in setup.homographies.items()}
+        self._sizes: dict[str, tuple[int, int]] = {}
+        self._tracker = GroundPlaneTracker(
+            # A camera's own size follows with its first observations.
+            {
+                camera: GroundCamera(homography, *map(float, setup.site_size))
+                for camera, homography in self._homographies.items()
+            },
+            GroundSettings(lag_s=setup.lag_s, stride_s=setup.stride_s),
+            create_solver(setup.solver, SolverBudget(setup.solver_work_s, setup.solver_time_s)),
+            setup.fps,
+            setup.units_per_metre,
+        )
+        self._builders = {camera: CameraTrackBuilder(camera, setup.fps) for camera in setup.homographies}
+        self._detections: dict[str, dict[int, Detections]] = {camera: {} for camera in setup.homographies}
+        """By camera and frame, from the first frame on that is not final."""
+        self._last = self._final_to = -1
+        self._ended: set[str] = set()
+
+    def step(self, task: JointTask) -> JointTracks:
+        """Track people in the frames of an epoch."""
+        for camera, part in task.cameras.items():
+            self._set_size(camera, part.size)
+            for frame in part.frames:
+                self._detections[camera][frame.pulse] = unpack_observations(frame)
+            (self._ended.add if part.ended else self._ended.discard)(camera)
+        all_ended = bool(task.cameras) and all(camera in self._ended for camera in self._sizes)
+        last = max(part.last for part in task.cameras.values()) if all_ended else task.last
+        final = self._push_to(last)
+        if all_ended:
+            final += self._tracker.flush()
+        first_open = self._tracker.first_open
+        if final and first_open is not None and final[-1].frame + 1 < first_open:
+            # Epochs were skipped for so long that nobody is known any more.
+            final, self._final_to = [], first_open - 1
+        first = final[0].frame if final else self._final_to + 1
+        self._final_to = final[-1].frame if final else self._final_to
+        # Before the first solution nobody is known.
+        ahead = self._tracker.provisional() if final and not all_ended else []
+        empty = [GroundFrame(n, (), None) for n in range(self._final_to + 1 + len(ahead), last + 1)]
+        frames = [*final, *ahead, *empty]
+        cameras = {
+            camera: self._builders[camera].tracks(
+                frames,
+                len(final),
+                self._detections[camera],
+                Letterbox(part.size, self._site_size),
+                part.motion,
+            )
+            for camera, part in task.cameras.items()
+        }
+        for found in self._detections.values():
+            for pulse in [pulse for pulse in found if pulse <= self._final_to]:
+                del found[pulse]
+        return JointTracks(
+            run=self._run,
+            first=first,
+            last=last,
+            final_to=self._final_to,
+            person_height=self._tracker.person_height or 0.0,
+            paths=_paths(final),
+            cameras=cameras,
+            solve=solver_report(final[-1].report if final else None),
+        )
+
+    def _push_to(self, last: int) -> list[GroundFrame]:
+        """Push the frames up to `last`; return those that have become final."""
+        observed = {pulse for found in self._detections.values() for pulse in found}
+        # The tracker counts frames that nobody has searched by itself.
+        final: list[GroundFrame] = []
+        new = sorted(pulse for pulse in {*observed, last} if pulse > self._last)
+        if self._last < 0 and new:
+            self._final_to = new[0] - 1
+        for pulse in new:
+            here = {camera: found[pulse] for camera, found in self._detections.items() if pulse in found}
+            final += self._tracker.push(pulse, here)
+        self._last = max(self._last, last)
+        return final
+
+    def _set_size(self, camera: str, size: tuple[int, int]) -> None:
+        if self._sizes.get(camera) != size:
+            self._sizes[camera] = size
+            self._tracker.set_camera(
+                camera, GroundCamera(self._homographies[camera], float(size[0]), float(size[1]))
+            )
+
+
+def _paths(frames: list[GroundFrame]) -> list[GroundPath]:
+    """Return the paths of everybody in final frames, by id."""
+    places: dict[int, list[tuple[float, float] | None]] = {}
+    for at, frame in enumerate(frames):
+        for track in frame.tracks:
+            x, y = track.place.tolist()
+            places.setdefault(track.id, [None] * len(frames))[at] = (x, y)
+    return [GroundPath(id=number, places=path) for number, path in sorted(places.items())]

@@ -1,0 +1,116 @@
+"""Joint tracking between ingest and identity: cameras' observations become tracks with one id in all."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from fakes.service.joint_floor import SIZE, STRIDE, VIEWS, joint_config, walk_past, walked_epochs
+from fakes.tracking.walked_floor import FloorNoise
+from server.messaging.camera_status import PictureMotion
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.joint_tracking.stage import JointStage
+from tracking.boxes import iou
+
+LAG = 4
+
+
+def tracked(epochs: list[Epoch]) -> list[Epoch]:
+    stage = JointStage(joint_config())
+    return [stage.step(epoch) for epoch in epochs]
+
+
+def test_people_have_the_same_number_and_their_boxes_in_every_camera() -> None:
+    walks = walk_past()
+    epochs = tracked(list(walked_epochs(walks, noise=FloorNoise(missed=0.1, deviation=0.005))))
+    ids = set()
+    for epoch in epochs[8:]:
+        for name, message in epoch.tracks.items():
+            assert len(message.tracks) == 2
+            for track in message.tracks:
+                for frame, box in enumerate(track.boxes, start=message.first):
+                    if box is None:
+                        continue
+                    overlaps = [iou(np.array(box), VIEWS[name].box(place)) for place in walks[frame]]
+                    assert max(overlaps) > 0.5
+                    ids.add((track.id, int(np.argmax(overlaps))))
+    assert len(ids) == 2, "each number is one person, in all cameras and frames"
+
+
+def test_every_frame_becomes_final_once_and_in_order() -> None:
+    epochs = tracked(list(walked_epochs(walk_past())))
+    final = -1
+    for epoch in epochs:
+        for message in epoch.tracks.values():
+            assert message.first == final + 1
+            assert all(len(track.boxes) == message.last - message.first + 1 for track in message.tracks)
+        final = next(iter(epoch.tracks.values())).final_to
+        assert final >= epoch.last - LAG or final < LAG
+    assert final == 39, "the end of all recordings makes the rest final"
+
+
+def test_a_recording_that_ends_earlier_is_final_to_its_end() -> None:
+    epochs = tracked(list(walked_epochs(walk_past(), ends={"c1": 20})))
+    ended = next(epoch.tracks["c1"] for epoch in epochs if epoch.tracks["c1"].ended)
+    assert (ended.last, ended.final_to) == (20, 20)
+    assert all(len(track.boxes) == 20 - ended.first + 1 for track in ended.tracks)
+    assert len(ended.tracks) == 2
+    assert "c1" not in epochs[-1].tracks
+    assert len(epochs[-1].tracks["c0"].tracks) == 2
+
+
+def test_a_camera_whose_message_is_lost_is_not_taken_to_have_missed_people() -> None:
+    absent = {("c0", number) for number in range(9, 14)} | {("c2", number) for number in range(9, 14)}
+    epochs = tracked(list(walked_epochs(walk_past(), absent=absent)))
+    ids = {track.id for epoch in epochs[8:] for message in epoch.tracks.values() for track in message.tracks}
+    assert len(ids) == 2
+
+
+def test_a_site_that_has_run_for_long_begins_with_the_present() -> None:
+    first = 1_000_000 * STRIDE
+    epochs = tracked(list(walked_epochs(walk_past(), first=first)))
+    assert epochs[0].tracks["c0"].first == first
+    assert {track.id for track in epochs[-1].tracks["c0"].tracks} == {1, 2}
+
+
+def test_after_skipped_epochs_only_frames_since_then_are_reported() -> None:
+    before = list(walked_epochs(walk_past(20)))[:-1]
+    after = list(walked_epochs(walk_past(20), first=400))
+    epochs = tracked([*before, *after])
+    resumed = epochs[len(before)].tracks["c0"]
+    assert 390 <= resumed.first <= 400 <= resumed.last
+    assert len(epochs[-1].tracks["c0"].tracks) == 2
+
+
+def test_a_camera_that_was_knocked_shows_boxes_where_its_picture_is_now() -> None:
+    walks, motion = walk_past(), PictureMotion(x=12.0, y=-7.0, grow=0.0, turn=0.0)
+    epochs = [
+        Epoch(
+            epoch.number,
+            epoch.last,
+            {name: msgspec.structs.replace(message, motion=motion) for name, message in epoch.tracks.items()},
+        )
+        for epoch in walked_epochs(walks)
+    ]
+    message = tracked(epochs)[10].tracks["c0"]
+    for track in message.tracks:
+        box = np.array(track.boxes[0]) - np.tile([12.0, -7.0], 2)
+        assert max(iou(box, VIEWS["c0"].box(place)) for place in walks[message.first]) > 0.8
+
+
+def test_looks_go_with_the_tracks() -> None:
+    epochs = tracked(list(walked_epochs(walk_past())))
+    samples = [
+        sample for epoch in epochs for track in epoch.tracks["c1"].tracks for sample in track.appearance
+    ]
+    assert samples
+    assert all(max(sample.histogram) == pytest.approx(1.0, abs=1e-3) for sample in samples)
+
+
+def test_sites_that_do_not_track_jointly_are_left_alone() -> None:
+    cameras = [{"id": name, "source": "scene:room"} for name in VIEWS]
+    stage = JointStage(joint_config(cameras=cameras))
+    for epoch in list(walked_epochs(walk_past(6))):
+        assert stage.step(epoch) is epoch
+    assert SIZE == (640, 480)

@@ -1,0 +1,48 @@
+"""The process that tracks jointly: the same tracks as in this process, and a new process where it dies."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+
+import pytest
+
+from fakes.service.joint_floor import joint_config, walk_past, walked_epochs
+from fakes.timeouts import PATIENCE
+from server.service.joint_tracking.stage import JointStage
+from server.service.joint_tracking.worker import JointWorker
+
+
+async def test_the_process_gives_the_same_tracks() -> None:
+    config, epochs = joint_config(), list(walked_epochs(walk_past(16)))
+    worker, stage = JointWorker(config), JointStage(config)
+    try:
+        async with asyncio.timeout(PATIENCE):
+            assert [await worker.step(epoch) for epoch in epochs] == [stage.step(epoch) for epoch in epochs]
+    finally:
+        await worker.close()
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+async def test_a_process_that_dies_or_hangs_is_replaced(
+    how: signal.Signals, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    epochs = list(walked_epochs(walk_past()))
+    worker = JointWorker(joint_config())
+    try:
+        async with asyncio.timeout(PATIENCE):
+            before = [await worker.step(epoch) for epoch in epochs[:8]][-1]
+            assert worker.pid is not None
+            os.kill(worker.pid, how)
+            monkeypatch.setattr(worker._worker, "_answer_s", 0.1)
+            lost = await worker.step(epochs[8])
+            after = [await worker.step(epoch) for epoch in epochs[9:-1]][-1]
+    finally:
+        await worker.close()
+    assert before.joint is not None
+    assert (lost.joint, lost.tracks["c0"].tracks) == (None, [])
+    assert after.joint is not None
+    assert after.joint.tracks.run == before.joint.tracks.run + 1
+    assert len(after.tracks["c0"].tracks) == 2
+    assert sum("started anew" in record.message for record in caplog.records) == 1
