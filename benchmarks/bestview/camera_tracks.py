@@ -7,17 +7,21 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from benchmarks.detectors.compared_detectors import CONFIDENT, rows_of
+from server.camera.observations import ObservationCollector
 from server.camera.peers.cross_view_scorer import CrossViewScorer
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEndedError
 from server.camera.track_messages import TrackMessageBuilder
 from server.config.site_config import Config
+from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
 from tracking import Detections, OnlineTracker
 from tracking.detectors import MotFileDetector
+from tracking.detectors.background.motion import STILL
 from tracking.motchallenge import MotRow
 
 Messages = Mapping[str, list[CameraTracks]]
@@ -103,13 +107,13 @@ def track_scene(config: Config, frames: Mapping[str, CameraDetections]) -> dict[
             if reader.scorer is not None:
                 others = [message for other, message in shared.items() if other != camera]
                 detections = reader.scorer.rescore(detections, others)
+            reader.observe(pulse)
             result = reader.tracker.push(pulse, detections)
             if result is not None:
-                messages[camera].append(reader.builder.regular(result))
+                messages[camera].append(reader.with_observations(reader.builder.regular(result)))
     for camera, reader in cameras.items():
-        messages[camera].append(
-            reader.builder.closing(reader.tracker.flush(), len(frames[camera].detections) - 1)
-        )
+        closing = reader.builder.closing(reader.tracker.flush(), len(frames[camera].detections) - 1)
+        messages[camera].append(reader.with_observations(closing))
     return messages
 
 
@@ -124,7 +128,22 @@ class _Camera:
         )
         self.builder = TrackMessageBuilder(camera, 0, frames.size, config.window.stride)
         self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.peers_of(camera) else None
+        site = config.site.size
+        self._observations = (
+            ObservationCollector(Letterbox(frames.size, site)) if camera in config.joint_cameras else None
+        )
         self._frames = frames
+
+    def observe(self, pulse: int) -> None:
+        """Keep the detections of a frame for joint tracking, where the scene is tracked so."""
+        if self._observations is not None and self._frames.searched[pulse]:
+            self._observations.add(pulse, self._frames.detections[pulse], STILL)
+
+    def with_observations(self, message: CameraTracks) -> CameraTracks:
+        """Return a message with the detections since the one before."""
+        if self._observations is None:
+            return message
+        return msgspec.structs.replace(message, observations=self._observations.take())
 
     def shared(self, pulse: int) -> Detections | None:
         """Return the detections of a frame for other cameras; None if the frame was not searched."""

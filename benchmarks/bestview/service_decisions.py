@@ -18,6 +18,7 @@ from server.messaging.epochs import epoch_of_recording_end
 from server.messaging.messages import Box, CameraTracks, TrackMessage
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import EpochAligner
+from server.service.joint_tracking.stage import JointStage
 from server.service.view_selection.decider import ViewDecider, camera_homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow, read_rows
@@ -55,6 +56,7 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
     )
     if people is not None:
         decider.people._registry = GroundTruthRegistry(people)  # type: ignore[assignment]  # noqa: SLF001 — ground truth
+    joint = JointStage(config)
     for camera in config.camera_ids:
         aligner.camera_connected(camera)
         aligner.frame_received(camera, messages[camera][0].boot, 0)
@@ -65,7 +67,7 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
             if message is not None:
                 aligner.add_tracks(message)
             for epoch in aligner.take_ready(now=-1):
-                for decision in decider.step(epoch):
+                for decision in decider.step(joint.step(epoch)):
                     recorder.write(decision)
         for decision in decider.finish(max(last.values())):
             recorder.write(decision)

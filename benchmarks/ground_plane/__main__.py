@@ -25,11 +25,11 @@ from benchmarks.bestview.scenes import BenchmarkScene, recorded, room
 from benchmarks.common.detector_names import detector_settings
 from benchmarks.common.environment import CannotRunError, parser
 from benchmarks.common.report import Report
-from benchmarks.ground_plane.ways import ALONE, BY_FRAME, JOINED, JOINT, NEAREST, WayScore, run_ways
+from benchmarks.ground_plane.ways import ALONE, BY_FRAME, JOINED, JOINT, NEAREST, SERVED, WayScore, run_ways
 from benchmarks.ground_plane.wildtrack import GRADES, wildtrack
 from server.cli.render.plots import new_figure, save_figure
 
-WAYS = (JOINT, BY_FRAME, JOINED, NEAREST, ALONE)
+WAYS = (JOINT, SERVED, BY_FRAME, JOINED, NEAREST, ALONE)
 WILDTRACK = tuple(f"wildtrack {grade}" for grade in GRADES)
 RECORDED = ("terrace", "terrace2")
 ROOMS = {"room-4-8": (4, 8, 40.0), "room-8-20": (8, 20, 30.0)}

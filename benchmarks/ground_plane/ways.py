@@ -24,8 +24,9 @@ from tracking.ground_plane.measurements import estimate_units_per_metre
 from tracking.motchallenge import MotRow
 
 MIN_IOU = 0.5
-JOINT, JOINED, NEAREST, ALONE, BY_FRAME = (
+JOINT, SERVED, JOINED, NEAREST, ALONE, BY_FRAME = (
     "joint program",
+    "joint program in the service",
     "per camera, joined",
     "per camera, nearest feet",
     "per camera alone",
@@ -76,6 +77,10 @@ def run_ways(
     if BY_FRAME in ways:
         began = time.process_time()
         yield score(BY_FRAME, track_frame_by_frame(_in_metres(cameras, frames), frames, fps), began)
+    if SERVED in ways:
+        began = time.process_time()
+        served = scene.config(track={"joint": True})
+        yield score(SERVED, decide(served, track_scene(served, detections.frames)).tracks, began)
     if {JOINED, NEAREST, ALONE} & set(ways):
         began = time.process_time()
         messages = track_scene(config, detections.frames)
