@@ -27,7 +27,8 @@ from server.config.loader import build_config
 from server.config.sections.site import ZenohSettings
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.messages import FRAME_DETECTIONS_MAX, FrameDetections, ZenohKeys
+from server.messaging.messages import FrameDetections, ZenohKeys
+from server.messaging.observations import FRAME_DETECTIONS_MAX
 from synthetic import Scene, write_recording
 from tracking import Detections
 
