@@ -169,10 +169,10 @@ def agglomerate(measurements: Measurements, density: float) -> list[tuple[int, .
 
 
 def _group_near(measurements: Measurements, mean: Floats, covariance: Floats) -> tuple[int, ...]:
-    """Return the detections, the nearest of each camera, that fit a predicted place and each other."""
+    """Return the detections, the likeliest of each camera, that fit a predicted place and each other."""
     spread = measurements.covariances + covariance
     distances = squared_distances(measurements.places - mean, spread)
-    costs = distances + np.log(determinants(spread))
+    costs = distances + np.log(determinants(spread)) + 2.0 * measurements.log_clutter
     group = []
     for camera in np.unique(measurements.camera):
         near = np.flatnonzero((measurements.camera == camera) & (distances < _PREDICTION_GATE))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import Floats, heights
+from tracking.boxes import Floats, areas, heights, intersections
 from tracking.ground_plane.camera import GroundCamera, feet
 from tracking.ground_plane.gaussians import determinants
 from tracking.ground_plane.settings import GroundSettings
@@ -18,6 +18,11 @@ PERSON_M = 1.7
 """Height of a person in metres, from which the unit of a ground plane follows."""
 _MAX_LOG_ODDS = 3.0
 """Scores are not certain: log odds for which they count at most."""
+_NOT_COVERED, _COVERED = 0.3, 0.95
+"""Shares of a box within a better one up to which its score holds, and from which it loses all it can.
+
+In between it loses linearly more, as scores of true and false detections in pictures do.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +38,8 @@ class Measurements:
         places: (D, 2) of the feet, metres.
         covariances: (D, 2, 2) of the places, m²: the noise of a foot carried through the homography, so that
             distant feet are long ellipses, and that of the calibration.
-        log_clutter: (D,) log of the expected false detections per m² there, less the log odds of the score.
+        log_clutter: (D,) log of the expected false detections per m² there, less the log odds of the score,
+            which counts for less within better boxes of the camera: those are parts of a person more often.
     """
 
     looked: NDArray[np.bool_]
@@ -88,8 +94,23 @@ def _measure_camera(
     per_pixel = settings.false_per_frame / (camera.width * camera.height)
     scores = np.clip(found.scores, 1e-6, 1.0 - 1e-6)
     odds = np.minimum(np.log(scores / (1.0 - scores)), _MAX_LOG_ODDS)
+    odds -= settings.covered_log_odds * covered_by_better(found.boxes, odds)
     log_clutter = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - odds
     return camera.to_ground(points), covariances, log_clutter
+
+
+def covered_by_better(boxes: Floats, log_odds: Floats) -> Floats:
+    """Return how much of each box (K, 4) of a picture a better one covers, from 0 to 1, (K,).
+
+    Of two boxes, each is the better one with a probability that their log odds (K,) determine.
+    """
+    if not len(boxes):
+        return np.zeros(0)
+    shares = intersections(boxes[:, None], boxes[None]) / np.maximum(areas(boxes), 1.0)[:, None]
+    np.fill_diagonal(shares, 0.0)
+    covers = np.clip((shares - _NOT_COVERED) / (_COVERED - _NOT_COVERED), 0.0, 1.0)
+    better = 1.0 / (1.0 + np.exp(log_odds[:, None] - log_odds[None]))
+    return np.asarray((covers * better).max(axis=1))
 
 
 def estimate_units_per_metre(cameras: Sequence[GroundCamera], boxes: Mapping[int, Floats]) -> float | None:

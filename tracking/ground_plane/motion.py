@@ -1,8 +1,8 @@
 """How people move on the plane: they walk on, or start, stop and turn.
 
-A walking person's velocity changes by a random acceleration (a Kalman filter of constant velocity). In a
-share of the frames people do anything else: then any velocity is possible. Costs are negative log densities
-of the mixture of both, so that a turn costs more than walking on, but less than leaving and arriving again.
+A walking person's velocity changes by a random acceleration (a Kalman filter of constant velocity). Now and
+then people do anything else: then any velocity is possible. Costs are negative log densities of the mixture
+of both, so that a turn costs more than walking on, but less than leaving and arriving again.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def reach_costs(
         covariances + ahead.place_covariance,
         means - state.place,
         covariances + state.place_covariance + spread,
-        settings.turn_probability,
+        settings.turn_probability(seconds),
     )
 
 
@@ -119,7 +119,7 @@ def follow(
         covariance + ahead.place_covariance,
         place - state.place,
         covariance + state.place_covariance + spread,
-        settings.turn_probability,
+        settings.turn_probability(seconds),
     )
     if turning > walking:
         turned = MotionState.at(state.place, _TURN_NOISE_M**2 * np.eye(2), settings.speed)

@@ -128,7 +128,7 @@ def _step_costs(
         spread + uncertain,
         offsets,
         spread + (settings.speed * seconds) ** 2 * np.eye(2),
-        settings.turn_probability,
+        settings.turn_probability(seconds),
     )
 
 

@@ -13,7 +13,10 @@ from tracking.ground_plane.hypotheses import Places
 _MEMORY = 400.0
 """Detections that a camera's noise is learned from."""
 _PRIOR = 40.0
-"""Detections that the assumed noise counts for."""
+"""Detections that the noise before anything is learned counts for."""
+_PRIOR_FACTOR = 3.0
+"""Factor of the assumed noise before anything is learned. Wide: a noise that is too small makes two people of
+one, and who is two can never show by how much the cameras disagree."""
 _MAX_DISTANCE = 9.2
 """Squared distances count for at most this, the quantile .99, so that a wrong group does no harm."""
 _RANGE = (1.0, 5.0)
@@ -28,8 +31,8 @@ class PlaceNoise:
     """
 
     def __init__(self, cameras: int) -> None:
-        self.factors: Floats = np.ones(cameras)
-        self._sums = np.full((cameras, 2), _PRIOR)
+        self.factors: Floats = np.full(cameras, _PRIOR_FACTOR)
+        self._sums = np.tile(_PRIOR * np.array([_PRIOR_FACTOR**2, 1.0]), (cameras, 1))
 
     def update(self, places: Places, chosen: Sequence[int]) -> None:
         """Learn from the chosen places of a final frame that more than one camera sees."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
+
+_MAY_BE_ANY = {"appearance", "unknown_appearance", "covered_log_odds"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +21,7 @@ class GroundSettings:
     correlation_s: float = 0.2  # seconds in which detections err alike: all frames in them count as one
     detection_probability: float = 0.9  # of a person that nothing hides, in one camera and frame
     false_per_frame: float = 0.5  # false detections per picture
+    covered_log_odds: float = 2.0  # log odds lost by a detection that a better one of its camera covers
     people_density: float = 0.05  # people per square metre, before anybody is known
     arrival_rate: float = 0.004  # people who appear per square metre and second, later
     departure_rate: float = 0.1  # share of the people that leaves per second
@@ -25,18 +29,23 @@ class GroundSettings:
     calibration_noise: float = 0.1  # standard deviation by which cameras disagree about a place, metres
     speed: float = 1.3  # standard deviation of the velocity of people who start, stop and turn, metres/s
     acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, metres/s²
-    turn_probability: float = 0.03  # share of the frames in which somebody starts, stops or turns
+    turn_rate: float = 0.06  # times per second that somebody starts, stops or turns
     forget_after_s: float = 2.0  # seconds unseen after which a person's number is retired
     appearance: float = 4.0  # weight of the distance to a person's appearance in a camera
     unknown_appearance: float = 0.3  # distance at which an appearance says nothing
 
     def __post_init__(self) -> None:
-        for name in ("detection_probability", "turn_probability"):
-            if not 0.0 < getattr(self, name) < 1.0:
-                raise ValueError(f"{name} is a probability between 0 and 1, not {getattr(self, name)}")
+        if not 0.0 < self.detection_probability < 1.0:
+            raise ValueError(
+                f"detection_probability is a probability between 0 and 1, not {self.detection_probability}"
+            )
         for field in fields(self):
-            if field.name not in {"appearance", "unknown_appearance"} and not getattr(self, field.name) > 0.0:
+            if field.name not in _MAY_BE_ANY and not getattr(self, field.name) > 0.0:
                 raise ValueError(f"{field.name} must be above 0, not {getattr(self, field.name)}")
+
+    def turn_probability(self, seconds: float) -> float:
+        """Return the probability that somebody starts, stops or turns within so many seconds."""
+        return -math.expm1(-self.turn_rate * seconds)
 
     def evidence_weight(self, seconds: float) -> float:
         """Return for how much a frame counts beside one that errs on its own; frames are `seconds` apart."""

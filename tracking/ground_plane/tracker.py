@@ -228,7 +228,7 @@ class GroundPlaneTracker:
         people = self._people
         if not people:
             return []
-        hidden = []
+        hidden, weight = [], self._settings.evidence_weight(self._seconds)
         for frame in self._window:
             ahead = [person.ahead(frame.number).place for person in people]
             probabilities = detection_probabilities(
@@ -239,7 +239,8 @@ class GroundPlaneTracker:
                 np.zeros((len(people), len(frame.places.measurements)), dtype=np.bool_),
                 self._settings.detection_probability,
             )
-            hidden.append(-np.log1p(-np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)).sum(axis=1))
+            seen = np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)
+            hidden.append(-weight * np.log1p(-seen).sum(axis=1))
         return [
             KnownPerson(
                 person.state,

@@ -97,6 +97,24 @@ def test_false_detections_alone_are_nobody() -> None:
     assert sum(len(frame.tracks) for frame in frames) < 0.15 * FRAMES
 
 
+def test_parts_of_people_are_seldom_somebody() -> None:
+    walks = crossing_walks(3)
+    detections = detect_walkers(walks, VIEWS, FloorNoise(deviation=0.006))
+    random = np.random.default_rng(0)
+    for found in detections:
+        for name, whole in found.items():
+            upper = whole.boxes[random.random(len(whole)) < 0.5].copy()
+            upper[:, 3] -= 0.5 * (upper[:, 3] - upper[:, 1])
+            found[name] = Detections(
+                np.concatenate([whole.boxes, upper]),
+                np.concatenate([whole.scores, np.full(len(upper), 0.3)]),
+                np.zeros((len(whole) + len(upper), 0)),
+            )
+    frames = track_ground_plane(tracker(), enumerate(detections))
+    assert all(len(found) == 1 for found in true_ids(frames, walks, 0.3))
+    assert len({track.id for frame in frames for track in frame.tracks}) < 8, "14 without regard to covers"
+
+
 def test_who_leaves_is_not_who_arrives_later() -> None:
     walks = crossing_walks(2)
     walks[15:, 0] = np.nan
@@ -182,8 +200,8 @@ def test_wrong_calls_are_refused() -> None:
         online.push(3, {})
     with pytest.raises(ValueError, match="no camera is called 'c9'; there are c0, c1, c2"):
         online.push(4, {"c9": Detections.empty(0)})
-    with pytest.raises(ValueError, match="turn_probability is a probability between 0 and 1, not 1"):
-        GroundSettings(turn_probability=1.0)
+    with pytest.raises(ValueError, match="detection_probability is a probability between 0 and 1, not 1"):
+        GroundSettings(detection_probability=1.0)
     with pytest.raises(ValueError, match="speed must be above 0, not -1"):
         GroundSettings(speed=-1.0)
 
