@@ -16,6 +16,8 @@ Detectors prescan recordings, as MyView does; with `--as-live` they learn the ba
 
 *Appearance only* is association without travel times, for sites whose cameras share no floor.
 
+*Joint* tracks people on the floor in all cameras at once (`track.joint`).
+
 *Detected only* excludes views of people that the camera does not detect, although other cameras locate them.
 *No peer evidence* is without detections from other cameras. *Calibrated* has the homographies that `myview
 calibrate` computes from the cameras' tracks. *Largest* selects in each frame the camera with the largest box.

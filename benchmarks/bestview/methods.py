@@ -34,6 +34,7 @@ MIN_IOU = 0.5
 MAX_GAP = 20
 """Frames of a gap that is interpolated."""
 DETECTED_ONLY = {"undetected_weight": 0.0}
+JOINT = {"joint": True}
 APPEARANCE_ONLY = {"identity": {"maximum_travel_evidence": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 MYVIEW, CALIBRATED, UNCALIBRATED = "MyView", "MyView, calibrated", "no homographies"
@@ -154,6 +155,10 @@ def run_methods(
             f"{name}, detected only", decide(calibrated_scene.config(view=DETECTED_ONLY), messages)
         )
         yield MethodResult(f"{name}, no peer evidence", decide(calibrated_scene.config(), without_peers))
+        tracked_jointly = calibrated_scene.config(track=JOINT)
+        yield MethodResult(
+            f"{name}, joint", decide(tracked_jointly, track_scene(tracked_jointly, found.frames))
+        )
         if scene.disjoint:
             yield MethodResult(
                 f"{name}, appearance only", decide(calibrated_scene.config(view=APPEARANCE_ONLY), messages)

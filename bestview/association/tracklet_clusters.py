@@ -53,9 +53,9 @@ class TrackletCluster:
     @cached_property
     def cameras_so_far(self) -> set[str]:
         """Cameras that see the person, or have seen them before."""
-        current_cameras = {tracklet.key.camera for tracklet in self.tracklets}
-        return current_cameras.union(
-            *(tracklet.appearance.by_camera for tracklet in self.tracklets),
+        # A track that several cameras see is named after none of them.
+        return set[str]().union(
+            *(tracklet.appearance.by_camera or {tracklet.key.camera} for tracklet in self.tracklets),
             *(person.appearance.by_camera for person in self.people),
         )
 

@@ -240,15 +240,11 @@ class PersonTracker:
     def _detecting_cameras(
         self, windows: Sequence[CameraWindow], first: int, last: int
     ) -> dict[str, tuple[int, int]]:
-        """Return the image sizes of the cameras that ran detection in any of these frames.
-
-        Joint tracking has weighed already who should have been seen.
-        """
+        """Return the image sizes of the cameras that ran detection in any of these frames."""
         return {
             window.message.camera: window.message.size
             for window in windows
-            if window.message.camera not in self._ground.cameras
-            and not self.undetected.over(window.message.camera, first, last + 1 - first).all()
+            if not self.undetected.over(window.message.camera, first, last + 1 - first).all()
         }
 
     def _fresh_tracks(self, windows: Sequence[CameraWindow], epoch: Epoch) -> list[TrackUpdate]:
