@@ -9,36 +9,27 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from tracking.boxes import Floats
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
-from tracking.ground_plane.hypotheses import Places, find_places
+from tracking.ground_plane.hypotheses import find_places
 from tracking.ground_plane.measurements import PERSON_M, estimate_units_per_metre, measure
-from tracking.ground_plane.motion import MotionState
-from tracking.ground_plane.network import KnownPerson, build_ground_network
+from tracking.ground_plane.network import build_ground_network
 from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.place_noise import PlaceNoise
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
-from tracking.ground_plane.visibility import detection_probabilities
+from tracking.ground_plane.window import WindowFrame, known_people, predict_places
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport
 from tracking.types import Detections
 
 _NEWCOMERS = 4
 """People who may arrive in one window; doubled as long as all of them do."""
-_MAX_DETECTION_PROBABILITY = 0.97
 _GONE = OCCLUDED - 1
 """State of a person who has left for good."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Frame:
-    number: int
-    places: Places
 
 
 class GroundPlaneTracker:
@@ -71,7 +62,7 @@ class GroundPlaneTracker:
         self._noise = PlaceNoise(len(cameras))
         self._people: list[GroundPerson] = []
         self._next_id = 1
-        self._window: deque[_Frame] = deque()
+        self._window: deque[WindowFrame] = deque()
         self._last: int | None = None
         self._states = np.zeros((0, 0), dtype=np.int64)
         self._report: SolveReport | None = None
@@ -132,7 +123,7 @@ class GroundPlaneTracker:
             if m < self._states.shape[1]
         ]
 
-    def _provisional_tracks(self, frame: _Frame, m: int) -> tuple[GroundTrack, ...]:
+    def _provisional_tracks(self, frame: WindowFrame, m: int) -> tuple[GroundTrack, ...]:
         tracks = []
         for person, row in zip(self._people, self._states, strict=False):
             if row[m] >= 0:
@@ -168,44 +159,24 @@ class GroundPlaneTracker:
             if part is not None:
                 sizes.update(part.boxes)
         measurements = measure(self._cameras, found, self._noise.factors, self._settings)
-        places = find_places(
-            measurements, self._predictions(), self._cameras, self._sizes, self._settings, self._seconds
+        predictions = predict_places(
+            self._people, self._states.tolist(), self._window, self._seconds, self._settings
         )
-        self._window.append(_Frame(number, places))
+        places = find_places(
+            measurements, predictions, self._cameras, self._sizes, self._settings, self._seconds
+        )
+        self._window.append(WindowFrame(number, places))
         if (number + 1) % self._stride or len(self._window) <= self._lag:
             return []
         self._solve()
         return [self._finish_oldest() for _ in range(len(self._window) - self._lag)]
 
-    def _predictions(self) -> list[tuple[Floats, Floats]]:
-        """Return mean and covariance of the place of each person, known or arriving, in the next frame."""
-        predictions = []
-        for n, row in enumerate(self._states):
-            seen = [m for m, state in enumerate(row) if state >= 0]
-            known = self._people[n].state if n < len(self._people) else None
-            seconds = self._seconds * (len(self._window) - seen[-1] if seen else len(self._window) + 1)
-            if seen:
-                places = self._window[seen[-1]].places
-                state = MotionState.at(
-                    places.means[row[seen[-1]]], places.covariances[row[seen[-1]]], self._settings.speed
-                )
-                if known is not None:
-                    joint = state.covariance.copy()
-                    joint[2:, 2:] = known.velocity_covariance
-                    state = MotionState(np.concatenate([state.place, known.velocity]), joint)
-            elif known is not None:
-                state = known
-                seconds += self._seconds * (self._window[0].number - 1 - self._people[n].seen)
-            else:
-                continue
-            ahead = state.predict(seconds, self._settings.acceleration)
-            predictions.append((ahead.place, ahead.place_covariance))
-        return predictions
-
     def _solve(self) -> None:
         """Solve the window's program, with as many possible arrivals as it takes."""
         frames = [frame.places for frame in self._window]
-        people = self._known()
+        people = known_people(
+            self._people, self._window, self._cameras, self._sizes, self._seconds, self._settings
+        )
         anybody_known = self._next_id > 1
         rate = self._settings.arrival_rate * self._seconds if anybody_known else self._settings.people_density
         newcomers = _NEWCOMERS
@@ -222,34 +193,6 @@ class GroundPlaneTracker:
             newcomers *= 2
         rows = np.concatenate([np.ones(len(people), dtype=np.bool_), arrived])
         self._states, self._report = states[rows], solution.report
-
-    def _known(self) -> list[KnownPerson]:
-        """Return the people known, with what the window's frames say of each."""
-        people = self._people
-        if not people:
-            return []
-        hidden, weight = [], self._settings.evidence_weight(self._seconds)
-        for frame in self._window:
-            ahead = [person.ahead(frame.number).place for person in people]
-            probabilities = detection_probabilities(
-                np.array(ahead),
-                self._cameras,
-                self._sizes,
-                frame.places.measurements,
-                np.zeros((len(people), len(frame.places.measurements)), dtype=np.bool_),
-                self._settings.detection_probability,
-            )
-            seen = np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)
-            hidden.append(-weight * np.log1p(-seen).sum(axis=1))
-        return [
-            KnownPerson(
-                person.state,
-                person.seconds_unseen(self._window[0].number),
-                np.array([costs[n] for costs in hidden]),
-                [person.appearance_costs(frame.places) for frame in self._window],
-            )
-            for n, person in enumerate(people)
-        ]
 
     def _finish_oldest(self) -> GroundFrame:
         """Make the oldest frame final: people move, arrive and leave."""
@@ -281,12 +224,12 @@ class GroundPlaneTracker:
         self._states = self._states[rows + arriving, 1:]
         return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)
 
-    def _arrive(self, frame: _Frame, state: int) -> GroundPerson:
+    def _arrive(self, frame: WindowFrame, state: int) -> GroundPerson:
         number, self._next_id = self._next_id, self._next_id + 1
         return GroundPerson(number, frame.number, frame.places, state, self._seconds, self._settings)
 
     def _track(
-        self, person: GroundPerson, frame: _Frame, state: int, place: Floats, covariance: Floats
+        self, person: GroundPerson, frame: WindowFrame, state: int, place: Floats, covariance: Floats
     ) -> GroundTrack:
         """Return the person's place and boxes: detections, and predicted boxes in the other cameras."""
         boxes = {}

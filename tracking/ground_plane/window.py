@@ -1,0 +1,98 @@
+"""The frames that are not final yet, and what they say about the people known before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.ground_plane.camera import BoxSizes, GroundCamera
+from tracking.ground_plane.hypotheses import Places
+from tracking.ground_plane.motion import MotionState
+from tracking.ground_plane.network import KnownPerson
+from tracking.ground_plane.person import GroundPerson
+from tracking.ground_plane.settings import GroundSettings
+from tracking.ground_plane.visibility import detection_probabilities
+
+_MAX_DETECTION_PROBABILITY = 0.97
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindowFrame:
+    """A frame and the hypotheses of places in it."""
+
+    number: int
+    places: Places
+
+
+def predict_places(
+    people: Sequence[GroundPerson],
+    states: Sequence[Sequence[int]],
+    window: Sequence[WindowFrame],
+    seconds_per_frame: float,
+    settings: GroundSettings,
+) -> list[tuple[Floats, Floats]]:
+    """Return mean and covariance of the place of each person in the frame after the window.
+
+    `states`: their places in each frame, below 0 where there is none; first of the `people` known, then of
+    those who arrive.
+    """
+    predictions = []
+    for n, row in enumerate(states):
+        seen = [m for m, state in enumerate(row) if state >= 0]
+        known = people[n].state if n < len(people) else None
+        seconds = seconds_per_frame * (len(window) - seen[-1] if seen else len(window) + 1)
+        if seen:
+            places = window[seen[-1]].places
+            state = MotionState.at(
+                places.means[row[seen[-1]]], places.covariances[row[seen[-1]]], settings.speed
+            )
+            if known is not None:
+                joint = state.covariance.copy()
+                joint[2:, 2:] = known.velocity_covariance
+                state = MotionState(np.concatenate([state.place, known.velocity]), joint)
+        elif known is not None:
+            state = known
+            seconds += seconds_per_frame * (window[0].number - 1 - people[n].seen)
+        else:
+            continue
+        ahead = state.predict(seconds, settings.acceleration)
+        predictions.append((ahead.place, ahead.place_covariance))
+    return predictions
+
+
+def known_people(
+    people: Sequence[GroundPerson],
+    window: Sequence[WindowFrame],
+    cameras: Sequence[GroundCamera],
+    sizes: Sequence[BoxSizes],
+    seconds_per_frame: float,
+    settings: GroundSettings,
+) -> list[KnownPerson]:
+    """Return the people known, with what the window's frames say of each."""
+    if not people:
+        return []
+    hidden, weight = [], settings.evidence_weight(seconds_per_frame)
+    for frame in window:
+        ahead = [person.ahead(frame.number).place for person in people]
+        probabilities = detection_probabilities(
+            np.array(ahead),
+            cameras,
+            sizes,
+            frame.places.measurements,
+            np.zeros((len(people), len(frame.places.measurements)), dtype=np.bool_),
+            settings.detection_probability,
+        )
+        seen = np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)
+        hidden.append(-weight * np.log1p(-seen).sum(axis=1))
+    return [
+        KnownPerson(
+            person.state,
+            person.seconds_unseen(window[0].number),
+            np.array([costs[n] for costs in hidden]),
+            [person.appearance_costs(frame.places) for frame in window],
+        )
+        for n, person in enumerate(people)
+    ]
