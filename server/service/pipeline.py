@@ -94,7 +94,6 @@ class BestViewPipeline:
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
         self._joint = JointWorker(config)
-        _log_joint_cameras(config)
         self.decision_state = DecisionState(config.site.fps)
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
@@ -187,7 +186,10 @@ class BestViewPipeline:
         ready. Frames are received first: a lost frame cannot be shown.
         """
         while (epoch := self._next_epoch()) is not None:
-            self._step(await self._joint.step(epoch))
+            if self.config.joint_cameras:
+                with self.stage_timers.tracking():
+                    epoch = await self._joint.step(epoch)
+            self._step(epoch)
             await asyncio.sleep(0)
             for _ in range(_INBOX_TURNS):
                 if not self.bus.has_waiting_messages:
@@ -299,11 +301,3 @@ class BestViewPipeline:
             self._decision_writer.write_or_skip(decision)
         self.loss_recorder.record_gop(decision)
         self.ingest.forget_thumbnails_before(decision.first - self.decider.people.forget_after)
-
-
-def _log_joint_cameras(config: Config) -> None:
-    """Log which cameras are tracked jointly, if any should be."""
-    if config.joint_cameras:
-        log.info("cameras %s are tracked jointly on their common ground", ", ".join(config.joint_cameras))
-    elif config.track.joint:
-        log.warning("track.joint: fewer than two upright cameras are calibrated: each is tracked alone")

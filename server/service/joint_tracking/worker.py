@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from itertools import count
 
 import msgspec
 
+from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.service.ingest.epoch_aligner import Epoch
@@ -16,6 +18,7 @@ from server.system.worker.process import WorkerDiedError, WorkerProcess
 
 log = logging.getLogger(__name__)
 
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 30.0
 _ANSWER_S = 10.0
 """A process that takes longer for an epoch hangs: it is replaced."""
 
@@ -23,29 +26,45 @@ _ANSWER_S = 10.0
 class JointWorker:
     """Replaces the own tracks of the cameras of the common ground by joint ones, epoch by epoch.
 
-    If the process dies it is replaced, and people are known again by where they are and how they look.
+    If the process dies it is replaced, and people are known again by where they are and how they look. Until
+    then epochs have no tracks in these cameras; a process that dies again and again is replaced less often.
     """
 
     def __init__(self, config: Config) -> None:
         self._cameras = config.joint_cameras
         self._setup = joint_setup(config) if self._cameras else None
+        if self._cameras:
+            log.info("cameras %s are tracked jointly on their common ground", ", ".join(self._cameras))
+        elif config.track.joint:
+            log.warning("track.joint: fewer than two upright cameras are calibrated: each is tracked alone")
         self._runs = count()
         self._worker: WorkerProcess[JointTracks] | None = None
         self._failures = LogThrottle()
+        self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
+        self._retry_at = 0.0
+        """When to start a process at the earliest, by the loop's clock."""
 
     async def step(self, epoch: Epoch) -> Epoch:
         """Return the epoch with joint tracks; unchanged where no cameras are tracked jointly."""
         if self._setup is None:
             return epoch
-        try:
-            worker = await self._running(self._setup)
-            joint = await worker.ask(joint_task(epoch, self._cameras))
-        except WorkerDiedError as error:
-            if (more := self._failures.record(str(error))) is not None:
-                log.warning("the process that tracks jointly %s%s: it is started anew", error, more)
-            await self.close()
-            joint = None
+        joint = None
+        if self._worker is not None or asyncio.get_running_loop().time() >= self._retry_at:
+            try:
+                worker = await self._running(self._setup)
+                joint = await worker.ask(joint_task(epoch, self._cameras))
+                self._backoff.reset()
+            except WorkerDiedError as error:
+                await self._replace(error)
         return with_joint_tracks(epoch, self._cameras, joint)
+
+    async def _replace(self, error: WorkerDiedError) -> None:
+        """End the process; the next one starts at once, and later if that fails, too."""
+        if (more := self._failures.record(str(error))) is not None:
+            log.warning("the process that tracks jointly %s%s: it is started anew", error, more)
+        is_first, delay = not self._backoff.failures, self._backoff.next()
+        self._retry_at = asyncio.get_running_loop().time() + (0.0 if is_first else delay)
+        await self.close()
 
     @property
     def pid(self) -> int | None:

@@ -49,7 +49,7 @@ class ServiceCollector(Collector):
             "First pulse that is not decided yet.",
             value=pipeline.decision_state.end,
         )
-        for histogram in (stages.decide, stages.send, stages.delay):
+        for histogram in (stages.track, stages.decide, stages.send, stages.delay):
             yield from histogram.collect()
         yield from self._queues()
         yield from self._flags()

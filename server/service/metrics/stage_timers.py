@@ -16,15 +16,23 @@ class StageTimers:
     """Measures the service's own stages.
 
     Attributes:
+        track: joint tracking of one epoch, where cameras are tracked jointly.
         decide: one epoch, from identities to view selection.
         send: publishing one GOP to viewers, bus and files.
         delay: from a GOP's first pulse until it is sent.
     """
 
     def __init__(self) -> None:
+        self.track = _histogram("myview_joint_tracking_seconds", "Joint tracking of one epoch.")
         self.decide = _histogram("myview_decide_seconds", "Deciding one epoch.")
         self.send = _histogram("myview_send_seconds", "Publishing one GOP.")
         self.delay = _histogram("myview_delay_seconds", "From a GOP's first pulse until it is sent.")
+
+    @contextmanager
+    def tracking(self) -> Iterator[None]:
+        """Measure the joint tracking of an epoch."""
+        with _measured(self.track):
+            yield
 
     @contextmanager
     def deciding(self) -> Iterator[None]:

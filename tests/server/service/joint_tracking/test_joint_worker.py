@@ -10,8 +10,10 @@ import pytest
 
 from fakes.service.joint_floor import joint_config, walk_past, walked_epochs
 from fakes.timeouts import PATIENCE
+from server.service.joint_tracking import worker as worker_module
 from server.service.joint_tracking.stage import JointStage
 from server.service.joint_tracking.worker import JointWorker
+from server.system.worker.process import WorkerDiedError, WorkerProcess
 
 
 async def test_the_process_gives_the_same_tracks() -> None:
@@ -46,3 +48,22 @@ async def test_a_process_that_dies_or_hangs_is_replaced(
     assert after.joint.tracks.run == before.joint.tracks.run + 1
     assert len(after.tracks["c0"].tracks) == 2
     assert sum("started anew" in record.message for record in caplog.records) == 1
+
+
+async def test_a_process_that_dies_again_and_again_is_replaced_less_often(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    starts = 0
+
+    async def fail(*_: object) -> None:
+        nonlocal starts
+        starts += 1
+        raise WorkerDiedError("died")
+
+    monkeypatch.setattr(WorkerProcess, "start", fail)
+    monkeypatch.setattr(worker_module, "_RETRY_FIRST_S", 1e6)
+    monkeypatch.setattr(worker_module, "_RETRY_MAX_S", 1e6)
+    worker = JointWorker(joint_config())
+    for epoch in walked_epochs(walk_past()):
+        assert (await worker.step(epoch)).tracks["c0"].tracks == []
+    assert starts == 2, "once more at once, and then later"
