@@ -31,7 +31,7 @@ def joint_setup(config: Config) -> JointSetup:
         site_size=config.site.size,
         fps=fps,
         stride_s=config.window.stride / fps,
-        lag_s=track.final_lag(fps) / fps,
+        lag_s=max(track.final_lag(fps), 1) / fps,
         units_per_metre=units.pop() if len(units) == 1 else None,
         solver=track.solver,
         solver_work_s=budget.work_s,

@@ -42,29 +42,13 @@ class JointTracker:
 
     def step(self, task: JointTask) -> JointTracks:
         """Track people in the frames of an epoch."""
-        for camera, part in task.cameras.items():
-            self._set_size(camera, part.size)
-            for frame in part.frames:
-                self._detections[camera][frame.pulse] = unpack_observations(frame)
-            (self._ended.add if part.ended else self._ended.discard)(camera)
+        self._take(task)
         all_ended = bool(task.cameras) and all(camera in self._ended for camera in self._sizes)
         last = max(part.last for part in task.cameras.values()) if all_ended else task.last
-        final = self._push_to(last)
-        if all_ended:
-            final += self._tracker.flush()
-        first_open = self._tracker.first_open
-        if final and first_open is not None and final[-1].frame + 1 < first_open:
-            # Epochs were skipped for so long that nobody is known any more.
-            final, self._final_to = [], first_open - 1
-        first = final[0].frame if final else self._final_to + 1
-        self._final_to = final[-1].frame if final else self._final_to
-        # Before the first solution nobody is known.
-        ahead = self._tracker.provisional() if final and not all_ended else []
-        empty = [GroundFrame(n, (), None) for n in range(self._final_to + 1 + len(ahead), last + 1)]
-        frames = [*final, *ahead, *empty]
+        final, ahead = self._track_to(last, all_ended=all_ended)
         cameras = {
             camera: self._builders[camera].tracks(
-                frames,
+                [*final, *ahead],
                 len(final),
                 self._detections[camera],
                 Letterbox(part.size, self._site_size),
@@ -77,7 +61,7 @@ class JointTracker:
                 del found[pulse]
         return JointTracks(
             run=self._run,
-            first=first,
+            first=self._final_to + 1 - len(final),
             last=last,
             final_to=self._final_to,
             person_height=self._tracker.person_height or 0.0,
@@ -85,6 +69,34 @@ class JointTracker:
             cameras=cameras,
             solve=solver_report(final[-1].report if final else None),
         )
+
+    def _take(self, task: JointTask) -> None:
+        """Store the observations of an epoch."""
+        for camera, part in task.cameras.items():
+            if self._sizes.get(camera) != part.size:
+                self._sizes[camera] = part.size
+                calibration = GroundCamera(self._homographies[camera], *map(float, part.size))
+                self._tracker.set_camera(camera, calibration)
+            for frame in part.frames:
+                self._detections[camera][frame.pulse] = unpack_observations(frame)
+            (self._ended.add if part.ended else self._ended.discard)(camera)
+
+    def _track_to(self, last: int, *, all_ended: bool) -> tuple[list[GroundFrame], list[GroundFrame]]:
+        """Track up to frame `last`; return the frames that have become final, and those after them."""
+        final = self._push_to(last)
+        if all_ended:
+            final += self._tracker.flush()
+        first_open = self._tracker.first_open
+        if final and first_open is not None and final[-1].frame + 1 < first_open:
+            # Epochs were skipped for so long that nobody is known any more.
+            final, self._final_to = [], first_open - 1
+        final = _without_gap(final)
+        if final:
+            self._final_to = final[-1].frame
+        ahead = self._tracker.provisional() if final and not all_ended else []
+        # Before the first solution nobody is known.
+        unsolved = range(self._final_to + 1 + len(ahead), last + 1)
+        return final, [*ahead, *(GroundFrame(frame, (), None) for frame in unsolved)]
 
     def _push_to(self, last: int) -> list[GroundFrame]:
         """Push the frames up to `last`; return those that have become final."""
@@ -100,12 +112,11 @@ class JointTracker:
         self._last = max(self._last, last)
         return final
 
-    def _set_size(self, camera: str, size: tuple[int, int]) -> None:
-        if self._sizes.get(camera) != size:
-            self._sizes[camera] = size
-            self._tracker.set_camera(
-                camera, GroundCamera(self._homographies[camera], float(size[0]), float(size[1]))
-            )
+
+def _without_gap(frames: list[GroundFrame]) -> list[GroundFrame]:
+    """Return the last of the frames, without those before a gap."""
+    gaps = [at for at in range(1, len(frames)) if frames[at].frame != frames[at - 1].frame + 1]
+    return frames[max(gaps, default=0) :]
 
 
 def _paths(frames: list[GroundFrame]) -> list[GroundPath]:

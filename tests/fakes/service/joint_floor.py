@@ -66,6 +66,7 @@ def walked_epochs(
     *,
     noise: FloorNoise = FloorNoise(),  # noqa: B008 — frozen
     first: int = 0,
+    stride: int = STRIDE,
     ends: Mapping[str, int] | None = None,
     boots: Mapping[str, int] | None = None,
     absent: Collection[tuple[str, int]] = (),
@@ -77,11 +78,11 @@ def walked_epochs(
     """
     detections = detect_walkers(walks, VIEWS, noise)
     last_of = {name: first + len(walks) - 1 for name in VIEWS} | dict(ends or {})
-    for number in range(first // STRIDE, (first + len(walks)) // STRIDE + 1):  # the last one closes
-        end, tracks = end_of_epoch(number, STRIDE), {}
+    for number in range(first // stride, (first + len(walks)) // stride + 1):  # the last one closes
+        end, tracks = end_of_epoch(number, stride), {}
         for name in VIEWS:
             last = min(end, last_of[name])
-            start = end - STRIDE + 1
+            start = end - stride + 1
             if start > last_of[name] + 1 or (name, number) in absent:
                 continue
             collector = ObservationCollector(Letterbox(SIZE, SIZE))

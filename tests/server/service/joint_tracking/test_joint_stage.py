@@ -114,3 +114,10 @@ def test_sites_that_do_not_track_jointly_are_left_alone() -> None:
     for epoch in list(walked_epochs(walk_past(6))):
         assert stage.step(epoch) is epoch
     assert SIZE == (640, 480)
+
+
+def test_windows_that_do_not_overlap_are_tracked_too() -> None:
+    window = {"length_s": 0.6, "stride_s": 0.6, "birth_s": 0.6, "min_frames": 3}
+    stage = JointStage(joint_config(track={"joint": True, "window": window}))
+    epochs = [stage.step(epoch) for epoch in walked_epochs(walk_past(), stride=3)]
+    assert {track.id for track in epochs[-1].tracks["c0"].tracks} == {1, 2}
