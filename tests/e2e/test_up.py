@@ -171,15 +171,22 @@ def missing_metrics(printed: ExportedMetrics) -> list[str]:
 
 async def test_every_frame_equals_the_selected_cameras_across_cuts(site: RunningSite, tmp_path: Path) -> None:
     await site.until(lambda: bool(site.gops[-1].choices), "a person is shown")
-    begin = len(site.gops)
     numbers = sorted(site.gops[-1].choices)
-    end = math.inf
+    begun, end = set[str](), math.inf
     paths = {f"object-{number}": f"objects/{number}/best.mp4" for number in numbers}
     paths |= {camera: f"cameras/{camera}/live.mp4" for camera in CAMERAS}
     async with aiohttp.ClientSession() as session:
-        recordings = asyncio.gather(
-            *(record(session, site.url + path, lambda: end, tmp_path / name) for name, path in paths.items())
-        )
+
+        async def recorded(name: str) -> Path:
+            def until() -> float:
+                begun.add(name)
+                return end
+
+            return await record(session, site.url + paths[name], until, tmp_path / name)
+
+        recordings = asyncio.gather(*map(recorded, paths))
+        await site.until(lambda: begun == set(paths), "all streams have begun")
+        begin = len(site.gops)
         await site.until(lambda: shows_enough(site.gops[begin:], numbers), "a cut, and enough to compare")
         end = site.pulse
         files = await with_timeout(recordings)

@@ -28,6 +28,8 @@ from server.service.streaming.subscriber_queue import Chunk, Subscriber
 from server.system.worker.process import START_S, WorkerDiedError, WorkerProcess
 
 _WORKER = "server.service.rendering.worker"
+_ANSWER_S = 5.0
+"""A worker that takes longer to answer counts as hung."""
 
 
 @dataclass(slots=True)
@@ -222,7 +224,7 @@ class RenderedStream:
 
     async def _run_worker(self) -> None:
         self.newest, self._has_rendered = -1, False
-        worker = await WorkerProcess.start(_WORKER, self._settings, RenderResult)
+        worker = await WorkerProcess.start(_WORKER, self._settings, RenderResult, _ANSWER_S)
         self.pid = worker.pid
         jobs = (self._feed(worker), self._answer_stills(worker), self._watch(worker))
         tasks = [asyncio.create_task(job) for job in jobs]

@@ -29,7 +29,7 @@ class WorkerProcess(Generic[Answer]):
     """
 
     def __init__(
-        self, process: asyncio.subprocess.Process, answer_type: type[Answer], answer_s: float = 5.0
+        self, process: asyncio.subprocess.Process, answer_type: type[Answer], answer_s: float
     ) -> None:
         assert process.stdin is not None  # noqa: S101 — tells mypy that there are pipes
         assert process.stdout is not None  # noqa: S101
@@ -41,7 +41,7 @@ class WorkerProcess(Generic[Answer]):
 
     @classmethod
     async def start(
-        cls, module: str, settings: msgspec.Struct, answer_type: type[Answer], answer_s: float = 5.0
+        cls, module: str, settings: msgspec.Struct, answer_type: type[Answer], answer_s: float
     ) -> Self:
         """Start a module as a worker with its settings; :meth:`wait_until_ready` waits for it.
 

@@ -193,7 +193,9 @@ async def test_one_worker_renders_a_stream_for_all_viewers(drawn: DrawnSite) -> 
 async def test_a_killed_worker_is_replaced_and_its_streams_continue(
     drawn: DrawnSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.service.rendering.worker_process._ANSWER_S", 1000.0)  # no viewer waits for it
+    monkeypatch.setattr(
+        "server.service.rendering.rendered_stream._ANSWER_S", 1000.0
+    )  # no viewer waits for it
     pictures: RenderPool = drawn.app[SERVICE].rendering
     sending = asyncio.create_task(drawn.advance_forever(GOP / FPS))
     async with (

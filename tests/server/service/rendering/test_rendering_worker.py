@@ -203,13 +203,15 @@ async def test_a_worker_that_is_ended_while_it_answers_leaves_nothing_open() -> 
     async with asyncio.timeout(PATIENCE):
         while not getattr(process.stdout, "_paused"):  # noqa: ASYNC110, B009 — the buffer is full
             await asyncio.sleep(0)
-        await WorkerProcess(process, RenderResult).kill()
+        await WorkerProcess(process, RenderResult, PATIENCE).kill()
         while not before.issuperset(Path("/proc/self/fd").iterdir()):  # noqa: ASYNC110
             await asyncio.sleep(0)
 
 
 async def test_a_worker_whose_killing_is_cancelled_leaves_nothing_open() -> None:
-    worker = await WorkerProcess.start("server.service.rendering.worker", RENDER_SETTINGS, RenderResult)
+    worker = await WorkerProcess.start(
+        "server.service.rendering.worker", RENDER_SETTINGS, RenderResult, PATIENCE
+    )
     killing = asyncio.create_task(worker.kill())
     await asyncio.sleep(0)
     killing.cancel()
