@@ -25,16 +25,17 @@ def joint_setup(config: Config) -> JointSetup:
     track, fps = config.track, config.site.fps
     cameras = [config.camera(camera) for camera in config.joint_cameras]
     units = {UNITS_PER_METER.get(camera.ground_unit or "") for camera in cameras}
-    budget = track.solver_budget(fps)
+    stride_s, budget = config.window.stride / fps, track.solver_budget(fps)
     return JointSetup(
         homographies={camera.id: _rows(camera.ground or []) for camera in cameras},
         site_size=config.site.size,
         fps=fps,
-        stride_s=config.window.stride / fps,
+        stride_s=stride_s,
         lag_s=max(track.final_lag(fps), 1) / fps,
         units_per_metre=units.pop() if len(units) == 1 else None,
         solver=track.solver,
-        solver_work_s=budget.work_s,
+        # The process does nothing else, so that it may work all the time.
+        solver_work_s=None if budget.work_s is None else stride_s,
         solver_time_s=budget.time_s,
     )
 
