@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 
 from server.media.letterbox import Letterbox
+from server.messaging.picture_motion import moved_homography
 from server.service.calibration.floor_map import floor_coverage
 from server.service.facade.errors import UnknownCameraError
-from server.service.identity.picture_motion import moved_homography
 from server.service.ingest.ingest import CameraState
 from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
 from server.service.pipeline import BestViewPipeline

@@ -12,8 +12,8 @@ from bestview import AppearanceHistogram, TrackKey, TrackUpdate
 from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
+from server.messaging.picture_motion import calibrated_boxes
 from server.service.identity.local_numbers import GROUND, LocalNumbers
-from server.service.identity.picture_motion import calibrated_boxes
 from server.service.ingest.box_arrays import boxes_array
 from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey, TrackUpdate
+from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
 from server.config.sections import ShareSettings
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
@@ -91,8 +91,12 @@ class PersonTracker:
         """Associate an epoch's tracks; return its windows, late revisions first."""
         late = [self._store(window) for window in self._reader.read_late(epoch)]
         windows = [self._store(window) for window in self._reader.read(epoch)]
-        self._recall(windows, epoch)
-        tracks = self._fresh_tracks(windows, epoch)
+        own = [window for window in windows if not epoch.is_joint(window.message.camera)]
+        joint = [window for window in windows if epoch.is_joint(window.message.camera)]
+        self._recall(own, joint, epoch)
+        tracks = [track for window in own for track in window.fresh_tracks()]
+        if epoch.joint is not None:
+            tracks += self._ground.updates(epoch.joint.tracks, [window.message for window in joint])
         since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
         image_sizes = self._detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
@@ -247,15 +251,6 @@ class PersonTracker:
             if not self.undetected.over(window.message.camera, first, last + 1 - first).all()
         }
 
-    def _fresh_tracks(self, windows: Sequence[CameraWindow], epoch: Epoch) -> list[TrackUpdate]:
-        """Return the new final frames of all tracks: on the ground, and of cameras that track alone."""
-        own = [window for window in windows if not epoch.is_joint(window.message.camera)]
-        tracks = [track for window in own for track in window.fresh_tracks()]
-        if epoch.joint is not None:
-            messages = [window.message for window in windows if epoch.is_joint(window.message.camera)]
-            tracks += self._ground.updates(epoch.joint.tracks, messages)
-        return tracks
-
     def _store(self, window: CameraWindow) -> CameraWindow:
         """Store a window, after repairing identity switches where it revises the past."""
         self.undetected.add(window.message)
@@ -267,10 +262,8 @@ class PersonTracker:
         history.put(window, window.first, window.message.last)
         return window
 
-    def _recall(self, windows: Sequence[CameraWindow], epoch: Epoch) -> None:
+    def _recall(self, own: Sequence[CameraWindow], joint: Sequence[CameraWindow], epoch: Epoch) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
-        own = [window for window in windows if not epoch.is_joint(window.message.camera)]
-        joint = [window for window in windows if epoch.is_joint(window.message.camera)]
         linked = {} if epoch.joint is None else self._ground.link(epoch.joint, joint)
         if not self._expected:
             return

@@ -9,11 +9,10 @@ import numpy as np
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import TrackMessage
+from server.messaging.picture_motion import shown_boxes
 from server.messaging.track_conversion import track_message
 from tracking import Detections, WindowTrack
 from tracking.appearance_histograms import add_appearance_histograms
-from tracking.boxes import Floats
-from tracking.detectors.background.motion import Motion
 from tracking.ground_plane import GroundFrame
 from tracking.solvers.base import OCCLUDED
 
@@ -61,7 +60,7 @@ class CameraTrackBuilder:
                     boxes[row, at] = found.box
         oldest = frames[0].frame - self._shown_undetected if frames else 0.0
         self._detected = {number: frame for number, frame in self._detected.items() if frame >= oldest}
-        placed = _in_picture(boxes, letterbox, motion)
+        placed = shown_boxes(letterbox.boxes_camera_to_site(boxes), motion, letterbox.site_size)
         shown = [row for row in range(len(people)) if not np.isnan(placed[row]).all()]
         tracks = [
             WindowTrack(people[row], placed[row], placed[row], np.zeros(0), float(scores[row].mean()))
@@ -71,12 +70,3 @@ class CameraTrackBuilder:
         first = frames[0].frame if frames else 0
         with_looks = add_appearance_histograms(tracks, [states[row] for row in shown], first, searched)
         return [track_message(track) for track in with_looks]
-
-
-def _in_picture(boxes: Floats, letterbox: Letterbox, motion: PictureMotion | None) -> Floats:
-    """Return boxes (..., 4) of a calibrated camera's image where the site's image shows them now."""
-    rows = letterbox.boxes_camera_to_site(boxes.reshape(-1, 4))
-    if motion is not None:
-        moved = Motion(motion.x, motion.y, motion.grow, motion.turn)
-        rows = moved.move_boxes(rows, letterbox.site_size)
-    return np.asarray(rows.reshape(boxes.shape))

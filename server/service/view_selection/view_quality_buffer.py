@@ -12,8 +12,8 @@ from bestview.quality import CameraLayout, QualitySettings, TrackWindow, ViewQua
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
+from server.messaging.picture_motion import moved_homography
 from server.service.identity.camera_window import CameraWindow
-from server.service.identity.picture_motion import moved_homography
 from server.service.ingest.window_history import HistorySpan, WindowHistory
 
 Floats = NDArray[np.float64]

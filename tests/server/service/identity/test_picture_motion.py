@@ -7,8 +7,8 @@ import numpy as np
 from bestview import to_ground
 from fakes.service.scripted_cameras import HEIGHT, WIDTH, camera_tracks, epoch_of
 from server.messaging.camera_status import PictureMotion
+from server.messaging.picture_motion import calibrated_boxes, moved_homography
 from server.service.identity.camera_window import WindowReader
-from server.service.identity.picture_motion import calibrated_boxes, moved_homography
 from tracking.detectors.background.motion import Motion
 
 SIZE = (WIDTH, HEIGHT)

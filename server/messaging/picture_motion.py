@@ -18,6 +18,13 @@ def calibrated_boxes(boxes: Floats, motion: PictureMotion | None, size: tuple[in
     return _motion(motion).move_boxes_back(boxes.reshape(-1, 4), size).reshape(boxes.shape)
 
 
+def shown_boxes(boxes: Floats, motion: PictureMotion | None, size: tuple[int, int]) -> Floats:
+    """Return boxes ``(..., 4)`` of before a camera moved where the site's image shows them now, pixels."""
+    if motion is None:
+        return boxes
+    return _motion(motion).move_boxes(boxes.reshape(-1, 4), size).reshape(boxes.shape)
+
+
 def moved_homography(homography: Floats, motion: PictureMotion | None, size: tuple[int, int]) -> Floats:
     """Return the homography `(3, 3)` of a camera that has moved, from the site's image of a size."""
     if motion is None:
