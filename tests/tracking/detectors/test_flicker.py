@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from fakes.tracking.drawn_people import HEIGHT, SCENE, WIDTH, Figure, Picture, picture
+from synthetic.scene import Scene
 from tracking.boxes import iou
 from tracking.detectors import BackgroundDetector
 from tracking.detectors.background.flicker import FlickerFinder
 
-CHECK_S, CHECKS = 0.2, 60
+FPS, CHECK_S, CHECKS = 25.0, 0.2, 60
 SWING = 40
 """Frames in which a leaf swings to and fro."""
 CANVAS = np.full((HEIGHT, WIDTH, 3), 120, dtype=np.uint8)
@@ -38,20 +39,24 @@ def with_tree(image: Picture, frame: int) -> Picture:
     return np.where(drawn.any(axis=2, keepdims=True), drawn, image)
 
 
+def foreground(image: Picture, background: Picture) -> Picture:
+    """Return where a picture differs from the background."""
+    return np.where(cv2.absdiff(image, background).max(axis=2) > 24, 255, 0).astype(np.uint8)
+
+
 def test_what_keeps_changing_is_flicker_until_it_is_calm() -> None:
     random, finder = np.random.default_rng(1), FlickerFinder(CHECK_S)
-    foreground = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
-    foreground[TREE] = 255
+    tree = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
+    tree[TREE] = 255
+    image = CANVAS
     for _ in range(CHECKS):
         image = CANVAS.copy()
         image[TREE] = random.integers(0, 256, image[TREE].shape)
-        finder.check(image, foreground)
+        finder.check(image, tree)
     assert finder.mask is not None
-    inside = np.zeros_like(foreground)
-    inside[TREE] = 255
-    assert np.mean(finder.mask == inside) > 0.98
+    assert np.mean(finder.mask == tree) > 0.98
     for _ in range(CHECKS):
-        finder.check(image, foreground)
+        finder.check(image, tree)
     assert finder.mask is None
 
 
@@ -63,8 +68,17 @@ def test_people_who_walk_by_and_one_who_stands_are_no_flicker(spacing: int) -> N
         frame = 5 * check
         walkers = [Figure(-400 - spacing * k + 2.0 * frame, 200) for k in range(12)]
         image = picture([*walkers, stands], frame)
-        difference = cv2.absdiff(image, SCENE).max(axis=2)
-        finder.check(image, np.where(difference > 24, 255, 0).astype(np.uint8))
+        finder.check(image, foreground(image, SCENE))
+        assert finder.mask is None
+
+
+@pytest.mark.parametrize("every", [5, 12])
+def test_a_crowd_that_mills_about_is_no_flicker(every: int) -> None:
+    scene = Scene("room", 4, 8, 1, 320, 180, FPS)
+    empty, finder = scene.clean_background(0), FlickerFinder(every / FPS)
+    for frame in range(350, 650, every):
+        image = scene.image(0, frame)
+        finder.check(image, foreground(image, empty))
         assert finder.mask is None
 
 
