@@ -10,7 +10,7 @@ import pytest
 
 from camsync import ClientSettings, Credentials, PulseClient, PulseServer, ServerLimits, query_clients
 from camsync.limits import select_evicted
-from camsync.messages import Greeting, LoginMessage, LoginRequest, Pong
+from camsync.messages import ClientList, ClientsRequest, Greeting, LoginMessage, LoginRequest, Pong
 from camsync.protocol import encode
 from fakes.camsync.pulse_clients import Connect, RawConnection
 from fakes.timeouts import PATIENCE
@@ -83,6 +83,20 @@ async def test_a_client_keeps_its_place_when_its_user_connects_again(connect: Co
             LOCALHOST, server.port, PATIENCE, credentials=Credentials("c0", USERS["c0"])
         )
         assert others[0].name == "c0"
+
+
+async def test_a_client_that_is_behind_gets_the_list_once_it_has_read_its_pulses(connect: Connect) -> None:
+    async with PulseServer(FPS, limits=ServerLimits(cut_off=PATIENCE)) as server:
+        client, other = await connect(server.port, receive=1024), await connect(server.port)
+        while not server.clients()[0].dropped:
+            await other.pulse()
+        client.send(encode(ClientsRequest()))
+        while server.clients()[0].dropped < 100:
+            await other.pulse()
+        message = await client.message()
+        while not isinstance(message, ClientList):
+            message = await client.message()
+        assert len(message.clients) == 1
 
 
 async def test_a_second_client_of_a_user_replaces_the_first(connect: Connect) -> None:

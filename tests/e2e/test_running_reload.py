@@ -49,7 +49,7 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         processes = site.children()
         path = f"objects/{min(site.gops[-1].choices)}/best.mp4"
         end = site.pulse + 100
-        viewer = asyncio.create_task(record(session, path, lambda: end, tmp_path / "viewer"))
+        viewer = asyncio.create_task(record(session, path, lambda pulse: pulse >= end, tmp_path / "viewer"))
 
         await reload(site, config, site={"fps": "banana"})
         await wait_for_log(site, "site.fps: Input should be a valid number")

@@ -16,16 +16,16 @@ FPS = 10
 
 
 async def record(
-    session: aiohttp.ClientSession, url: str, until_pulse: Callable[[], float], out: Path
+    session: aiohttp.ClientSession, url: str, is_enough: Callable[[int], bool], out: Path
 ) -> Path:
-    """Save a stream up to a pulse, which may be known only while it is saved."""
+    """Save a stream until its newest pulse is enough."""
     data = bytearray()
     async with session.get(url) as answer:
         assert answer.status == 200, await answer.text()
         assert answer.content_type == "video/mp4"
         async for piece, _ in answer.content.iter_chunks():
             data += piece
-            if newest_pulse(data) >= until_pulse():
+            if is_enough(newest_pulse(data)):
                 break
     out.write_bytes(data)
     return out
