@@ -43,12 +43,21 @@ def selected_scenes(options: argparse.Namespace, folder: Path, report: Report) -
     """Yield the selected scenes one after the other; drawn ones are written into the folder.
 
     Those whose recordings are missing are reported.
+
+    Raises:
+        CannotRunError: all recordings are missing.
     """
-    for name in options.scene or options.all_scenes:
+    names, problems = options.scene or options.all_scenes, []
+    for name in names:
         try:
-            yield draw_room(folder) if name == DRAWN else recorded(options.data, name)
+            scene = draw_room(folder) if name == DRAWN else recorded(options.data, name)
         except CannotRunError as problem:
             report.line(f"{name}: skipped: {problem}")
+            problems.append(problem)
+        else:
+            yield scene
+    if len(problems) == len(names):
+        raise problems[0]
 
 
 def draw_room(folder: Path, fps: float = 25.0) -> BenchmarkScene:
