@@ -32,8 +32,10 @@ class TrackletCluster:
 
     @property
     def frame_count(self) -> int:
-        """Observations in all cameras."""
-        return sum(tracklet.frame_count for tracklet in self.tracklets)
+        """Observations in all cameras; those of a track that several cameras see count for each."""
+        return sum(
+            tracklet.frame_count * max(len(tracklet.appearance.by_camera), 1) for tracklet in self.tracklets
+        )
 
     @property
     def first_frame(self) -> int:

@@ -27,6 +27,7 @@ from fakes.bestview.identity_scenes import (
     STRIDE,
     VIEWS,
     StraightTrack,
+    coat,
     collect_updates,
     in_two_cameras,
     numbers,
@@ -57,6 +58,17 @@ def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
     # Two cameras see 10 frames together in every update.
     assert [update.created for update in seen] == [(), (), (1,)] + [()] * 9
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
+
+
+@pytest.mark.parametrize(("cameras", "frames"), [(("south",), 25), (("south", "west"), 15)])
+def test_a_track_that_several_cameras_see_is_confirmed_sooner(cameras: tuple[str, ...], frames: int) -> None:
+    seen = registry(confirmation_s=1.0, clustering_interval_s=0.2)
+    stays = StraightTrack("south", 1, 0, 99, (0, 0))
+    for last in range(STRIDE - 1, frames, STRIDE):
+        first = last - STRIDE + 1
+        looks = tuple(AppearanceHistogram(first, last, coat(1), camera) for camera in cameras)
+        update = seen.update([replace(stays.track(first, last), appearance=looks)], last)
+        assert bool(update.created) == (last == frames - 1)
 
 
 @OPEN_TRACKLET_LIMITS
