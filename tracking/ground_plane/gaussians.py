@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tracking.boxes import Floats
@@ -24,12 +26,34 @@ def inverses(matrices: Floats) -> Floats:
 
 def squared_distances(offsets: Floats, covariances: Floats) -> Floats:
     """Return the squared Mahalanobis distances of offsets (..., 2) under covariances (..., 2, 2)."""
-    return np.asarray(np.einsum("...i,...ij,...j", offsets, inverses(covariances), offsets))
+    x, y = offsets[..., 0], offsets[..., 1]
+    twice_covariance = covariances[..., 0, 1] + covariances[..., 1, 0]
+    adjugate = covariances[..., 1, 1] * x * x - twice_covariance * x * y + covariances[..., 0, 0] * y * y
+    return np.asarray(adjugate / determinants(covariances))
 
 
 def negative_log_densities(offsets: Floats, covariances: Floats) -> Floats:
     """Return -log N(offset; 0, covariance), where the density is per unit of area."""
-    return 0.5 * (squared_distances(offsets, covariances) + np.log(determinants(covariances))) + LOG_2PI
+    return OffsetDensities.of(offsets, covariances).costs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OffsetDensities:
+    """The densities of offsets under their covariances.
+
+    Attributes:
+        distances: (...) squared Mahalanobis distances.
+        costs: (...) negative logs of the densities, per unit of area.
+    """
+
+    distances: Floats
+    costs: Floats
+
+    @classmethod
+    def of(cls, offsets: Floats, covariances: Floats) -> OffsetDensities:
+        """Compute them for offsets (..., 2) and covariances (..., 2, 2)."""
+        distances = squared_distances(offsets, covariances)
+        return cls(distances, 0.5 * (distances + np.log(determinants(covariances))) + LOG_2PI)
 
 
 def fuse(places: Floats, covariances: Floats) -> tuple[Floats, Floats]:

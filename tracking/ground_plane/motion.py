@@ -10,12 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracking.boxes import Floats
-from tracking.ground_plane.gaussians import negative_log_densities, squared_distances
+from tracking.ground_plane.gaussians import OffsetDensities
 from tracking.ground_plane.settings import GroundSettings
 
-MOTION_GATE = 16.0
+_MOTION_GATE = 16.0
 """Squared Mahalanobis distance, the quantile .9997, beyond which a move is impossible."""
 _MAX_TURN_S = 1.5
 """Seconds after which the place of somebody who may have turned is not searched further away."""
@@ -79,18 +80,19 @@ class MotionState:
         )
 
 
-def move_costs(
-    walked: Floats, walked_covariances: Floats, turned: Floats, turned_covariances: Floats, turns: float
-) -> Floats:
-    """Return the negative log densities of offsets from where somebody walks on to, and from where they were.
+def move_costs(walked: OffsetDensities, turned: OffsetDensities, turns: float) -> Floats:
+    """Return the negative log densities of moves: of walking on, or of turning with the probability `turns`.
 
-    Offsets are (..., 2), covariances (..., 2, 2); infinite where both are impossible.
+    Both densities are of offsets: from where somebody walks on to, and from where they were. Infinite where
+    both are impossible.
     """
-    walking, turning = _log_densities(walked, walked_covariances, turned, turned_covariances, turns)
-    possible = (squared_distances(walked, walked_covariances) < MOTION_GATE) | (
-        squared_distances(turned, turned_covariances) < MOTION_GATE
-    )
-    return np.where(possible, -np.logaddexp(walking, turning), np.inf)
+    walking, turning = _log_densities(walked, turned, turns)
+    return np.where(is_possible(walked) | is_possible(turned), -np.logaddexp(walking, turning), np.inf)
+
+
+def is_possible(moves: OffsetDensities) -> NDArray[np.bool_]:
+    """Return which moves are not too far."""
+    return np.asarray(moves.distances < _MOTION_GATE)
 
 
 def reach_costs(
@@ -100,10 +102,8 @@ def reach_costs(
     ahead = state.predict(seconds, settings.acceleration)
     spread = (settings.speed * min(seconds, _MAX_TURN_S)) ** 2 * np.eye(2)
     return move_costs(
-        means - ahead.place,
-        covariances + ahead.place_covariance,
-        means - state.place,
-        covariances + state.place_covariance + spread,
+        OffsetDensities.of(means - ahead.place, covariances + ahead.place_covariance),
+        OffsetDensities.of(means - state.place, covariances + state.place_covariance + spread),
         settings.turn_probability(seconds),
     )
 
@@ -115,10 +115,8 @@ def follow(
     ahead = state.predict(seconds, settings.acceleration)
     spread = (settings.speed * seconds) ** 2 * np.eye(2)
     walking, turning = _log_densities(
-        place - ahead.place,
-        covariance + ahead.place_covariance,
-        place - state.place,
-        covariance + state.place_covariance + spread,
+        OffsetDensities.of(place - ahead.place, covariance + ahead.place_covariance),
+        OffsetDensities.of(place - state.place, covariance + state.place_covariance + spread),
         settings.turn_probability(seconds),
     )
     if turning > walking:
@@ -127,10 +125,6 @@ def follow(
     return ahead.update(place, covariance)
 
 
-def _log_densities(
-    walked: Floats, walked_covariances: Floats, turned: Floats, turned_covariances: Floats, turns: float
-) -> tuple[Floats, Floats]:
+def _log_densities(walked: OffsetDensities, turned: OffsetDensities, turns: float) -> tuple[Floats, Floats]:
     """Return the log densities of having walked on and of having turned, each with its probability."""
-    walking = np.log1p(-turns) - negative_log_densities(walked, walked_covariances)
-    turning = np.log(turns) - negative_log_densities(turned, turned_covariances)
-    return walking, turning
+    return np.log1p(-turns) - walked.costs, np.log(turns) - turned.costs

@@ -14,9 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
-from tracking.ground_plane.gaussians import negative_log_densities, squared_distances
+from tracking.ground_plane.gaussians import OffsetDensities
 from tracking.ground_plane.hypotheses import Places
-from tracking.ground_plane.motion import MOTION_GATE, MotionState, move_costs, reach_costs
+from tracking.ground_plane.motion import MotionState, is_possible, move_costs, reach_costs
 from tracking.ground_plane.settings import GroundSettings
 from tracking.model.network import Network
 
@@ -76,17 +76,16 @@ def build_ground_network(
             )
             node[n, m, : len(places)] += person.appearance[m]
             (source[n] if m == 0 else pair[n, m - 1, hidden])[: len(places)] = reach
-            if m:
-                pair[n, m - 1, : len(frames[m - 1]), : len(places)] = _step_costs(
-                    person, m, seconds, frames[m - 1], places, settings
-                )
-    for n in range(len(people), objects):
-        node[n, :, hidden] = 0.0
-        source[n, : len(frames[0])] = arrival_cost
-        pair[n, :, :gone, gone] = departure
-        for m, (before, after) in enumerate(pairwise(frames)):
-            pair[n, m, hidden, : len(after)] = arrival_cost
-            pair[n, m, : len(before), : len(after)] = _arrival_step_costs(before, after, seconds, settings)
+    node[len(people) :, :, hidden] = 0.0
+    source[len(people) :, : len(frames[0])] = arrival_cost
+    pair[len(people) :, :, :gone, gone] = departure
+    for m, (before, after) in enumerate(pairwise(frames)):
+        steps = _Steps.between(before, after, seconds, settings)
+        pair[len(people) :, m, hidden, : len(after)] = arrival_cost
+        pair[len(people) :, m, : len(before), : len(after)] = steps.costs_of_newcomers()
+        for n, person in enumerate(people):
+            ahead = person.state.predict(person.seconds + m * seconds, settings.acceleration)
+            pair[n, m, : len(before), : len(after)] = steps.costs(ahead, seconds, settings)
     return _network(node, source, pair, frames)
 
 
@@ -114,27 +113,34 @@ def _network(node: Floats, source: Floats, pair: Floats, frames: Sequence[Places
     )
 
 
-def _step_costs(
-    person: KnownPerson, m: int, seconds: float, before: Places, after: Places, settings: GroundSettings
-) -> Floats:
-    """Return the costs of going from the places of frame m - 1 to those of frame m."""
-    ahead = person.state.predict(person.seconds + (m - 1) * seconds, settings.acceleration)
-    offsets = after.means[None] - before.means[:, None]
-    spread = before.covariances[:, None] + after.covariances[None]
-    uncertain = ahead.velocity_covariance * seconds**2
-    uncertain = uncertain + (0.5 * settings.acceleration * seconds**2) ** 2 * np.eye(2)
-    return move_costs(
-        offsets - seconds * ahead.velocity,
-        spread + uncertain,
-        offsets,
-        spread + (settings.speed * seconds) ** 2 * np.eye(2),
-        settings.turn_probability(seconds),
-    )
+@dataclass(frozen=True, slots=True, eq=False)
+class _Steps:
+    """The steps from each place of a frame to each of the next.
 
+    Attributes:
+        offsets: (K, L, 2) metres.
+        spread: (K, L, 2, 2) their covariances.
+        turned: their densities for somebody who may walk anywhere.
+    """
 
-def _arrival_step_costs(before: Places, after: Places, seconds: float, settings: GroundSettings) -> Floats:
-    offsets = after.means[None] - before.means[:, None]
-    spread = before.covariances[:, None] + after.covariances[None]
-    spread = spread + (settings.speed * seconds) ** 2 * np.eye(2)
-    possible = squared_distances(offsets, spread) < MOTION_GATE
-    return np.where(possible, negative_log_densities(offsets, spread), np.inf)
+    offsets: Floats
+    spread: Floats
+    turned: OffsetDensities
+
+    @classmethod
+    def between(cls, before: Places, after: Places, seconds: float, settings: GroundSettings) -> _Steps:
+        offsets = after.means[None] - before.means[:, None]
+        spread = before.covariances[:, None] + after.covariances[None]
+        anywhere = (settings.speed * seconds) ** 2 * np.eye(2)
+        return cls(offsets, spread, OffsetDensities.of(offsets, spread + anywhere))
+
+    def costs(self, person: MotionState, seconds: float, settings: GroundSettings) -> Floats:
+        """Return the costs of the steps for a person whose velocity is known, (K, L)."""
+        uncertain = person.velocity_covariance * seconds**2
+        uncertain = uncertain + (0.5 * settings.acceleration * seconds**2) ** 2 * np.eye(2)
+        walked = OffsetDensities.of(self.offsets - seconds * person.velocity, self.spread + uncertain)
+        return move_costs(walked, self.turned, settings.turn_probability(seconds))
+
+    def costs_of_newcomers(self) -> Floats:
+        """Return the costs of the steps for somebody whose velocity is not known, (K, L)."""
+        return np.where(is_possible(self.turned), self.turned.costs, np.inf)

@@ -15,6 +15,7 @@ from tracking.ground_plane.predicted_boxes import PersonBoxes
 from tracking.ground_plane.settings import GroundSettings
 
 _TEMPLATE_UPDATE_RATE = 0.05
+_UNKNOWN = np.zeros(0)
 
 
 class GroundPerson:
@@ -55,6 +56,10 @@ class GroundPerson:
         self.state = follow(self.state, seconds, mean, covariance, self._settings)
         self.seen = frame
 
+    def template(self, camera: int) -> Floats:
+        """Return the mean histogram in a camera, (B,); B = 0: not known."""
+        return self._histograms.get(camera, _UNKNOWN)
+
     def learn(self, places: Places, k: int, sizes: Sequence[BoxSizes]) -> None:
         """Learn appearance and size from the detections of place `k`."""
         measurements = places.measurements
@@ -67,15 +72,22 @@ class GroundPerson:
                 self._histograms[camera] = histogram
             self.boxes.update(measurements.boxes[index], sizes[camera])
 
-    def appearance_costs(self, places: Places) -> Floats:
-        """Return the costs of the places by the person's appearance in the cameras that see them, (K,)."""
-        measurements = places.measurements
-        costs = np.zeros(len(measurements))
-        if not self._histograms:
-            return np.zeros(len(places))
-        for index, histogram in enumerate(measurements.histograms):
-            template = self._histograms.get(int(measurements.camera[index]))
-            if template is not None and len(template) == len(histogram):
-                distance = appearance_distance_matrix(template[None], histogram[None])[0, 0]
-                costs[index] = self._settings.appearance * (distance - self._settings.unknown_appearance)
-        return np.array([costs[list(group)].sum() for group in places.groups])
+
+def appearance_costs(people: Sequence[GroundPerson], places: Places, settings: GroundSettings) -> Floats:
+    """Return the costs of the K places by people's appearance in the cameras that see them, (P, K)."""
+    measurements = places.measurements
+    costs = np.zeros((len(people), len(measurements)))
+    if not costs.size or not len(places):
+        return np.zeros((len(people), len(places)))
+    for camera in np.unique(measurements.camera).tolist():
+        seen = np.flatnonzero(measurements.camera == camera)
+        looks = np.stack([measurements.histograms[index] for index in seen])
+        templates = [person.template(camera) for person in people]
+        known = np.flatnonzero([len(template) == looks.shape[1] > 0 for template in templates])
+        if len(known):
+            chosen = np.stack([templates[n] for n in known.tolist()])
+            distances = appearance_distance_matrix(chosen, looks) - settings.unknown_appearance
+            costs[np.ix_(known, seen)] = settings.appearance * distances
+    members = np.concatenate([np.array(group) for group in places.groups])
+    begins = np.cumsum([0, *(len(group) for group in places.groups[:-1])])
+    return np.asarray(np.add.reduceat(costs[:, members], begins, axis=1))

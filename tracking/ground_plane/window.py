@@ -12,7 +12,7 @@ from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.hypotheses import Places
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.network import KnownPerson
-from tracking.ground_plane.person import GroundPerson
+from tracking.ground_plane.person import GroundPerson, appearance_costs
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.visibility import detection_probabilities
 
@@ -87,12 +87,13 @@ def known_people(
         )
         seen = np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)
         hidden.append(-weight * np.log1p(-seen).sum(axis=1))
+    appearance = [appearance_costs(people, frame.places, settings) for frame in window]
     return [
         KnownPerson(
             person.state,
             person.seconds_unseen(window[0].number),
             np.array([costs[n] for costs in hidden]),
-            [person.appearance_costs(frame.places) for frame in window],
+            [costs[n] for costs in appearance],
         )
         for n, person in enumerate(people)
     ]
