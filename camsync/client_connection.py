@@ -95,7 +95,7 @@ class ClientConnection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._handshake: asyncio.Task[None] | None = None
         self._sent = self._dropped = self._dropped_in_a_row = self._errors = 0
-        self._is_registered = self._owes_clients = False
+        self._is_registered = self._is_list_due = False
         self._early_lines: list[bytes] = []
         """Lines that arrived with the end of the TLS handshake."""
         self.address = self._host = "?"
@@ -182,7 +182,7 @@ class ClientConnection(asyncio.Protocol):
 
     def send_pulse(self, line: bytes) -> None:
         """Send a pulse, or count it as dropped; close the connection of a client that stays behind."""
-        if self._owes_clients:
+        if self._is_list_due:
             self._send_clients()
         now = self._clock()
         if self.send(line):
@@ -275,8 +275,8 @@ class ClientConnection(asyncio.Protocol):
     def _send_clients(self) -> None:
         """Send the list of the other clients: a long line, so only once a client has read everything else."""
         transport = self._transport
-        self._owes_clients = transport is not None and transport.get_write_buffer_size() > 0
-        if transport is None or self._owes_clients:
+        self._is_list_due = transport is not None and transport.get_write_buffer_size() > 0
+        if transport is None or self._is_list_due:
             return
         listed = tuple(
             ListedClient(client.name, client.dropped_in_a_row)

@@ -19,7 +19,7 @@ from tracking.detectors.background.motion import STILL, Motion
 _PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 
 
-def unmoved_camera_boxes(
+def calibrated_camera_boxes(
     boxes: NDArray[np.float64], letterbox: Letterbox, motion: Motion
 ) -> NDArray[np.float64]:
     """Return boxes (K, 4) of the site's image in the camera's pixels, where they were before it moved."""
@@ -37,7 +37,7 @@ def scored_boxes(
     detections: Detections, chosen: NDArray[np.int64], letterbox: Letterbox, motion: Motion
 ) -> list[ScoredBox]:
     """Return the chosen detections as a message has them, rounded."""
-    boxes = unmoved_camera_boxes(detections.boxes[chosen], letterbox, motion).round(_PIXEL_DIGITS)
+    boxes = calibrated_camera_boxes(detections.boxes[chosen], letterbox, motion).round(_PIXEL_DIGITS)
     scores = detections.scores[chosen].round(_SCORE_DIGITS)
     rows = np.clip(np.column_stack([boxes, scores]), -COORDINATE_MAX, COORDINATE_MAX)
     return [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bestview import CameraDetections, CameraGeometry, rescore_detections, views_overlap
-from server.camera.observations import most_confident, scored_boxes, unmoved_camera_boxes
+from server.camera.observations import calibrated_camera_boxes, most_confident, scored_boxes
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import FrameDetections
@@ -62,7 +62,7 @@ class CrossViewScorer:
             for message in messages
             if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]
-        own = unmoved_camera_boxes(detections.boxes, self._letterbox, motion)
+        own = calibrated_camera_boxes(detections.boxes, self._letterbox, motion)
         found = CameraDetections(own, detections.scores)
         return replace(
             detections, scores=rescore_detections(self._geometry, found, peers, self._config.track.cross_view)

@@ -19,6 +19,9 @@ from server.service.joint_tracking.stage import JointStage
 from server.service.view_selection.decider import camera_homographies
 from tracking.boxes import Floats, iou
 
+MEET, OTHER = 31, {1: 2, 2: 1}
+"""A frame in which two people stand together; each one's id, and the other's."""
+
 
 def person_tracker() -> PersonTracker:
     config = joint_config()
@@ -117,9 +120,6 @@ def test_looks_tell_who_is_who_after_people_who_met_were_confused() -> None:
     assert people.registry.all_numbers == [1, 2]
 
 
-MEET = 31
-
-
 def meet_and_part() -> Floats:
     """Return two people who walk towards each other, stand together, and go back, (F, 2, 2) metres."""
     ahead = np.concatenate([np.linspace(2.0, 4.85, 26), np.full(10, 4.85), np.linspace(4.85, 2.0, 30)])
@@ -142,6 +142,3 @@ def confused(epoch: Epoch) -> Epoch:
     }
     tracks = msgspec.structs.replace(joint, paths=paths, cameras=cameras)
     return replace(epoch, tracks=windows, joint=replace(epoch.joint, tracks=tracks))
-
-
-OTHER = {1: 2, 2: 1}
