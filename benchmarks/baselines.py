@@ -3,9 +3,9 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.baselines --data ../shared/data --out out/bench
 
 People are detected once per view, as in `myview track`; each tracker gets these detections and the pictures.
-All trackers initiate and terminate objects by detections. `lp`, `kalman` and `track-graph` also track
-them by detections, the others by appearance: they alone can drift onto the background. Perfect association of
-the same detections is the upper bound. Times are the tracker's alone.
+All trackers initiate and terminate objects by detections. `lp`, `kalman` and the track graphs also track
+them by detections, `rjmcmc` by both, the others by appearance: they alone can drift onto the background.
+Perfect association of the same detections is the upper bound. Times are the tracker's alone.
 """
 
 from __future__ import annotations

@@ -27,15 +27,19 @@ TEMPORAL_TRACKER = "temporal"
 PREDICTION_METHODS = {
     "kalman": ("tracking.baselines.kalman_prediction", "KalmanPrediction"),
     "klt": ("tracking.baselines.optical_flow", "OpticalFlow"),
-    "mcmc": ("tracking.baselines.mcmc", "McmcFilter"),
+    "mcmc": ("tracking.baselines.particles.mcmc", "McmcFilter"),
     "mean-shift": ("tracking.baselines.mean_shift", "MeanShift"),
-    "separated-particles": ("tracking.baselines.separated_particles", "SeparatedParticles"),
-    "occlusion-cues": ("tracking.baselines.occlusion_cues", "OcclusionCueTracker"),
-    "particle": ("tracking.baselines.particle_filter", "ParticleFilters"),
+    "separated-particles": ("tracking.baselines.particles.separated_particles", "SeparatedParticles"),
+    "occlusion-cues": ("tracking.baselines.particles.occlusion_cues", "OcclusionCueTracker"),
+    "particle": ("tracking.baselines.particles.particle_filter", "ParticleFilters"),
 }
 """Module and class of each frame-by-frame tracker's prediction method, by the tracker's name."""
 
-_GRAPH = "track-graph"
+SELF_CONTAINED = {
+    "rjmcmc": ("tracking.baselines.particles.varying_targets", "VaryingTargetsTracker", True),
+    "track-graph": ("tracking.baselines.track_graphs.track_graph", "TrackGraph", False),
+}
+"""Module, class and need for images of the trackers that decide more than a prediction, by name."""
 
 
 class Tracker(Protocol):
@@ -65,7 +69,7 @@ class PrescanTracker(Protocol):
 
 def tracker_names() -> tuple[str, ...]:
     """Return the names of all trackers."""
-    return (DEFAULT_TRACKER, *sorted((*PREDICTION_METHODS, TEMPORAL_TRACKER, _GRAPH)))
+    return (DEFAULT_TRACKER, *sorted((*PREDICTION_METHODS, TEMPORAL_TRACKER, *SELF_CONTAINED)))
 
 
 def needs_images(name: str) -> bool:
@@ -74,9 +78,9 @@ def needs_images(name: str) -> bool:
     Raises:
         ValueError: no tracker has that name.
     """
-    return name == TEMPORAL_TRACKER or (
-        name not in {DEFAULT_TRACKER, _GRAPH} and bool(_method_of(name).uses_image)
-    )
+    if name in SELF_CONTAINED:
+        return SELF_CONTAINED[name][2]
+    return name == TEMPORAL_TRACKER or (name != DEFAULT_TRACKER and bool(_method_of(name).uses_image))
 
 
 def create_tracker(
@@ -106,10 +110,10 @@ def create_tracker(
             "tracking.baselines.temporal_consistency.tracker"
         ).TemporalBlobTracker(window, temporal, fps)
         return tracker
-    if name == _GRAPH:
-        from tracking.baselines.track_graph import TrackGraph  # noqa: PLC0415 — imported on demand
-
-        return TrackGraph(window, fps=fps)
+    if name in SELF_CONTAINED:
+        module, class_name, _ = SELF_CONTAINED[name]
+        found: Tracker = getattr(import_module(module), class_name)(window, fps=fps)
+        return found
     return StepwiseTracker(_method_of(name)(), window, fps=fps)
 
 

@@ -46,10 +46,15 @@ class Crossing:
         image = rng.integers(90, 130, (*SIZE, 3)).astype(np.uint8)
         texture = rng.integers(-25, 25, (_TALL, _WIDE, 1))
         self.furnish(image, texture)
-        for person, clothes in enumerate(self.clothes):
+        for person in self.present(frame):
+            clothes = self.clothes[person]
             left, top = np.rint(self.where(person, frame)[:2]).astype(int).tolist()
             _dress(image, left, top, np.array(clothes), texture)
         return image
+
+    def present(self, frame: int) -> Sequence[int]:  # noqa: ARG002
+        """Return who is in the picture, from back to front."""
+        return range(len(self.clothes))
 
     def furnish(self, image: Image, texture: Floats) -> None:
         """Draw objects of the background."""
@@ -70,6 +75,17 @@ class WalkTogether(Crossing):
     def furnish(self, image: Image, texture: Floats) -> None:
         faded = 0.6 * np.array(self.clothes[0]) + 0.4 * 110
         _dress(image, 125, 66, faded, texture)
+
+
+@dataclass(frozen=True)
+class EnterAndLeave(Crossing):
+    """The second person enters in frame 12, nearer to the camera; the first leaves in frame 40."""
+
+    def where(self, person: int, frame: int) -> Floats:
+        return super().where(person, frame) + np.array([0.0, 1.0, 0.0, 1.0]) * (-35.0 + 65.0 * person)
+
+    def present(self, frame: int) -> Sequence[int]:
+        return [person for person in range(2) if 12 * person <= frame < 40 + 30 * person]
 
 
 @dataclass(frozen=True)

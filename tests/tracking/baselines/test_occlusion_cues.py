@@ -18,16 +18,22 @@ from fakes.tracking.crossings import (
     WalkTogether,
     count_tracked_scenes,
 )
-from tracking.baselines.color_mixture import CODE_COLORS, COLOR_CODES, color_codes, fit_mixture, posterior
-from tracking.baselines.occluder_particles import OccluderParticles
-from tracking.baselines.occlusion_cues import (
+from tracking.baselines.particles.color_mixture import (
+    CODE_COLORS,
+    COLOR_CODES,
+    color_codes,
+    fit_mixture,
+    posterior,
+)
+from tracking.baselines.particles.occluder_particles import OccluderParticles
+from tracking.baselines.particles.occlusion_cues import (
     RING_AREA_RATIO,
     CenterSurroundIntegral,
     OcclusionCueSettings,
     OcclusionCueTracker,
     add_ring,
 )
-from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
+from tracking.baselines.particles.particle_filter import ParticleFilters, ParticleSettings
 
 SEEDS = range(4)
 

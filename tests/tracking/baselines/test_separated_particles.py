@@ -15,8 +15,8 @@ from tracking.baselines.integral_histograms import (
     bhattacharyya_coefficient,
     split_boxes,
 )
-from tracking.baselines.particle_filter import ParticleFilters, ParticleSettings
-from tracking.baselines.separated_particles import (
+from tracking.baselines.particles.particle_filter import ParticleFilters, ParticleSettings
+from tracking.baselines.particles.separated_particles import (
     SeparatedParticles,
     SeparatedParticleSettings,
     overlap_factors,

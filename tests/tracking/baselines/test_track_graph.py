@@ -14,7 +14,7 @@ from fakes.tracking.strolls import BINS, WalkingPerson, detections_at, final_box
 from fakes.tracking.windows import window_of_frames
 from tracking import CostSettings, Detections, create_solver
 from tracking.appearance import appearance_distance_matrix
-from tracking.baselines.track_groups import TrackEndpoint, TrackGraphSettings, departed_member
+from tracking.baselines.track_graphs.track_groups import TrackEndpoint, TrackGraphSettings, departed_member
 from tracking.boxes import iou
 from tracking.registry import Tracker, create_tracker
 

@@ -24,7 +24,7 @@ from tracking.baselines.integral_histograms import (
     core_boxes,
     split_boxes,
 )
-from tracking.baselines.particle_filter import (
+from tracking.baselines.particles.particle_filter import (
     ParticleTarget,
     initial_state,
     particle_boxes,

@@ -19,7 +19,7 @@ from tracking.baselines.integral_histograms import (
     color_distance,
     upper_and_lower_halves,
 )
-from tracking.baselines.particle_filter import initial_state, particle_boxes, propagate
+from tracking.baselines.particles.particle_filter import initial_state, particle_boxes, propagate
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.detectors.base import Image
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from tracking.baselines.kalman_prediction import KalmanPrediction
 from tracking.baselines.stepwise import StepwiseSettings, StepwiseTracker
-from tracking.baselines.track_groups import (
+from tracking.baselines.track_graphs.track_groups import (
     KalmanTrack,
     MeanAppearance,
     SplitCandidate,

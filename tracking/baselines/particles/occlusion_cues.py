@@ -18,10 +18,10 @@ from itertools import count
 import cv2
 import numpy as np
 
-from tracking.baselines.color_mixture import CODE_COLORS, color_codes, fit_mixture, posterior
 from tracking.baselines.integral_histograms import core_boxes
-from tracking.baselines.occluder_particles import OccluderParticles
-from tracking.baselines.particle_filter import (
+from tracking.baselines.particles.color_mixture import CODE_COLORS, color_codes, fit_mixture, posterior
+from tracking.baselines.particles.occluder_particles import OccluderParticles
+from tracking.baselines.particles.particle_filter import (
     initial_state,
     particle_boxes,
     propagate,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking.baselines.particle_filter import resample_if_degenerate
+from tracking.baselines.particles.particle_filter import resample_if_degenerate
 from tracking.boxes import Floats
 
 

@@ -1,0 +1,1 @@
+"""Particle filters and Markov chains over the boxes of one or of all targets."""

@@ -1,0 +1,1 @@
+"""Track graphs: identities through merges into groups of people and splits from them."""
