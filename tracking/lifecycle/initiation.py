@@ -60,9 +60,10 @@ def find_births(
         for detections, boxes in zip(frames, occupied, strict=True)
     ]
     births: list[Birth] = []
-    latest = max(len(frames) - _required_frames(window), 1)
     tries = 0
-    for last in range(len(frames) - 1, max(len(frames) - 1 - latest, -1), -1):
+    # A path that ends earlier is too short.
+    earliest = _required_frames(window) - 1
+    for last in range(len(frames) - 1, earliest - 1, -1):
         tried = np.zeros(len(unassigned[last]), dtype=np.bool_)
         while tries < window.birth_max_tests and not tried.all():
             seed = int(np.argmax(np.where(tried, -1.0, unassigned[last].scores)))
