@@ -136,17 +136,18 @@ def _reference_scores(ablation: str, with_total: dict[str, list[Scores]]) -> Seq
     return [None] * len(default) if ablation == DEFAULT.name else default
 
 
-def run(recordings: list[Recording], out: Path, jobs: int) -> None:
-    """Measure, print and save."""
+def run(recordings: list[Recording], out: Path, jobs: int, names: list[str] | None = None) -> None:
+    """Measure the ablations, or those named, beside the default; print and save."""
     sequences = input_sequences(recordings)
     report = Report()
-    pairs = [(ablation, sequence) for ablation in (DEFAULT, *ABLATIONS) for sequence in sequences]
+    chosen = (DEFAULT, *(one for one in ABLATIONS if not names or one.name in names))
+    pairs = [(ablation, sequence) for ablation in chosen for sequence in sequences]
     with ProcessPoolExecutor(jobs) as pool:
         scores = iter(list(pool.map(score, *zip(*pairs, strict=True))))
     tables(
         report,
         [sequence.name for sequence in sequences],
-        {ablation.name: [next(scores) for _ in sequences] for ablation in (DEFAULT, *ABLATIONS)},
+        {ablation.name: [next(scores) for _ in sequences] for ablation in chosen},
     )
     report.save(out / "ablation.txt")
 
@@ -155,10 +156,12 @@ def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "ablation")
     options.add_argument("--sequence", action="append", help="only this one; may be repeated")
+    rows = [ablation.name for ablation in ABLATIONS]
+    options.add_argument("--row", action="append", choices=rows, help="only this one; may be repeated")
     options.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="parallel processes")
     chosen = options.parse_args()
     try:
-        run(find_recordings(chosen.data, chosen.sequence), chosen.out, chosen.jobs)
+        run(find_recordings(chosen.data, chosen.sequence), chosen.out, chosen.jobs, chosen.row)
     except CannotRunError as problem:
         finish(problem, "ablation")
 
