@@ -25,6 +25,8 @@ TEMPORAL_TRACKER = "temporal"
 
 # Imported on demand: a camera with the default tracker loads none of them.
 PREDICTION_METHODS = {
+    "contour-particles": ("tracking.baselines.particles.contour_particles", "ContourParticles"),
+    "joint-particles": ("tracking.baselines.particles.joint_particles", "JointParticles"),
     "kalman": ("tracking.baselines.kalman_prediction", "KalmanPrediction"),
     "klt": ("tracking.baselines.optical_flow", "OpticalFlow"),
     "mcmc": ("tracking.baselines.particles.mcmc", "McmcFilter"),
