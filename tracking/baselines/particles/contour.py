@@ -92,7 +92,7 @@ class Outline:
         moved = self.points + offsets[:, None] * self.normals
         basis = spline_basis(controls, len(moved))
         found, *_ = np.linalg.lstsq(basis, moved, rcond=None)
-        return Outline.of_controls(found, len(moved))
+        return Outline.of_controls(np.asarray(found, dtype=np.float64), len(moved))
 
 
 def find_edges(image: Image) -> NDArray[np.bool_]:

@@ -42,7 +42,7 @@ class ContourSettings:
     normals: int = 32  # M
     reach: float = 0.08  # μ: search along a normal on either side, in heights
     steps: int = 8  # positions searched on either side
-    deviation: float = 0.02  # root of r: usual distance of an edge from the outline, in heights
+    deviation: float = 0.014  # root of r: usual distance of an edge from the outline, in heights
     seed: int = 1  # of the random numbers
 
     def __post_init__(self) -> None:
@@ -94,9 +94,14 @@ class ContourParticles:
         return ContourTarget(outline, aspect, states, np.full(count, 1.0 / count), box.copy())
 
     def predict(self, image: Image | None, targets: Sequence[ContourTarget]) -> Floats:
-        """Propagate and weigh the particles; return `(N, 4)`, NaN for lost targets."""
+        """Propagate and weigh the particles; return `(N, 4)`, NaN for lost targets.
+
+        Without an image they are only propagated: outlines that fall behind find no edges again.
+        """
         boxes = np.full((len(targets), BOX_SIDES), np.nan)
         if image is None:
+            for target in targets:
+                target.states = propagate(self._rng, target.states)
             return boxes
         edges, settings = self._edges(image), self._settings
         sharpness = settings.reach**2 / (2.0 * settings.deviation**2)
