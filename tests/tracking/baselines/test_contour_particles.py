@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import exp, floor
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,6 +26,7 @@ from tracking.baselines.particles.particle_filter import (
     resample_if_degenerate,
     reweight,
 )
+from tracking.baselines.stepwise import PredictionMethod
 from tracking.boxes import iou
 from tracking.detectors.base import Image
 
@@ -114,7 +116,7 @@ def test_the_particles_have_the_exact_posterior_on_a_grid() -> None:
     assert columns[exact.argmax()] == pytest.approx(58, abs=2)
 
 
-def _follow(method: ContourParticles | ParticleFilters, dim: float) -> bool:
+def _follow(method: PredictionMethod[Any], dim: float) -> bool:
     """Track a person while the light falls to a share of its brightness; return whether they are found."""
     scene = EnterAndLeave((RED, BLUE))
     target = method.initialize(scene.picture(0), scene.where(0, 0))
