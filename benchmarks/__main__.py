@@ -44,6 +44,7 @@ BENCHMARKS = (
     Benchmark("picture_condition", "seconds until a camera says that its lens is covered; 15 minutes"),
     Benchmark("rates", "frame rates from 2 to 60 a second; 40 minutes"),
     Benchmark("detectors.score_calibration", "fits the probabilities of installed networks; 10 minutes"),
+    Benchmark("detectors.network_speed", "networks by provider and batch size, cameras of a GPU; 2 minutes"),
     Benchmark("other_trackers", "MyView and trackers from PyPI on public detections; 5 minutes"),
     Benchmark("baselines", "the survey's trackers beside the network program; 7 minutes"),
     Benchmark("temporal_consistency", "overhead view: identity errors after merges, pruning; 6 minutes"),

@@ -53,4 +53,5 @@ def describe_detector(detector: Detector) -> str:
 
 def _describe_network(network: OnnxDetector) -> str:
     model = network.settings.model
-    return f"network {model.stem if model else ''} ({network.provider})"
+    runs_on = "; ".join([network.provider, *(f"not {failure}" for failure in network.failed_providers)])
+    return f"network {model.stem if model else ''} ({runs_on})"

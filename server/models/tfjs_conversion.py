@@ -200,28 +200,22 @@ def _max_pool(converter: GraphConverter, node: GraphNode) -> None:
 
 def _resize(converter: GraphConverter, node: GraphNode) -> None:
     height, width = (int(side) for side in converter.weights(node.inputs[1]))
-    images = converter.tensor(node.inputs[0])
+    # Channels first: onnxruntime resizes the last two dimensions on CUDA, whatever the sizes say.
+    images = converter.onnx.add("Transpose", [converter.tensor(node.inputs[0])], perm=_NCHW)
     sides = converter.onnx.constant(np.array(converter.scaled(height, width), dtype=np.int64))
     # onnxruntime's optimizer loses the sizes of a `Resize` that names its axes.
-    sizes = converter.onnx.add(
-        "Concat",
-        [
-            converter.onnx.add("Shape", [images], start=0, end=1),
-            sides,
-            converter.onnx.add("Shape", [images], start=3, end=4),
-        ],
-        axis=0,
-    )
+    kept = converter.onnx.add("Shape", [images], start=0, end=2)
+    sizes = converter.onnx.add("Concat", [kept, sides], axis=0)
     mode = "half_pixel" if node.is_set("half_pixel_centers") else "asymmetric"
     if node.is_set("align_corners"):
         mode = "align_corners"
-    converter.onnx.add(
+    resized = converter.onnx.add(
         "Resize",
         [images, "", "", sizes],
-        node.name,
         mode="linear",
         coordinate_transformation_mode=mode,
     )
+    converter.onnx.add("Transpose", [resized], node.name, perm=_NHWC)
 
 
 _CONVERSIONS: dict[str, Callable[[GraphConverter, GraphNode], None]] = {

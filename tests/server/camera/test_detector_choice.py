@@ -10,7 +10,7 @@ import pytest
 
 from fakes.tracking.tiny_networks import save_network, yolov8
 from server.camera import detector_choice
-from server.camera.detector_choice import choose_detector
+from server.camera.detector_choice import choose_detector, describe_detector
 from server.camera.detector_setup import make_prescanned_detector
 from server.camera.sources import open_source
 from server.config.loader import build_config
@@ -18,9 +18,7 @@ from server.config.sections.detect import DetectSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.models.catalog import MODELS
-from tracking.detectors.neural.providers import provider_names
-
-CPU = "CPUExecutionProvider"
+from tracking.detectors import OnnxDetector, OnnxSettings
 
 
 def config_of(detect: dict[str, Any] | None = None, **camera: Any) -> Config:
@@ -92,11 +90,11 @@ def test_the_start_says_what_detects(tmp_path: Path, caplog: pytest.LogCaptureFi
     assert line in caplog.messages
 
 
-def test_the_fastest_installed_provider_is_tried_first_and_the_cpu_last() -> None:
-    cuda, tensorrt = "CUDAExecutionProvider", "TensorrtExecutionProvider"
-    assert provider_names("auto", ["AzureExecutionProvider", CPU]) == [CPU]
-    assert provider_names("auto", [tensorrt, cuda, CPU]) == [cuda, CPU]
-    assert provider_names("tensorrt", [tensorrt, cuda, CPU]) == [tensorrt, CPU]
-    assert provider_names("cpu", [cuda, CPU]) == [CPU]
-    with pytest.raises(ValueError, match="provider: this onnxruntime has no cuda, only CPUExecutionProvider"):
-        provider_names("cuda", [CPU])
+def test_the_start_says_which_provider_could_not_be_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save_network(tmp_path / "own.onnx", yolov8([(30.0, 32.0, 12.0, 40.0, 0.72)]))
+    detector = OnnxDetector(OnnxSettings(model=tmp_path / "own.onnx", provider="cpu"))
+    assert describe_detector(detector) == "network own (CPU)"
+    monkeypatch.setattr(OnnxDetector, "failed_providers", ("CUDA: libcuda.so.1: cannot open",))
+    assert describe_detector(detector) == "network own (CPU; not CUDA: libcuda.so.1: cannot open)"

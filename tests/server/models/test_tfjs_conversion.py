@@ -84,6 +84,14 @@ def test_a_network_is_converted_for_another_input_size(rows: int, columns: int) 
     assert converted.shape == (1, 12, size[0] // 2, size[1] // 2)
 
 
+def test_maps_are_resized_with_the_channels_first_since_cuda_resizes_the_last_dimensions() -> None:
+    converter = GraphConverter(read_graph_model(small_network().topology(), small_network().binary()))
+    converter.convert("resized")
+    producers = {node.output[0]: node for node in converter.onnx.nodes}
+    (resize,) = [node for node in producers.values() if node.op_type == "Resize"]
+    assert list(producers[resize.input[0]].attribute[0].ints) == [0, 3, 1, 2]
+
+
 def test_only_what_the_output_depends_on_is_converted() -> None:
     model = small_network()
     model.add("TopKV2", ["maps"], "strange")

@@ -1,26 +1,24 @@
-"""Neural detector: any YOLO-style ONNX network, run by onnxruntime on the CPU."""
+"""Neural detector: any YOLO-style ONNX network, run by onnxruntime."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
 from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
-from tracking.detectors.neural.providers import Provider, provider_names
+from tracking.detectors.neural.providers import Provider
+from tracking.detectors.neural.session import Planes, open_session
 from tracking.detectors.neural.yolo_output import Layout, decode_output
 from tracking.detectors.non_maximum_suppression import non_maximum_suppression
 from tracking.types import Detections
 
-_INPUTS: dict[str, type[np.floating]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
-_DIMENSIONS = 4
 # Gray level of the letterbox bars, as in YOLO's training.
 _BAR_LEVEL = 114
 _MIN_SCORE = 0.25
@@ -44,7 +42,7 @@ class OnnxSettings:
     )
     input_size: int = 640  # side of the input in pixels, if the file leaves it open
     provider: Provider = (
-        "auto"  # what runs the network: the first that is installed, cuda, openvino, coreml, cpu
+        "auto"  # what runs the network: the first that works, cuda, openvino, coreml, cpu
     )
     threads: int = 1  # threads of the network; each camera has its own process
     max_detections: int = 100  # most boxes per frame
@@ -77,18 +75,22 @@ class OnnxDetector:
         self._ignore_filter = IgnoreFilter(ignore)
         if settings.model is None:
             raise ValueError("no model is given: the path of an ONNX file")
-        self._session = _open_session(settings.model, settings.threads, settings.provider)
-        self._name, self._size, self._type = _input_of(self._session, settings)
+        self._session = open_session(settings.model, settings.provider, settings.threads, settings.input_size)
         # Run a blank image, to detect an unusable network before the first frame.
         try:
-            self.detect(np.zeros((*self._size, 3), dtype=np.uint8))
+            self.detect(np.zeros((*self._session.size, 3), dtype=np.uint8))
         except ValueError as error:
             raise ValueError(f"{settings.model}: {error}") from error
 
     @property
     def provider(self) -> str:
         """What runs the network: onnxruntime's execution provider."""
-        return str(self._session.get_providers()[0]).removesuffix("ExecutionProvider")
+        return self._session.provider
+
+    @property
+    def failed_providers(self) -> tuple[str, ...]:
+        """Preferred providers that could not be used, each with the reason."""
+        return self._session.failures
 
     @property
     def appearance_bins(self) -> int:
@@ -112,7 +114,7 @@ class OnnxDetector:
         """
         validate_image(image)
         planes, scale, offset = self._fit_to_input(image)
-        found = decode_output(self._run(planes), self.settings.output_layout, self.settings.classes)
+        found = decode_output(self._session.run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
         boxes = np.clip((found.boxes - offset) / scale, 0.0, limits)
         min_score = _MIN_SCORE if self.settings.min_score is None else self.settings.min_score
@@ -121,18 +123,12 @@ class OnnxDetector:
         best = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
         return Detections(boxes[best], scores[best], np.empty((len(best), 0)))
 
-    def _run(self, planes: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-        try:
-            return np.asarray(self._session.run(None, {self._name: planes})[0])
-        except Exception as error:  # onnxruntime has no common exception class
-            raise ValueError(f"the network cannot be run: {_first_line(error)}") from error
-
-    def _fit_to_input(self, image: Image) -> tuple[npt.NDArray[np.floating], Floats, Floats]:
+    def _fit_to_input(self, image: Image) -> tuple[Planes, Floats, Floats]:
         """Resize the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1.
 
         Returns the input, and the scale and the offset of the image, both `(4,)` as for a box.
         """
-        height, width = self._size
+        height, width = self._session.size
         scales = width / image.shape[1], height / image.shape[0]
         if self.settings.resize == "letterbox":
             scales = min(scales), min(scales)
@@ -144,47 +140,7 @@ class OnnxDetector:
         )
         planes = cv2.dnn.blobFromImage(canvas, scalefactor=1.0 / 255.0, swapRB=True)
         return (
-            planes.astype(self._type, copy=False),
+            planes.astype(self._session.element, copy=False),
             np.array(scales * 2),
             np.array([left, top] * 2, dtype=np.float64),
         )
-
-
-def _open_session(model: Path, threads: int, provider: Provider) -> Any:
-    """Open the file with onnxruntime, which is imported only here since it is an optional dependency."""
-    try:
-        import onnxruntime  # noqa: PLC0415
-    except ImportError as error:
-        raise ImportError("onnxruntime is not installed: pip install 'myview[neural]'") from error
-    content = model.read_bytes()
-    providers = provider_names(provider, onnxruntime.get_available_providers())
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # errors are raised instead of printed
-    try:
-        return onnxruntime.InferenceSession(content, options, providers=providers)
-    except Exception as error:  # onnxruntime has no common exception class
-        raise ValueError(f"{model}: not a usable ONNX file: {_first_line(error)}") from error
-
-
-def _input_of(session: Any, settings: OnnxSettings) -> tuple[str, tuple[int, int], type[np.floating]]:
-    """Return the input's name, its height and width, and its type."""
-    inputs = session.get_inputs()
-    shape = list(inputs[0].shape)
-    fits = len(inputs) == 1 and len(shape) == _DIMENSIONS and shape[0] in {1, None} | _names(shape[:1])
-    if not (fits and shape[1] in {3, None} | _names(shape[1:2]) and inputs[0].type in _INPUTS):
-        raise ValueError(
-            f"{settings.model}: the input is {inputs[0].type} {shape}, not floats (1, 3, height, width)"
-        )
-    height, width = (side if isinstance(side, int) else settings.input_size for side in shape[2:])
-    return str(inputs[0].name), (height, width), _INPUTS[inputs[0].type]
-
-
-def _names(sides: list[Any]) -> set[Any]:
-    """Return the dimensions that the file leaves open, which have a name instead of a number."""
-    return {side for side in sides if isinstance(side, str)}
-
-
-def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]

@@ -14,7 +14,8 @@ from tracking.boxes import Floats
 Layout = Literal["auto", "yolov5", "yolov8", "end2end"]
 
 _BOX = 4
-_END_TO_END = 6
+END_TO_END = 6
+"""Columns of an end-to-end network's output."""
 _MAX_END_TO_END = 1000
 """End-to-end networks return 100 to 300 boxes; one-class YOLOv5 outputs have as many columns, but thousands
 of rows."""
@@ -53,7 +54,7 @@ def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Seq
         raise ValueError("its output has no finite numbers")
     table = table[finite]
     if kind == "end2end":
-        if table.shape[1] != _END_TO_END:
+        if table.shape[1] != END_TO_END:
             raise ValueError(_unfit(output.shape))
         selected = np.isin(table[:, 5].astype(np.int64), list(classes))
         return DecodedBoxes(table[selected, :_BOX], np.clip(table[selected, _BOX], 0.0, 1.0))
@@ -71,7 +72,7 @@ def decode_output(output: npt.NDArray[np.floating], layout: Layout, classes: Seq
 
 def _layout_of(shape: tuple[int, ...]) -> Layout:
     rows, columns = shape
-    if columns == _END_TO_END and rows <= _MAX_END_TO_END:
+    if columns == END_TO_END and rows <= _MAX_END_TO_END:
         return "end2end"
     return "yolov8" if rows < columns else "yolov5"
 
