@@ -41,9 +41,7 @@ class OnnxSettings:
         "letterbox"  # fit images into the input with bars, or stretch them
     )
     input_size: int = 640  # side of the input in pixels, if the file leaves it open
-    provider: Provider = (
-        "auto"  # what runs the network: the first that works, cuda, openvino, coreml, cpu
-    )
+    provider: Provider = "auto"  # what runs the network: the first that works, cuda, openvino, coreml, cpu
     threads: int = 1  # threads of the network; each camera has its own process
     max_detections: int = 100  # most boxes per frame
 
