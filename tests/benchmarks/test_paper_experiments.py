@@ -11,7 +11,7 @@ import pytest
 from benchmarks.common.report import Report
 from benchmarks.paper_experiments.__main__ import run
 from benchmarks.paper_experiments.drawn_toys import TOYS, play_toys
-from benchmarks.paper_experiments.experiment_list import EXPERIMENTS, Experiment, TrackerSetting
+from benchmarks.paper_experiments.experiment_list import EXPERIMENTS, Experiment, PaperFigure, TrackerSetting
 from benchmarks.paper_experiments.label_errors import judge, named, per_frame
 from benchmarks.paper_experiments.noisy_detections import SceneParameters, play
 from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
@@ -128,14 +128,16 @@ def test_toys_in_full_view_are_among_their_own_peaks() -> None:
 
 def test_an_experiment_prints_its_table_and_saves_its_plot(tmp_path: Path) -> None:
     settings = (TrackerSetting("paper", PAPER.costs, PAPER.window),)
-    experiment = Experiment(
-        "tiny", "two people", "Fig. 0", lambda seed: play(CAST, seed), settings, "nothing"
-    )
+    figures = (PaperFigure("columns", "0.123", "2 of 3"),)
+    experiment = Experiment("tiny", "two people", "Fig. 0", lambda seed: play(CAST, seed), settings, figures)
     report = Report()
     run(experiment, 1, report, tmp_path)
     report.save(tmp_path / "table.txt")
     text = (tmp_path / "table.txt").read_text(encoding="utf-8")
     assert "paper: separate-dp" in text
+    assert "the paper's recording: columns" in text
+    assert "0.123" in text
+    assert "2 of 3" in text
     assert "3 of 3" in text
     assert (tmp_path / "paper_experiments-tiny.png").stat().st_size > 10_000
 
