@@ -40,8 +40,12 @@ PREDICTION_METHODS = {
 SELF_CONTAINED = {
     "rjmcmc": ("tracking.baselines.particles.varying_targets", "VaryingTargetsTracker", True),
     "track-graph": ("tracking.baselines.track_graphs.track_graph", "TrackGraph", False),
+    "track-network": ("tracking.baselines.track_graphs.whole_recording", "WholeRecordingTracker", False),
 }
 """Module, class and need for images of the trackers that decide more than a prediction, by name."""
+
+OFFLINE_TRACKERS = frozenset({"track-network"})
+"""Trackers that publish nothing before the end of a recording."""
 
 
 class Tracker(Protocol):

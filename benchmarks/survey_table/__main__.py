@@ -60,11 +60,15 @@ RATINGS = {
     "klt": SurveyRatings("No", "Yes", "No", "Yes"),
     "mean-shift": SurveyRatings("No", "No", "No", "Yes"),
     "kalman": SurveyRatings("Some", "No", "No", "Yes"),
-    "particle": SurveyRatings("Some", "Yes", "No", "Yes"),
-    "mcmc": SurveyRatings("Some", "Yes", "No", "Yes"),
-    "track-graph": SurveyRatings("Some", "Yes", "Yes", "No"),
+    **dict.fromkeys(
+        ("particle", "joint-particles", "contour-particles"), SurveyRatings("Some", "Yes", "No", "Yes")
+    ),
+    **dict.fromkeys(("mcmc", "rjmcmc"), SurveyRatings("Some", "Yes", "No", "Yes")),
+    **dict.fromkeys(("track-graph", "track-network"), SurveyRatings("Some", "Yes", "Yes", "No")),
 }
-"""Ratings of the survey's Table 1, for the measured columns (Todor 2009, section 7.5)."""
+"""Ratings of the survey's Table 1, for the measured columns (Todor 2009, section 7.5).
+
+It has one row each for particle filters, MCMC and track graphs; their kinds are measured apart here."""
 
 
 def recorded_views(data: Path) -> Iterator[DetectedView]:

@@ -14,7 +14,7 @@ from server.config.unknown_keys import no_unknown_keys
 from tracking import DEFAULT_SOLVER, CostSettings, Solver, SolverBudget, WindowSettings, create_solver
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.interactive import InteractiveSettings
-from tracking.registry import DEFAULT_TRACKER, TEMPORAL_TRACKER, tracker_names
+from tracking.registry import DEFAULT_TRACKER, OFFLINE_TRACKERS, TEMPORAL_TRACKER, tracker_names
 
 
 class CameraSettings(Section):
@@ -111,6 +111,8 @@ class TrackSettings(Section):
     def _tracker_is_known(cls, tracker: str) -> str:
         if tracker not in tracker_names():
             raise ValueError(f"there is no tracker {tracker!r}; there are {', '.join(tracker_names())}")
+        if tracker in OFFLINE_TRACKERS:
+            raise ValueError(f"{tracker} needs the whole recording: use `myview track --tracker {tracker}`")
         return tracker
 
     @field_validator("solver")

@@ -170,6 +170,11 @@ def test_values_out_of_range_are_refused(section: str, value: dict[str, Any]) ->
     assert f"{section}.{next(iter(value))}" in error_of(site(**{section: value}))
 
 
+def test_a_tracker_that_needs_the_whole_recording_is_refused_for_cameras() -> None:
+    assert "myview track --tracker track-network" in error_of(site(track={"tracker": "track-network"}))
+    assert "joint-particles" in error_of(site(track={"tracker": "oracle"}))
+
+
 def test_unknown_solver_is_refused_with_the_known_ones() -> None:
     assert "columns" in error_of(site(track={"solver": "oracle"}))
 
