@@ -22,7 +22,7 @@ from tracking.baselines.track_graphs.interaction_graph import (
     build_graph,
 )
 from tracking.baselines.track_graphs.relative_positions import SimilaritySettings, relative_histograms
-from tracking.baselines.track_graphs.variable_elimination import Factor, TooManyStatesError, minimize
+from tracking.baselines.track_graphs.variable_elimination import Factor, TableTooLargeError, minimize
 from tracking.baselines.track_graphs.whole_recording import WholeRecordingSettings, WholeRecordingTracker
 from tracking.boxes import iou
 
@@ -51,7 +51,7 @@ def test_elimination_finds_the_least_of_all_joint_states(seed: int) -> None:
 
 
 def test_too_large_a_table_is_refused() -> None:
-    with pytest.raises(TooManyStatesError, match="more than 8 states"):
+    with pytest.raises(TableTooLargeError, match="more than 8 states"):
         minimize([Factor((0, 1), np.zeros((3, 3)))], {0: 3, 1: 3}, max_states=8)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.baselines.track_graphs.interaction_graph import InteractionGraph
-from tracking.baselines.track_graphs.variable_elimination import Factor, TooManyStatesError, minimize
+from tracking.baselines.track_graphs.variable_elimination import Factor, TableTooLargeError, minimize
 
 State = tuple[int, ...]
 """Where each person of a node goes: the index of a way out."""
@@ -65,7 +65,7 @@ class IdentityNetwork:
         while True:
             try:
                 return minimize(self.factors(distance, horizon), sizes)
-            except TooManyStatesError:
+            except TableTooLargeError:
                 if horizon == 1:
                     raise
                 horizon -= 1

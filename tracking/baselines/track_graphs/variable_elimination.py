@@ -24,7 +24,7 @@ class Factor:
     table: Floats
 
 
-class TooManyStatesError(ValueError):
+class TableTooLargeError(ValueError):
     """An intermediate table would be larger than allowed."""
 
 
@@ -41,7 +41,7 @@ def minimize(
         max_states: largest size of an intermediate table.
 
     Raises:
-        TooManyStatesError: a table would be larger than `max_states`.
+        TableTooLargeError: a table would be larger than `max_states`.
     """
     left, remaining = list(factors), set(sizes)
     eliminated: list[tuple[int, Factor]] = []
@@ -49,7 +49,7 @@ def minimize(
         variable = min(remaining, key=lambda v: (prod(sizes[u] for u in _joint_scope(left, v)) or 1, v))
         scope = tuple(sorted({variable, *_joint_scope(left, variable)}))
         if prod(sizes[v] for v in scope) > max_states:
-            raise TooManyStatesError(f"a table of {len(scope)} variables has more than {max_states} states")
+            raise TableTooLargeError(f"a table of {len(scope)} variables has more than {max_states} states")
         joined = Factor(scope, _total([f for f in left if variable in f.scope], scope, sizes))
         left = [f for f in left if variable not in f.scope]
         axis = scope.index(variable)
