@@ -66,6 +66,7 @@ BENCHMARKS = (
         ("--kind", "fish", "--clips", "4"),
     ),
     Benchmark("ablation", "tracking scores without each cost term; 15 minutes"),
+    Benchmark("layout_gain", "what a layout term could gain, and one between companions does; 20 minutes"),
     Benchmark("paper_experiments", "the paper's experiments, repeated on synthetic scenes; 10 minutes"),
     Benchmark("live_cameras", "real-time tracking of four live cameras, cost by stage; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),

@@ -1,0 +1,1 @@
+"""What a layout term could gain, and what one between companions does gain."""
