@@ -38,6 +38,7 @@ PREDICTION_METHODS = {
 """Module and class of each frame-by-frame tracker's prediction method, by the tracker's name."""
 
 SELF_CONTAINED = {
+    "flag-states": ("tracking.baselines.flag_states.tracker", "FlagStatesTracker", False),
     "rjmcmc": ("tracking.baselines.particles.varying_targets", "VaryingTargetsTracker", True),
     "track-graph": ("tracking.baselines.track_graphs.track_graph", "TrackGraph", False),
     "track-network": ("tracking.baselines.track_graphs.whole_recording", "WholeRecordingTracker", False),

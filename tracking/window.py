@@ -153,7 +153,7 @@ class WindowResult:
             provisional. An object without a final frame may still be dropped.
         tracks: the objects detected in any of the frames, by ascending id.
         report: the solver's report on the last window.
-        risk_events: predicted identity failures, the riskiest first; only of a `CorrectableTracker`.
+        risk_events: predicted identity failures, the riskiest first; of trackers that help an operator.
         revised_from: the first final frame changed by an operator's correction: all frames from `first` on
             replace earlier results. None: no final frame has changed.
     """

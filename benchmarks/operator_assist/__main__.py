@@ -24,7 +24,7 @@ import matplotlib.pyplot as plt
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.operator_assist import outcome_table, recall_curve
-from benchmarks.operator_assist.assisted_tracking import TrackedClip, track_clip
+from benchmarks.operator_assist.assisted_tracking import TrackedClip, track_by_states, track_clip
 from benchmarks.operator_assist.clip_kinds import ClipKind, kinds
 from benchmarks.operator_assist.flag_outcomes import CAUSES, OutcomeCounts, count
 from benchmarks.operator_assist.flag_selection import FlagSelector
@@ -50,6 +50,9 @@ def measure(options: argparse.Namespace) -> None:
         track_clip(clip, kind.setup) for clip in kind.clips(options.clips, first=0 if options.even else 1)
     ]
     points = recall_curve.curve(alone, OperatorProfile())
+    by_states = recall_curve.curve(
+        [track_by_states(result.clip, kind.setup) for result in alone], OperatorProfile()
+    )
     few, any_number = (
         FlagSettings(per_minute=most, risk=options.risk) for most in (options.per_minute, _ANY)
     )
@@ -68,6 +71,15 @@ def measure(options: argparse.Namespace) -> None:
         "Failures foreseen by flags",
         ["risk from", "flags/min", "failures/min", "flags per failure", "foreseen", "upper bound"],
         recall_curve.rows(points),
+    )
+    report.table(
+        "The thesis's state machine, with its own tracks, beside the swap margins",
+        ["", "flags/min", "failures/min", "flags per failure", "foreseen", "upper bound"],
+        [
+            [name, *row[1:]]
+            for name, found_points in (("state machine", by_states), ("margins, all", points))
+            for row in recall_curve.rows(found_points[-1:])
+        ],
     )
     _print_tables(report, found, thesis=options.kind != "court" and options.objects in {None, 9})
     recall_curve.plot(points, options.out / f"{name}-flags.png")

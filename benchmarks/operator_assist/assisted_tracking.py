@@ -13,6 +13,7 @@ from benchmarks.operator_assist.identity_failures import IdentityFailure, failur
 from benchmarks.operator_assist.simulated_operator import OperatorFlag, OperatorProfile, SimulatedOperator
 from server.config.sections import FlagSettings
 from tracking import CostSettings, WindowResult, WindowSettings, create_solver
+from tracking.baselines.flag_states.tracker import FlagStatesTracker
 from tracking.boxes import Floats
 from tracking.interactive import CorrectableTracker, InteractiveSettings, PositionCorrection, RiskEvent
 from tracking.solvers import DEFAULT_SOLVER
@@ -108,6 +109,19 @@ def track_clip(
     _merge_result(shown, tracker.apply_corrections(waiting))
     failed = failures(clip.truth, shown, clip.fps)
     return TrackedClip(clip, failed, risk_events, operator.flags if operator else [], shown)
+
+
+def track_by_states(clip: Clip, setup: TrackingSetup) -> TrackedClip:
+    """Track a clip by the thesis's state machine, without an operator; its flags are the risk events."""
+    tracker = FlagStatesTracker(setup.window, fps=clip.fps)
+    shown: dict[int, dict[int, Floats]] = {}
+    raised: list[tuple[int, RiskEvent]] = []
+    for newest, detections in enumerate(clip.detections):
+        result = tracker.push(newest, detections)
+        _merge_result(shown, result)
+        raised += [(newest, event) for event in (result.risk_events if result else ())]
+    _merge_result(shown, tracker.flush())
+    return TrackedClip(clip, failures(clip.truth, shown, clip.fps), raised, [], shown)
 
 
 def _merge_result(shown: dict[int, dict[int, Floats]], result: WindowResult | None) -> None:
