@@ -97,7 +97,7 @@ def find_places(
     for k, group in enumerate(groups):
         probabilities[k, measurements.camera[list(group)]] = 0.0
     costs -= np.log1p(-probabilities).sum(axis=1)
-    costs *= settings.evidence_weight(seconds)
+    costs *= settings.detection_weight(seconds)
     kept = np.flatnonzero(costs < _MAX_COST)
     shared = members[kept].astype(np.float64)
     return Places(

@@ -16,14 +16,15 @@ class GroundSettings:
         ValueError: a setting is out of range.
     """
 
+    frame_s: float = 0.12  # seconds between two frames of the program; boxes in between are interpolated
     lag_s: float = 0.4  # seconds that a frame waits for later ones before it is final; at least one frame
     stride_s: float = 0.2  # seconds between two solutions
-    correlation_s: float = 0.2  # seconds in which detections err alike: all frames in them count as one
+    correlation_s: float = 0.9  # seconds in which detectors err alike: detections in them count as one
     detection_probability: float = 0.9  # of a person that nothing hides, in one camera and frame
     false_per_frame: float = 0.5  # false detections per picture
     covered_log_odds: float = 2.0  # log odds lost by a detection that a better one of its camera covers
     people_density: float = 0.05  # people per square metre, before anybody is known
-    arrival_rate: float = 0.004  # people who appear per square metre and second, later
+    arrival_rate: float = 0.2  # people who appear per square metre and second, later
     departure_rate: float = 0.1  # share of the people that leaves per second
     foot_noise: float = 0.012  # standard deviation of a foot, box heights, before it is known per camera
     calibration_noise: float = 0.1  # standard deviation by which cameras disagree about a place, metres
@@ -31,7 +32,7 @@ class GroundSettings:
     acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, metres/s²
     turn_rate: float = 0.06  # times per second that somebody starts, stops or turns
     forget_after_s: float = 2.0  # seconds unseen after which a person's number is retired
-    appearance: float = 4.0  # weight of the distance to a person's appearance in a camera
+    appearance: float = 8.0  # weight of the distance to a person's appearance in a camera
     unknown_appearance: float = 0.3  # distance at which an appearance says nothing
 
     def __post_init__(self) -> None:
@@ -47,6 +48,9 @@ class GroundSettings:
         """Return the probability that somebody starts, stops or turns within so many seconds."""
         return -math.expm1(-self.turn_rate * seconds)
 
-    def evidence_weight(self, seconds: float) -> float:
-        """Return for how much a frame counts beside one that errs on its own; frames are `seconds` apart."""
+    def detection_weight(self, seconds: float) -> float:
+        """Return for how much a frame's detections and misses count beside those that err on their own.
+
+        Frames are `seconds` apart.
+        """
         return min(seconds / self.correlation_s, 1.0)

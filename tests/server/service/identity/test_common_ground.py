@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
-import msgspec
 import numpy as np
 
 from bestview import Merge, Split
 from fakes.service.joint_floor import FPS, SIZE, VIEWS, joint_config, walk_past, walked_epochs
 from fakes.tracking.walked_floor import FloorNoise
-from server.messaging.messages import TrackMessage
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.joint_tracking.stage import JointStage
 from server.service.view_selection.decider import camera_homographies
 from tracking.boxes import Floats, iou
-
-MEET, OTHER = 31, {1: 2, 2: 1}
-"""A frame in which two people stand together; each one's id, and the other's."""
 
 
 def person_tracker() -> PersonTracker:
@@ -107,38 +99,3 @@ def test_an_operator_splits_off_whom_a_camera_shows() -> None:
     assert not [each for each in corrections if isinstance(each, Merge)]
     splits = [each for each in corrections if isinstance(each, Split)]
     assert [split.camera for split in splits] == list(VIEWS)
-
-
-def test_looks_tell_who_is_who_after_people_who_met_were_confused() -> None:
-    walks, people, stage = meet_and_part(), person_tracker(), JointStage(joint_config())
-    for epoch in walked_epochs(walks):
-        tracked = stage.step(epoch)
-        people.update(confused(tracked) if epoch.last >= MEET else tracked)
-    before = numbers_of(people, walks, MEET - 12)
-    assert [len(numbers) for numbers in before] == [1, 1]
-    assert numbers_of(people, walks, len(walks) - 8) == before
-    assert people.registry.all_numbers == [1, 2]
-
-
-def meet_and_part() -> Floats:
-    """Return two people who walk towards each other, stand together, and go back, (F, 2, 2) metres."""
-    ahead = np.concatenate([np.linspace(2.0, 4.85, 26), np.full(10, 4.85), np.linspace(4.85, 2.0, 30)])
-    return np.stack([np.column_stack([x, np.full(len(ahead), 5.0)]) for x in (ahead, 10.0 - ahead)], axis=1)
-
-
-def confused(epoch: Epoch) -> Epoch:
-    """Return an epoch with the first two people's ids exchanged."""
-    assert epoch.joint is not None
-    joint = epoch.joint.tracks
-
-    def exchanged(tracks: Sequence[TrackMessage]) -> list[TrackMessage]:
-        return [msgspec.structs.replace(track, id=OTHER.get(track.id, track.id)) for track in tracks]
-
-    paths = [msgspec.structs.replace(path, id=OTHER.get(path.id, path.id)) for path in joint.paths]
-    cameras = {name: exchanged(tracks) for name, tracks in joint.cameras.items()}
-    windows = {
-        name: msgspec.structs.replace(window, tracks=exchanged(window.tracks))
-        for name, window in epoch.tracks.items()
-    }
-    tracks = msgspec.structs.replace(joint, paths=paths, cameras=cameras)
-    return replace(epoch, tracks=windows, joint=replace(epoch.joint, tracks=tracks))

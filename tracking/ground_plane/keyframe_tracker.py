@@ -1,0 +1,224 @@
+"""Online tracking of everybody on a ground plane by all cameras at once, with a fixed lag, in keyframes.
+
+Each keyframe's detections become hypotheses of places, the network program over the last frames chooses among
+them, and the oldest frame becomes final. Who arrives is decided in the same program: a person is known from
+their first final place on.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.frame_rate import frames_in
+from tracking.ground_plane.camera import BoxSizes, GroundCamera
+from tracking.ground_plane.hypotheses import find_places
+from tracking.ground_plane.measurements import PERSON_M, estimate_units_per_metre, measure
+from tracking.ground_plane.network import build_ground_network
+from tracking.ground_plane.person import GroundPerson
+from tracking.ground_plane.place_noise import PlaceNoise
+from tracking.ground_plane.settings import GroundSettings
+from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
+from tracking.ground_plane.window import WindowFrame, known_people, predict_places
+from tracking.solvers.base import OCCLUDED, Solver, SolveReport
+from tracking.types import Detections
+
+_NEWCOMERS = 4
+"""People who may arrive in one window; doubled as long as all of them do."""
+_GONE = OCCLUDED - 1
+"""State of a person who has left for good."""
+
+
+class KeyframeTracker:
+    """Tracks people in frames that are far enough apart to tell something new.
+
+    Deterministic; memory bounded by the window.
+    """
+
+    def __init__(
+        self,
+        cameras: Mapping[str, GroundCamera],
+        settings: GroundSettings,
+        solver: Solver,
+        fps: float,
+        units_per_metre: float | None = None,
+    ) -> None:
+        """Create a tracker of frames that are 1 / `fps` seconds apart.
+
+        `units_per_metre`: of the plane; None: estimated from the heights of the first boxes.
+        """
+        self._names = tuple(cameras)
+        self._given = tuple(cameras.values())
+        self._settings = settings
+        self._solver = solver
+        self._seconds = 1.0 / fps
+        self._lag = frames_in(settings.lag_s, fps)
+        self._stride = frames_in(settings.stride_s, fps)
+        self._units_per_metre = units_per_metre
+        self._cameras = (
+            tuple(camera.scaled(units_per_metre) for camera in self._given) if units_per_metre else ()
+        )
+        self._sizes = [BoxSizes() for _ in cameras]
+        self._noise = PlaceNoise(len(cameras))
+        self._people: list[GroundPerson] = []
+        self._next_id = 1
+        self._window: deque[WindowFrame] = deque()
+        self._states = np.zeros((0, 0), dtype=np.int64)
+        self._report: SolveReport | None = None
+
+    def push(self, number: int, detections: Mapping[str, Detections]) -> list[GroundFrame]:
+        """Add the detections of a frame by camera; return the frames that become final, in order.
+
+        Numbers are successive, except after `flush`. Cameras that are left out have not searched the frame.
+        """
+        found = [detections.get(name) for name in self._names]
+        if self._units_per_metre is None:
+            self._units_per_metre = estimate_units_per_metre(
+                self._given, {k: part.boxes for k, part in enumerate(found) if part is not None}
+            )
+            if self._units_per_metre is None:
+                return [GroundFrame(number, (), None)]
+            self._cameras = tuple(camera.scaled(self._units_per_metre) for camera in self._given)
+        for sizes, part in zip(self._sizes, found, strict=True):
+            if part is not None:
+                sizes.update(part.boxes)
+        measurements = measure(self._cameras, found, self._noise.factors, self._settings)
+        predictions = predict_places(
+            self._people, self._states.tolist(), self._window, self._seconds, self._settings
+        )
+        places = find_places(
+            measurements, predictions, self._cameras, self._sizes, self._settings, self._seconds
+        )
+        self._window.append(WindowFrame(number, places))
+        if (number + 1) % self._stride or len(self._window) <= self._lag:
+            return []
+        self._solve()
+        return [self._finish_oldest() for _ in range(len(self._window) - self._lag)]
+
+    def set_camera(self, name: str, camera: GroundCamera) -> None:
+        """Replace a camera's calibration from the next frame on.
+
+        Raises:
+            KeyError: no camera has this name.
+        """
+        index = dict(zip(self._names, range(len(self._names)), strict=True))[name]
+        self._given = (*self._given[:index], camera, *self._given[index + 1 :])
+        if self._units_per_metre is not None:
+            self._cameras = tuple(given.scaled(self._units_per_metre) for given in self._given)
+
+    @property
+    def person_height(self) -> float | None:
+        """How tall people are, in the unit of the plane; None before the first detections."""
+        return None if self._units_per_metre is None else PERSON_M * self._units_per_metre
+
+    def provisional(self) -> list[GroundFrame]:
+        """Return the frames that are not final yet, as the last solution has them.
+
+        Valid after a `push` that returned frames. Who has arrived since the last final frame has no number
+        yet, and is left out.
+        """
+        return [
+            GroundFrame(frame.number, self._provisional_tracks(frame, m), self._report)
+            for m, frame in enumerate(self._window)
+            if m < self._states.shape[1]
+        ]
+
+    def _provisional_tracks(self, frame: WindowFrame, m: int) -> tuple[GroundTrack, ...]:
+        tracks = []
+        for person, row in zip(self._people, self._states, strict=False):
+            if row[m] >= 0:
+                places = frame.places
+                place, covariance = places.means[row[m]], places.covariances[row[m]]
+            elif (row[m:] >= 0).any():
+                ahead = person.ahead(frame.number)
+                place, covariance = ahead.place, ahead.place_covariance
+            else:
+                continue
+            tracks.append(self._track(person, frame, int(row[m]), place, covariance))
+        return tuple(sorted(tracks, key=lambda track: track.id))
+
+    def flush(self) -> list[GroundFrame]:
+        """End the recording: return the remaining frames; everybody is forgotten."""
+        final = []
+        if self._window:
+            self._solve()
+            final = [self._finish_oldest() for _ in range(len(self._window))]
+        self._people, self._states = [], np.zeros((0, 0), dtype=np.int64)
+        return final
+
+    def _solve(self) -> None:
+        """Solve the window's program, with as many possible arrivals as it takes."""
+        frames = [frame.places for frame in self._window]
+        people = known_people(
+            self._people, self._window, self._cameras, self._sizes, self._seconds, self._settings
+        )
+        anybody_known = self._next_id > 1
+        rate = self._settings.arrival_rate * self._seconds if anybody_known else self._settings.people_density
+        newcomers = _NEWCOMERS
+        while True:
+            network = build_ground_network(
+                people, newcomers, frames, self._seconds, -float(np.log(rate)), self._settings
+            )
+            solution = self._solver.solve(network)
+            gone = network.max_places - 1
+            states = np.where(solution.states == gone, _GONE, solution.states)
+            arrived = (states[len(people) :] >= 0).any(axis=1)
+            if not arrived.all():
+                break
+            newcomers *= 2
+        rows = np.concatenate([np.ones(len(people), dtype=np.bool_), arrived])
+        self._states, self._report = states[rows], solution.report
+
+    def _finish_oldest(self) -> GroundFrame:
+        """Make the oldest frame final: people move, arrive and leave."""
+        frame = self._window.popleft()
+        people, rows, arriving, tracks = [], [], [], []
+        for n, row in enumerate(self._states):
+            state = int(row[0])
+            if n < len(self._people):
+                person = self._people[n]
+                if state >= 0:
+                    person.move(frame.number, frame.places, state)
+                elif state == _GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
+                    continue
+            elif state >= 0:
+                person = self._arrive(frame, state)
+            else:
+                arriving.append(n)
+                continue
+            people.append(person)
+            rows.append(n)
+            if state >= 0:
+                person.learn(frame.places, state, self._sizes)
+            if state >= 0 or (row[1:] >= 0).any():
+                ahead = person.ahead(frame.number)
+                tracks.append(self._track(person, frame, state, ahead.place, ahead.place_covariance))
+        chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
+        self._noise.update(frame.places, chosen)
+        self._people = people
+        self._states = self._states[rows + arriving, 1:]
+        return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)
+
+    def _arrive(self, frame: WindowFrame, state: int) -> GroundPerson:
+        number, self._next_id = self._next_id, self._next_id + 1
+        return GroundPerson(number, frame.number, frame.places, state, self._seconds, self._settings)
+
+    def _track(
+        self, person: GroundPerson, frame: WindowFrame, state: int, place: Floats, covariance: Floats
+    ) -> GroundTrack:
+        """Return the person's place and boxes: detections, and predicted boxes in the other cameras."""
+        boxes = {}
+        measurements = frame.places.measurements
+        for k in frame.places.groups[state] if state >= 0 else ():
+            camera = int(measurements.camera[k])
+            boxes[self._names[camera]] = GroundBox(measurements.boxes[k], int(measurements.index[k]))
+        for camera, name in enumerate(self._names):
+            if name not in boxes:
+                box = person.boxes.predict(place, self._cameras[camera], self._sizes[camera])
+                if box is not None:
+                    boxes[name] = GroundBox(box, None)
+        units = self._units_per_metre or 1.0
+        return GroundTrack(person.id, units * place, units**2 * covariance, boxes)
