@@ -1,4 +1,4 @@
-"""Trackers that know the true positions: upper bounds of what a layout term can gain."""
+"""A tracker that is told the true positions: what a layout term could know at best."""
 
 from __future__ import annotations
 
@@ -58,8 +58,9 @@ def _relative(first: Floats, second: Floats) -> Floats:
 class TruePositionTracker(OnlineTracker):
     """The online tracker, with a cost of up to 1 for places off the true position of an object's person.
 
-    No layout term can do better on the same network: it would know where everybody is by the others. An
-    object is the person whom its first final detection overlaps.
+    A layout term would at best know as much, from where the others are. An object is the person whom its
+    first final detection overlaps. IDF1 may still fall, where an object begins on two people, or waits for
+    somebody who is not detected.
     """
 
     def __init__(
