@@ -65,7 +65,7 @@ BENCHMARKS = (
         "operator assistance on drawn fish that are detected in the pictures; 9 minutes",
         ("--kind", "fish", "--clips", "4"),
     ),
-    Benchmark("operator_assist.play", "the thesis's soccer experiment on drawn play and real people; 10 minutes"),
+    Benchmark("operator_assist.play", "the thesis's soccer clips on drawn play and real people; 10 minutes"),
     Benchmark("ablation", "tracking scores without each cost term; 15 minutes"),
     Benchmark("layout_gain", "what a layout term could gain, and one between companions does; 20 minutes"),
     Benchmark("paper_experiments", "the paper's experiments, repeated on synthetic scenes; 10 minutes"),
