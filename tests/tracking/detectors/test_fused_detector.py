@@ -11,6 +11,7 @@ from fakes.tracking.drawn_people import WIDTH, Figure, picture
 from tracking.boxes import Floats, iou
 from tracking.detectors import BackgroundDetector, FusedDetector, FusedSettings
 from tracking.detectors.base import Image
+from tracking.detectors.fused.explanation import consider_wrong_people, to_probability
 from tracking.types import Detections
 
 WALKER = Figure(10, 200, speed=2.0, begin=40)
@@ -173,3 +174,19 @@ def test_a_recording_is_prepared_by_network_and_background() -> None:
 def test_settings_are_shares() -> None:
     with pytest.raises(ValueError, match=r"min_probability is between 0 and 1, not 1.5"):
         FusedSettings(min_probability=1.5)
+
+
+def test_an_alternative_is_as_likely_as_the_person_it_could_replace_is_doubtful() -> None:
+    person, other, away = [0.0, 0.0, 10.0, 30.0], [4.0, 2.0, 14.0, 32.0], [50.0, 0.0, 60.0, 30.0]
+    boxes = np.array([person, other, away])
+
+    def alternatives(log_odds_of_person: float) -> Floats:
+        odds = consider_wrong_people(boxes, np.array([log_odds_of_person, -5.0, -5.0]), 1)
+        assert odds[0] == log_odds_of_person
+        return to_probability(odds[1:])
+
+    sure, doubtful = alternatives(6.0), alternatives(0.0)
+    assert sure[0] < 0.01
+    assert 0.05 < doubtful[0] < 0.2
+    np.testing.assert_allclose([sure[1], doubtful[1]], to_probability(np.array(-5.0)))
+    assert len(consider_wrong_people(np.empty((0, 4)), np.empty(0), 0)) == 0
