@@ -24,7 +24,7 @@ from benchmarks.paper_experiments.windowed_tracking import TrackedLabels, follow
 from tracking import SolverBudget, create_solver
 
 _PLOTTED = ("columns", "greedy-dp", "separate-dp")
-BUDGET = SolverBudget(work_s=20.0)
+BUDGET = SolverBudget(work_s=120.0)
 """Of each segment: branch and bound may take for ever under the layout term."""
 
 
