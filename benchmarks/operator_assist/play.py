@@ -162,7 +162,16 @@ def choose_flags(failures: Sequence[TargetFailure], fps: float) -> dict[int, ran
 
 @dataclass(frozen=True, slots=True)
 class PlayCounts:
-    """The counts of one clip; `caused`: targets that fail with help only."""
+    """The counts of one clip.
+
+    Attributes:
+        targets: people.
+        minutes: of video.
+        failures: targets that fail without help.
+        flagged: those of them that are flagged.
+        corrected: flagged targets that are on their person for a second after the pointing.
+        caused: targets that fail with help only.
+    """
 
     targets: int
     minutes: float
@@ -176,12 +185,16 @@ def count_play(clip: PlayClip) -> PlayCounts:
     """Track a clip without and with help."""
     alone = target_failures(clip, follow(clip, {}))
     flags = choose_flags(alone, clip.fps)
-    helped = {failure.target for failure in target_failures(clip, follow(clip, flags))}
-    failed = {failure.target for failure in alone}
+    helped = {failure.target: failure.frame for failure in target_failures(clip, follow(clip, flags))}
+    caused = helped.keys() - {failure.target for failure in alone}
+    settled = round(_LASTS_S * clip.fps)
+    corrected = [
+        number
+        for number, frames in flags.items()
+        if number not in helped or helped[number] >= frames.stop + settled
+    ]
     minutes = len(clip.images) / clip.fps / 60.0
-    return PlayCounts(
-        clip.truth.objects, minutes, len(alone), len(flags), len(flags.keys() - helped), len(helped - failed)
-    )
+    return PlayCounts(clip.truth.objects, minutes, len(alone), len(flags), len(corrected), len(caused))
 
 
 def measure(options: argparse.Namespace) -> None:
