@@ -61,6 +61,7 @@ BUDGET_CASES = (
     WindowCase("walking", walking_window, WindowSize(60, 60, 15)),
     WindowCase("walking", walking_window, WindowSize(8, 20, 15), layout=0.001),
     WindowCase("walking", walking_window, WindowSize(20, 40, 15), layout=0.001),
+    WindowCase("random", random_window, WindowSize(20, 40, 15), layout=0.001),
     WindowCase("walking", walking_window, WindowSize(40, 60, 15), layout=0.001),
 )
 """Windows that take longer than a stride."""

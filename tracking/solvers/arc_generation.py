@@ -1,4 +1,4 @@
-"""Column generation over arcs: for the layout term, and for windows in which many objects conflict.
+"""Column generation over arcs: for windows in which many objects conflict, and for the squared layout term.
 
 The program starts with the arcs of a few paths. The duals of violated conflict rows and of the layout are
 prices on nodes. A forward and a backward Viterbi pass over the priced network give the cost of the best path
@@ -17,7 +17,7 @@ from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
-from tracking.solvers.dual_ascent import DualGuess, add_layout_prices, guess_duals
+from tracking.solvers.dual_ascent import DualGuess, guess_duals, usage_of_paths
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.arc_master import (
     ArcMaster,
@@ -28,13 +28,10 @@ from tracking.solvers.programs.arc_master import (
 )
 from tracking.solvers.programs.linear_program import WorkLimitError
 from tracking.solvers.relaxation import OPTIMALITY_TOLERANCE, RelaxedSolution, add_conflict_prices
-from tracking.solvers.viterbi import MinMarginals, PathPricer, Trellis, best_paths, forward
+from tracking.solvers.viterbi import MinMarginals, PathPricer, Trellis, forward
 
 _ARCS_WITH_LAYOUT, _ARCS = 300, 100
 """Most arcs added per object and round, about those of a few paths; more only enlarge the program."""
-
-_ENTRIES_PER_ROW = 5
-"""Entries of a row of the layout term, at least."""
 
 _STATES_WITH_LAYOUT, _STATES = 12, 6
 """Cheapest states per frame and object whose arcs are tried first: most rounds need no others."""
@@ -48,6 +45,17 @@ class _PricedTrellis:
     forward: Floats
     reduced_cost_limits: Floats
     bound: float
+
+
+def add_layout_prices(node: Floats, locations: Floats, layout_prices: Floats) -> Floats:
+    """Return node costs `node` (n, M, S) at `locations` (n, M, S, 4) with the layout prices.
+
+    `layout_prices` (n, M - 1, 4) is the gain per pixel of movement.
+    """
+    prices = np.zeros((*node.shape[:2], BOX_SIDES))
+    prices[:, 1:] -= layout_prices
+    prices[:, :-1] += layout_prices
+    return np.asarray(node + (locations @ prices[:, :, :, None])[:, :, :, 0])
 
 
 class ArcGeneration:
@@ -87,9 +95,8 @@ class ArcGeneration:
         owners = np.tile(np.arange(self._network.objects), len(guess.paths))
         self._master.add_arcs(path_arcs(owners, np.concatenate(guess.paths)))
         no_limits = np.full(self._network.objects, np.inf)
-        point = ArcMasterSolution(
-            0.0, guess.prices, guess.layout_prices, no_limits, float(guess.prices.sum())
-        )
+        still = self._no_layout_prices()
+        point = ArcMasterSolution(0.0, guess.prices, still, no_limits, float(guess.prices.sum()))
         self._guessed = mean_flow(self._network, guess.paths)
         self._add_improving_arcs(self._price(point))
 
@@ -108,30 +115,27 @@ class ArcGeneration:
         except WorkLimitError:
             limit = self._meter.reached(RELAXATION_SHARE) or "work"
         # The first prices of a search can prove less than none.
-        network = self._network
-        layout_prices = np.zeros((network.objects, network.frames - 1, BOX_SIDES))
-        free = ArcMasterSolution(0.0, np.empty(0), layout_prices, np.full(network.objects, np.inf), 0.0)
+        limits = np.full(self._network.objects, np.inf)
+        free = ArcMasterSolution(0.0, np.empty(0), self._no_layout_prices(), limits, 0.0)
         point, priced = max(
             ((free, self._price(free)), *self._priced_points), key=lambda found: found[1].bound
         )
         return self._relaxed(point, priced, rounds, limit)
 
+    def _no_layout_prices(self) -> Floats:
+        return np.zeros((self._network.objects, self._network.frames - 1, BOX_SIDES))
+
     def _relaxed(
         self, point: ArcMasterSolution, priced: _PricedTrellis, rounds: int, limit: Limit | None
     ) -> RelaxedSolution:
         rows = self._master.rows[: len(point.prices)]
-        bound_reductions = np.zeros(self._network.frames)
-        frames = np.array([row.frame for row in rows], dtype=np.int64)
-        np.add.at(bound_reductions, frames, point.prices)
         usage = self._master.usage()
         return RelaxedSolution(
             usage=usage if usage.any() or not len(self._guessed) else self._guessed,
             bound=priced.bound,
-            priced=priced.trellis.node,
+            priced=priced.trellis,
             rounds=rounds,
             prices=conflict_prices(self._network, rows, point.prices),
-            layout_prices=point.layout_prices,
-            bound_reductions=bound_reductions,
             limit=limit,
         )
 
@@ -180,55 +184,16 @@ class ArcGeneration:
 def generate_arcs(
     network: Network, pricing: PathPricer, finder: ConflictSeparator, meter: BudgetMeter
 ) -> RelaxedSolution:
-    """Find the optimum of the relaxation, from a guess at the duals; the finder must be unused.
-
-    Where the budget does not allow even one program, the guess takes its place.
-    """
-    if not _allows_a_program(network, meter):
-        return relaxed_by_ascent(network, guess_duals(network, pricing, finder, meter, is_last=True), meter)
+    """Find the optimum of the relaxation, from a guess at the duals; the finder must be unused."""
     starts = path_arcs(np.arange(network.objects), pricing.alone.nodes)
     search = ArcGeneration(network, starts, [], finder, meter)
     search.enter_guess(guess_duals(network, pricing, finder, meter))
     return search.run()
 
 
-def _allows_a_program(network: Network, meter: BudgetMeter) -> bool:
-    """Return whether the budget allows a simplex iteration for each row of the layout term."""
-    if not network.layout:
-        return True
-    pairs = network.objects * (network.objects - 1) // 2
-    rows = (network.objects + pairs) * (network.frames - 1) * BOX_SIDES
-    least = BudgetMeter()
-    least.add_iterations(rows, _ENTRIES_PER_ROW * rows)
-    return least.work_s <= meter.left(RELAXATION_SHARE)
-
-
-def relaxed_by_ascent(network: Network, guess: DualGuess, meter: BudgetMeter) -> RelaxedSolution:
-    """Return the bound of a guess at the duals, and the mean of its last paths as the flow."""
-    node = add_conflict_prices(network, guess.rows, guess.prices)
-    if network.layout:
-        node = add_layout_prices(node, network.locations[network.sets], guess.layout_prices)
-    paths, free = best_paths(Trellis.of(network).with_node(node)), best_paths(Trellis.of(network))
-    for _ in range(2):
-        meter.add_passes(*network.node.shape)
-    bound = float(paths.costs.sum() - guess.prices.sum())
-    alone = float(free.costs.sum())
-    return RelaxedSolution(
-        usage=mean_flow(network, guess.paths),
-        bound=max(bound, alone),
-        priced=node if bound >= alone else network.node,
-        rounds=0,
-        limit=meter.reached(RELAXATION_SHARE) or "work",
-    )
-
-
 def mean_flow(network: Network, paths: Ints) -> Floats:
     """Return the mean flow y (n, M, S) of paths (G, n, M); an ascent's last ones approximate the optimum."""
-    each, frames = np.indices(paths.shape[1:])
-    usage = np.zeros(network.node.shape)
-    for nodes in paths:
-        usage[each, frames, nodes] += 1.0 / len(paths)
-    return usage
+    return np.asarray(np.mean([usage_of_paths(network, nodes) for nodes in paths], axis=0))
 
 
 def _cheapest_arcs(owner: Ints, costs: Floats, objects: int, limit: int) -> Bools:

@@ -142,7 +142,9 @@ class ArcProgramSolver(TimedSolver):
             usage = np.zeros(network.node.shape)
             np.put_along_axis(usage, alone.nodes[:, :, None], 1.0, axis=2)
             limit = meter.reached(RELAXATION_SHARE) or "work"
-            found = RelaxedSolution(usage, float(alone.costs.sum()), network.node, rounds=0, limit=limit)
+            found = RelaxedSolution(
+                usage, float(alone.costs.sum()), Trellis.of(network), rounds=0, limit=limit
+            )
         return solution_from_relaxation(self.name, network, found, meter)
 
 
@@ -160,7 +162,7 @@ def solve_arc_relaxation(network: Network, meter: BudgetMeter) -> RelaxedSolutio
     found = solve_program(reduced.program, meter=meter)
     usage = np.zeros(network.node.shape)
     usage[built.nodes >= 0] = reduced.sums @ found.values
-    return RelaxedSolution(usage, found.objective, network.node, rounds=1)
+    return RelaxedSolution(usage, found.objective, Trellis.of(network), rounds=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

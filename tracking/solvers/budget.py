@@ -21,6 +21,8 @@ _PASS_ARC = 3e-9
 """Seconds for an arc of a Viterbi pass."""
 _LAYOUT_ARC = 4e-9
 """Seconds for an arc, a side of the box and another object of the layout term."""
+_MOVEMENT_ARC, _MOVEMENT_CELL = 1.4e-8, 1e-9
+"""Seconds for an arc with a price of its movement, and for a cell of movements and another object."""
 _ITERATION, _ITERATION_ENTRY = 1e-5, 5e-9
 """Seconds for a simplex iteration, and more for each entry of the matrix."""
 _INTERIOR_ENTRY = 3e-7
@@ -86,6 +88,10 @@ class BudgetMeter:
     def add_layout(self, others: int, frames: int, states: int) -> None:
         """Add the layout term of one object's arcs with the others."""
         self.work_s += 4.0 * _LAYOUT_ARC * others * frames * states**2
+
+    def add_movement_prices(self, objects: int, steps: int, cells: int, states: int) -> None:
+        """Add a step of the prices of movements: all arcs, and all pairs of objects in all cells."""
+        self.work_s += objects * steps * (_MOVEMENT_ARC * states**2 + _MOVEMENT_CELL * objects * cells)
 
     def add_iterations(self, iterations: int, entries: int) -> None:
         """Add simplex iterations on a matrix of so many entries."""

@@ -22,6 +22,7 @@ from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
+from tracking.solvers.layout_ascent import LayoutAscent
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.programs.arc_master import ArcMaster, path_arcs
 from tracking.solvers.programs.linear_program import WorkLimitError
@@ -63,7 +64,7 @@ class PathGeneration:
         self._alone = self._pricing.alone
         self._bound = -np.inf
         self._rounds = 0
-        self._priced = network.node
+        self._priced = self._pricing.trellis
         self._prices = np.empty(0)
         self._point = PathMasterSolution(0.0, np.empty(0), np.empty(0))
         self._linked = np.zeros((network.objects, network.objects), dtype=np.bool_)
@@ -199,7 +200,8 @@ class PathGeneration:
             self._meter.add_passes(len(active), *self._network.node.shape[1:])
             bound = inactive_cost + float(paths.costs.sum() - prices.sum())
             if bound >= self._bound:
-                self._bound, self._priced, self._prices = bound, priced, prices
+                self._bound, self._prices = bound, prices
+                self._priced = self._pricing.trellis.with_node(priced)
             gaps.append(cost - bound)
             if gaps[-1] <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost)):
                 return False
@@ -237,16 +239,16 @@ class ColumnGenerationSolver(TimedSolver):
 def solve_relaxation(
     network: Network, warm_start: WarmStart | None = None, meter: BudgetMeter | None = None
 ) -> RelaxedSolution:
-    """Return the optimum of the relaxation of a network with at least one object.
+    """Return the optimum of a relaxation of a network with at least one object.
 
-    The columns are paths if only conflicts couple the objects, and arcs under the layout term, for which
-    whole paths are unsuitable.
+    If only conflicts couple the objects, it is that of the program in II.D, by columns of paths. With a
+    layout term it is near the optimum of a tighter one, by dual ascent.
     """
     network, meter = allow_hiding(network), meter or BudgetMeter()
-    if not network.layout:
+    if not network.layout or min(network.objects, network.frames) < 2:  # noqa: PLR2004 — nothing moves apart
         return PathGeneration(network, meter).run(warm_start)
     pricing = PathPricer(Trellis.of(network))
-    return generate_arcs(network, pricing, ConflictSeparator(network), meter)
+    return LayoutAscent(network, pricing, ConflictSeparator(network), meter).run()
 
 
 _SQUARED_POWER = 2

@@ -23,7 +23,7 @@ from tracking.solvers.objective import Ints, total_cost
 from tracking.solvers.programs.linear_program import WorkLimitError, solve_program
 from tracking.solvers.relaxation import RelaxedSolution
 from tracking.solvers.solution_builder import Certificate, build_solution, empty_solution, integer_nodes
-from tracking.solvers.viterbi import MinMarginals, Trellis, backward, forward
+from tracking.solvers.viterbi import MinMarginals, backward, forward
 from tracking.solvers.warm_start import WarmStart
 
 _MAX_JOINT_STATES = 150_000
@@ -63,13 +63,14 @@ class JointStateSearch:
         self._meter = meter or BudgetMeter()
         self._bound = found.bound
         self._exclusions = network.exclusions()
-        passes = MinMarginals.of(Trellis.of(network).with_node(found.priced))
+        passes = MinMarginals.of(found.priced)
         self._excess = passes.through - passes.least[:, None, None]
         self._locations = network.locations[network.sets]
-        # Lower bound of the cost from each state on, without the layout price that acts at that frame.
-        self._bound_ahead = np.swapaxes(passes.backward, 0, 1).copy()
-        self._bound_ahead[:, :-1] += np.einsum("nml,nmsl->nms", found.layout_prices, self._locations[:, :-1])
-        self._bound_reductions = np.append(np.cumsum(found.bound_reductions[::-1])[::-1][1:], 0.0)
+        # Lower bound of the cost from each state on.
+        self._bound_ahead = np.swapaxes(passes.backward, 0, 1)
+        # Without other objects or later frames there are no later prices.
+        reductions = found.bound_reductions if len(found.bound_reductions) else np.zeros(network.frames)
+        self._bound_reductions = np.append(np.cumsum(reductions[::-1])[::-1][1:], 0.0)
 
     def cheaper_than(self, cost: float) -> Ints | None:
         """Return the cheapest nodes (n, M) if they cost less than `cost`, else None.
@@ -217,22 +218,22 @@ def branch_and_bound(
     Raises:
         WorkLimitError: the meter's budget is spent before.
     """
-    excess = arc_excess(network, found)
+    excess = arc_excess(found)
     tight = _TOLERANCE * max(1.0, abs(total_cost(network, nodes)))
     nodes = _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= tight, meter))
     gap = max(0.0, total_cost(network, nodes) - found.bound) + tight
     return _cheaper_nodes(network, nodes, _solve_restricted(network, nodes, excess <= gap, meter))
 
 
-def arc_excess(network: Network, found: RelaxedSolution) -> Floats:
+def arc_excess(found: RelaxedSolution) -> Floats:
     """Return the excess cost of the best path through each arc over its object's best path, at the prices.
 
     Shape (n, M - 1, S, S); infinite where there is no arc.
     """
-    trellis = Trellis.of(network).with_node(found.priced)
+    trellis = found.priced
     forward_costs, backward_costs = forward(trellis), backward(trellis)
     least = (forward_costs[-1] + trellis.sink).min(axis=1)
-    objects, frames, states = network.node.shape
+    objects, frames, states = trellis.node.shape
     excess = np.empty((objects, frames - 1, states, states))
     for m in range(1, frames):
         after = (trellis.node[:, m] + backward_costs[m])[:, None]

@@ -58,7 +58,9 @@ class JointDpSolver(TimedSolver):
             alone = best_paths(Trellis.of(network))
             usage = np.zeros(network.node.shape)
             np.put_along_axis(usage, alone.nodes[:, :, None], 1.0, axis=2)
-            found = RelaxedSolution(usage, float(alone.costs.sum()), network.node, rounds=0, limit=limit)
+            found = RelaxedSolution(
+                usage, float(alone.costs.sum()), Trellis.of(network), rounds=0, limit=limit
+            )
             return solution_from_relaxation(self.name, network, found, meter, warm_start=warm_start)
         nodes = _JointStates(network).best()
         # The optimum is its own bound, unless every answer has conflicts or a missing arc.

@@ -11,6 +11,7 @@ from tracking.model.network import Network
 from tracking.solvers.budget import Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
 from tracking.solvers.objective import Ints, conflict_count, path_costs
+from tracking.solvers.rounding import is_integral
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis, best_paths
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
@@ -25,25 +26,30 @@ class RelaxedSolution:
     Attributes:
         usage: y (n, M, S), the flow of each object through each node.
         bound: its cost, as proven by the prices.
-        priced: (n, M, S) node costs with the prices of conflicts and of the layout, at which the cheapest
-            paths prove the bound.
+        priced: the trellis with the prices of conflicts and of the layout, whose cheapest paths prove the
+            bound.
         rounds: how often paths or arcs were priced.
         prices: the binding conflict rows, if all objects share the observations.
-        layout_prices: (n, M - 1, 4) the gain per pixel of movement; empty without layout term.
         bound_reductions: (M,) by how much the prices of each frame's rows reduce the bound; empty without
             layout term.
         limit: the limit at which the search ended before the optimum, None if it is the optimum. Then y may
             violate rows, and the bound is lower.
+        is_optimum: False: it is not the optimum of a relaxation, but near that of one, as an ascent finds it.
     """
 
     usage: Floats
     bound: float
-    priced: Floats
+    priced: Trellis
     rounds: int
     prices: tuple[ConflictPrice, ...] = ()
-    layout_prices: Floats = field(default_factory=lambda: np.empty(0))
     bound_reductions: Floats = field(default_factory=lambda: np.empty(0))
     limit: Limit | None = None
+    is_optimum: bool = True
+
+    @property
+    def is_integral(self) -> bool:
+        """Whether it is the optimum of the relaxation, and all of its y are 0 or 1."""
+        return self.is_optimum and self.limit is None and is_integral(self.usage)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +86,7 @@ def try_warm_start(
             usage = np.zeros(network.node.shape)
             np.put_along_axis(usage, nodes[:, :, None], 1.0, axis=2)
             return WarmStartResult(
-                rows, paths, RelaxedSolution(usage, bound, node, 0, conflict_prices(network, rows, prices))
+                rows, paths, RelaxedSolution(usage, bound, trellis, 0, conflict_prices(network, rows, prices))
             )
     return WarmStartResult(rows, paths, None)
 

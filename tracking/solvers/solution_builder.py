@@ -14,7 +14,7 @@ from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, states_from_nodes, total_cost
 from tracking.solvers.relaxation import RelaxedSolution
-from tracking.solvers.rounding import LocalSearch, is_integral, round_relaxation
+from tracking.solvers.rounding import LocalSearch, round_relaxation
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 
@@ -44,12 +44,12 @@ def integer_nodes(
     are the greedy paths and the cheapest of `candidate_nodes`; the cheapest of the three are returned, the
     rounded ones if equal. So no answer is dearer than hiding everybody.
     """
-    if found.limit:
+    if found.limit or not found.is_optimum:
         # The flow of a search that has not ended may violate rows; shares below 1 are rounded in each frame.
         nodes = round_relaxation(network, 0.5 * found.usage)
     else:
         nodes = round_relaxation(network, found.usage)
-        if is_integral(found.usage) and np.isfinite(total_cost(network, nodes, power)):
+        if found.is_integral and np.isfinite(total_cost(network, nodes, power)):
             return nodes
     network = allow_hiding(network)
     improver = LocalSearch(network, power, meter)
@@ -75,7 +75,7 @@ class Certificate:
     @classmethod
     def of(cls, solver: str, found: RelaxedSolution, meter: BudgetMeter) -> Certificate:
         """Return what the relaxation has proven, and what the budget has cut after it."""
-        integral = found.limit is None and is_integral(found.usage)
+        integral = found.is_integral
         skipped = ["relaxation"] if found.limit else []
         limit = found.limit
         if not integral and (rest := meter.reached()):
