@@ -15,9 +15,9 @@ import numpy as np
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
+from tracking.solvers.ascent.dual_ascent import DualGuess, guess_duals, usage_of_paths
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
-from tracking.solvers.dual_ascent import DualGuess, guess_duals, usage_of_paths
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.arc_master import (
     ArcMaster,

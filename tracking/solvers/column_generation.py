@@ -17,12 +17,12 @@ import numpy as np
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.arc_generation import ArcGeneration, generate_arcs
+from tracking.solvers.ascent.layout_ascent import LayoutAscent
 from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
-from tracking.solvers.layout_ascent import LayoutAscent
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.programs.arc_master import ArcMaster, path_arcs
 from tracking.solvers.programs.linear_program import WorkLimitError

@@ -13,7 +13,7 @@ from fakes.tracking.random_networks import Case, cases, network_of
 from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import SolverBudget, create_solver
-from tracking.solvers.movement_prices import (
+from tracking.solvers.ascent.movement_prices import (
     MovementCells,
     MovementLengths,
     hiding_tolls,

@@ -8,20 +8,20 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.model.network import Network
-from tracking.solvers.adam import AdamSteps
-from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
-from tracking.solvers.conflict_duals import ConflictDuals, typical_price
-from tracking.solvers.cutting_planes import ConflictSeparator
-from tracking.solvers.dual_ascent import usage_of_paths
-from tracking.solvers.movement_prices import (
+from tracking.solvers.ascent.adam import AdamSteps
+from tracking.solvers.ascent.conflict_duals import ConflictDuals, typical_price
+from tracking.solvers.ascent.dual_ascent import usage_of_paths
+from tracking.solvers.ascent.movement_prices import (
     MovementCells,
     MovementLengths,
     hiding_tolls,
     slopes_from_tensions,
 )
+from tracking.solvers.ascent.soft_paths import node_shares, soft_paths
+from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
+from tracking.solvers.cutting_planes import ConflictSeparator
 from tracking.solvers.objective import Ints, conflict_count, total_cost
 from tracking.solvers.relaxation import OPTIMALITY_TOLERANCE, RelaxedSolution, add_conflict_prices
-from tracking.solvers.soft_paths import node_shares, soft_paths
 from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, Trellis, trace_back
 
 _STEPS = 80

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.solvers.adam import AdamSteps
+from tracking.solvers.ascent.adam import AdamSteps
 from tracking.solvers.cutting_planes import ConflictRow
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import PrunedStates

@@ -8,8 +8,8 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.model.network import Network
+from tracking.solvers.ascent.conflict_duals import ConflictDuals, typical_price
 from tracking.solvers.budget import BudgetMeter
-from tracking.solvers.conflict_duals import ConflictDuals, typical_price
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, best_paths

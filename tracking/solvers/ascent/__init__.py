@@ -1,0 +1,1 @@
+"""Dual ascent: prices that rise and fall along their slopes, for bounds and starting points."""
