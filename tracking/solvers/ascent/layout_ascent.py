@@ -30,6 +30,9 @@ _STEPS = 80
 _PROOFS = 8
 """How often all paths are priced on the way, which proves a bound and finds violated conflict rows."""
 
+_EARLY_PROOFS, _LEAST_GAIN = 2, 5e-4
+"""Proofs that need not raise the bound, and the relative gain below which a later one is the last."""
+
 _FIRST_TEMPERATURE, _LAST_TEMPERATURE = 0.2, 0.02
 """Temperatures of the soft paths, relative to what all others can charge for a movement by a height."""
 
@@ -88,13 +91,17 @@ class LayoutAscent:
     def run(self) -> RelaxedSolution:
         """Return the best bound, and the last soft paths as the flow."""
         steps = self._affordable_steps()
+        proofs = [(part * steps) // _PROOFS - 1 for part in range(1, _PROOFS + 1)]
         is_closed = self._prove()
         for step in range(steps):
             if is_closed or self._meter.reached(RELAXATION_SHARE):
                 break
             self._step(step / max(steps - 1, 1))
-            if step in {(part * steps) // _PROOFS - 1 for part in range(1, _PROOFS + 1)}:
-                is_closed = self._prove()
+            if step in proofs:
+                before, is_closed = self._best.bound, self._prove()
+                gain = self._best.bound - before
+                if proofs.index(step) >= _EARLY_PROOFS and gain < _LEAST_GAIN * max(1.0, abs(before)):
+                    break
         is_cut = not is_closed and steps < _STEPS
         return RelaxedSolution(
             usage=self._usage,
