@@ -15,6 +15,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.frame_rate import frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
+from tracking.ground_plane.candidates import Candidates
 from tracking.ground_plane.hypotheses import find_places
 from tracking.ground_plane.measurements import PERSON_M, estimate_units_per_metre, measure
 from tracking.ground_plane.network import build_ground_network
@@ -22,7 +23,7 @@ from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.place_noise import PlaceNoise
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
-from tracking.ground_plane.window import WindowFrame, known_people, predict_places
+from tracking.ground_plane.window import WindowFrame, known_people, missed_costs, predict_places
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport
 from tracking.types import Detections
 
@@ -63,6 +64,8 @@ class KeyframeTracker:
         )
         self._sizes = [BoxSizes() for _ in cameras]
         self._noise = PlaceNoise(len(cameras))
+        self._first_detected: int | None = None
+        self._candidates = Candidates(self._seconds, settings)
         self._people: list[GroundPerson] = []
         self._next_id = 1
         self._window: deque[WindowFrame] = deque()
@@ -92,6 +95,8 @@ class KeyframeTracker:
         places = find_places(
             measurements, predictions, self._cameras, self._sizes, self._settings, self._seconds
         )
+        if self._first_detected is None and len(measurements):
+            self._first_detected = number
         self._window.append(WindowFrame(number, places))
         if (number + 1) % self._stride or len(self._window) <= self._lag:
             return []
@@ -146,6 +151,8 @@ class KeyframeTracker:
         if self._window:
             self._solve()
             final = [self._finish_oldest() for _ in range(len(self._window))]
+        self._candidates.clear()
+        self._first_detected = None
         self._people, self._states = [], np.zeros((0, 0), dtype=np.int64)
         return final
 
@@ -155,12 +162,15 @@ class KeyframeTracker:
         people = known_people(
             self._people, self._window, self._cameras, self._sizes, self._seconds, self._settings
         )
-        anybody_known = self._next_id > 1
-        rate = self._settings.arrival_rate * self._seconds if anybody_known else self._settings.people_density
+        rate = self._settings.arrival_rate * self._seconds
+        if self._is_beginning(self._window[0].number):
+            rate = self._settings.people_density
+        arrival_cost = -float(np.log(rate))
+        first = arrival_cost - np.minimum(self._candidates.discounts(frames[0]), arrival_cost)
         newcomers = _NEWCOMERS
         while True:
             network = build_ground_network(
-                people, newcomers, frames, self._seconds, -float(np.log(rate)), self._settings
+                people, newcomers, frames, self._seconds, arrival_cost, first, self._settings
             )
             solution = self._solver.solve(network)
             gone = network.max_places - 1
@@ -171,6 +181,12 @@ class KeyframeTracker:
             newcomers *= 2
         rows = np.concatenate([np.ones(len(people), dtype=np.bool_), arrived])
         self._states, self._report = states[rows], solution.report
+
+    def _is_beginning(self, number: int) -> bool:
+        """Return whether people whom nobody has found yet may have been there from the first detection on."""
+        if self._first_detected is None:
+            return True
+        return self._seconds * (number - self._first_detected) < self._settings.forget_after_s
 
     def _finish_oldest(self) -> GroundFrame:
         """Make the oldest frame final: people move, arrive and leave."""
@@ -198,6 +214,10 @@ class KeyframeTracker:
                 tracks.append(self._track(person, frame, state, ahead.place, ahead.place_covariance))
         chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
         self._noise.update(frame.places, chosen)
+        missed = missed_costs(
+            self._candidates.places, frame.places.measurements, self._cameras, self._sizes, self._settings
+        )
+        self._candidates.update(frame.places, chosen, self._settings.detection_weight(self._seconds) * missed)
         self._people = people
         self._states = self._states[rows + arriving, 1:]
         return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)

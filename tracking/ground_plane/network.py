@@ -47,11 +47,13 @@ def build_ground_network(
     frames: Sequence[Places],
     seconds: float,
     arrival_cost: float,
+    first_arrival_costs: Floats,
     settings: GroundSettings,
 ) -> Network:
     """Build the network of M frames, `seconds` apart, of the people known and `newcomers` who may arrive.
 
-    `arrival_cost`: negative log of the people who arrive per m² and frame.
+    `arrival_cost`: negative log of the people who arrive per m² and frame; `first_arrival_costs` (K,): the
+    same at each place of the first frame.
     """
     objects, length = len(people) + newcomers, len(frames)
     gone = max(len(places) for places in frames)
@@ -77,7 +79,7 @@ def build_ground_network(
             node[n, m, : len(places)] += person.appearance[m]
             (source[n] if m == 0 else pair[n, m - 1, hidden])[: len(places)] = reach
     node[len(people) :, :, hidden] = 0.0
-    source[len(people) :, : len(frames[0])] = arrival_cost
+    source[len(people) :, : len(frames[0])] = first_arrival_costs
     pair[len(people) :, :, :gone, gone] = departure
     for m, (before, after) in enumerate(pairwise(frames)):
         steps = _Steps.between(before, after, seconds, settings)

@@ -10,6 +10,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.hypotheses import Places
+from tracking.ground_plane.measurements import Measurements
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.network import KnownPerson
 from tracking.ground_plane.person import GroundPerson, appearance_costs
@@ -74,19 +75,18 @@ def known_people(
     """Return the people known, with what the window's frames say of each."""
     if not people:
         return []
-    hidden, weight = [], settings.detection_weight(seconds_per_frame)
-    for frame in window:
-        ahead = [person.ahead(frame.number).place for person in people]
-        probabilities = detection_probabilities(
-            np.array(ahead),
+    weight = settings.detection_weight(seconds_per_frame)
+    hidden = [
+        weight
+        * missed_costs(
+            np.array([person.ahead(frame.number).place for person in people]),
+            frame.places.measurements,
             cameras,
             sizes,
-            frame.places.measurements,
-            np.zeros((len(people), len(frame.places.measurements)), dtype=np.bool_),
-            settings.detection_probability,
+            settings,
         )
-        seen = np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)
-        hidden.append(-weight * np.log1p(-seen).sum(axis=1))
+        for frame in window
+    ]
     appearance = [appearance_costs(people, frame.places, settings) for frame in window]
     return [
         KnownPerson(
@@ -97,3 +97,18 @@ def known_people(
         )
         for n, person in enumerate(people)
     ]
+
+
+def missed_costs(
+    places: Floats,
+    measurements: Measurements,
+    cameras: Sequence[GroundCamera],
+    sizes: Sequence[BoxSizes],
+    settings: GroundSettings,
+) -> Floats:
+    """Return the costs of people at places (N, 2) being detected by no camera in a frame, (N,)."""
+    nobody = np.zeros((len(places), len(measurements)), dtype=np.bool_)
+    probabilities = detection_probabilities(
+        places, cameras, sizes, measurements, nobody, settings.detection_probability
+    )
+    return np.asarray(-np.log1p(-np.minimum(probabilities, _MAX_DETECTION_PROBABILITY)).sum(axis=1))
