@@ -16,7 +16,7 @@ from tracking.appearance_histograms import add_appearance_histograms
 from tracking.ground_plane import GroundFrame
 from tracking.solvers.base import OCCLUDED
 
-_SHOWN_UNDETECTED_S = 1.0
+_SHOWN_UNDETECTED_S = 0.4
 """Seconds for which a camera shows somebody whom it no longer detects, where they must be by their place."""
 
 

@@ -33,7 +33,7 @@ _MIN_SUPPORT = 0.5
 _REPLACING_SHARE, _REPLACING_OVERLAP = 0.2, 0.1
 """Probability that an alternative is right if the person it overlaps (IoU) by at least so much is not.
 
-Without it, alternatives in crowds are right in 5 to 8 % and have a probability of 2 %.
+Without it, alternatives in crowds are right somewhat more often than their probability says.
 """
 _NO_BOX = -1
 _MIN_PROBABILITY, _MAX_PROBABILITY = 0.01, 0.99
