@@ -2,9 +2,10 @@
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.paper_experiments --out out/bench
 
-Counts wrong labels per frame of the LP, its exact optimum, greedy and separate dynamic programming, and the
-windows in which the LP was integral: means over several scenes, beside the paper's figures of its own
-recordings. The difficulty of the scenes is chosen here, to compare the solvers with each other.
+Counts wrong labels per frame of the LP (solver `arcs`), its exact optimum, greedy and separate dynamic
+programming, and the windows in which the LP was integral: means over several scenes, beside the paper's
+figures of its own recordings. The difficulty of the scenes is chosen here, to compare the solvers with each
+other.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from benchmarks.paper_experiments.scene import ExperimentScene
 from benchmarks.paper_experiments.windowed_tracking import TrackedLabels, follow
 from tracking import SolverBudget, create_solver
 
-_PLOTTED = ("columns", "greedy-dp", "separate-dp")
+_PLOTTED = ("arcs", "greedy-dp", "separate-dp")
 BUDGET = SolverBudget(work_s=120.0)
 """Of each segment: branch and bound may take for ever under the layout term."""
 
@@ -62,7 +63,7 @@ def row(setting: TrackerSetting, solver: str, outcomes: list[SolverOutcome]) -> 
         _spread([per_frame(label.wrong) for label in labels]),
         _spread([per_frame(label.unlike) for label in labels]),
         _spread([per_frame(label.missing) for label in labels]),
-        f"{integral} of {windows}" if solver == "columns" else "",
+        f"{integral} of {windows}" if solver == "arcs" else "",
         "" if solver == "separate-dp" else f"{100 * max(outcome.gap for outcome in outcomes):.2f}",
     ]
 

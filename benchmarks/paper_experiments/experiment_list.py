@@ -11,8 +11,8 @@ from benchmarks.paper_experiments.scene import ExperimentScene
 from benchmarks.paper_experiments.walking_people import WalkParameters
 from tracking import PAPER, PAPER_CVPR, CostSettings, PaperPreset, WindowSettings
 
-SOLVERS = ("columns", "exact", "greedy-dp", "separate-dp")
-_LP = ("columns",)
+SOLVERS = ("arcs", "exact", "greedy-dp", "separate-dp")
+_LP = ("arcs",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def _settings(preset: PaperPreset, default: CostSettings) -> tuple[TrackerSettin
         _paper(preset),
         *(_paper(preset, f"paper, μ / {part}", _LP, preset.costs.layout / part) for part in _SMALLER_LAYOUT),
         _paper(preset, "paper, no layout term", layout=0.0),
-        _paper(_cvpr(preset), "CVPR paper", ("columns", "greedy-dp")),
+        _paper(_cvpr(preset), "CVPR paper", ("arcs", "greedy-dp")),
         TrackerSetting("default", default, WindowSettings()),
     )
 
@@ -117,7 +117,7 @@ _THREE = SceneParameters(
 )
 _FOUR = SceneParameters((0, 1, 0, 1), _FOUR_FRAMES, WalkParameters(7.0, 0.25), clutter=3.0)
 
-_EXAMPLE_PAPER = (PaperFigure("columns", "none told", "1 of 1"), PaperFigure("greedy-dp", "at 2 meetings"))
+_EXAMPLE_PAPER = (PaperFigure("arcs", "none told", "1 of 1"), PaperFigure("greedy-dp", "at 2 meetings"))
 
 
 def _example(name: str, title: str, scene: SceneParameters) -> Experiment:
@@ -126,7 +126,7 @@ def _example(name: str, title: str, scene: SceneParameters) -> Experiment:
     settings = (
         _paper(whole, "paper, one segment"),
         _paper(whole, "paper, one segment, μ / 50", _LP, PAPER.costs.layout / 50),
-        _paper(whole_cvpr, "CVPR paper, one segment", ("columns", "greedy-dp")),
+        _paper(whole_cvpr, "CVPR paper, one segment", ("arcs", "greedy-dp")),
         *_settings(PAPER, CostSettings()),
     )
     return Experiment(name, title, "Fig. 8", lambda seed: play(scene, seed), settings, _EXAMPLE_PAPER)
@@ -141,7 +141,7 @@ EXPERIMENTS = (
         "Fig. 12",
         lambda seed: play_toys(_TOYS_FRAMES, seed),
         _settings(_TOYS, _TOYS_DEFAULT),
-        (PaperFigure("columns", "0.000"),),
+        (PaperFigure("arcs", "0.000"),),
         scenes=3,
     ),
     Experiment(
@@ -150,7 +150,7 @@ EXPERIMENTS = (
         "Fig. 14",
         lambda seed: play(_TWO, seed),
         _settings(PAPER, CostSettings()),
-        (PaperFigure("columns", "0.009", "72 of 75"),),
+        (PaperFigure("arcs", "0.009", "72 of 75"),),
     ),
     Experiment(
         "three",
@@ -158,7 +158,7 @@ EXPERIMENTS = (
         "Fig. 18",
         lambda seed: play(_THREE, seed),
         _settings(_THREE_PEOPLE, CostSettings()),
-        (PaperFigure("columns", "0.063", "131 of 135"), PaperFigure("greedy-dp", "0.174")),
+        (PaperFigure("arcs", "0.063", "131 of 135"), PaperFigure("greedy-dp", "0.174")),
     ),
     Experiment(
         "four",

@@ -93,7 +93,7 @@ def test_each_object_has_one_track_and_each_track_one_object() -> None:
     np.testing.assert_array_equal(boxes[1], wandering)
 
 
-@pytest.mark.parametrize("solver", ["columns", "exact", "greedy-dp", "separate-dp"])
+@pytest.mark.parametrize("solver", ["arcs", "exact", "greedy-dp", "separate-dp"])
 def test_people_who_stand_apart_keep_their_labels(solver: str) -> None:
     scene = two_apart()
     window = window_of_frames(3, 2)
@@ -104,14 +104,14 @@ def test_people_who_stand_apart_keep_their_labels(solver: str) -> None:
 
 def test_people_who_are_not_known_are_found() -> None:
     scene = play(replace(CAST, known=False), 1)
-    followed = follow(scene, CostSettings(), WindowSettings(), create_solver("columns"))
+    followed = follow(scene, CostSettings(), WindowSettings(), create_solver("arcs"))
     assert (~np.isnan(followed.boxes[..., 0])).mean() > 0.7
     assert per_frame(judge(scene, followed.boxes).wrong) < 0.1
 
 
 def test_separate_paths_share_boxes_where_the_program_does_not() -> None:
     scene = play(SceneParameters((0, 0), FRAMES, WalkParameters(6.0, 0.25, side=140.0)), 3)
-    together = follow(scene, PAPER.costs, PAPER.window, create_solver("columns"))
+    together = follow(scene, PAPER.costs, PAPER.window, create_solver("arcs"))
     apart = follow(scene, PAPER.costs, PAPER.window, create_solver("separate-dp"))
     assert sum(report.conflicts for report in together.reports) == 0
     assert sum(report.conflicts for report in apart.reports) > 0
@@ -128,14 +128,14 @@ def test_toys_in_full_view_are_among_their_own_peaks() -> None:
 
 def test_an_experiment_prints_its_table_and_saves_its_plot(tmp_path: Path) -> None:
     settings = (TrackerSetting("paper", PAPER.costs, PAPER.window),)
-    figures = (PaperFigure("columns", "0.123", "2 of 3"),)
+    figures = (PaperFigure("arcs", "0.123", "2 of 3"),)
     experiment = Experiment("tiny", "two people", "Fig. 0", lambda seed: play(CAST, seed), settings, figures)
     report = Report()
     run(experiment, 1, report, tmp_path)
     report.save(tmp_path / "table.txt")
     text = (tmp_path / "table.txt").read_text(encoding="utf-8")
     assert "paper: separate-dp" in text
-    assert "the paper's recording: columns" in text
+    assert "the paper's recording: arcs" in text
     assert "0.123" in text
     assert "2 of 3" in text
     assert "3 of 3" in text
@@ -151,9 +151,9 @@ def test_the_papers_first_example_is_solved_to_the_letter_in_one_segment() -> No
     scene, setting = example.play(1), example.settings[0]
     costs = setting.costs
     assert (costs.layout > 0.0, costs.conflict_rule, costs.conflict_rows) == (True, "corners", "star")
-    followed = follow(scene, costs, setting.window, create_solver("columns"))
+    followed = follow(scene, costs, setting.window, create_solver("arcs"))
     [report] = followed.reports
     assert report.gap < 0.003
     assert followed.boxes.shape[1] == 340
-    [free] = follow(scene, replace(costs, layout=0.0), setting.window, create_solver("columns")).reports
+    [free] = follow(scene, replace(costs, layout=0.0), setting.window, create_solver("arcs")).reports
     assert (free.integral, free.status) == (True, "optimal")
