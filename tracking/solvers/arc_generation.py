@@ -76,7 +76,7 @@ class ArcGeneration:
         self._guessed = np.empty((0, 0))
         self._trellis = Trellis.of(network)
         self._finder = finder
-        self._master = self._new_master()
+        self._master = ArcMaster(network, meter=meter)
         # An object that is always occluded violates no row, so the program is feasible.
         occluded = np.full((network.objects, network.frames), network.max_places)
         self._master.add_arcs(path_arcs(np.arange(network.objects), occluded))
@@ -85,9 +85,6 @@ class ArcGeneration:
 
     _tolerance = OPTIMALITY_TOLERANCE
     """Relative gap at which the optimum is proven."""
-
-    def _new_master(self) -> ArcMaster:
-        return ArcMaster(self._network, meter=self._meter)
 
     def enter_guess(self, guess: DualGuess) -> None:
         """Add the conflict rows of a dual guess, and the arcs that improve the program at its prices."""

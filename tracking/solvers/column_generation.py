@@ -24,7 +24,7 @@ from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conf
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, path_costs
-from tracking.solvers.programs.arc_master import ArcMaster, path_arcs
+from tracking.solvers.programs.arc_master import path_arcs
 from tracking.solvers.programs.linear_program import WorkLimitError
 from tracking.solvers.programs.path_master import PathMaster, PathMasterSolution
 from tracking.solvers.relaxation import (
@@ -279,6 +279,3 @@ class _SquaredLayoutGeneration(ArcGeneration):
     """The same search with the quadratic program, whose duals are less exact than a simplex method's."""
 
     _tolerance = 1e-8
-
-    def _new_master(self) -> ArcMaster:
-        return ArcMaster(self._network, squared=True, meter=self._meter)

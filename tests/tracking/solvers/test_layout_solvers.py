@@ -80,7 +80,7 @@ def test_tied_windows_are_solved_to_the_optimum_of_all_arcs(seed: int) -> None:
     """HiGHS' solver of quadratic programs cycles on most of them."""
     network = tied_window(seed)
     report = create_solver("l2").solve(network).report
-    program = ArcMaster(network, squared=True)
+    program = ArcMaster(network)
     program.add_arcs(all_arcs(network))
     separator = ConflictSeparator(network)
     optimum = program.solve().objective

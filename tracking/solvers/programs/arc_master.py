@@ -84,13 +84,12 @@ class ArcMasterSolution:
 class ArcMaster:
     """Minimum-cost flow of one unit per object through its arcs, subject to the conflict rows.
 
-    With `squared`, the layout term uses the squared L2 norm.
+    A layout term is the squared one, of the solver `l2`.
     """
 
-    def __init__(self, network: Network, *, squared: bool = False, meter: BudgetMeter | None = None) -> None:
+    def __init__(self, network: Network, *, meter: BudgetMeter | None = None) -> None:
         self._network = network
         self._meter = meter or BudgetMeter()
-        self._squared = squared
         self._highs = create_highs(growing=True, presolve=True)
         objects, frames, states = network.node.shape
         none = np.empty(0, dtype=np.int64)
@@ -104,7 +103,7 @@ class ArcMaster:
         self._empty_rows(ones, ones)
         self._layout = None
         if network.layout and frames > 1:
-            self._layout = LayoutConstraints(network, self._highs, squared=squared)
+            self._layout = LayoutConstraints(network, self._highs)
         self._values = np.empty(0)
 
     def _empty_rows(self, lower: Floats, upper: Floats) -> Ints:
@@ -219,7 +218,7 @@ class ArcMaster:
         )
 
     def _run(self) -> LinearSolution:
-        if self._layout is None or not self._squared:
+        if self._layout is None:
             return run_highs(self._highs, self._meter)
         # Imported on demand: only the solver `l2` needs it.
         from tracking.solvers.programs.quadratic_program import solve_quadratic_program  # noqa: PLC0415

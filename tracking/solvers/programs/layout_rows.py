@@ -1,4 +1,4 @@
-"""The layout term in a program of arcs: movements δ of the objects, and differences of pairs of movements."""
+"""The squared layout term in a program of arcs: movements δ of objects, and differences of two movements."""
 
 from __future__ import annotations
 
@@ -14,22 +14,18 @@ from tracking.solvers.objective import Ints
 
 
 class LayoutConstraints:
-    """Columns δ, p+ and p- and their rows; the network has at least two frames.
+    """Columns δ and p and their rows; the network has at least two frames. The term is μ p².
 
     A row per object, step and side defines δ as the movement of the flow; a row per pair of objects, step and
-    side defines p+ - p- as the difference of two movements. The duals of the pair rows are in [-μ, μ], and
-    those of the movements are sums of them: a potential on the nodes, so that Viterbi can price it.
-
-    With `squared`, the term is μ times the squared difference; then p+ alone, unbounded, is the difference,
-    and its duals have no limits.
+    side defines p as the difference of two movements. The duals of the movements are sums of those of the
+    pairs: a potential on the nodes, so that Viterbi can price it.
 
     Attributes:
-        squares: the columns that are squared, at the weight μ.
+        squares: the columns p, which are squared, at the weight μ.
     """
 
-    def __init__(self, network: Network, highs: highspy.Highs, *, squared: bool) -> None:
+    def __init__(self, network: Network, highs: highspy.Highs) -> None:
         self._network = network
-        self._squared = squared
         self._pairs = np.array(list(combinations(range(network.objects), 2)), dtype=np.int64).reshape(-1, 2)
         steps = (network.frames - 1, BOX_SIDES)
         moves, differences = (network.objects, *steps), (len(self._pairs), *steps)
@@ -44,39 +40,33 @@ class LayoutConstraints:
         self._add_columns(highs)
 
     def _add_columns(self, highs: highspy.Highs) -> None:
-        """Add δ, unbounded and without cost, and p+ and p- at the cost μ."""
+        """Add δ and p, unbounded and without linear cost."""
         moves, differences, first_row = self._moves, self._differences, int(self._moves.flat[0])
-        count = moves.size + 2 * differences.size
+        count = moves.size + differences.size
         delta = np.arange(moves.size).reshape(moves.shape)
-        plus = np.arange(moves.size, moves.size + differences.size).reshape(differences.shape)
+        apart = np.arange(moves.size, count).reshape(differences.shape)
         a, b = self._pairs.T
         entries = [
             (moves, delta, -1.0),
             (differences, delta[a], 1.0),
             (differences, delta[b], -1.0),
-            (differences, plus, -1.0),
-            (differences, plus + differences.size, 1.0),
+            (differences, apart, -1.0),
         ]
         row = np.concatenate([rows.ravel() - first_row for rows, _, _ in entries])
         column = np.concatenate([columns.ravel() for _, columns, _ in entries])
         value = np.concatenate([np.full(rows.size, sign) for rows, _, sign in entries])
-        matrix = sparse.csc_array((value, (row, column)), shape=(moves.size + differences.size, count))
-        lower, costs = np.zeros(count), np.full(count, self._network.layout)
-        upper = np.full(count, np.inf)
-        lower[: moves.size], costs[: moves.size] = -np.inf, 0.0
-        if self._squared:
-            lower[plus], costs[:], upper[plus + differences.size] = -np.inf, 0.0, 0.0
+        matrix = sparse.csc_array((value, (row, column)), shape=(count, count))
         highs.addCols(
             count,
-            costs,
-            lower,
-            upper,
+            np.zeros(count),
+            np.full(count, -np.inf),
+            np.full(count, np.inf),
             matrix.nnz,
             matrix.indptr[:-1].astype(np.int32),
             (matrix.indices + first_row).astype(np.int32),
             matrix.data,
         )
-        self.squares = highs.getNumCol() - count + plus.ravel()
+        self.squares = highs.getNumCol() - count + apart.ravel()
 
     def entries(self, owner: Ints, step: Ints, origin: Ints, target: Ints) -> tuple[Ints, Floats]:
         """Return the rows and values, both (A, 4), of arcs from frame `step` to the next."""
@@ -84,9 +74,8 @@ class LayoutConstraints:
         return self._moves[owner, step], locations[sets, step + 1, target] - locations[sets, step, origin]
 
     def forces(self, duals: Floats) -> Floats:
-        """Return each pair's duals per pixel of difference, (pairs, M - 1, 4), clipped to be feasible."""
-        forces = duals[self._differences]
-        return forces if self._squared else np.clip(forces, -self._network.layout, self._network.layout)
+        """Return each pair's duals per pixel of difference, (pairs, M - 1, 4)."""
+        return np.asarray(duals[self._differences])
 
     def layout_prices(self, forces: Floats) -> Floats:
         """Return each object's gain per pixel of movement, (n, M - 1, 4)."""
@@ -96,5 +85,5 @@ class LayoutConstraints:
         return prices
 
     def bound_reduction(self, forces: Floats) -> float:
-        """Return the reduction of the bound by the duals: the conjugate of the square; 0 for the L1 norm."""
-        return float((forces**2).sum() / (4.0 * self._network.layout)) if self._squared else 0.0
+        """Return the reduction of the bound by the duals: the conjugate of the square."""
+        return float((forces**2).sum() / (4.0 * self._network.layout))
