@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.baselines.flag_states.machine import ComponentView, FlagState, next_state
+from tracking.baselines.frame_by_frame import StepwiseSettings, StepwiseTrack
 from tracking.baselines.kalman_prediction import KalmanPrediction
-from tracking.baselines.stepwise import StepwiseSettings, StepwiseTrack, StepwiseTracker
+from tracking.baselines.stepwise import StepwiseTracker
 from tracking.boxes import Floats, areas, intersections
 from tracking.detectors.base import Image
 from tracking.frame_rate import DEFAULT_FPS

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.assignment import assign_pairs
+from tracking.baselines.frame_by_frame import FrameByFrameTracker, StepwiseSettings, StepwiseTrack
 from tracking.baselines.integral_histograms import (
     ColorIntegralCache,
     ColorIntegralImage,
@@ -32,7 +33,6 @@ from tracking.baselines.particles.reversible_jumps import (
     ChainLength,
     sample_targets,
 )
-from tracking.baselines.stepwise import StepwiseSettings, StepwiseTrack, StepwiseTracker
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.frame_rate import DEFAULT_FPS
@@ -92,22 +92,7 @@ class JumpTarget:
     presence: float
 
 
-class _NoPrediction:
-    """Stands in the place of a prediction method: the tracker predicts and decides by itself."""
-
-    name, uses_image = "rjmcmc", True
-
-    def initialize(self, image: Image, box: Floats) -> JumpTarget:
-        raise NotImplementedError
-
-    def predict(self, image: Image | None, targets: Sequence[JumpTarget]) -> Floats:
-        raise NotImplementedError
-
-    def update(self, target: JumpTarget, box: Floats, /) -> Floats:
-        raise NotImplementedError
-
-
-class VaryingTargetsTracker(StepwiseTracker[JumpTarget]):
+class VaryingTargetsTracker(FrameByFrameTracker[JumpTarget]):
     """Tracks a varying number of targets by one Markov chain over their joint state."""
 
     def __init__(
@@ -117,7 +102,7 @@ class VaryingTargetsTracker(StepwiseTracker[JumpTarget]):
         jumps: JumpSettings | None = None,
         fps: float = DEFAULT_FPS,
     ) -> None:
-        super().__init__(_NoPrediction(), window, settings, fps)
+        super().__init__("rjmcmc", window, settings, fps)
         self._jumps = jumps or JumpSettings()
         self._fps = fps
         self._rng = np.random.default_rng(self._jumps.seed)

@@ -14,8 +14,9 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
+from tracking.baselines.frame_by_frame import StepwiseSettings
 from tracking.baselines.kalman_prediction import KalmanPrediction
-from tracking.baselines.stepwise import StepwiseSettings, StepwiseTracker
+from tracking.baselines.stepwise import StepwiseTracker
 from tracking.baselines.track_graphs.track_groups import (
     KalmanTrack,
     MeanAppearance,

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from tracking.appearance import appearance_distance_matrix
-from tracking.baselines.stepwise import StepwiseTrack
+from tracking.baselines.frame_by_frame import StepwiseTrack
 from tracking.boxes import Floats
 from tracking.types import Detections
 

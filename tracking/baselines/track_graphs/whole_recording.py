@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.appearance_histograms import add_appearance_histograms
+from tracking.baselines.frame_by_frame import StepwiseSettings
 from tracking.baselines.kalman_prediction import KalmanPrediction
-from tracking.baselines.stepwise import StepwiseSettings, StepwiseTracker
+from tracking.baselines.stepwise import StepwiseTracker
 from tracking.baselines.track_graphs.identity_network import IdentityNetwork
 from tracking.baselines.track_graphs.interaction_graph import Tracklet, build_graph
 from tracking.baselines.track_graphs.relative_positions import SimilaritySettings, TrackDistance
