@@ -59,9 +59,7 @@ class KeyframeTracker:
         self._lag = frames_in(settings.lag_s, fps)
         self._stride = frames_in(settings.stride_s, fps)
         self._units_per_metre = units_per_metre
-        self._cameras = (
-            tuple(camera.scaled(units_per_metre) for camera in self._given) if units_per_metre else ()
-        )
+        self._cameras = self._in_metres()
         self._sizes = [BoxSizes() for _ in cameras]
         self._noise = PlaceNoise(len(cameras))
         self._first_detected: int | None = None
@@ -84,7 +82,7 @@ class KeyframeTracker:
             )
             if self._units_per_metre is None:
                 return [GroundFrame(number, (), None)]
-            self._cameras = tuple(camera.scaled(self._units_per_metre) for camera in self._given)
+            self._cameras = self._in_metres()
         for sizes, part in zip(self._sizes, found, strict=True):
             if part is not None:
                 sizes.update(part.boxes)
@@ -111,8 +109,12 @@ class KeyframeTracker:
         """
         index = dict(zip(self._names, range(len(self._names)), strict=True))[name]
         self._given = (*self._given[:index], camera, *self._given[index + 1 :])
-        if self._units_per_metre is not None:
-            self._cameras = tuple(given.scaled(self._units_per_metre) for given in self._given)
+        self._cameras = self._in_metres()
+
+    def _in_metres(self) -> tuple[GroundCamera, ...]:
+        """Return the cameras over a plane in metres; none while the unit of the plane is not known."""
+        units = self._units_per_metre
+        return () if units is None else tuple(camera.scaled(units) for camera in self._given)
 
     @property
     def person_height(self) -> float | None:
@@ -186,7 +188,7 @@ class KeyframeTracker:
         """Return whether people whom nobody has found yet may have been there from the first detection on."""
         if self._first_detected is None:
             return True
-        return self._seconds * (number - self._first_detected) < self._settings.forget_after_s
+        return self._seconds * (number - self._first_detected) < self._settings.beginning_s
 
     def _finish_oldest(self) -> GroundFrame:
         """Make the oldest frame final: people move, arrive and leave."""

@@ -24,6 +24,7 @@ class GroundSettings:
     false_per_frame: float = 0.5  # false detections per picture
     covered_log_odds: float = 2.0  # log odds lost by a detection that a better one of its camera covers
     people_density: float = 0.05  # people per square metre who are there at the beginning
+    beginning_s: float = 2.0  # seconds after the first detection in which they may still be found
     arrival_rate: float = 0.004  # people who appear per square metre and second, later
     departure_rate: float = 0.1  # share of the people that leaves per second
     foot_noise: float = 0.012  # standard deviation of a foot, box heights, before it is known per camera
@@ -31,7 +32,7 @@ class GroundSettings:
     speed: float = 1.3  # standard deviation of the velocity of people who start, stop and turn, metres/s
     acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, metres/s²
     turn_rate: float = 0.06  # times per second that somebody starts, stops or turns
-    forget_after_s: float = 2.0  # seconds unseen after which somebody has left; so long is the beginning, too
+    forget_after_s: float = 2.0  # seconds unseen after which somebody has left
     appearance: float = 8.0  # weight of the distance to a person's appearance in a camera
     unknown_appearance: float = 0.3  # distance at which an appearance says nothing
 
