@@ -49,9 +49,14 @@ def render(
     )
     with atomic_folder(out) as folder, bar("frames") as progress:
         task = progress.add_task("rendering", total=total_frames(videos, loaded.site.fps))
-        numbers = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
-    people = ", ".join(map(str, numbers)) or "none"
-    typer.echo(f"{out}: best views of {len(numbers)} people ({people}), tracks, choices.csv and plots")
+        people = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
+    numbers = ", ".join(map(str, people.numbers)) or "none"
+    typer.echo(
+        f"{out}: best views of {len(people.numbers)} people ({numbers}), tracks, choices.csv and plots"
+    )
+    if people.corrected:
+        corrected = ", ".join(f"{number} is {kept}" for number, kept in people.corrected.items())
+        typer.echo(f"numbers that turned out to be others' (corrections.csv): {corrected}")
 
 
 def track(

@@ -1,12 +1,18 @@
-"""Films of a rendering: one file per person with the spliced best view, from first to last sighting."""
+"""Films of a rendering: one file per person with the spliced best view, from first to last sighting.
+
+A number that turned out to be another person's has a film of its own only where that person's film lacks
+some of its sightings.
+"""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from bestview import Merge
 from server.config.sections import SiteSettings
 from server.media.audio.audio_chunk import AudioChunk
 from server.media.containers.mp4_audio import audio_fragment
@@ -29,6 +35,47 @@ class _Film:
     """Bytes up to the end of the last GOP in which the person was present."""
     until: int
     """The pulse after it."""
+
+
+class CorrectedNumbers:
+    """Collects which numbers turned out to be another person's.
+
+    They were merged, or split in all cameras that saw them, and not seen since.
+    """
+
+    def __init__(self) -> None:
+        self._seen: defaultdict[int, set[int]] = defaultdict(set)
+        """Of each number the first pulses of the GOPs in which cameras see the person."""
+        self._unsplit: defaultdict[int, set[str]] = defaultdict(set)
+        """Of each number the cameras that saw it and have not split it since."""
+        self._successor: dict[int, int] = {}
+
+    def add(self, decision: GopDecision) -> None:
+        """Add the sightings and corrections of a decision."""
+        for camera, frames in decision.boxes.items():
+            for number in {number for boxes in frames for number, *_ in boxes}:
+                self._seen[number].add(decision.first)
+                self._unsplit[number].add(camera)
+                self._successor.pop(number, None)
+        for correction in decision.corrections:
+            if isinstance(correction, Merge):
+                self._successor[correction.lost] = correction.kept
+                self._unsplit[correction.lost].clear()
+            else:
+                self._successor[correction.published_id] = correction.corrected_id
+                self._unsplit[correction.published_id].discard(correction.camera)
+
+    def corrected(self) -> dict[int, int]:
+        """Return the number that replaces each number whose sightings are all in GOPs with the other's."""
+        replaced = {}
+        for number in sorted(self._successor):
+            last, chain = number, {number}
+            while not self._unsplit[last] and self._successor.get(last, last) not in chain:
+                last = self._successor[last]
+                chain.add(last)
+            if last != number and self._seen[number] <= self._seen[last]:
+                replaced[number] = last
+        return replaced
 
 
 class FilmWriter:
@@ -54,14 +101,21 @@ class FilmWriter:
         )
         self._sound = sound
         self._films: dict[int, _Film] = {}
+        self._corrected = CorrectedNumbers()
 
     @property
     def numbers(self) -> list[int]:
         """Numbers of all people who have a film."""
-        return sorted(self._films)
+        return sorted(set(self._films) - set(self.corrected))
+
+    @property
+    def corrected(self) -> dict[int, int]:
+        """The numbers without a film of their own, with the numbers whose films show the same person."""
+        return self._corrected.corrected()
 
     def write(self, decision: GopDecision) -> None:
         """Append one GOP to all films."""
+        self._corrected.add(decision)
         gop = GopAssembler(
             self._frame_buffers, decision.first, decision.frames, self._site.fps, 0, self._sound
         )
@@ -77,19 +131,26 @@ class FilmWriter:
                 film.trimmed_size, film.until = film.file.tell(), decision.first + decision.frames
 
     def close(self) -> None:
-        """Truncate each film after the last GOP with its person, and close the files."""
-        for film in self._films.values():
-            if not film.file.closed:
-                film.file.truncate(film.trimmed_size)
-                film.file.seek(0)
-                film.file.write(self._head(film.until - film.origin))
-                film.file.close()
+        """Truncate each film after the last GOP with its person, close the files, delete those of no use."""
+        corrected = self.corrected
+        for number, film in self._films.items():
+            if film.file.closed:
+                continue
+            film.file.truncate(film.trimmed_size)
+            film.file.seek(0)
+            film.file.write(self._head(film.until - film.origin))
+            film.file.close()
+            if number in corrected:
+                self._path(number).unlink()
 
     def _begin(self, number: int, decision: GopDecision) -> _Film:
-        file = (self._folder / f"object-{number}.{self._stream_format.container}").open("wb")
+        file = self._path(number).open("wb")
         file.write(self._head(0))
         showing = GopSequencer(GaplessTimeline(self._stream_format, self._site.fps, decision.frames))
         return _Film(file, showing, decision.first, file.tell(), decision.first)
+
+    def _path(self, number: int) -> Path:
+        return self._folder / f"object-{number}.{self._stream_format.container}"
 
     def _write(self, film: _Film, chunk: MediaChunk) -> None:
         if chunk.audio is not None:

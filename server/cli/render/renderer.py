@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from server.cli.render.camera_workers import CameraWorkers, EpochBatch
@@ -23,6 +24,16 @@ from server.service.view_selection.decider import GopDecision, ViewDecider, came
 log = logging.getLogger(__name__)
 
 _BOOT = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RenderedPeople:
+    """The people of a rendering."""
+
+    numbers: list[int]
+    """Of all people who have a film."""
+    corrected: dict[int, int]
+    """Numbers that turned out to be another person's, with that person's number."""
 
 
 class Renderer:
@@ -72,8 +83,8 @@ class Renderer:
             for decision in self._decider.step(self._joint.step(epoch)):
                 self._write(decision)
 
-    def finish(self) -> list[int]:
-        """Decide and write the remaining GOPs; return the numbers of all people."""
+    def finish(self) -> RenderedPeople:
+        """Decide and write the remaining GOPs; return all people."""
         for decision in self._decider.finish(max(self.ended.values())):
             self._write(decision)
         self.close()
@@ -81,7 +92,7 @@ class Renderer:
         plot_choices(self._folder / "choices.csv", self._config.camera_ids, self._folder / "choices.png")
         for camera in self._config.camera_ids:
             plot_tracks(self._folder / "tracks" / f"{camera}.txt", self._folder / "tracks" / f"{camera}.png")
-        return self._films.numbers
+        return RenderedPeople(self._films.numbers, self._films.corrected)
 
     def close(self) -> None:
         """Close all files; :meth:`finish` does it, too."""
@@ -94,7 +105,7 @@ class Renderer:
         self._films.write(decision)
 
 
-def render(config: Config, folder: Path, progress: Callable[[int], None]) -> list[int]:
+def render(config: Config, folder: Path, progress: Callable[[int], None]) -> RenderedPeople:
     """Render into an existing folder; ``progress`` is called with the frames done in all cameras.
 
     Raises:

@@ -120,6 +120,49 @@ def test_a_film_ends_with_the_last_gop_of_the_person(tmp_path: Path) -> None:
         assert len(list(film.decode(video=0))) == 3 * GOP, "a person who returns is shown to the end"
 
 
+@pytest.mark.parametrize(
+    "corrections",
+    [
+        (Merge(kept=1, lost=5),),
+        (Split(published_id=5, corrected_id=1, camera=B),),
+        (Split(published_id=5, corrected_id=6, camera=B), Merge(kept=1, lost=6)),
+    ],
+)
+def test_who_turned_out_to_be_another_person_has_no_film_if_the_others_film_has_all(
+    tmp_path: Path, corrections: tuple[Merge | Split, ...]
+) -> None:
+    writer, _ = films(tmp_path / "best")
+    writer.write(decision(0, choice(1, A), choice(5, B), c0=[[(1, *SMALL)]], c1=[[(5, *SMALL)]]))
+    writer.write(decision(1, choice(1, A), choice(5, B), c1=[[(1, *SMALL)]], corrections=corrections))
+    writer.close()
+    assert (writer.numbers, writer.corrected[5]) == ([1], 1)
+    assert [path.name for path in (tmp_path / "best").iterdir()] == ["object-1.mp4"]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "corrections"),
+    [
+        pytest.param(((), (5,)), ((1,), ()), (Merge(kept=1, lost=5),), id="seen when 1 was not"),
+        pytest.param(((1,), (5,)), ((1,), (5,)), (Split(5, 1, A),), id="split in another camera only"),
+        pytest.param(((1, 5), (5,)), ((1,), ()), (Split(5, 1, B),), id="seen by a camera without a split"),
+    ],
+)
+def test_a_number_with_sightings_of_its_own_keeps_its_film(
+    tmp_path: Path,
+    before: tuple[tuple[int, ...], ...],
+    after: tuple[tuple[int, ...], ...],
+    corrections: tuple[Merge | Split, ...],
+) -> None:
+    writer, _ = films(tmp_path / "best")
+    for gop, numbers in enumerate((before, after)):
+        in_a, in_b = ([[(number, *SMALL) for number in of_camera]] for of_camera in numbers)
+        turned_out = corrections if gop else ()
+        writer.write(decision(gop, choice(1, A), choice(5, B), c0=in_a, c1=in_b, corrections=turned_out))
+    writer.close()
+    assert (writer.numbers, writer.corrected) == ([1, 5], {})
+    assert len(list((tmp_path / "best").iterdir())) == 2
+
+
 @pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
 def test_gaps_in_films_are_filled_as_in_live_streams(tmp_path: Path, codec: Codec, container: str) -> None:
     writer, frame_buffers = films(tmp_path / "best", codec)

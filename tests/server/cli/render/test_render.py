@@ -68,7 +68,13 @@ def test_two_views_become_films_tracks_choices_and_plots_with_one_warning_of_len
     assert (out / "late.csv").read_text() == "frame,camera,reason\n"
     with (out / "choices.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert {f"best/object-{row['object']}.mp4" for row in rows} <= films
+    with (out / "corrections.csv").open(encoding="ascii", newline="") as file:
+        corrected = {
+            row["other"] if row["correction"] == "merged" else row["object"] for row in csv.DictReader(file)
+        }
+    numbers = {row["object"] for row in rows}
+    assert {f"best/object-{number}.mp4" for number in numbers - corrected} <= films
+    assert films <= {f"best/object-{number}.mp4" for number in numbers}
     assert all(row["camera"] == "c0" for row in rows if int(row["frame"]) > 65), "only c0 is left"
     for film in films:
         with av.open(str(out / film), "r") as container:
