@@ -67,7 +67,7 @@ class RoomStream:
 
     def __init__(self, site: SiteSettings, encode: EncodeSettings) -> None:
         scene = Scene("room", 3, 4, 1, site.width, site.height, site.fps)
-        self.site, self.gop = site, encode.gop
+        self.site, self.gop = site, encode.frames_per_gop(site.fps)
         self._images = [scene.image(0, _START + frame) for frame in range(_FRAMES)]
         truth = [scene.truth(_START + frame)[0] for frame in range(_FRAMES)]
         self._boxes = [
@@ -83,7 +83,7 @@ class RoomStream:
             width=site.width,
             height=site.height,
             fps=site.fps,
-            gop=encode.gop,
+            gop=encode.frames_per_gop(site.fps),
             preset=encode.preset,
             crf=encode.crf,
             max_kbps=encode.max_kbps,

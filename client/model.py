@@ -19,7 +19,7 @@ class Site(msgspec.Struct, frozen=True):
     height: int
     gop: int
     """Frames per group of pictures: views are cut at multiples of it."""
-    lookahead_frames: int
+    lookahead_s: float
     """Frames by which the best view lags behind the cameras."""
     codec: str | None
     """Codec string of every stream (RFC 6381); None before the first picture."""
@@ -85,8 +85,8 @@ class Choice(msgspec.Struct, frozen=True):
     """Pulse from which on this camera is shown."""
     costs: dict[str, float | None]
     """By camera; None: it cannot be shown."""
-    switch_cost: float
-    """Cost of a cut, in frames of not seeing the object."""
+    switch_cost_s: float
+    """Cost of a cut, in seconds of not seeing the object."""
     reason: str
     seen: dict[str, float] = {}
     """By camera: the share of the look-ahead in which it sees the object."""
@@ -103,9 +103,9 @@ class Choice(msgspec.Struct, frozen=True):
     """By term: the share of a view's quality that is lost if the term is 0."""
     before: str | None = None
     """The camera of the previous GOP."""
-    stay: float | None = None
-    """Cost of the look-ahead with that camera, in the unit of `switch_cost`; None: it cannot be shown."""
-    cut: float | None = None
+    stay_s: float | None = None
+    """Cost of the look-ahead with that camera, in seconds as `switch_cost_s`; None: it cannot be shown."""
+    cut_s: float | None = None
     """Cost with the best other camera, the cut included; None: there is no other."""
     cut_to: str | None = None
 

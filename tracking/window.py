@@ -41,7 +41,9 @@ class WindowSettings:
     duplicate_overlap: float = 0.8  # mean overlap of two tracks above which they are duplicates
     forget_after_s: float = 60.0  # F: seconds occluded after which an object is dropped, its id retired
     max_objects: int = 24  # most objects kept; the longest occluded one is dropped first
-    template_update_rate: float = 0.05  # weight of a new histogram in an object's template
+    template_memory_s: float = (
+        0.8  # seconds of detections over which an object's template is averaged; inf: all
+    )
     gate_heights: float = 0.2  # box heights by which an object may move at once
     gate_speed: float = 7.5  # box heights per second since its last detection, added to that
     max_height_ratio: float = 1.5  # factor by which its height may change meanwhile
@@ -60,8 +62,10 @@ class WindowSettings:
             )
         if not 0.0 < self.birth_min_visible <= 1.0:
             raise ValueError(f"birth_min_visible is a share between 0 and 1, not {self.birth_min_visible}")
-        if not self.forget_after_s > 0.0 or self.max_objects < 1:
-            raise ValueError("forget_after_s must be above 0, and max_objects at least 1")
+        if not min(self.forget_after_s, self.template_memory_s) > 0.0 or self.max_objects < 1:
+            raise ValueError(
+                "forget_after_s and template_memory_s must be above 0, and max_objects at least 1"
+            )
         if self.min_frames < SHORTEST_WINDOW:
             raise ValueError(
                 f"min_frames must be at least {SHORTEST_WINDOW}, not {self.min_frames}:"
@@ -78,6 +82,7 @@ class WindowSettings:
             stride=min(frames_in(self.stride_s, fps), window),
             birth_window=min(frames_in(self.birth_s, fps, self.min_frames), window),
             forget_after=frames_in(self.forget_after_s, fps, window),
+            template_update_rate=min(1.0 / (self.template_memory_s * fps), 1.0),
             max_interpolated_gap=frames_in(
                 self.max_interpolated_gap_s, fps, _MIN_INTERPOLATED if self.max_interpolated_gap_s else 0
             ),
@@ -89,7 +94,8 @@ class WindowSettings:
 class ResolvedWindowSettings(WindowSettings):
     """Settings for one frame rate: each time is also given as a number of frames.
 
-    Windows end at the frames n where `stride` divides n + 1.
+    `template_update_rate` is the weight of a new histogram in a template. Windows end at the frames n where
+    `stride` divides n + 1.
     """
 
     fps: float
@@ -97,6 +103,7 @@ class ResolvedWindowSettings(WindowSettings):
     stride: int
     birth_window: int
     forget_after: int
+    template_update_rate: float
     max_interpolated_gap: int
     reidentify_after: int
 

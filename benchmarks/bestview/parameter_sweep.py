@@ -15,6 +15,7 @@ from bestview import NO_CAMERA, ViewScore, score_views, select_views
 from server.cli.evaluate.choices_file import views_of
 from server.cli.evaluate.ground_truth import SceneTruth
 from server.config.sections import EncodeSettings, ViewSettings
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 
 STRIDE = 5
 """Frames between two windows of the tracker: the default, for realistic delays."""
@@ -24,13 +25,14 @@ SWITCH_COSTS_S = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
 EXTRAPOLATE_S = (0.0, 0.25, 0.5, 1.0, 2.0)
 QUICK_LOOKAHEADS, QUICK_GOPS, QUICK_SWITCH_COSTS_S = (10, 25), (1, 10), (0.1, 0.3)
 QUICK_EXTRAPOLATE_S = (0.0,)
-DEFAULT_LOOKAHEAD, DEFAULT_GOP = ViewSettings().lookahead, EncodeSettings().gop
+DEFAULT_LOOKAHEAD = frames_in(ViewSettings().lookahead_s, DEFAULT_FPS)
+DEFAULT_GOP = EncodeSettings().frames_per_gop(DEFAULT_FPS)
 DEFAULT_SWITCH_COST_S, DEFAULT_EXTRAPOLATE_S = ViewSettings().switch_cost_s, ViewSettings().extrapolate_s
 
 
 @dataclass(frozen=True, slots=True)
 class SweepSetting:
-    """One setting of the sweep; look-ahead None: the whole recording is known."""
+    """One setting of the sweep, in frames where no unit is named; look-ahead None: all is known."""
 
     lookahead: int | None
     gop: int
@@ -79,7 +81,7 @@ def sweep(scene: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[Swee
             views = _offline_optimum(truth, setting.gop, switch_cost)
         else:
             config = scene.config(
-                encode={"gop": setting.gop},
+                encode={"gop_s": setting.gop / fps},
                 track={
                     "window": {
                         "length_s": STRIDE / fps,
@@ -89,7 +91,7 @@ def sweep(scene: BenchmarkScene, truth: SceneTruth, *, quick: bool) -> list[Swee
                     }
                 },
                 view={
-                    "lookahead": setting.lookahead,
+                    "lookahead_s": setting.lookahead / fps,
                     "switch_cost_s": setting.switch_cost_s,
                     "extrapolate_s": setting.extrapolate_s,
                 },

@@ -50,6 +50,8 @@ async def watch_page(browser: Browser, url: str, settle_s: float, seconds: float
         cores = read_processor_usage().cores_since(before)
         site = await page.evaluate("myview.site")
         number = await page.evaluate("myview.object")
-        return ShownFrames(int(number), at, int(site["lookahead_frames"]), float(site["fps"]), cores)
+        return ShownFrames(
+            int(number), at, round(site["lookahead_s"] * site["fps"]), float(site["fps"]), cores
+        )
     finally:
         await page.close()

@@ -73,7 +73,7 @@ class FastSite:
     def _loop(self, seed: int) -> list[bytes]:
         site, rng = SiteSettings(width=_WIDTH, height=_HEIGHT, fps=_FPS), np.random.default_rng(seed)
         encoder, frame_buffer = (
-            Encoder(site, EncodeSettings(gop=_GOP)),
+            Encoder(site, EncodeSettings(gop_s=_GOP / _FPS)),
             FrameBuffer(_FPS, _LOOP, self._stream_format),
         )
         small = rng.integers(0, 255, (_LOOP, _HEIGHT // 16, _WIDTH // 16, 3), dtype=np.uint8)
@@ -102,7 +102,7 @@ class FastSite:
             "width": _WIDTH,
             "height": _HEIGHT,
             "gop": _GOP,
-            "lookahead_frames": _AHEAD,
+            "lookahead_s": _AHEAD / _FPS,
             "codec": self._stream_format.codec,
             "container": "mp4",
             "sound": None,
@@ -129,11 +129,11 @@ class FastSite:
                 "terms": {camera: {"size": 0.5} for camera in _CAMERAS},
                 "weights": {"size": 1.0},
                 "before": shown,
-                "stay": 0.0,
+                "stay_s": 0.0,
                 "cut_to": None,
-                "cut": None,
-                "switch_cost": 25.0,
-                "lookahead": _AHEAD,
+                "cut_s": None,
+                "switch_cost_s": 1.0,
+                "lookahead_s": _AHEAD / _FPS,
             }
         )
 

@@ -38,7 +38,7 @@ async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
     keys, bus = ZenohKeys(config.site.name), Bus.client(config.zenoh)
     encoder = Encoder(config.site, config.encode)
     gray = np.full((HEIGHT, WIDTH, 3), 128, dtype=np.uint8)
-    gop = [encoder.encode(frame, gray) for frame in range(config.encode.gop)]
+    gop = [encoder.encode(frame, gray) for frame in range(config.gop)]
     there = asyncio.Event()
     bus.watch_alive(keys.bestview("alive"), lambda _, alive: there.set() if alive else None)
     await there.wait()

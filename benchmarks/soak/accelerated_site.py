@@ -84,11 +84,11 @@ class LoopedRecordings:
         window = {"length_s": 15 / self.time_scale.fps, "stride_s": 5 / self.time_scale.fps}
         return {
             "track": {"window": {**window, "birth_s": window["length_s"]}},
-            "encode": {"gop": _GOP},
+            "encode": {"gop_s": _GOP / self.time_scale.fps},
             "http": {"viewer_queue_gops": round(_VIEWER_S * self.time_scale.fps / _GOP)},
             "detect": {"work_width": WIDTH, "prescan_every_s": 0.4},
             "view": {
-                "lookahead": _LOOKAHEAD,
+                "lookahead_s": _LOOKAHEAD / self.time_scale.fps,
                 "buffer_s": seconds(60.0),
                 "identity": {
                     "forget_after_s": _FORGET / self.time_scale.fps,

@@ -25,7 +25,7 @@ from benchmarks.streaming.delay_drift import drift
 from benchmarks.streaming.ffmpeg_and_nginx import ffmpeg_switching, hls_from_nginx, hls_from_service
 from benchmarks.streaming.frame_correctness import check_frames
 from benchmarks.streaming.hls_latency import hls_delays
-from benchmarks.streaming.simulated_cameras import ENCODE, SITE, draw_room
+from benchmarks.streaming.simulated_cameras import GOP, SITE, draw_room
 from benchmarks.streaming.splice_cost import splice, transcode
 from benchmarks.streaming.stalled_viewers import StallComparison, compare_stalled, describe_stalled
 from benchmarks.streaming.stream_site import running, viewers
@@ -116,9 +116,7 @@ def measure(options: argparse.Namespace) -> None:
     report = Report()
     films = draw_room(_FILM_FRAMES)
     kbits = np.mean([8 * len(unit.data) for film in films for unit in film]) * SITE.fps / 1e3
-    report.line(
-        f"4 cameras of {SITE.width}x{SITE.height}, GOPs of {ENCODE.gop}, {kbits:.0f} kbit/s on average"
-    )
+    report.line(f"4 cameras of {SITE.width}x{SITE.height}, GOPs of {GOP}, {kbits:.0f} kbit/s on average")
     with tempfile.TemporaryDirectory(prefix="myview-stream-") as temporary:
         found = measure_parts(options, films, Path(temporary))
         stalled = (

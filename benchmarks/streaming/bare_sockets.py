@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.streaming.simulated_cameras import ENCODE, SITE
+from benchmarks.streaming.simulated_cameras import GOP, SITE
 from benchmarks.streaming.stream_site import viewers
 from benchmarks.streaming.viewer_crowd import CrowdReading
 from benchmarks.streaming.viewing_cost import send_delays
@@ -82,10 +82,10 @@ def _send_gops(
             viewer.sendall(gop)
         sent_s = time.monotonic() - began
         yield _SentGop(first, began, sent_s, time.thread_time() - busy)
-        first += ENCODE.gop
-        time.sleep(max(0.0, ENCODE.gop / SITE.fps - sent_s))
+        first += GOP
+        time.sleep(max(0.0, GOP / SITE.fps - sent_s))
 
 
 def _gop(film: Sequence[AccessUnit], first: int) -> bytes:
-    units = ((pulse, film[pulse % len(film)]) for pulse in range(first, first + ENCODE.gop))
+    units = ((pulse, film[pulse % len(film)]) for pulse in range(first, first + GOP))
     return b"".join(fragment([FragmentSample(unit.data, unit.key)], pulse, SITE.fps) for pulse, unit in units)

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.streaming.simulated_cameras import ENCODE, SITE
+from benchmarks.streaming.simulated_cameras import ENCODE, GOP, SITE
 from benchmarks.streaming.stream_site import StreamSite, terminate
 from server.camera.encoder import AccessUnit
 from server.cli.generated_config import free_port
@@ -53,7 +53,7 @@ def ffmpeg_switching(films: Sequence[Sequence[AccessUnit]], frames: int, folder:
     labels = "".join(f"[{number}:v]" for number in range(1, len(films)))
     graph = f"[0:v]sendcmd=c='{commands}'[first];[first]{labels}streamselect=inputs={len(films)}:map=0[out]"
     encode = ["-c:v", "libx264", "-preset", ENCODE.preset, "-tune", "zerolatency", "-crf", f"{ENCODE.crf}"]
-    output = ["-g", f"{ENCODE.gop}", "-threads", "1", "-f", "null", "-"]
+    output = ["-g", f"{GOP}", "-threads", "1", "-f", "null", "-"]
     words = [program, "-nostdin", "-v", "error", "-filter_threads", "1", "-filter_complex_threads", "1"]
     before = _children_seconds()
     subprocess.run([*words, *inputs, "-filter_complex", graph, "-map", "[out]", *encode, *output], check=True)

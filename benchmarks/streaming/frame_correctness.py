@@ -75,7 +75,7 @@ async def check_frames(
 ) -> FrameCorrectness:
     """Splice frames, decode a viewer's stream, and compare with the decoded streams of the cameras."""
     encoded = films(frames, seed, encode)
-    chosen = schedule(frames // encode.gop, cuts, seed)
+    chosen = schedule(frames // encode.frames_per_gop(_SITE.fps), cuts, seed)
     chunks, fixture = await _watch(encoded, chosen, encode)
     digests = [_digests(film, encode.codec) for film in encoded]
     head = fixture.stream_format.init_segment(_SITE.size, _SITE.fps)
@@ -84,9 +84,9 @@ async def check_frames(
     has_ts = fixture.stream_format.container == "mp4"
     ts = b"".join(chunk.mpegts for chunk in chunks if isinstance(chunk, MediaChunk)) if has_ts else b""
     expected = [
-        digests[camera][gop * encode.gop + offset]
+        digests[camera][gop * encode.frames_per_gop(_SITE.fps) + offset]
         for gop, camera in enumerate(chosen)
-        for offset in range(encode.gop)
+        for offset in range(encode.frames_per_gop(_SITE.fps))
     ]
     return FrameCorrectness(
         frames=len(expected),

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.streaming.delay_drift import PacedCameras
-from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
+from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, GOP, SITE
 from server.camera.encoder import AccessUnit
 from server.config.sections import CameraSettings, HttpSettings
 from server.config.site_config import Config
@@ -61,7 +61,7 @@ class _Player:
             self.stalls += 1
             self.start += now - due
         for pulse in range(first, first + pulses):
-            decided = self.decided[pulse // ENCODE.gop * ENCODE.gop]
+            decided = self.decided[pulse // GOP * GOP]
             self.fetched.append(now - decided)
             self.shown.append(self.start + pulse / SITE.fps - decided)
 

@@ -30,6 +30,7 @@ CAMERAS = 4
 SITE = SiteSettings(name="stream", width=352, height=288, fps=25)
 """CIF resolution."""
 ENCODE = EncodeSettings()
+GOP = ENCODE.frames_per_gop(SITE.fps)
 _START = 200
 """The scene's first frame: people are in sight."""
 

@@ -12,7 +12,7 @@ import av
 import numpy as np
 from av.codec.context import Flags
 
-from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
+from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, GOP, SITE
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
@@ -32,7 +32,7 @@ class SplicerFixture:
     """A splicer with frame buffers filled from films, and given decisions."""
 
     def __init__(self, films: Sequence[Sequence[AccessUnit]], config: Config) -> None:
-        self._films, self.gop = films, config.encode.gop
+        self._films, self.gop = films, config.gop
         self.stream_format = stream_format = stream_format_for(
             config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )
@@ -126,15 +126,15 @@ def transcode(film: Sequence[AccessUnit], gops: int) -> TranscodeCost:
     decoder.flags |= Flags.low_delay
     decoded, encoded = [], []
     for gop in range(gops + 1):
-        first = gop * ENCODE.gop
+        first = gop * GOP
         began = time.process_time()
-        units = [film[pulse % len(film)] for pulse in range(first, first + ENCODE.gop)]
+        units = [film[pulse % len(film)] for pulse in range(first, first + GOP)]
         frames = [frame for unit in units for frame in decoder.decode(av.Packet(unit.data))]
         between = time.process_time()
         for pulse, frame in enumerate(frames, start=first):
             encoder.encode(pulse, frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False))
         end = time.process_time()
         if gop:
-            decoded.append(_US * (between - began) / ENCODE.gop)
-            encoded.append(_US * (end - between) / ENCODE.gop)
+            decoded.append(_US * (between - began) / GOP)
+            encoded.append(_US * (end - between) / GOP)
     return TranscodeCost(statistics.median(decoded), statistics.median(encoded))

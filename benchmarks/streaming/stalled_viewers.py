@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.report import Report
-from benchmarks.streaming.simulated_cameras import ENCODE, SITE
+from benchmarks.streaming.simulated_cameras import GOP, SITE
 from benchmarks.streaming.stream_site import StreamSite, ViewerProcess
 from benchmarks.streaming.viewing_cost import send_delays
 from server.media.rendering_messages import TIMESCALE
@@ -105,7 +105,7 @@ def _measure_round(site: StreamSite, crowd: ViewerProcess, readers: int, seconds
         delays.append(send_delays(reading, {first: sent_gop.began for first, sent_gop in site.sent.items()}))
         read_s += reading.seconds
         times, counts = np.unique(ticks, return_counts=True)
-        ends = np.rint(times * SITE.fps / TIMESCALE).astype(int) % ENCODE.gop == ENCODE.gop - 1
+        ends = np.rint(times * SITE.fps / TIMESCALE).astype(int) % GOP == GOP - 1
         received = counts[ends][1:-1]  # the first and the last are incomplete
         if len(received) >= _MIN_GOPS:
             p50, p99 = np.percentile(np.concatenate(delays), [50, 99]).tolist()

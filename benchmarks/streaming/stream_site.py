@@ -103,7 +103,7 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
     config, address = folder / "site.yaml", f"tcp/127.0.0.1:{bus}"
     content = {
         "site": {"name": SITE.name, "fps": SITE.fps, "width": SITE.width, "height": SITE.height},
-        "encode": {"gop": ENCODE.gop},
+        "encode": {"gop_s": ENCODE.gop_s},
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": address, "listen": address},
         "http": {"port": http, "viewers_max": _NO_LIMIT, "viewers_per_object": _NO_LIMIT},

@@ -14,7 +14,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.streaming.simulated_cameras import ENCODE, SITE
+from benchmarks.streaming.simulated_cameras import GOP, SITE
 from benchmarks.streaming.splice_cost import transcode
 from benchmarks.streaming.stream_site import StreamSite, ViewerProcess
 from benchmarks.streaming.timed_service import SendTimes
@@ -114,7 +114,7 @@ def step_up(
                 cores=cores,
                 reader_cores=reading.processor_s / reading.seconds,
                 kbits=8e3 * reading.megabytes / reading.seconds / count,
-                arrived=len(delays) / (count * reading.seconds * SITE.fps / ENCODE.gop),
+                arrived=len(delays) / (count * reading.seconds * SITE.fps / GOP),
                 delays=(p50, p95, p99),
                 sent_ms=statistics.median(_send_durations(reading, sent)),
                 load=os.getloadavg()[0],
@@ -125,13 +125,13 @@ def step_up(
 
 def _send_durations(reading: CrowdReading, sent: dict[int, SendTimes]) -> list[float]:
     """Return the milliseconds that sending each received GOP took."""
-    gops = {round(tick * SITE.fps / TIMESCALE) // ENCODE.gop * ENCODE.gop for tick in reading.ticks}
+    gops = {round(tick * SITE.fps / TIMESCALE) // GOP * GOP for tick in reading.ticks}
     return [1e3 * (sent_gop.ended - sent_gop.began) for first, sent_gop in sent.items() if first in gops]
 
 
 def send_delays(reading: CrowdReading, sent: dict[int, float]) -> NDArray[np.float64]:
     """Return the milliseconds from when each GOP was sent to when its end was read."""
-    gop = ENCODE.gop
+    gop = GOP
     last_pulses = (round(tick * SITE.fps / TIMESCALE) for tick in reading.ticks)
     return np.array(
         [

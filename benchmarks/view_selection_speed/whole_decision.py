@@ -149,7 +149,7 @@ def _config(crowd: SimulatedCrowd, gop: int, quality: dict[str, float]) -> Confi
     return build_config(
         {
             "site": {"width": _WIDTH, "height": _HEIGHT},
-            "encode": {"gop": gop},
+            "encode": {"gop_s": gop / 25.0},
             "cameras": cameras,
             "view": {"quality": quality},
         },

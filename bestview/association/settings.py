@@ -67,8 +67,8 @@ class IdentitySettings:
     appearance_gate: float = 0.05
     # The gate is at most this times the lower quartile of distances between simultaneous people.
     appearance_gate_share: float = 1.0
-    # Share of the cross-camera appearance evidence that is kept from one update to the next.
-    cross_camera_memory: float = 0.95
+    # Seconds over which cross-camera appearance evidence fades.
+    cross_camera_memory_s: float = 4.0
     # Largest such evidence, for or against.
     maximum_cross_camera_evidence: float = 8.0
     # Seconds, summed over all cameras, for which a person must be seen to get an id.
@@ -108,10 +108,9 @@ class IdentitySettings:
         """Check the ranges."""
         if self.gate_distance is not None and not self.gate_distance > 0:
             raise ValueError(f"identity gate_distance: {self.gate_distance} is not above 0")
-        if not 0 < self.cross_camera_memory <= 1:
-            raise ValueError(f"identity cross_camera_memory: {self.cross_camera_memory} is not in (0, 1]")
         for name in (
             "clustering_interval_s",
+            "cross_camera_memory_s",
             "appearance_s",
             "ground_correlation_s",
             "continuation_decay_s",

@@ -62,7 +62,9 @@ def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) 
     """
     if camera.detections is not None:
         with _as_user_error(f"camera {camera.id}: detections"):
-            file = MotFileDetector(camera.detections, MotFileSettings(first_frame=camera.offset))
+            file = MotFileDetector(
+                camera.detections, MotFileSettings(first_frame=camera.first_pulse(config.site.fps))
+            )
             return LetterboxedDetections(file, letterbox, config.detect)
     polygons = [letterbox.camera_to_site(np.asarray(polygon, dtype=np.float64)) for polygon in camera.ignore]
     ignore = tuple(tuple((float(x), float(y)) for x, y in polygon) for polygon in polygons)

@@ -50,7 +50,7 @@ class Encoder:
     def __init__(
         self, site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings
     ) -> None:
-        self._gop = settings.gop
+        self._gop = _frames_per_gop(site, settings)
         self._fps = site.fps
         self._last: int | None = None
         if (
@@ -120,6 +120,10 @@ def _create_context(name: str, site: SiteSettings | RenderSettings) -> VideoCode
     return context
 
 
+def _frames_per_gop(site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings) -> int:
+    return settings.gop if isinstance(settings, RenderSettings) else settings.frames_per_gop(site.fps)
+
+
 def _rate_limit(site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings) -> str:
     """Return x264's VBV parameters that keep every second below ``max_kbps`` (H.264, annex C).
 
@@ -128,6 +132,6 @@ def _rate_limit(site: SiteSettings | RenderSettings, settings: EncodeSettings | 
     """
     if settings.max_kbps is None:
         return ""
-    buffer_s = min(settings.gop / site.fps, _MAX_BUFFER_S)
+    buffer_s = min(_frames_per_gop(site, settings) / site.fps, _MAX_BUFFER_S)
     rate = settings.max_kbps / (1 + buffer_s)
     return f":vbv-maxrate={max(1, int(rate))}:vbv-bufsize={max(1, int(rate * buffer_s))}"

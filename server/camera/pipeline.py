@@ -139,13 +139,13 @@ class CameraPipeline:
         self._observations = (
             ObservationCollector(self._letterbox) if camera_id in config.joint_cameras else None
         )
-        self.first_pulse = camera.offset if self.source.recorded else 0
+        self.first_pulse = camera.first_pulse(site.fps) if self.source.recorded else 0
         """The pulse of the first frame."""
         self._last: int | None = None
         self._corrections: deque[PositionCorrection] = deque(maxlen=CORRECTIONS_MAX)
         self._missing = 0
         """Pulses since the last frame."""
-        self._away_after = round(_AWAY_AFTER_S * site.fps) + config.encode.gop
+        self._away_after = round(_AWAY_AFTER_S * site.fps) + config.gop
 
     def take(self, pulse: int) -> Image | None:
         """Return the site-sized image of a pulse; None where the source has none (yet).

@@ -31,11 +31,10 @@ from server.config.sections import (
 from server.config.sections.detect import DetectSettings
 from server.config.unknown_keys import no_unknown_keys
 from tracking import ResolvedWindowSettings
+from tracking.frame_rate import frames_in, seconds_up
 from tracking.registry import TEMPORAL_TRACKER
 
 PREFIX = "MYVIEW_"
-_LOOKAHEAD_S = 1.0
-"""Seconds of the look-ahead where none is configured; more if the tracks need it."""
 _ROUNDING = 1e-9
 _SERVICE = re.compile(r"bestview(-\d+)?")
 """Names of best-view services as clients of the pulse server; no camera may have one."""
@@ -94,16 +93,30 @@ class Config(BaseSettings):
 
     @model_validator(mode="after")
     def _lookahead_covers_the_tracker(self) -> Self:
-        if "lookahead" not in self.view.model_fields_set:
-            lookahead = max(round(_LOOKAHEAD_S * self.site.fps), self.least_lookahead)
-            object.__setattr__(self, "view", self.view.model_copy(update={"lookahead": lookahead}))
+        if "lookahead_s" not in self.view.model_fields_set and self.lookahead < self.least_lookahead:
+            seconds = self.least_lookahead / self.site.fps
+            object.__setattr__(self, "view", self.view.model_copy(update={"lookahead_s": seconds}))
         self.check_lookahead(self.view)
         return self
 
     @property
     def least_lookahead(self) -> int:
         """The fewest look-ahead frames, after which tracks no longer change."""
-        return self.encode.gop + self.track.final_lag(self.site.fps)
+        return self.gop + self.track.final_lag(self.site.fps)
+
+    @property
+    def gop(self) -> int:
+        """The frames in a GOP."""
+        return self.encode.frames_per_gop(self.site.fps)
+
+    @property
+    def lookahead(self) -> int:
+        """The frames of the look-ahead, N."""
+        return self.lookahead_of(self.view)
+
+    def lookahead_of(self, view: ViewSettings) -> int:
+        """Return the frames of the look-ahead under other settings."""
+        return frames_in(view.lookahead_s, self.site.fps)
 
     @property
     def window(self) -> ResolvedWindowSettings:
@@ -116,13 +129,13 @@ class Config(BaseSettings):
         Raises:
             ValueError: they do not.
         """
-        if view.lookahead < self.least_lookahead:
-            lag = "the frames of track.window.length_s - stride_s"
+        if self.lookahead_of(view) < self.least_lookahead:
+            lag = "track.window.length_s - stride_s, in whole frames"
             if self.track.tracker == TEMPORAL_TRACKER:
-                lag = "the frames of all stages of track.temporal, less one"
+                lag = "all stages of track.temporal, less a frame"
             raise ValueError(
-                f"view.lookahead: is {view.lookahead} frames but must be at least {self.least_lookahead} "
-                f"(encode.gop + {lag}), "
+                f"view.lookahead_s: is {view.lookahead_s:g} s but must be at least "
+                f"{seconds_up(self.least_lookahead, self.site.fps):g} (encode.gop_s + {lag}), "
                 "so that a view is chosen on tracks that no longer change"
             )
 

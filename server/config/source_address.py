@@ -19,7 +19,7 @@ class SourceKind(Enum):
     FOLDER = "folder"
     """A folder of images, in the order of their names."""
     FILE = "file"
-    """A recording: at pulse n its picture at (n - offset) / fps, however busy the machine is."""
+    """A recording: at pulse n its picture at n / fps - offset_s, however busy the machine is."""
     STREAM = "stream"
     """A camera: its newest picture at every pulse."""
 

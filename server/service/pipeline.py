@@ -55,9 +55,7 @@ class BestViewPipeline:
         fps, stride = config.site.fps, config.window.stride
         grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
         # Frames must still be buffered when the last camera that is waited for has reported.
-        frames = max(
-            round(config.view.buffer_s * fps), backlog + 4 * (config.view.lookahead + grace + stride)
-        )
+        frames = max(round(config.view.buffer_s * fps), backlog + 4 * (config.lookahead + grace + stride))
         self.max_lookahead = (frames - backlog) // 2 - grace - stride
         """The longest look-ahead, in frames, that can be set at run time: half of what the buffers allow."""
         self.stream_format = stream_format_for(
@@ -74,7 +72,7 @@ class BestViewPipeline:
             if audio_format is None
             else AudioBuffer(audio_format, config.site.fps, frames / config.site.fps)
         )
-        self._backlog_monitor = BacklogMonitor(frames - config.view.lookahead - config.encode.gop)
+        self._backlog_monitor = BacklogMonitor(frames - config.lookahead - config.gop)
         self.skipped_epochs = 0
         """Epochs that were not decided because decisions had fallen too far behind."""
         self._skip_log = LogThrottle()
@@ -226,9 +224,10 @@ class BestViewPipeline:
             self.config.check_lookahead(view)
         except ValueError as error:
             raise UserError(str(error)) from error
-        if view.lookahead > self.max_lookahead:
+        if self.config.lookahead_of(view) > self.max_lookahead:
+            most = self.max_lookahead / self.config.site.fps
             raise UserError(
-                f"view.lookahead: is {view.lookahead} frames but can be at most {self.max_lookahead} while "
+                f"view.lookahead_s: is {view.lookahead_s:g} s but can be at most {most:g} while "
                 "the service runs (frame buffers); set a longer view.buffer_s and restart for more"
             )
         self.decider.apply_live_view_settings(view)

@@ -36,5 +36,5 @@ def max_normal_delay(pipeline: BestViewPipeline) -> int:
     """Return the largest normal delay of decisions, in pulses."""
     config, fps = pipeline.config, pipeline.config.site.fps
     wait_s = config.view.late_after_s + config.track.backlog_s + _SLACK_S
-    designed = pipeline.decider.view.lookahead + config.encode.gop + config.window.stride
+    designed = config.lookahead_of(pipeline.decider.view) + config.gop + config.window.stride
     return designed + round(wait_s * fps)

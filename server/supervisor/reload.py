@@ -11,7 +11,7 @@ from server.config.site_config import Config
 
 _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """Settings that the best view applies at the next GOP."""
-_CAMERA_KEYS = ("source", "password", "offset", "at_end", "h264", "options", "ignore", "detections")
+_CAMERA_KEYS = ("source", "password", "offset_s", "at_end", "h264", "options", "ignore", "detections")
 """Settings that only the camera's own process uses."""
 _TRACK = tuple(name for name in TrackSettings.model_fields if name not in {"backlog_s", "joint"})
 _SHARED_KEYS = ("detect", *(f"track.{name}" for name in _TRACK))
@@ -62,8 +62,8 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     try:
         running.check_lookahead(view)
     except ValueError:  # the settings that allow a shorter one wait for a restart
-        view = view.model_copy(update={"lookahead": running.view.lookahead})
-        live = tuple(key for key in live if key != "view.lookahead")
+        view = view.model_copy(update={"lookahead_s": running.view.lookahead_s})
+        live = tuple(key for key in live if key != "view.lookahead_s")
     unchanged = _deferred_track_settings(running, wanted, keys)
     shared = tuple(
         key for key in _of(keys, _SHARED_KEYS) if not _of((key,), [f"track.{name}" for name in unchanged])

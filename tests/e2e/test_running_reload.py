@@ -59,7 +59,7 @@ async def test_an_invalid_file_changes_nothing_and_a_valid_one_interrupts_no_str
         await site.until(lambda: site.state("c2") == "live", "c2 is back")
 
         cameras = [dict(camera) for camera in site.config["cameras"]]
-        cameras[1]["offset"] = 5
+        cameras[1]["offset_s"] = 0.2
         view = {**site.config["view"], "switch_cost_s": 0.7}
         await reload(site, config, cameras=cameras, view=view, encode={"crf": 30})
         await wait_for_log(site, "bestview: configuration reloaded: in force now: view.switch_cost_s")

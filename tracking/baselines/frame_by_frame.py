@@ -1,6 +1,6 @@
 """What all frame-by-frame trackers share: gaps, confirmation and end of tracks, and their results.
 
-A track is confirmed in its third consecutive matched frame. Without a match for `max_missed_frames` frames it
+A track is confirmed in its third consecutive matched frame. Without a match for `max_missed_s` seconds it
 ends; its id is not used again.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from tracking.appearance_histograms import add_appearance_histograms
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Image
-from tracking.frame_rate import DEFAULT_FPS
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.model.object_state import mean_histogram, uniform_histogram
 from tracking.solvers.base import OCCLUDED, SolveReport
 from tracking.types import Detections
@@ -38,8 +38,8 @@ class StepwiseSettings:
     max_birth_iou: float = 0.3  # overlap (IoU) with a track above which a detection starts none
     min_match_iou: float = 0.3  # least overlap (IoU) of a track and its matched detection
     confirm_frames: int = 3  # consecutive matched frames that confirm a track
-    max_missed_frames: int = 25  # frames without a match after which a track ends
-    max_unmatched_frames: int = 5  # frames without a match in which an image-based prediction is published
+    max_missed_s: float = 1.0  # seconds without a match after which a track ends
+    max_unmatched_s: float = 0.2  # seconds without a match in which an image-based prediction is published
 
     def __post_init__(self) -> None:
         shares = (self.min_birth_score, self.max_birth_iou, self.min_match_iou)
@@ -47,9 +47,9 @@ class StepwiseSettings:
             raise ValueError(
                 f"min_birth_score, max_birth_iou and min_match_iou are shares between 0 and 1, not {shares}"
             )
-        if self.confirm_frames < 1 or self.max_missed_frames < 1 or self.max_unmatched_frames < 0:
+        if self.confirm_frames < 1 or not self.max_missed_s > 0.0 or self.max_unmatched_s < 0.0:
             raise ValueError(
-                "confirm_frames and max_missed_frames must be at least 1, max_unmatched_frames at least 0"
+                "confirm_frames must be at least 1, max_missed_s above 0, max_unmatched_s at least 0"
             )
 
 
@@ -82,6 +82,8 @@ class FrameByFrameTracker(ABC, Generic[S]):
     ) -> None:
         self._name, self._window = name, window.resolve(fps)
         self._settings = settings or StepwiseSettings()
+        self._max_missed = frames_in(self._settings.max_missed_s, fps)
+        self._max_unmatched = frames_in(self._settings.max_unmatched_s, fps, 0)
         self._objects: list[StepwiseTrack[S]] = []
         self._ended: list[StepwiseTrack[S]] = []
         """Tracks that ended since the last result."""
@@ -138,11 +140,9 @@ class FrameByFrameTracker(ABC, Generic[S]):
         """Update all tracks by a frame: start, match and end them."""
 
     def _end_lost_tracks(self) -> None:
-        lost = [track for track in self._objects if track.missed_frames >= self._settings.max_missed_frames]
+        lost = [track for track in self._objects if track.missed_frames >= self._max_missed]
         self._ended += [track for track in lost if track.matches >= self._settings.confirm_frames]
-        self._objects = [
-            track for track in self._objects if track.missed_frames < self._settings.max_missed_frames
-        ]
+        self._objects = [track for track in self._objects if track.missed_frames < self._max_missed]
 
     def _result(self, last: int) -> WindowResult:
         """Return the result for all frames not yet published."""

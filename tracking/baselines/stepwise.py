@@ -3,7 +3,7 @@
 All of them start, match and end tracks in the same way, so that comparisons measure the prediction method
 only. A detection that overlaps no track starts a new one, which is confirmed in its third consecutive frame.
 In each frame tracks and detections are matched by one assignment over their overlaps (IoU). A track without a
-match for `max_missed_frames` frames ends; its id is not used again.
+match for `max_missed_s` seconds ends; its id is not used again.
 """
 
 from __future__ import annotations
@@ -75,10 +75,8 @@ class StepwiseTracker(FrameByFrameTracker[S]):
             if frame not in track.observations:
                 track.missed_frames += 1
                 if track.matches < self._settings.confirm_frames:
-                    track.missed_frames = (
-                        self._settings.max_missed_frames
-                    )  # an unconfirmed track ends at its first miss
-                elif self._method.uses_image and track.missed_frames <= self._settings.max_unmatched_frames:
+                    track.missed_frames = self._max_missed  # an unconfirmed track ends at its first miss
+                elif self._method.uses_image and track.missed_frames <= self._max_unmatched:
                     track.observations[frame] = (track.box, OCCLUDED)
         self._end_lost_tracks()
         self._start_tracks(frame, detections, matched, image)

@@ -46,7 +46,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
     """Return the configuration of two cameras that share a floor; every epoch is a GOP."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
-        "encode": {"gop": GOP, "codec": codec},
+        "encode": {"gop_s": GOP / FPS, "codec": codec},
         "cameras": [{"id": camera, "source": "scene:room", "ground": _GROUND} for camera in CAMERAS],
         "track": {
             "window": {
@@ -59,7 +59,7 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
             "assist": {"enabled": True},
         },
         "view": {
-            "lookahead": 2 * GOP,
+            "lookahead_s": 2 * GOP / FPS,
             "late_after_s": 0.1,
             "identity": {"confirmation_s": 0.04, "clustering_interval_s": 0.04},
         },
@@ -72,7 +72,9 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
 
 def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> tuple[AccessUnit, ...]:
     """Encode pictures that differ by camera (seed) and by frame."""
-    encoder = Encoder(SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, codec=codec))
+    encoder = Encoder(
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop_s=GOP / FPS, codec=codec)
+    )
     rng = np.random.default_rng(seed)
     images = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)
     return tuple(

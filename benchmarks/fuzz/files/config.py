@@ -34,9 +34,9 @@ cameras:
   - id: c0
     source: c0.mp4
     ignore: [[[0, 0], [9, 0], [9, 9]]]
-  - {id: c1, source: "rtsp://10.0.0.2/a", offset: 2}
+  - {id: c1, source: "rtsp://10.0.0.2/a", offset_s: 0.1}
 track: {window: {stride: 5}}
-view: {lookahead: 25, identity: {confirmation_s: 0.08}}
+view: {lookahead_s: 1, identity: {confirmation_s: 0.08}}
 http: {port: 8080}
 """
 _TOKENS = b"""tokens:

@@ -18,7 +18,7 @@ _REQUESTS: tuple[tuple[str, str, Any], ...] = (
         "/api/operator/position_corrections",
         {"object": 1, "camera": "c0", "corrections": [{"pulse": 12, "x": 9.5, "y": 20.0, "tolerance": 3.0}]},
     ),
-    ("PUT", "/api/operator/view_selection", {"switch_cost_s": 0.2, "extrapolate_s": 0.5, "lookahead": 10}),
+    ("PUT", "/api/operator/view_selection", {"switch_cost_s": 0.2, "extrapolate_s": 0.5, "lookahead_s": 0.4}),
     (
         "PUT",
         "/api/operator/view_selection",

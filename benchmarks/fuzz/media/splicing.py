@@ -12,6 +12,7 @@ import msgspec
 from benchmarks.fuzz.bus.messages import drain, read_api
 from benchmarks.fuzz.engine.fed_site import (
     CAMERAS,
+    FPS,
     STRIDE,
     FedService,
     make_tracks,
@@ -59,7 +60,7 @@ class _Splice(ScriptTarget):
         self._loop.run_until_complete(self._whole(right))
 
     def _site(self) -> Config:
-        encode = {"gop": STRIDE, "codec": self.codec, "parameters": self.parameters}
+        encode = {"gop_s": STRIDE / FPS, "codec": self.codec, "parameters": self.parameters}
         return site(codec=self.codec, encode=encode)
 
     def make(self, rng: Random) -> bytes:

@@ -25,6 +25,10 @@ Ints = NDArray[np.int64]
 
 _MINIMUM_COMMON_FRAMES = 3
 """Frames in which both must be seen before their positions count."""
+SCORED_S = 0.2
+"""Seconds between two updates for which an appearance score counts once."""
+_MAXIMUM_SCORED_S = 1.0
+"""Seconds for which a score counts at most: people may have left in between."""
 _EXTRA_LOCALIZED_FRAMES = 256
 """Frames kept beyond those within which people take part in clustering."""
 
@@ -40,9 +44,9 @@ class AffinityMatrix:
     """
 
     def __init__(self, settings: ResolvedIdentitySettings) -> None:
-        self._ground_cap, self._memory, self._appearance_cap = (
+        self._ground_cap, self._memory_s, self._appearance_cap = (
             settings.maximum_ground_evidence,
-            settings.cross_camera_memory,
+            settings.cross_camera_memory_s,
             settings.maximum_cross_camera_evidence,
         )
         self._frames = settings.ground_correlation_frames
@@ -168,11 +172,18 @@ class AffinityMatrix:
         first, second = self._rows_of(self._appearance.first), self._rows_of(self._appearance.second)
         return np.minimum(first, second), np.maximum(first, second)
 
-    def add_appearance_evidence(self, first: Ints, second: Ints, score: Floats) -> None:
-        """Add an update's appearance scores of (P,) pairs of rows, each pair once."""
+    def add_appearance_evidence(
+        self, first: Ints, second: Ints, score: Floats, elapsed_s: float = SCORED_S
+    ) -> None:
+        """Add an update's appearance scores of (P,) pairs of rows, each pair once.
+
+        Earlier evidence fades with the seconds since the last update, `elapsed_s`; the scores stand for them.
+        """
+        elapsed_s = min(elapsed_s, _MAXIMUM_SCORED_S)
+        memory, score = max(1.0 - elapsed_s / self._memory_s, 0.0), score * (elapsed_s / SCORED_S)
         first, second = self._names_of(first, second)
         known = self._appearance.get(first, second)[:, 0]
-        value = np.clip(self._memory * known + score, -self._appearance_cap, self._appearance_cap)
+        value = np.clip(memory * known + score, -self._appearance_cap, self._appearance_cap)
         self._appearance.set(first, second, value[:, None])
         self._appearance.keep(self._appearance.values[:, 0] != 0)
 

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.affinity.affinity_matrix import SCORED_S, AffinityMatrix
 from bestview.association.appearance.histograms import (
     CDF_POINTS,
     MAXIMUM_DIFFERENT_PAIRS,
@@ -70,13 +70,20 @@ class CrossCameraAppearance:
             self._calibrated[camera] for camera in second
         )
 
-    def update(self, tracklets: Sequence[Tracklet], rows: Ints, affinity: AffinityMatrix) -> None:
+    def update(
+        self,
+        tracklets: Sequence[Tracklet],
+        rows: Ints,
+        affinity: AffinityMatrix,
+        elapsed_s: float = SCORED_S,
+    ) -> None:
         """Compare the tracklets that an update has observed.
 
         Args:
             tracklets: all active ones.
             rows: (P,) those that the update has observed.
             affinity: receives the evidence.
+            elapsed_s: seconds since the last update.
         """
         active = {tracklet.key for tracklet in tracklets}
         self._learned = {seen for seen in self._learned if seen.key in active}
@@ -106,7 +113,7 @@ class CrossCameraAppearance:
             self.same_person_gate,
         )
         first, second = row_of[scores.first], row_of[scores.second]
-        affinity.add_appearance_evidence(first, second, scores.score)
+        affinity.add_appearance_evidence(first, second, scores.score, elapsed_s)
 
     def _curves(self, tracklets: Sequence[Tracklet], cameras: Sequence[slice]) -> Floats:
         """Return equalized cumulative histograms (P, 33), NaN where a histogram has too few frames."""

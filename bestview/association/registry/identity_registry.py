@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview.association.affinity.affinity_fusion import AffinityFusion
-from bestview.association.affinity.affinity_matrix import AffinityMatrix
+from bestview.association.affinity.affinity_matrix import SCORED_S, AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
 from bestview.association.co_occurrence import (
     GroundTrajectories,
@@ -133,7 +133,8 @@ class IdentityRegistry:
         )
         cameras = [observations.keys[row].camera for row in track.tolist()]
         self._people.add_sightings(zip(person_id.tolist(), cameras, strict=True), last_frame)
-        self._add_evidence(observations, rows, settled, last_frame)
+        elapsed_s = SCORED_S if previous_frame is None else (last_frame - previous_frame) / self._settings.fps
+        self._add_evidence(observations, rows, settled, last_frame, elapsed_s)
         tracklets = self._splitter.active
         created: tuple[int, ...] = ()
         merged: tuple[Merge, ...] = ()
@@ -247,6 +248,7 @@ class IdentityRegistry:
         rows: NDArray[np.int64],
         settled: NDArray[np.int64],
         last_frame: int,
+        elapsed_s: float,
     ) -> None:
         """Add the update's evidence about pairs of tracklets to the affinity matrix."""
         known_ids = [person.person_id for person in self._people.people_to_cluster(last_frame)]
@@ -269,7 +271,7 @@ class IdentityRegistry:
             )
             affinity.add_localized_frames(trajectories.sighting_rows, trajectories.sighting_frames)
         self._cross_camera.update(
-            self._splitter.active, np.unique(rows[(rows >= 0) & (rows < count)]), affinity
+            self._splitter.active, np.unique(rows[(rows >= 0) & (rows < count)]), affinity, elapsed_s
         )
 
     def _cluster(self, last_frame: int) -> tuple[tuple[int, ...], tuple[Merge, ...]]:

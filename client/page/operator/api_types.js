@@ -82,8 +82,8 @@
  * @property {Values} values in force
  * @property {Values} file values of the configuration
  * @property {string} lines YAML for the configuration
- * @property {number} min_lookahead frames
- * @property {number} max_lookahead frames
+ * @property {number} min_lookahead_s
+ * @property {number} max_lookahead_s
  *
  * @typedef {object} ManualOverrides /api/operator/people
  * @property {Record<string, string>} names by number

@@ -9,7 +9,7 @@ import { copy } from '../shared/tools.js';
 
 /** @type {[string, string, string][]} key, label, explanation */
 const FIELDS = [
-  ['lookahead', 'Look-ahead, frames', 'Frames known ahead when a view is selected; adds that delay.'],
+  ['lookahead_s', 'Look-ahead, s', 'Seconds known ahead when a view is selected; adds that delay.'],
   ['switch_cost_s', 'Cut cost λ, s', 'Seconds of not seeing the person that cost as much as a cut.'],
   ['extrapolate_s', 'Extrapolation, s', 'For how long after the look-ahead its last views are assumed to stay.'],
   ['presence_decay_s', 'Presence decay, s', 'How long a view takes to decay to nothing after the last detection.'],
@@ -82,11 +82,11 @@ export class ViewSelectionForm {
   }
 
   /** @param {SelectionSettings} settings */
-  #show({ values, file, lines, min_lookahead: min, max_lookahead: max }) {
+  #show({ values, file, lines, min_lookahead_s: min, max_lookahead_s: max }) {
     this.#values = values;
     if (!this.#fields.size) element('selection-fields').append(...FIELDS.filter(([key]) => key in values).map((field) => this.#createField(field)));
-    const lookahead = this.#fields.get('lookahead')?.input;
-    if (lookahead) Object.assign(lookahead, { min: String(min), max: String(max), step: '1' });
+    const lookahead = this.#fields.get('lookahead_s')?.input;
+    if (lookahead) Object.assign(lookahead, { min: String(min), max: String(max) });
     let changed = 0;
     for (const [key, { input, file: fileValue }] of this.#fields) {
       const value = values[key];

@@ -11,7 +11,7 @@ import { getJson } from '../shared/requests.js';
 
 const CACHE_SIZE = 200; // answers: more than the GOPs of a minute
 const NUMBERS = new Intl.NumberFormat('en', { minimumFractionDigits: 2, maximumFractionDigits: 2 });
-const FRAMES = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
+const SECONDS = new Intl.NumberFormat('en', { maximumFractionDigits: 2 });
 
 /** Opens the table: by the Why button for the displayed view, by the mouse on the timeline for another. */
 export class SelectionCosts {
@@ -153,12 +153,12 @@ function cameraTable(choice) {
 }
 
 /** @param {Choice} choice */
-function cutCosts({ before, stay, cut_to: to, cut, switch_cost: cutCost, lookahead }) {
-  const text = `A cut costs as much as ${FRAMES.format(cutCost)} frames of not seeing the person.`;
+function cutCosts({ before, stay_s: stay, cut_to: to, cut_s: cut, switch_cost_s: cutCost, lookahead_s: ahead }) {
+  const text = `A cut costs as much as ${SECONDS.format(cutCost)} s of not seeing the person.`;
   const costs = [];
-  if (before !== null && stay !== null) costs.push(`staying with ${before} ${FRAMES.format(stay)}`);
-  if (to !== null && cut !== null) costs.push(`${to} ${FRAMES.format(cut)} with its cut`);
-  return costs.length ? `${text} Over ${lookahead} frames: ${costs.join(', ')}.` : text;
+  if (before !== null && stay !== null) costs.push(`staying with ${before} ${SECONDS.format(stay)} s`);
+  if (to !== null && cut !== null) costs.push(`${to} ${SECONDS.format(cut)} s with its cut`);
+  return costs.length ? `${text} Over ${SECONDS.format(ahead)} s: ${costs.join(', ')}.` : text;
 }
 
 /** @param {number | null | undefined} value */

@@ -9,7 +9,7 @@
  * @property {number} width of the site's picture, the pixels of boxes
  * @property {number} height
  * @property {number} gop frames of a GOP; the camera changes only between GOPs
- * @property {number} lookahead_frames
+ * @property {number} lookahead_s
  * @property {string | null} codec RFC 6381, such as avc1.42C01F, or vp8; null: no keyframe has arrived yet
  * @property {'mp4' | 'webm'} [container] of the streams; mp4 if missing
  * @property {string | null} [sound] codec of the audio, such as mp4a.40.2; null: the site has none
@@ -84,11 +84,11 @@
  * @property {Record<string, Record<string, number>>} terms by camera and view-quality term
  * @property {Record<string, number>} weights by term
  * @property {string | null} before camera of the previous GOP
- * @property {number | null} stay cost of the look-ahead without a cut
+ * @property {number | null} stay_s cost of the look-ahead without a cut
  * @property {string | null} cut_to the best other camera
- * @property {number | null} cut cost of the look-ahead with that camera, including the cut
- * @property {number} switch_cost frames of not seeing the person
- * @property {number} lookahead frames
+ * @property {number | null} cut_s cost of the look-ahead with that camera, including the cut
+ * @property {number} switch_cost_s seconds of not seeing the person
+ * @property {number} lookahead_s
  */
 
 export {};

@@ -28,17 +28,17 @@ def open_site_audio(config: Config, camera_id: str) -> RecordedAudioSource | Liv
     settings, fps = config.sound, config.site.fps
     if settings.source is None or config.audio_sender != camera_id:
         return None
-    path, offset, at_end = settings.source, settings.offset, settings.at_end
+    path, offset_s, at_end = settings.source, settings.offset_s, settings.at_end
     if settings.source in config.camera_ids:
         camera = config.camera(camera_id)
-        path, offset, at_end = camera.source, camera.offset, camera.at_end
+        path, offset_s, at_end = camera.source, camera.offset_s, camera.at_end
         if source_kind(path) is SourceKind.STREAM:
-            return LiveAudioSource(settings, fps, config.encode.gop / fps)
+            return LiveAudioSource(settings, fps, config.gop / fps)
         if source_kind(path) is not SourceKind.FILE:
             raise UserError(
                 f"sound: camera {camera_id} has no audio: {redact_to_host(path)}; name another, or a file"
             )
     try:
-        return RecordedAudioSource(path, settings, fps, offset, at_end)
+        return RecordedAudioSource(path, settings, fps, round(offset_s * fps), at_end)
     except UserError as error:
         raise UserError(f"sound: {error}") from error

@@ -18,7 +18,7 @@ class LoadMonitor:
 
     def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
         track = config.track
-        self._camera, self._stride, self._gop = camera_id, config.window.stride, config.encode.gop
+        self._camera, self._stride, self._gop = camera_id, config.window.stride, config.gop
         latency_s = track.cross_view_wait_s if config.peers_of(camera_id) else 0.0
         latency_s += 1.0 / config.site.fps
         bounds = LevelBounds(latency_s + _BEHIND * track.backlog_s, latency_s + _KEEPS_UP * track.backlog_s)

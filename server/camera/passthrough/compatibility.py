@@ -42,7 +42,7 @@ def required_format(config: Config) -> RequiredFormat:
         black = np.zeros((site.height, site.width, 3), dtype=np.uint8)
         first = Encoder(site, config.encode).encode(0, black)
         parameters = parameter_sets(nal_units(first.data))
-    return RequiredFormat((site.width, site.height), site.fps, config.encode.gop, parameters)
+    return RequiredFormat((site.width, site.height), site.fps, config.gop, parameters)
 
 
 class CompatibilityCheck:
@@ -116,7 +116,7 @@ class CompatibilityCheck:
                 else "does not begin a GOP"
             )
             raise IncompatibleStreamError(
-                f"frame {frame} {problem}: they begin every {gop} frames (encode.gop)"
+                f"frame {frame} {problem}: they begin every {gop} frames (encode.gop_s)"
             )
         if pulse % gop == 0:
             self._check_parameters(frame, parameter_sets(nal_units(data)))

@@ -53,6 +53,7 @@ def _open(config: Config, camera: CameraSettings, listener: LiveAudioSource | No
         case SourceKind.STREAM:
             return PassthroughStream(camera.source, camera.options, listener, required_format(config))
         case SourceKind.FILE:
-            return PassthroughRecording(camera.source, camera.offset, camera.at_end, required_format(config))
+            first = camera.first_pulse(config.site.fps)
+            return PassthroughRecording(camera.source, first, camera.at_end, required_format(config))
         case _:
             raise IncompatibleStreamError("image files contain no H.264")

@@ -124,7 +124,7 @@ def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> No
                 break
         if start < 0:
             raise IncompatibleStreamError(
-                f"no GOP begins within {_CHECKED_GOPS * required.gop} frames (encode.gop)"
+                f"no GOP begins within {_CHECKED_GOPS * required.gop} frames (encode.gop_s)"
             )
     except (av.error.InvalidDataError, ValueError) as error:
         reason = ffmpeg_reason(error) if isinstance(error, av.error.FFmpegError) else str(error)

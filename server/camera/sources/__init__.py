@@ -40,9 +40,9 @@ def open_source(
             case SourceKind.STREAM:
                 return LiveStream(camera.source, camera.options, listener)
             case SourceKind.FOLDER:
-                return ImageFolder(camera.source, camera.offset, camera.at_end)
+                return ImageFolder(camera.source, camera.first_pulse(site.fps), camera.at_end)
             case SourceKind.FILE:
-                return Recording(camera.source, camera.offset, camera.at_end, site.fps)
+                return Recording(camera.source, camera.first_pulse(site.fps), camera.at_end, site.fps)
     except UserError as error:
         # A network camera may be off temporarily; a missing file is permanent.
         is_stream = source_kind(camera.source) is SourceKind.STREAM

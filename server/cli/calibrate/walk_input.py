@@ -94,7 +94,7 @@ def walks_from_videos(
         name: config.site.fps for name, config, info in zip(names, loaded, infos, strict=True) if info.fps
     }
     fps = picture.fps or _rate(rates)
-    offsets = [config.cameras[0].offset for config in loaded]
+    offsets = [config.cameras[0].first_pulse(config.site.fps) for config in loaded]
     walks = []
     with TemporaryDirectory() as folder:
         for name, video, info, offset in zip(names, videos, infos, offsets, strict=True):

@@ -43,7 +43,7 @@ class Renderer:
         cameras = config.camera_ids
         self._config, self._folder = config, folder
         # Undecided frames, and frames by which a camera is ahead.
-        frames = 4 * (config.view.lookahead + config.encode.gop + config.window.stride)
+        frames = 4 * (config.lookahead + config.gop + config.window.stride)
         stream_format = stream_format_for(
             config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )

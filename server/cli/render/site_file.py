@@ -40,8 +40,8 @@ def write_site(folder: Path, config: Config, sizes: Mapping[str, Size]) -> None:
     """Write `site.json`."""
     content = {
         "fps": config.site.fps,
-        "gop": config.encode.gop,
-        "lookahead": config.view.lookahead,
+        "gop_s": config.gop / config.site.fps,
+        "lookahead_s": config.lookahead / config.site.fps,
         "switch_cost_s": config.view.switch_cost_s,
         "sizes": {camera: list(sizes[camera]) for camera in config.camera_ids},
     }

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from server.config.sections.base import Section
+from server.config.sections.base import OffsetSeconds, Section
 from server.media.audio.audio_format import OPUS_RATE, AudioFormat, Coding
 
 
@@ -15,8 +15,8 @@ class SoundSettings(Section):
 
     source: str | None = None
     """A camera's id: that camera's sound. Or a file; None: the site has no sound."""
-    offset: int = 0
-    """A file's sound at pulse n is that of its moment (n - offset) / fps; a camera has its own offset."""
+    offset_s: OffsetSeconds = 0.0
+    """A file's sound at pulse n is that of its moment n / fps - offset_s; a camera has its own offset."""
     at_end: Literal["stop", "loop"] = "stop"
     """What a file does after its end; a camera has its own."""
     codec: Coding = "aac"

@@ -38,6 +38,9 @@ PictureSide = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
 
 Port = Annotated[int, Field(ge=1, le=_PORT_MOST)]
 
+OffsetSeconds = Annotated[float, Field(ge=-86_400, le=86_400)]
+"""Seconds by which a recording begins later than the others; below 0 earlier."""
+
 
 class Section(BaseModel):
     """A section of the configuration; unknown keys are errors."""

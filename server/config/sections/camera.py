@@ -9,7 +9,7 @@ from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, Validation
 
 from bestview import CrossViewSettings, validate_homography
 from server.config.ground_unit import check_unit_spelling
-from server.config.sections.base import Identifier, Polygon, Section
+from server.config.sections.base import Identifier, OffsetSeconds, Polygon, Section
 from server.config.unknown_keys import no_unknown_keys
 from tracking import DEFAULT_SOLVER, CostSettings, Solver, SolverBudget, WindowSettings, create_solver
 from tracking.baselines.temporal_consistency import TemporalSettings
@@ -27,8 +27,8 @@ class CameraSettings(Section):
     """A file whose one line, the camera's password, replaces `{password}` in `source`."""
     kind: Literal["upright", "overhead"] = "upright"
     """People stand upright in its picture, or it looks straight down on them."""
-    offset: int = 0
-    """A recording shows at pulse n its moment (n - offset) / fps."""
+    offset_s: OffsetSeconds = 0.0
+    """A recording shows at pulse n its moment n / fps - offset_s, to the next frame."""
     at_end: Literal["stop", "loop"] = "stop"
     """What a recording does after its last frame."""
     h264: Literal["encode", "auto", "pass"] = "encode"
@@ -43,6 +43,10 @@ class CameraSettings(Section):
     """The ground plane's unit; m, cm or mm also tell how tall people are in the picture."""
     detections: Path | None = None
     """A MOTChallenge detection file to use instead of a detector."""
+
+    def first_pulse(self, fps: float) -> int:
+        """Return the pulse of a recording's first frame at so many pulses per second."""
+        return round(self.offset_s * fps)
 
     @field_validator("password")
     @classmethod

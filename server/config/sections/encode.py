@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, PositiveInt, model_validator
+from pydantic import Field, model_validator
 
 from server.config.sections.base import Section
+from tracking.frame_rate import frames_in
 
 
 class EncodeSettings(Section):
@@ -14,8 +15,8 @@ class EncodeSettings(Section):
 
     codec: Literal["h264", "vp8"] = "h264"
     """H.264 by x264 in MP4, or VP8 by libvpx in WebM: free of patents' and of the GPL's terms."""
-    gop: PositiveInt = 10
-    """Frames in a closed group of pictures; views can change only where one begins."""
+    gop_s: Annotated[float, Field(gt=0, le=60)] = 0.4
+    """Seconds of a closed group of pictures, at least one frame; views can change only where one begins."""
     crf: Annotated[int, Field(ge=0, le=51)] = 23
     """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
@@ -27,6 +28,10 @@ class EncodeSettings(Section):
     """VP8's constant quality, instead of crf: smaller is better and larger; 8 to 32 is sensible."""
     speed: Annotated[int, Field(ge=1, le=16)] = 10
     """VP8's, instead of preset: higher is quicker, and a little larger."""
+
+    def frames_per_gop(self, fps: float) -> int:
+        """Return the frames in a GOP at so many frames per second."""
+        return frames_in(self.gop_s, fps)
 
     @model_validator(mode="after")
     def _can_be_capped(self) -> Self:

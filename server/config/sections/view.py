@@ -13,7 +13,7 @@ from server.config.unknown_keys import no_unknown_keys
 from tracking.types import RiskReason
 
 LIVE_VIEW_SETTINGS = (
-    "lookahead",
+    "lookahead_s",
     "switch_cost_s",
     "extrapolate_s",
     "presence_decay_s",
@@ -64,9 +64,9 @@ class FlagSettings(Section):
 class ViewSettings(Section):
     """The best-view service."""
 
-    lookahead: PositiveInt = 25
-    """Frames that view selection looks ahead: N of the paper's section III; all of it is delay. By default
-    those of one second, or as many as the tracks need."""
+    lookahead_s: Annotated[float, Field(gt=0, le=600)] = 1.0
+    """Seconds that view selection looks ahead: N of the paper's section III; all of it is delay. By default a
+    second, or as long as the tracks need."""
     switch_cost_s: Seconds = 0.3
     """λ: a cut costs as much as so many seconds of not seeing the person while another camera does; or twice
     as many of a view worth half the best one."""

@@ -16,7 +16,7 @@ class SiteInfo(msgspec.Struct, frozen=True):
     width: int
     height: int
     gop: int
-    lookahead_frames: int
+    lookahead_s: float
     codec: str | None
     """RFC 6381 codec string of every stream; null before the first keyframe."""
     container: str

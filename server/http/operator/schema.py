@@ -46,10 +46,10 @@ class SelectionSettings(msgspec.Struct, frozen=True):
     """The values of the configuration file."""
     lines: str
     """Configuration lines (YAML) for values that differ from their default or from the file."""
-    min_lookahead: int
-    """The fewest frames, which the tracking window needs."""
-    max_lookahead: int
-    """The most frames, which the service's buffers hold."""
+    min_lookahead_s: float
+    """The shortest, which the tracking window needs."""
+    max_lookahead_s: float
+    """The longest, which the service's buffers hold."""
 
 
 class IdentityOverrides(msgspec.Struct, frozen=True):

@@ -22,6 +22,7 @@ from server.http.operator.schema import SelectionSettings, Setting, Settings
 from server.service.service import BestViewService
 from server.system.address_redaction import HIDDEN, redact_to_host, redact_zenoh_endpoint
 from server.system.errors import UserError
+from tracking.frame_rate import seconds_up
 
 routes = web.RouteTableDef()
 
@@ -137,8 +138,14 @@ def _selection_settings(service: BestViewService) -> SelectionSettings:
     file, defaults = _flat(service.config.view), _flat(ViewSettings())
     lines = {key: value for key, value in current.items() if value != defaults[key] or value != file[key]}
     text = "" if not lines else dump_yaml({"view": _nested(lines)})
-    least, most = service.config.least_lookahead, service.operations.max_lookahead
-    return SelectionSettings(values=current, file=file, lines=text, min_lookahead=least, max_lookahead=most)
+    fps = service.config.site.fps
+    return SelectionSettings(
+        values=current,
+        file=file,
+        lines=text,
+        min_lookahead_s=seconds_up(service.config.least_lookahead, fps),
+        max_lookahead_s=service.operations.max_lookahead / fps,
+    )
 
 
 def _flat(view: ViewSettings) -> dict[str, float | bool]:

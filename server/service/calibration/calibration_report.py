@@ -195,9 +195,8 @@ def _offsets(recorded: RecordedWalk, calibration: WalkCalibration) -> list[str]:
                 verdict = "perhaps out of sync; late foot points look alike: compare two frames first"
             if _is_out_of_sync(camera) and camera.camera in recorded.without_offset:
                 verdict += "; a live camera has no configurable offset"
-            frames = f"{camera.offset:+.1f} frames ({camera.offset / fps:+.2f} s)"
-            margin = f"± {_SIGNIFICANT * camera.offset_error:.1f}"
-            lines.append(f"{camera.camera}: {frames} later than {first}, {margin}: {verdict}")
+            seconds, margin = camera.offset / fps, _SIGNIFICANT * camera.offset_error / fps
+            lines.append(f"{camera.camera}: {seconds:+.3f} s later than {first}, ± {margin:.3f} s: {verdict}")
     return lines
 
 
@@ -208,21 +207,22 @@ def offset_lines(recorded: RecordedWalk, calibration: WalkCalibration) -> str:
         for camera in calibration.cameras
         if _is_out_of_sync(camera) and camera.camera not in recorded.without_offset
     ]
-    lines = [f"  - id: {camera.camera}\n    offset: {_use(recorded, camera)}\n" for camera in moved]
+    lines = [f"  - id: {camera.camera}\n    offset_s: {_use(recorded, camera):g}\n" for camera in moved]
     return "".join(["cameras:\n", *lines]) if lines else ""
 
 
 def _offset(recorded: RecordedWalk, camera: CameraCalibration) -> dict[str, float]:
     return {
-        "frames": round(camera.offset, 2),
-        "error": round(camera.offset_error, 2),
+        "seconds": round(camera.offset / recorded.fps, 4),
+        "error": round(camera.offset_error / recorded.fps, 4),
         "use": _use(recorded, camera),
     }
 
 
-def _use(recorded: RecordedWalk, camera: CameraCalibration) -> int:
-    """Return the offset to configure: the configured one plus the measured one."""
-    return recorded.offsets.get(camera.camera, 0) + (round(camera.offset) if _is_out_of_sync(camera) else 0)
+def _use(recorded: RecordedWalk, camera: CameraCalibration) -> float:
+    """Return the offset to configure, in seconds: the configured one plus the measured one."""
+    frames = recorded.offsets.get(camera.camera, 0) + (round(camera.offset) if _is_out_of_sync(camera) else 0)
+    return round(frames / recorded.fps, 4)
 
 
 def _is_out_of_sync(camera: CameraCalibration) -> bool:

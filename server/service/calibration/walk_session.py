@@ -85,7 +85,7 @@ class WalkSession:
         self._cancel_calibration()
         boxes = [walk.boxes for walk in self._walks.values()]
         offsets = {
-            camera.id: camera.offset
+            camera.id: camera.first_pulse(self._fps)
             for camera in self._config.cameras
             if source_kind(camera.source) in (SourceKind.FILE, SourceKind.FOLDER)
         }

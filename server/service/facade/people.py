@@ -167,7 +167,7 @@ class PeopleService:
             None: there is no such person, or no reasons of that time.
         """
         selection = self._pipeline.decision_state.explain(number, pulse)
-        return None if selection is None else view_selection_of(selection)
+        return None if selection is None else view_selection_of(selection, self._pipeline.config.site.fps)
 
     def thumbnail_of(self, number: int) -> Thumbnail | None:
         """Return the newest thumbnail of a person, from the chosen camera where it has a recent one."""

@@ -115,7 +115,7 @@ class RecordedStream:
             pipeline.splicer.layout,
             self._timeline,
             self._playback_audio,
-            gop=pipeline.config.encode.gop,
+            gop=pipeline.config.gop,
             decided=pipeline.recorder.recent.end,
             has_ended=has_ended,
         )
@@ -134,7 +134,7 @@ class RecordedStream:
 
     def _timeline(self) -> GaplessTimeline:
         config = self._pipeline.config
-        return GaplessTimeline(self._pipeline.stream_format, config.site.fps, config.encode.gop)
+        return GaplessTimeline(self._pipeline.stream_format, config.site.fps, config.gop)
 
     def _playback_audio(self) -> PlaybackAudio | None:
         audio = self._pipeline.recorder.audio_buffer

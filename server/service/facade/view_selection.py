@@ -34,21 +34,21 @@ class ViewSelection(msgspec.Struct, frozen=True):
     """By term: the share of a view's quality that is lost where the term is 0."""
     before: str | None
     """The camera of the GOP before; null: there was none."""
-    lookahead: int
-    """Frames of the look-ahead, from `first` on."""
-    switch_cost: float
-    """The cost of a cut, in frames without the person."""
-    stay: float | None
+    lookahead_s: float
+    """Seconds of the look-ahead, from `first` on."""
+    switch_cost_s: float
+    """The cost of a cut, in seconds without the person."""
+    stay_s: float | None
     """The cost of the look-ahead with `before`; null: there is none, or it cannot be shown."""
-    cut: float | None
+    cut_s: float | None
     """The cost with the best other camera, the cut included; null: there is none."""
     cut_to: str | None
     """That camera."""
     reason: str
 
 
-def view_selection_of(selection: SelectionReason) -> ViewSelection:
-    """Return a selected view with the costs behind it."""
+def view_selection_of(selection: SelectionReason, fps: float) -> ViewSelection:
+    """Return a selected view with the costs behind it, at so many frames per second."""
     view, explanation = selection.view, selection.explanation
     return ViewSelection(
         object=view.choice.number,
@@ -66,10 +66,10 @@ def view_selection_of(selection: SelectionReason) -> ViewSelection:
         },
         weights=explanation.weights,
         before=view.choice.before,
-        lookahead=explanation.frames,
-        switch_cost=explanation.switch_cost,
-        stay=explanation.stay,
-        cut=explanation.cut,
+        lookahead_s=explanation.frames / fps,
+        switch_cost_s=explanation.switch_cost / fps,
+        stay_s=None if explanation.stay is None else explanation.stay / fps,
+        cut_s=None if explanation.cut is None else explanation.cut / fps,
         cut_to=explanation.cut_to,
         reason=reason(view.choice, explanation),
     )

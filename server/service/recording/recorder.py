@@ -44,7 +44,7 @@ class Recorder:
         self._config, self._stream_format = config, stream_format
         self.audio_buffer = audio_buffer
         """The newest audio; None if the site has none."""
-        self.recent = RecentGops(frame_buffers, config.encode.gop, frames)
+        self.recent = RecentGops(frame_buffers, config.gop, frames)
         self.pulse0: float | None = None
         self.person_numbers_since: float | None = None
         self._pending: deque[GopChoices] = deque()
@@ -60,7 +60,7 @@ class Recorder:
         if record.folder is not None:
             limits = RetentionLimits(record.keep_s, record.max_mb, record.segment_s, record.trust_clock)
             self.folder = folder = RecordingFolder(record.folder, limits)
-            max_queued = max(4, frames // config.encode.gop)  # no more than the frame buffers hold anyway
+            max_queued = max(4, frames // config.gop)  # no more than the frame buffers hold anyway
             self.writer = WriterThread(
                 self._write, folder.abandon_segment, folder.close, max_queued, where=str(record.folder)
             )

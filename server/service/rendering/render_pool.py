@@ -72,7 +72,7 @@ class RenderPool:
             width=config.site.width,
             height=config.site.height,
             fps=config.site.fps,
-            gop=config.encode.gop,
+            gop=config.gop,
             preset=config.encode.preset,
             crf=config.encode.crf,
             max_kbps=config.encode.max_kbps,

@@ -71,7 +71,7 @@ class Splicer:
         self._frame_buffers, self._stream_format, self._config = frame_buffers, stream_format, config
         self._audio_buffer = audio_buffer
         site, http = config.site, config.http
-        self.layout = segment_layout(site.fps, config.encode.gop, http.hls_segment_s, http.hls_window_s)
+        self.layout = segment_layout(site.fps, config.gop, http.hls_segment_s, http.hls_window_s)
         self._live = {
             camera: CameraLiveStream(self._broadcaster(), self._timeline(), site.fps, audio_buffer)
             for camera in frame_buffers
@@ -145,7 +145,7 @@ class Splicer:
         return Broadcaster(queue_gops=self._config.http.viewer_queue_gops)
 
     def _timeline(self) -> GaplessTimeline:
-        return GaplessTimeline(self._stream_format, self._config.site.fps, self._config.encode.gop)
+        return GaplessTimeline(self._stream_format, self._config.site.fps, self._config.gop)
 
     def _stream(self) -> SplicedStream:
         return SplicedStream(self._broadcaster(), self._timeline(), HlsSegmenter(self.layout))

@@ -95,7 +95,7 @@ class ViewDecider:
             fps,
             config.joint_cameras,
         )
-        stride, gop = config.window.stride, config.encode.gop
+        stride, gop = config.window.stride, config.gop
         self._max_gops_per_epoch = -(-stride // gop) + 1
         """One more than an epoch completes, so that a backlog after a shorter look-ahead shrinks."""
         self._quality_buffer = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
@@ -128,7 +128,7 @@ class ViewDecider:
     def _apply(self, view: ViewSettings) -> None:
         fps = self._config.site.fps
         self.switch_cost = view.switch_cost_s * fps
-        self.min_shot_gops = -(-round(view.min_shot_s * fps) // self._config.encode.gop)
+        self.min_shot_gops = -(-round(view.min_shot_s * fps) // self._config.gop)
         """The minimum length of a shot, in GOPs."""
         self._extrapolated_frames = view.extrapolate_s * fps
 
@@ -137,7 +137,7 @@ class ViewDecider:
 
         After skipped epochs, the GOPs that were not decided before them are skipped, too.
         """
-        gop, lookahead = self._config.encode.gop, self._config.view.lookahead
+        gop, lookahead = self._config.gop, self._config.lookahead
         if self._next_gop is None or epoch.skipped:  # earlier frames are unknown
             start = epoch.last - self._config.window.stride + 1
             self._next_gop = -(-start // gop) * gop
@@ -157,7 +157,7 @@ class ViewDecider:
         """Decide the remaining GOPs when all recordings are over; ``last`` is the last frame of all."""
         if self._next_gop is None or self._next_gop > last:
             return []
-        gop, lookahead = self._config.encode.gop, self._config.view.lookahead
+        gop, lookahead = self._config.gop, self._config.lookahead
         window = self._window(self._next_gop, last)
         return [
             self._decide(window, first, min(gop, last + 1 - first), np.ones(min(lookahead, last + 1 - first)))
@@ -194,13 +194,13 @@ class ViewDecider:
         since = np.fromiter((first_seen[number] for number in numbers.tolist()), np.int64, len(numbers))
         part = window.part(first, lookahead, since < first + frames)
         before = self._shots.of(part.numbers)
-        starts = np.arange(lookahead) % self._config.encode.gop == 0
+        starts = np.arange(lookahead) % self._config.gop == 0
         gops = part.gops(starts, weight, mark_hidden=self.min_shot_gops > 1)
         (views,), _ = select_views_by_gop(
             gops, before.cameras, self.switch_cost, self.min_shot_gops, before.gops, decided_gops=1
         )
         self._shots = before.then(views)
-        self._next_gop = first + self._config.encode.gop
+        self._next_gop = first + self._config.gop
         boxes = {camera: people.boxes(camera, first, frames) for camera in self._cameras}
         self._quality_buffer.forget_before(self._next_gop)
         people.forget_before(self._next_gop)

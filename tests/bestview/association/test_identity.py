@@ -347,7 +347,7 @@ def test_invalid_arguments_are_refused_in_one_line() -> None:
     with pytest.raises(ValueError, match="comes after"):
         identities.update([track], 14)
     with pytest.raises(ValueError, match="memory"):
-        IdentitySettings(cross_camera_memory=1.5)
+        IdentitySettings(cross_camera_memory_s=0.0)
     with pytest.raises(ValueError, match="gate"):
         IdentitySettings(gate_distance=0.0)
 

@@ -43,7 +43,7 @@ SITE: dict[str, Any] = {
     "width": 352,
     "height": 288,
     "gop": GOP,
-    "lookahead_frames": 25,
+    "lookahead_s": 1.0,
     "codec": "avc1.42C01F",
     "pulse0": None,
     "now": 1732159200.5,

@@ -84,7 +84,7 @@ def _audio_frame(number: int, rate: int, layout: str) -> av.AudioFrame:
 @cache
 def access_units(recording: Path) -> tuple[AccessUnit, ...]:
     """Return the recording's pictures as access units of a camera."""
-    encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop=GOP))
+    encoder = Encoder(SiteSettings(width=64, height=48, fps=FPS), EncodeSettings(gop_s=GOP / FPS))
     with av.open(str(recording)) as container:
         pictures = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
     return tuple(encoder.encode(pulse, picture) for pulse, picture in enumerate(pictures))

@@ -16,7 +16,7 @@ PRESETS = ("ultrafast", "superfast", "medium")
 
 def encoded(size: tuple[int, int], preset: str, frames: int, gop: int = 6) -> list[AccessUnit]:
     encoder = Encoder(
-        SiteSettings(width=size[0], height=size[1], fps=25), EncodeSettings(gop=gop, preset=preset)
+        SiteSettings(width=size[0], height=size[1], fps=25), EncodeSettings(gop_s=gop / 25, preset=preset)
     )  # type: ignore[arg-type]
     noise = np.random.default_rng(0).integers(0, 255, (frames, size[1], size[0], 3), dtype=np.uint8)
     return [encoder.encode(pulse, np.asarray(picture // 4 * 2)) for pulse, picture in enumerate(noise)]

@@ -30,7 +30,7 @@ def joint_config(**changes: Any) -> Config:
     """Return a site whose cameras are tracked jointly; changes are of whole sections."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": SIZE[0], "height": SIZE[1]},
-        "encode": {"gop": 2},
+        "encode": {"gop_s": 2 / FPS},
         "cameras": [
             {
                 "id": name,
@@ -44,7 +44,7 @@ def joint_config(**changes: Any) -> Config:
             "joint": True,
             "window": {"length_s": 1.2, "stride_s": STRIDE / FPS, "birth_s": 1.2, "min_frames": 3},
         },
-        "view": {"lookahead": 8, "identity": {"confirmation_s": 0.4}},
+        "view": {"lookahead_s": 8 / FPS, "identity": {"confirmation_s": 0.4}},
     }
     return build_config({**content, **changes}, where="hall", folder=Path())
 

@@ -27,7 +27,8 @@ LOST_GOPS = {(B, 3), (A, 6), (A, 7), (B, 10)}
 @cache
 def sent_units(camera: str) -> tuple[AccessUnit, ...]:
     encoder = Encoder(
-        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=GOP, **ENCODINGS[camera])
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
+        EncodeSettings(gop_s=GOP / FPS, **ENCODINGS[camera]),
     )
     rng = np.random.default_rng(sum(camera.encode()))
     coarse = rng.integers(0, 255, (GOPS * GOP, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)

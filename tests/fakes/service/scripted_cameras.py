@@ -45,7 +45,7 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
     """Return a site in which every epoch is a GOP, and one detection confirms a person."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
-        "encode": {"gop": GOP},
+        "encode": {"gop_s": GOP / FPS},
         "cameras": [
             {"id": camera, "source": "scene:room"} if isinstance(camera, str) else camera
             for camera in cameras
@@ -59,7 +59,7 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
             }
         },
         "view": {
-            "lookahead": 2 * GOP,
+            "lookahead_s": 2 * GOP / FPS,
             "switch_cost_s": 0.04,
             "identity": {"confirmation_s": 0.04, "clustering_interval_s": 0.04},
         },
@@ -75,7 +75,8 @@ def encoded(
 ) -> tuple[AccessUnit, ...]:
     """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
     encoder = Encoder(
-        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop=gop, crf=crf, codec=codec)
+        SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
+        EncodeSettings(gop_s=gop / FPS, crf=crf, codec=codec),
     )
     rng = np.random.default_rng(seed)
     pictures = rng.integers(0, 255, (frames, HEIGHT // 8, WIDTH // 8, 3), dtype=np.uint8)

@@ -313,7 +313,7 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
     heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     frames = [head.pulse for head in heads]
     assert frames[:6] == [0, 2, 4, 6, 8, 9]
-    assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.encode.gop))
+    assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.gop))
     pairs = [(before.pulse, head.reference_pulse) for before, head in pairwise(heads) if not head.key]
     assert all(before == after for before, after in pairs), "a frame that was not captured affects no other"
     messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]

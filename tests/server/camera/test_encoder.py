@@ -42,14 +42,15 @@ def peak_kbps(units: list[AccessUnit]) -> float:
 @pytest.mark.parametrize("preset", ["ultrafast", "medium"])
 @pytest.mark.parametrize("gop", [1, 10, 50])
 def test_no_second_of_a_noisy_scene_takes_more_than_the_cap(gop: int, preset: str) -> None:
-    settings = EncodeSettings.model_validate({"gop": gop, "preset": preset, "max_kbps": CAP})
+    settings = EncodeSettings.model_validate({"gop_s": gop / SITE.fps, "preset": preset, "max_kbps": CAP})
     assert CAP / 2 < peak_kbps(encoded(settings)) <= CAP
-    uncapped = EncodeSettings.model_validate({"gop": gop, "preset": preset})
+    uncapped = EncodeSettings.model_validate({"gop_s": gop / SITE.fps, "preset": preset})
     assert peak_kbps(encoded(uncapped)) > 2 * CAP, "the cap has an effect"
 
 
 @pytest.mark.parametrize(
-    "settings", [EncodeSettings(gop=10, max_kbps=CAP), EncodeSettings(gop=10, codec="vp8")]
+    "settings",
+    [EncodeSettings(gop_s=10 / SITE.fps, max_kbps=CAP), EncodeSettings(gop_s=10 / SITE.fps, codec="vp8")],
 )
 def test_keyframes_are_at_gop_starts_and_bytes_are_reproducible(settings: EncodeSettings) -> None:
     units = encoded(settings)
@@ -73,7 +74,7 @@ def test_vp8_has_a_frame_for_every_pulse_and_a_higher_quantizer_is_smaller() -> 
 
 
 def test_parameter_sets_do_not_depend_on_the_images() -> None:
-    settings = EncodeSettings(gop=10, max_kbps=CAP)
+    settings = EncodeSettings(gop_s=10 / SITE.fps, max_kbps=CAP)
     sets = {parameter_sets(nal_units(unit.data)) for unit in encoded(settings) if unit.key}
     assert len(sets) == 1
     assert None not in sets

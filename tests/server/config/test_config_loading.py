@@ -129,9 +129,9 @@ def test_a_mirrored_homography_is_refused_with_its_camera() -> None:
 
 def test_the_lookahead_must_cover_the_stages_of_temporal_consistency() -> None:
     track = {"tracker": "temporal", "temporal": {"window_stages": 2, "stage_s": 0.4}}
-    wrong = error_of(site(view={"lookahead": 28}, track=track))
-    assert "must be at least 29 (encode.gop + the frames of all stages of track.temporal, less one)" in wrong
-    enough = build_config(site(view={"lookahead": 29}, track=track), where="", folder=Path())
+    wrong = error_of(site(view={"lookahead_s": 1.12}, track=track))
+    assert "must be at least 1.16 (encode.gop_s + all stages of track.temporal, less a frame)" in wrong
+    enough = build_config(site(view={"lookahead_s": 1.16}, track=track), where="", folder=Path())
     assert enough.track.final_lag(25.0) == 19
 
 
@@ -141,7 +141,7 @@ def test_too_many_stages_are_refused_before_their_frames_are_counted() -> None:
 
 
 def test_a_lookahead_below_the_trackers_lag_is_refused_with_the_minimum() -> None:
-    assert "must be at least 20" in error_of(site(view={"lookahead": 19}))
+    assert "must be at least 0.8" in error_of(site(view={"lookahead_s": 0.76}))
 
 
 def test_a_person_must_be_published_before_they_are_settled() -> None:
@@ -160,7 +160,7 @@ def test_a_person_must_be_published_before_they_are_settled() -> None:
     [
         ("site", {"fps": 0}),
         ("site", {"width": 333}),
-        ("encode", {"gop": 0}),
+        ("encode", {"gop_s": 0.0}),
         ("http", {"port": 70000}),
         ("view", {"min_shot_s": 1e9}),
         ("view", {"extrapolate_s": float("inf")}),

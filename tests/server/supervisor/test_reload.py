@@ -41,13 +41,13 @@ LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras",
 CHANGES: dict[str, tuple[str, Any]] = {
     "view.switch_cost_s": (LIVE, 2.0),
     "view.quality.centering": (LIVE, 0.5),
-    "view.lookahead": (LIVE, 20),
+    "view.lookahead_s": (LIVE, 0.8),
     "view.buffer_s": (BEST_VIEW, 20.0),
     "view.identity.merge_threshold": (BEST_VIEW, 1.0),
     "http.port": (BEST_VIEW, 8123),
     "record.keep_s": (BEST_VIEW, 5.0),
     "cameras.c1.source": (CAMERA, "rtsp://elsewhere/1"),
-    "cameras.c1.offset": (CAMERA, 3),
+    "cameras.c1.offset_s": (CAMERA, 0.12),
     "cameras.c1.options": (CAMERA, {"rtsp_transport": "tcp"}),
     "cameras.c1.ground": (SITE, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
     "detect.box_filter.min_height": (ALL_CAMERAS, 0.3),
@@ -113,18 +113,18 @@ def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
 
 def test_a_lookahead_below_the_current_lag_waits_for_a_restart() -> None:
     track = {"window": {"length_s": 0.6, "stride_s": 0.2, "birth_s": 0.2, "min_frames": 3}}
-    running = small_config(track=track, view={"lookahead": 15})
-    reload = plan_reload(running, small_config(view={"lookahead": 5, "switch_cost_s": 1.0}))
+    running = small_config(track=track, view={"lookahead_s": 0.6})
+    reload = plan_reload(running, small_config(view={"lookahead_s": 0.2, "switch_cost_s": 1.0}))
     assert reload.live == ("view.switch_cost_s",)
-    assert reload.best_view == ("view.lookahead",)
+    assert reload.best_view == ("view.lookahead_s",)
     assert reload.site == ("track.window.length_s",)
-    assert reload.now.view.lookahead == running.view.lookahead
+    assert reload.now.view.lookahead_s == running.view.lookahead_s
     assert reload.now.track.window == running.track.window
 
 
 def test_a_changed_list_of_cameras_waits_for_a_restart() -> None:
     running = small_config()
-    wanted = small_config([{"id": "c0", "source": "scene:room", "offset": 5}, "c1", "c2"])
+    wanted = small_config([{"id": "c0", "source": "scene:room", "offset_s": 0.2}, "c1", "c2"])
     reload = plan_reload(running, wanted)
     assert (reload.site, reload.now.cameras) == (("cameras",), running.cameras)
 
@@ -143,17 +143,17 @@ def test_the_difference_to_an_invalid_changed_or_repaired_file_is_known(tmp_path
     write(path)
     running = ActiveConfig(path)
     assert not running.on_disk().differs
-    write(path, view={"lookahead": "many"})
+    write(path, view={"lookahead_s": "many"})
     found = running.on_disk()
-    assert "view.lookahead" in found.error
+    assert "view.lookahead_s" in found.error
     assert found.differs
-    with pytest.raises(UserError, match=r"view\.lookahead"):
+    with pytest.raises(UserError, match=r"view\.lookahead_s"):
         running.read_config_to_activate()
-    write(path, view={"lookahead": 40}, site={"fps": 12.5})
-    assert running.on_disk().changed_keys == ("site.fps", "view.lookahead")
+    write(path, view={"lookahead_s": 1.6}, site={"fps": 12.5})
+    assert running.on_disk().changed_keys == ("site.fps", "view.lookahead_s")
     running.now = plan_reload(running.now, running.read_config_to_activate()).now
     assert running.on_disk().changed_keys == ("site.fps",)
-    write(path, view={"lookahead": 40})
+    write(path, view={"lookahead_s": 1.6})
     assert not running.on_disk().differs
 
 
@@ -187,14 +187,14 @@ def test_processes_use_the_supervisors_active_configuration(
 def test_a_service_applies_a_reload_and_keeps_other_trial_settings() -> None:
     service = FedService(small_config())
     service.apply_live_view_settings(service.config.view.model_copy(update={"switch_cost_s": 3.0}))
-    service.apply_config(small_config([{"id": "c0", "source": "scene:room", "offset": 4}, "c1"]))
-    assert service.config.camera("c0").offset == 4
+    service.apply_config(small_config([{"id": "c0", "source": "scene:room", "offset_s": 0.16}, "c1"]))
+    assert service.config.camera("c0").offset_s == 0.16
     assert service.decider.view.switch_cost_s == 3.0
     service.apply_config(small_config(view={"switch_cost_s": 2.0}))
     assert service.decider.view.switch_cost_s == service.config.view.switch_cost_s == 2.0
     before = service.config
     with pytest.raises(UserError, match="can be at most"):
-        service.apply_config(small_config(view={"lookahead": 10_000}))
+        service.apply_config(small_config(view={"lookahead_s": 400.0}))
     assert service.config is before
     service.close()
 
@@ -262,10 +262,10 @@ async def test_a_process_logs_pending_and_invalid_settings_and_ends_with_its_ter
 
 
 def test_a_tracker_with_another_lag_waits_for_a_restart() -> None:
-    running = small_config(view={"lookahead": 200})
+    running = small_config(view={"lookahead_s": 8.0})
     for track in ({"tracker": "temporal"}, {"tracker": "temporal", "temporal": {"window_stages": 2}}):
-        reload = plan_reload(running, small_config(view={"lookahead": 200}, track=track))
+        reload = plan_reload(running, small_config(view={"lookahead_s": 8.0}, track=track))
         assert reload.now.track == running.track
         assert "track.tracker" in reload.site
-    quicker = plan_reload(running, small_config(view={"lookahead": 200}, track={"tracker": "kalman"}))
+    quicker = plan_reload(running, small_config(view={"lookahead_s": 8.0}, track={"tracker": "kalman"}))
     assert quicker.now.track.tracker == "kalman"

@@ -16,6 +16,7 @@ from tracking.baselines import StepwiseSettings
 from tracking.baselines.integral_histograms import BINS, ColorIntegralImage
 from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.registry import (
     TEMPORAL_TRACKER,
     Tracker,
@@ -145,8 +146,8 @@ def test_an_unknown_tracker_is_refused_with_the_known_names() -> None:
         {"min_match_iou": 1.5},
         {"min_birth_score": -0.1},
         {"confirm_frames": 0},
-        {"max_missed_frames": 0},
-        {"max_unmatched_frames": -1},
+        {"max_missed_s": 0.0},
+        {"max_unmatched_s": -0.1},
     ],
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
@@ -188,7 +189,9 @@ def test_every_frame_is_published_once_and_no_id_is_reused(stream: list[tuple[in
             assert not np.isnan(track.boxes).all()
             shown = result.first + np.flatnonzero(~np.isnan(track.boxes[:, 0]))
             assert shown[0] > ends.get(track.id, -1)
-            assert shown[0] - ends.get(track.id, shown[0]) <= StepwiseSettings().max_missed_frames
+            assert shown[0] - ends.get(track.id, shown[0]) <= frames_in(
+                StepwiseSettings().max_missed_s, DEFAULT_FPS
+            )
             begins.setdefault(track.id, int(shown[0]))
             ends[track.id] = int(shown[-1])
     assert sorted(begins) == list(range(1, len(begins) + 1))

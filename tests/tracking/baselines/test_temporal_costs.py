@@ -177,7 +177,7 @@ def test_a_person_walking_through_during_learning_is_not_part_of_the_background(
 
 def test_a_slowly_changing_background_is_learned_outside_of_people() -> None:
     rng = np.random.default_rng(4)
-    detector = BlobDetector((120, 90), 6.0, BlobSettings(learn_rate=0.3))
+    detector = BlobDetector((120, 90), 6.0, BlobSettings(learn_s=2.0), sample_s=0.6)
     detector.prepare([_room(rng) for _ in range(20)])
     person = slice(30, 60), slice(40, 60)
     for step in range(40):

@@ -215,7 +215,7 @@ def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:
         {"dilation_m": 2.0},
         {"min_area_m2": -1.0},
         {"samples": 10**9},
-        {"learn_rate": 1.5},
+        {"learn_s": 0.0},
     ],
 )
 def test_invalid_blob_settings_are_refused(wrong: dict[str, float]) -> None:

@@ -143,9 +143,9 @@ def test_a_frame_has_an_id_at_most_once_and_results_are_deterministic() -> None:
     [
         {"min_covered_share": 0.0},
         {"split_margin": -1.0},
-        {"split_decision_frames": 0},
-        {"max_group_frames": 0},
-        {"merge_after_frames": 0},
+        {"split_decision_s": 0.0},
+        {"max_group_s": 0.0},
+        {"merge_after_s": 0.0},
     ],
 )
 def test_invalid_settings_are_refused(wrong: dict[str, float]) -> None:

@@ -176,10 +176,8 @@ class VaryingTargetsTracker(FrameByFrameTracker[JumpTarget]):
                 continue
             item.missed_frames += 1
             if item.matches < self._settings.confirm_frames:
-                item.missed_frames = self._settings.max_missed_frames
-            elif (
-                item.target.presence >= _PRESENT and item.missed_frames <= self._settings.max_unmatched_frames
-            ):
+                item.missed_frames = self._max_missed
+            elif item.target.presence >= _PRESENT and item.missed_frames <= self._max_unmatched:
                 item.observations[frame] = (item.box, OCCLUDED)
 
     def _enter(

@@ -19,6 +19,8 @@ from tracking.detectors.base import Image, Mask, Plane
 
 _INLIERS = 3.0
 """Robust standard deviations from the median within which a sample counts as background."""
+_SAMPLE_S = 0.5
+"""Seconds between two images that are learned."""
 _MAD = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
 
@@ -26,8 +28,10 @@ _MAD = 1.4826
 class YuvBackground:
     """Mean and covariance of each pixel, `(H, W, 3)` and `(H, W, 3, 3)`."""
 
-    def __init__(self, images: Sequence[Image], settings: BlobSettings) -> None:
+    def __init__(self, images: Sequence[Image], settings: BlobSettings, sample_s: float = _SAMPLE_S) -> None:
         """Learn from images of the room, empty or with people who keep moving.
+
+        Images that are learned later are `sample_s` seconds apart.
 
         The report's room is empty. Here only samples near the median count, so that people who walk through
         are left out.
@@ -51,7 +55,7 @@ class YuvBackground:
         covariance = np.einsum("n...i,n...j->...ij", deviations, deviations) / count[..., None]
         self._mean: Plane = mean.astype(np.float32)
         self._whitening = _whitening(covariance + np.diag(floors**2))
-        self._rate = settings.learn_rate
+        self._rate = min(sample_s / settings.learn_s, 1.0)
         self._squared = np.float32(settings.threshold**2)
 
     def foreground(self, image: Image) -> Mask:
@@ -122,9 +126,14 @@ class BlobDetector:
         pixels_per_meter: pixels of the working image per meter of floor.
     """
 
-    def __init__(self, size: tuple[int, int], room_m: float, settings: BlobSettings) -> None:
-        """Set up for images of `size` (width, height) in pixels that show `room_m` meters of floor across."""
-        self._settings = settings
+    def __init__(
+        self, size: tuple[int, int], room_m: float, settings: BlobSettings, sample_s: float = _SAMPLE_S
+    ) -> None:
+        """Set up for images of `size` (width, height) in pixels that show `room_m` meters of floor across.
+
+        Between two images that are learned are `sample_s` seconds.
+        """
+        self._settings, self._sample_s = settings, sample_s
         width, height = size
         scale = min(1.0, settings.work_width / width)
         self.size = max(round(width * scale), 1), max(round(height * scale), 1)
@@ -152,7 +161,7 @@ class BlobDetector:
         Raises:
             ValueError: there is no image.
         """
-        self._background = YuvBackground(work_images, self._settings)
+        self._background = YuvBackground(work_images, self._settings, self._sample_s)
 
     def detect(self, work_image: Image, *, learn: bool) -> tuple[Blob, ...]:
         """Return the blobs of a working image, from left to right; none while the background is unknown.

@@ -31,7 +31,7 @@ class BlobSettings:
     min_area_m2: float = 0.04  # square meters of floor below which a blob is noise
     bootstrap_s: float = 4.0  # seconds from which the background is learned live
     samples: int = 25  # frames of these that are used
-    learn_rate: float = 0.05  # share of each sample that enters the background where no person is
+    learn_s: float = 10.0  # seconds in which the background follows a change, outside of people
 
     def __post_init__(self) -> None:
         positive = (self.work_width, self.threshold, self.brightness_floor, self.chroma_floor, self.samples)
@@ -41,8 +41,8 @@ class BlobSettings:
             )
         if not self.bootstrap_s > 0.0 or self.samples > _MAX_SAMPLES:
             raise ValueError(f"bootstrap_s must be above 0, and samples at most {_MAX_SAMPLES}")
-        if not 0.0 <= self.learn_rate <= 1.0:
-            raise ValueError(f"learn_rate is a share between 0 and 1, not {self.learn_rate}")
+        if not self.learn_s > 0.0:
+            raise ValueError(f"learn_s must be above 0, not {self.learn_s}")
         if not 0.0 <= self.dilation_m <= _MAX_DILATION_M or not self.min_area_m2 >= 0.0:
             raise ValueError(f"dilation_m must be 0 to {_MAX_DILATION_M:g} and min_area_m2 at least 0")
 

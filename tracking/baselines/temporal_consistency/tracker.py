@@ -215,7 +215,9 @@ class TemporalBlobTracker:
     def _blobs_of(self, image: Image) -> BlobDetector:
         if self._blobs is None:
             size = (int(image.shape[1]), int(image.shape[0]))
-            self._blobs = BlobDetector(size, self._settings.room_m, self._settings.blobs)
+            self._blobs = BlobDetector(
+                size, self._settings.room_m, self._settings.blobs, self._settings.stage_s
+            )
             self._scale = size[0] / self._blobs.size[0]
         return self._blobs
 

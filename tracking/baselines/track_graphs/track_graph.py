@@ -28,7 +28,7 @@ from tracking.baselines.track_graphs.track_groups import (
 )
 from tracking.boxes import Floats, areas, intersections
 from tracking.detectors.base import Image
-from tracking.frame_rate import DEFAULT_FPS
+from tracking.frame_rate import DEFAULT_FPS, frames_in
 from tracking.solvers.base import OCCLUDED
 from tracking.types import Detections
 from tracking.window import WindowSettings
@@ -49,6 +49,10 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
     ) -> None:
         super().__init__(KalmanPrediction(), window, settings, fps)
         self._graph = graph or TrackGraphSettings()
+        self._merge_after = frames_in(self._graph.merge_after_s, fps)
+        self._split_decision = frames_in(self._graph.split_decision_s, fps)
+        self._max_group = frames_in(self._graph.max_group_s, fps)
+        self._motion_frames = frames_in(self._graph.motion_s, fps)
         self._appearances: dict[int, MeanAppearance] = {}
         self._groups: dict[int, TrackGroup] = {}
         self._split_candidates: dict[int, SplitCandidate] = {}
@@ -79,7 +83,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
             if serial in alive and candidate.host.serial in alive and candidate.host.serial in self._groups
         }
         for serial, group in list(self._groups.items()):
-            expired = [frame - end.frame > self._graph.max_group_frames for end in group.entries[1:]]
+            expired = [frame - end.frame > self._max_group for end in group.entries[1:]]
             gone = [serial not in alive or too_long for too_long in expired]
             self._ended += [item for item, ended in zip(group.merged_tracks, gone, strict=True) if ended]
             group.entries[1:] = [end for end, ended in zip(group.entries[1:], gone, strict=True) if not ended]
@@ -114,7 +118,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         confirmed = [item for item in self._objects if self._is_confirmed(item)]
         for item in confirmed:
             hosts = [other for other in confirmed if other.missed_frames == 0 and other in self._objects]
-            if item.missed_frames < self._graph.merge_after_frames or not hosts:
+            if item.missed_frames < self._merge_after or not hosts:
                 continue
             shared = intersections(np.stack([host.box for host in hosts]), item.box)
             best = int(np.argmax(shared))
@@ -163,7 +167,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
         """Decide the identity of split candidates that were observed long enough."""
         for serial, candidate in list(self._split_candidates.items()):
             enough = (
-                candidate.track.matches >= self._graph.split_decision_frames
+                candidate.track.matches >= self._split_decision
                 and candidate.host_appearance.frames
                 and candidate.appearance.frames
             )
@@ -181,7 +185,7 @@ class TrackGraph(StepwiseTracker[cv2.KalmanFilter]):
                 candidate.first_frame, candidate.first_host_box, no_velocity, candidate.host_appearance.mean
             )
             departed = departed_member(
-                group.entries, split, remaining, self._graph.motion_frames, self._graph.max_distance
+                group.entries, split, remaining, self._motion_frames, self._graph.max_distance
             )
             if departed is not None:
                 self._reassign_tracks(candidate, group, departed)

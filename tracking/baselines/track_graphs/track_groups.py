@@ -33,20 +33,18 @@ class TrackGraphSettings:
     """
 
     min_covered_share: float = 0.5  # share of a box that another must cover for the tracks to merge
-    merge_after_frames: int = 3  # frames without a match after which they merge
+    merge_after_s: float = 0.12  # seconds without a match after which they merge
     split_margin: float = 0.5  # widths around a group in which a new track counts as split from it
-    split_decision_frames: int = 6  # frames of a new track before its identity is decided
-    max_group_frames: int = 250  # frames after which a member of a group is dropped
-    motion_frames: int = 25  # gap in frames between two tracks up to which motion counts
+    split_decision_s: float = 0.24  # seconds of a new track before its identity is decided
+    max_group_s: float = 10.0  # seconds after which a member of a group is dropped
+    motion_s: float = 1.0  # gap in seconds between two tracks up to which motion counts
     max_distance: float = 0.5  # distance above which a new track is no member of the group
 
     def __post_init__(self) -> None:
         if not 0.0 < self.min_covered_share <= 1.0 or self.split_margin < 0.0:
             raise ValueError("min_covered_share is a share above 0, split_margin at least 0")
-        if min(self.merge_after_frames, self.split_decision_frames, self.max_group_frames) < 1:
-            raise ValueError(
-                "merge_after_frames, split_decision_frames and max_group_frames must be at least 1 frame"
-            )
+        if not min(self.merge_after_s, self.split_decision_s, self.max_group_s) > 0.0:
+            raise ValueError("merge_after_s, split_decision_s and max_group_s must be above 0")
 
 
 _MOTION = 0.3

@@ -61,10 +61,8 @@ class WholeRecordingTracker:
     ) -> None:
         self._settings, self._fps = settings or WholeRecordingSettings(), fps
         self._forget_after = window.resolve(fps).forget_after
-        gap = max(round(self._settings.tracklet_gap_s * fps), 1)
-        self._steps = StepwiseTracker(
-            KalmanPrediction(), window, StepwiseSettings(max_missed_frames=gap), fps
-        )
+        stepwise = StepwiseSettings(max_missed_s=self._settings.tracklet_gap_s)
+        self._steps = StepwiseTracker(KalmanPrediction(), window, stepwise, fps)
         self._results: list[WindowResult] = []
         self._detections: dict[int, Detections] = {}
         self._last_id = 0

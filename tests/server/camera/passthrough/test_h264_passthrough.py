@@ -126,7 +126,7 @@ def test_passthrough_can_be_spliced_with_encoded_video(tmp_path: Path) -> None:
 
 
 def test_passthrough_honors_offset_and_loop(tmp_path: Path) -> None:
-    camera = {"offset": GOP, "at_end": "loop"}
+    camera = {"offset_s": GOP / FPS, "at_end": "loop"}
     pipeline = CameraPipeline(site(write_h264(tmp_path, "ts"), camera=camera), "c0")
     sent = sent_units(pipeline, range(2 * FRAMES + GOP))
     pipeline.close()
@@ -142,7 +142,7 @@ def test_the_documented_camera_settings_are_compatible(tmp_path: Path) -> None:
     gop, path = 10, tmp_path / "documented.mp4"
     test_picture = f"-f lavfi -i testsrc2=size={WIDTH}x{HEIGHT}:rate={FPS} -t 2 -pix_fmt yuv420p"
     subprocess.run(f"ffmpeg -v error {test_picture} {options} {path}".split(), check=True)
-    config = site(path, encode={"gop": gop}, view={"lookahead": 2 * gop})
+    config = site(path, encode={"gop_s": gop / FPS}, view={"lookahead_s": 2 * gop / FPS})
     pipeline = CameraPipeline(config, "c0")
     assert len(sent_units(pipeline, range(2 * FPS))) == 2 * FPS
     pipeline.close()
@@ -155,10 +155,13 @@ def test_the_documented_camera_settings_are_compatible(tmp_path: Path) -> None:
             {"encode": {"crf": 30}},
             "frame 0 has other parameter sets .* than those that this site encodes with",
         ),
-        ({"encode": {"gop": 4}}, r"frame 4 does not begin a GOP: they begin every 4 frames \(encode.gop\)"),
+        (
+            {"encode": {"gop_s": 4 / FPS}},
+            r"frame 4 does not begin a GOP: they begin every 4 frames \(encode.gop_s\)",
+        ),
         ({"site": {"width": 128}}, r"its frames are 64x48, the site's 128x48"),
         ({"site": {"fps": 30}}, r"it has 25 frames a second, the site 30"),
-        ({"camera": {"offset": 1}}, "frame 0 begins a GOP, but none of the site"),
+        ({"camera": {"offset_s": 1 / FPS}}, "frame 0 begins a GOP, but none of the site"),
     ],
 )
 def test_incompatible_video_is_encoded_or_refused_with_the_reason(
@@ -200,7 +203,7 @@ def test_the_process_logs_once_whether_video_is_passed_through(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, h264: str, gop: int, text: str
 ) -> None:
     caplog.set_level("INFO", "server.camera.process")
-    process = CameraProcess(site(write_h264(tmp_path, "mp4"), h264, encode={"gop": gop}), "c0")
+    process = CameraProcess(site(write_h264(tmp_path, "mp4"), h264, encode={"gop_s": gop / FPS}), "c0")
     process._pipeline.close()
     assert caplog.text.count("own H.264") == bool(text)
     assert text in caplog.text

@@ -57,7 +57,8 @@ def config_of(
     """Return a site of the room's views on free ports, with offsets by camera."""
     bus = f"tcp/127.0.0.1:{free_port()}"
     cameras = [
-        {"id": f"c{n}", "source": f"c{n}.mp4", "offset": offsets.get(f"c{n}", 0)} for n in range(views)
+        {"id": f"c{n}", "source": f"c{n}.mp4", "offset_s": offsets.get(f"c{n}", 0) / FPS}
+        for n in range(views)
     ]
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": 192, "height": 108},

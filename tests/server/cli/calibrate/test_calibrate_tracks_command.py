@@ -61,14 +61,14 @@ def test_tracks_become_a_ground_file_and_an_offset_to_copy(run: RunCommand, tmp_
     code, out, err = run("tracks", "--size", "640x360", "--shift", "0.8", "--out", "ground.json")
     assert (code, err) == (0, "")
     assert "person heights (median; 90 % below" in out
-    assert f"cameras:\n  - id: c1\n    offset: {OFFSET}\n" in out
+    assert f"cameras:\n  - id: c1\n    offset_s: {OFFSET / 25:g}\n" in out
     assert (tmp_path / "ground.png").read_bytes().startswith(b"\x89PNG")
     cameras = [{"id": name, "source": "scene:room"} for name in ("c0", "c1")]
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="test", folder=tmp_path)
     assert all(camera.ground is not None for camera in config.cameras)
     content = json.loads((tmp_path / "ground.json").read_text())
     assert content["unit"] == "m"
-    assert content["offset"]["c1"]["use"] == OFFSET
+    assert content["offset"]["c1"]["use"] == OFFSET / 25
     assert content["left_out"] == {}
 
 

@@ -160,9 +160,9 @@ def test_a_view_is_named_after_its_file_with_valid_characters() -> None:
 
 def test_a_recording_is_played_once_regardless_of_the_configuration(tmp_path: Path) -> None:
     path = write_video(tmp_path / "c0.mp4", 3)
-    base = {"cameras": [{"id": "c0", "source": "elsewhere", "at_end": "loop", "offset": 7}]}
+    base = {"cameras": [{"id": "c0", "source": "elsewhere", "at_end": "loop", "offset_s": 0.28}]}
     [camera] = config_for_videos([path], base=base).cameras
-    assert (camera.at_end, camera.offset, camera.source) == ("stop", 7, str(path))
+    assert (camera.at_end, camera.offset_s, camera.source) == ("stop", 0.28, str(path))
 
 
 def test_rate_and_size_are_those_of_the_first_view_unless_configured(tmp_path: Path) -> None:

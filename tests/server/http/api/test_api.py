@@ -26,13 +26,13 @@ from server.messaging.inbox import Inbox
 
 async def test_the_site_is_described(site_with_people: ServedSite) -> None:
     site = await site_with_people.get_json("/api/site")
-    assert {key: site[key] for key in ("name", "fps", "width", "height", "gop", "lookahead_frames")} == {
+    assert {key: site[key] for key in ("name", "fps", "width", "height", "gop", "lookahead_s")} == {
         "name": "hall",
         "fps": FPS,
         "width": WIDTH,
         "height": HEIGHT,
         "gop": GOP,
-        "lookahead_frames": 2 * GOP,
+        "lookahead_s": 2 * GOP / FPS,
     }
     assert re.fullmatch(r"avc1\.[0-9A-F]{6}", site["codec"])
     assert site["cameras"] == list(CAMERAS)
@@ -147,8 +147,8 @@ async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:
         assert worth == pytest.approx(
             math.prod(1 - weights[weight] * (1 - terms[camera][weight]) for weight in weights)
         )
-    assert choice.pop("stay") == 0.0
-    assert choice.pop("cut") == pytest.approx((2 * GOP + 0.5 * FPS) * costs[A] + 1.0)
+    assert choice.pop("stay_s") == 0.0
+    assert choice.pop("cut_s") == pytest.approx((2 * GOP / FPS + 0.5) * costs[A] + 1.0 / FPS)
     assert choice == {
         "object": 1,
         "first": GOP,
@@ -159,9 +159,9 @@ async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:
         "undetected": {A: 0.0, B: 0.0},
         "undetected_quality": {A: None, B: None},
         "before": B,
-        "lookahead": 2 * GOP,
+        "lookahead_s": 2 * GOP / FPS,
         "cut_to": A,
-        "switch_cost": 1.0,
+        "switch_cost_s": 1.0 / FPS,
         "reason": "c1 sees this person best over the next frames.",
     }
 

@@ -273,7 +273,7 @@ async def test_ffmpeg_ignores_parts_and_plays_without_a_warning(served: ServedSi
 
 
 async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> None:
-    async for served in serve_site(http=HTTP, encode={"gop": 2}, view={"lookahead": 10}):
+    async for served in serve_site(http=HTTP, encode={"gop_s": 0.08}, view={"lookahead_s": 0.4}):
         served.service.connect_cameras(*CAMERAS)
         gops = 40
         for camera in CAMERAS:

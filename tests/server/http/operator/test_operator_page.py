@@ -395,14 +395,14 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
         await expect(page.locator("#selection-state")).to_have_text("2 changed from the file.")
         assert (decider.view.switch_cost_s, decider.view.quality.centering) == (2.0, 0.5)
         assert "switch_cost_s: 2.0" in await lines.input_value()
-        ahead = page.get_by_label("Look-ahead, frames")
-        await ahead.fill(str(served.service.max_lookahead + 1))
+        ahead = page.get_by_label("Look-ahead, s")
+        await ahead.fill(str((served.service.max_lookahead + 1) / 25))
         await page.keyboard.press("Enter")
         assert await ahead.evaluate("(it) => it.validity.rangeOverflow")
-        await ahead.fill("15")
+        await ahead.fill("0.6")
         await page.keyboard.press("Enter")
         await expect(page.locator("#selection-state")).to_have_text("3 changed from the file.")
-        assert decider.view.lookahead == 15
+        assert decider.view.lookahead_s == 0.6
         await page.get_by_label("Size").fill("0")  # the page lets it pass, the site does not: all are 0
         for name in ("Truncation", "Occlusion", "Centering", "Clear picture"):
             await page.get_by_label(name).fill("0")
@@ -417,7 +417,7 @@ async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browse
 async def test_the_configuration_shows_differences_and_can_be_searched(browser: Browser) -> None:
     async with open_operator_page(browser, "#configuration") as (_, page):
         rows = page.locator("#settings tr")
-        await expect(rows.filter(has_text="encode.gop")).to_have_text("encode.gop510")
+        await expect(rows.filter(has_text="encode.gop_s")).to_have_text("encode.gop_s0.20.4")
         await expect(rows.filter(has_text="http.jpeg_quality")).to_have_count(0)
         await page.get_by_role("button", name="Only non-defaults").click()
         await page.get_by_label("Find").fill("jpeg")

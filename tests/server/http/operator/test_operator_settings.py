@@ -88,7 +88,7 @@ def test_settings_can_be_tuned_back() -> None:
     config = small_config()
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.apply_live_view_settings(TRIED)
-    assert decider.view.lookahead == config.view.lookahead
+    assert decider.view.lookahead_s == config.view.lookahead_s
     assert decider.view.identity == config.view.identity
     decider.apply_live_view_settings(config.view)
     assert decider.view == config.view
@@ -108,11 +108,11 @@ async def test_trial_settings_are_in_force_at_once_with_configuration_lines(
     assert tried["file"] == at_first["file"]
     assert site_with_people.service.decider.switch_cost == 50.0
     assert yaml.safe_load(tried["lines"]) == {
-        "view": {"lookahead": 10, "switch_cost_s": 2.0, "quality": {"facing": 0.5, "relative": False}}
+        "view": {"lookahead_s": 0.4, "switch_cost_s": 2.0, "quality": {"facing": 0.5, "relative": False}}
     }
     small_config(view=yaml.safe_load(tried["lines"])["view"])  # they are lines of a configuration
     site_with_people.service.feed(3, {A: {1: SMALL}, B: {1: LARGE}})
-    assert (await site_with_people.get_json("/api/objects/1/choice"))["switch_cost"] == 50.0
+    assert (await site_with_people.get_json("/api/objects/1/choice"))["switch_cost_s"] == 2.0
     async with site_with_people.session.delete(CHOOSING, headers=MINE) as answer:
         assert await answer.json() == at_first
 
@@ -124,7 +124,7 @@ async def test_trial_settings_are_in_force_at_once_with_configuration_lines(
         ({"switch_cost_s": 1e308}, "to try out: view.switch_cost_s: Input should be less than or equal to"),
         ({"min_shot_s": 1e6}, "to try out: view.min_shot_s: Input should be less than or equal to 600"),
         ({"quality.size": 2}, "to try out: view.quality: the weight size"),
-        ({"buffer_s": 30}, "view.buffer_s: cannot be changed here; these can: lookahead, switch_cost_s, "),
+        ({"buffer_s": 30}, "view.buffer_s: cannot be changed here; these can: lookahead_s, switch_cost_s, "),
         ({"switch_cost": 1}, "view.switch_cost: cannot be changed here"),
         ({"switch_cost_s": "1"}, "the request's JSON: "),
         ([], "the request's JSON: "),
@@ -162,7 +162,12 @@ async def test_the_configuration_shows_differences_and_no_secrets(open_hall: Ser
     settings = {
         setting["key"]: setting for setting in (await open_hall.get_json("/api/operator/config"))["settings"]
     }
-    assert settings["encode.gop"] == {"key": "encode.gop", "value": "5", "default": "10", "differs": True}
+    assert settings["encode.gop_s"] == {
+        "key": "encode.gop_s",
+        "value": "0.2",
+        "default": "0.4",
+        "differs": True,
+    }
     assert settings["view.quality.truncation"]["differs"] is False
     assert settings["view.quality.truncation"]["value"] == str(QualitySettings().truncation)
     source, options = settings[f"cameras.{A}.source"], settings[f"cameras.{A}.options"]

@@ -28,7 +28,7 @@ def picture(seed: int) -> NDArray[np.uint8]:
 
 
 def encoded(first: int, frames: int, seed: int = 0, crf: int = 23) -> list[AccessUnit]:
-    encoder = Encoder(SITE, EncodeSettings(gop=GOP, crf=crf))
+    encoder = Encoder(SITE, EncodeSettings(gop_s=GOP / SITE.fps, crf=crf))
     return [encoder.encode(pulse, picture(1000 * seed + pulse)) for pulse in range(first, first + frames)]
 
 

@@ -56,7 +56,9 @@ def test_a_gray_picture_leaves_its_neighbors_unchanged(preset: str, blocks: tupl
 @given(Sizes)
 def test_a_vp8_picture_is_gray(blocks: tuple[int, int]) -> None:
     width, height = 16 * blocks[0], 16 * blocks[1] + 2
-    encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(gop=GOP, codec="vp8"))
+    encoder = Encoder(
+        SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(gop_s=GOP / FPS, codec="vp8")
+    )
     noise = np.random.default_rng(0).integers(0, 255, (3, height, width, 3), dtype=np.uint8)
     units = [encoder.encode(pulse, picture).data for pulse, picture in enumerate(noise)]
 

@@ -35,7 +35,9 @@ sides = st.integers(8, 60).map(lambda half: 2 * half)
 @cache
 def encoded(width: int, height: int, missed: frozenset[int] = frozenset()) -> tuple[AccessUnit, ...]:
     """Encode pictures that move, so that frames build on the ones before them, but for those missed."""
-    encoder = Encoder(SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(codec="vp8", gop=GOP))
+    encoder = Encoder(
+        SiteSettings(width=width, height=height, fps=FPS), EncodeSettings(codec="vp8", gop_s=GOP / FPS)
+    )
     noise = np.random.default_rng(0).integers(0, 255, (height, width, 3), dtype=np.uint8)
     captured = (pulse for pulse in range(FRAMES) if pulse not in missed)
     return tuple(encoder.encode(pulse, np.roll(noise, 3 * pulse, axis=1)) for pulse in captured)

@@ -197,7 +197,10 @@ async def test_a_walk_started_before_any_camera_counts_from_the_first_window() -
 
 
 async def test_offsets_are_those_of_recordings_only() -> None:
-    cameras = [{"id": "c0", "source": "c0.mp4", "offset": 7}, {"id": "c1", "source": "rtsp://10.0.0.1/a"}]
+    cameras = [
+        {"id": "c0", "source": "c0.mp4", "offset_s": 0.28},
+        {"id": "c1", "source": "rtsp://10.0.0.1/a"},
+    ]
     config = walk_config(cameras=cameras)
     assert (await task_of([], config)).offsets == {"c0": 7}
 

@@ -41,7 +41,7 @@ def captured_units(seed: int, missed: frozenset[int], preset: str) -> tuple[Acce
     """Encode a camera's pictures except at missed pulses."""
     encoder = Encoder(
         SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
-        EncodeSettings.model_validate({"gop": GOP, "preset": preset}),
+        EncodeSettings.model_validate({"gop_s": GOP / FPS, "preset": preset}),
     )
     noise = np.random.default_rng(seed).integers(0, 255, (FRAMES, HEIGHT, WIDTH, 3), dtype=np.uint8)
     return tuple(encoder.encode(pulse, noise[pulse]) for pulse in range(FRAMES) if pulse not in missed)

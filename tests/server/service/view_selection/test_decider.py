@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from fakes.service.scripted_cameras import (
     CAMERAS,
+    FPS,
     GOP,
     LARGE,
     SMALL,
@@ -127,7 +128,7 @@ def test_finishing_without_epochs_decides_nothing() -> None:
 
 
 def test_a_service_started_within_a_gop_begins_with_the_next() -> None:
-    view_decider = decider(encode={"gop": 10}, view={"lookahead": 20})
+    view_decider = decider(encode={"gop_s": 0.4}, view={"lookahead_s": 0.8})
     decisions = []
     for number in range(5, 12):
         decisions += view_decider.step(epoch_of(number, camera_tracks(A, number, {1: SMALL})))
@@ -222,7 +223,9 @@ def test_a_camera_that_dies_within_the_look_ahead_is_left_at_that_gop() -> None:
 
 def test_the_look_ahead_is_evaluated_again_without_a_dead_camera() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3
-    late = decider(has=lambda camera, pulse: camera == B or pulse < 2 * GOP, view={"lookahead": 4 * GOP})
+    late = decider(
+        has=lambda camera, pulse: camera == B or pulse < 2 * GOP, view={"lookahead_s": 4 * GOP / FPS}
+    )
     early = decide(late, [*story, *[{B: {1: SMALL}}] * 4])
     assert shown(early) == [A, A, B, B]
     sum_ahead = early[0].reasons.of(1)
@@ -233,7 +236,7 @@ def test_the_look_ahead_is_evaluated_again_without_a_dead_camera() -> None:
 
 def test_the_reason_announces_a_planned_cut() -> None:
     story: list[Seen] = [{A: {1: LARGE}, B: {1: SMALL}}] * 3 + [{A: {1: SMALL}, B: {1: LARGE}}] * 7
-    decisions = decide(decider(view={"lookahead": 4 * GOP, "switch_cost_s": 0.04}), story)
+    decisions = decide(decider(view={"lookahead_s": 4 * GOP / FPS, "switch_cost_s": 0.04}), story)
     last = shown(decisions).index(B) - 1
     reasons = decisions[last].reasons.of(1)
     assert reasons.stay is not None

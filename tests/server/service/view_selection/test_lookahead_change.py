@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import (
     CAMERAS,
+    FPS,
     GOP,
     LARGE,
     SMALL,
@@ -37,7 +38,7 @@ CHANGED = st.dictionaries(st.integers(0, 29), st.integers(GOP, 40), max_size=6)
 
 
 def with_lookahead(view: ViewSettings, frames: int) -> ViewSettings:
-    return view.model_copy(update={"lookahead": frames})
+    return view.model_copy(update={"lookahead_s": frames / FPS})
 
 
 @settings(deadline=None, max_examples=15)
@@ -45,7 +46,9 @@ def with_lookahead(view: ViewSettings, frames: int) -> ViewSettings:
 def test_every_gop_is_decided_once_in_order_with_known_frames(
     changes: Changes, gop: int, min_shot_s: float
 ) -> None:
-    config = small_config(encode={"gop": gop}, view={"lookahead": 20, "min_shot_s": min_shot_s})
+    config = small_config(
+        encode={"gop_s": gop / FPS}, view={"lookahead_s": 20 / FPS, "min_shot_s": min_shot_s}
+    )
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decided: list[GopDecision] = []
@@ -57,18 +60,19 @@ def test_every_gop_is_decided_once_in_order_with_known_frames(
         new = decider.step(epoch)
         assert len(new) <= -(-STRIDE // gop) + 1, "viewers lose nothing"
         for decision in new:
-            assert decision.reasons.of(1).frames == decider.view.lookahead
-            assert decision.first + decider.view.lookahead - 1 <= epoch.last
+            assert decision.reasons.of(1).frames == config.lookahead_of(decider.view)
+            assert decision.first + config.lookahead_of(decider.view) - 1 <= epoch.last
         decided += new
     assert [decision.first for decision in decided] == [gop * n for n in range(len(decided))]
     # Some epochs after the last change the streams are as near to the cameras as they can be.
     ahead = epoch.last + 1 - (decided[-1].first + gop)
-    assert decider.view.lookahead - gop <= ahead < decider.view.lookahead
+    lookahead = config.lookahead_of(decider.view)
+    assert lookahead - gop <= ahead < lookahead
 
 
 def test_after_a_change_settles_views_are_selected_as_if_it_had_always_applied() -> None:
     def decisions_after(*changes: tuple[int, int]) -> list[GopDecision]:
-        config = small_config(view={"lookahead": 20})
+        config = small_config(view={"lookahead_s": 20 / FPS})
         decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
         decider.people._registry = TrackNumbers()  # type: ignore[assignment]
         decided = []
@@ -123,18 +127,18 @@ def test_streams_are_the_selected_cameras_gops_without_a_gap(changes: Changes) -
 
 
 @pytest.mark.parametrize(
-    ("frames", "error"),
+    ("seconds", "error"),
     [
-        (4, "view.lookahead: is 4 frames but must be at least 5 (encode.gop + "),
-        (10_000, "view.lookahead: is 10000 frames but can be at most "),
-        (0, "to try out: view.lookahead: Input should be greater than 0"),
-        (10.5, "to try out: view.lookahead: Input should be a valid integer"),
+        (0.16, "view.lookahead_s: is 0.16 s but must be at least 0.2 (encode.gop_s + "),
+        (400.0, "view.lookahead_s: is 400 s but can be at most "),
+        (0, "to try out: view.lookahead_s: Input should be greater than 0"),
+        (True, "to try out: view.lookahead_s: Input should be a valid number"),
     ],
 )
 async def test_an_invalid_look_ahead_is_refused_with_the_limits(
-    site_with_people: ServedSite, frames: float, error: str
+    site_with_people: ServedSite, seconds: float, error: str
 ) -> None:
-    request = {"lookahead": frames}
+    request = {"lookahead_s": seconds}
     async with site_with_people.session.put(
         "/api/operator/view_selection", headers=MINE, json=request
     ) as answer:
@@ -146,25 +150,25 @@ async def test_an_invalid_look_ahead_is_refused_with_the_limits(
 
 
 async def test_the_api_reports_the_look_ahead_in_force(site_with_people: ServedSite) -> None:
-    most = (await site_with_people.get_json("/api/operator/view_selection"))["max_lookahead"]
-    for frames in (most, 5):
-        request: dict[str, Any] = {"lookahead": frames}
+    most = (await site_with_people.get_json("/api/operator/view_selection"))["max_lookahead_s"]
+    for seconds in (most, 0.2):
+        request: dict[str, Any] = {"lookahead_s": seconds}
         async with site_with_people.session.put(
             "/api/operator/view_selection", headers=MINE, json=request
         ) as answer:
             decisions_after = await answer.json()
-        assert decisions_after["values"]["lookahead"] == frames
-        assert f"lookahead: {frames}\n" in decisions_after["lines"]
-        assert (await site_with_people.get_json("/api/site"))["lookahead_frames"] == frames
+        assert decisions_after["values"]["lookahead_s"] == seconds
+        assert f"lookahead_s: {seconds}\n" in decisions_after["lines"]
+        assert (await site_with_people.get_json("/api/site"))["lookahead_s"] == seconds
 
 
 def test_frame_buffers_cover_the_longest_look_ahead() -> None:
-    for view in ({}, {"buffer_s": 1.0}, {"buffer_s": 60.0}, {"lookahead": 200}):
+    for view in ({}, {"buffer_s": 1.0}, {"buffer_s": 60.0}, {"lookahead_s": 8.0}):
         service = FedService(small_config(view=view))
         config, fps = service.config, service.config.site.fps
         buffered = service.frame_buffers[A]._max_frames
         late = round(config.view.late_after_s * fps) + round(config.track.backlog_s * fps)
-        assert service.max_lookahead >= config.view.lookahead
+        assert service.max_lookahead >= config.lookahead
         assert service.max_lookahead + late + STRIDE + GOP <= buffered
         with pytest.raises(UserError):
             service.apply_live_view_settings(with_lookahead(config.view, service.max_lookahead + 1))
