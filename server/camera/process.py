@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Callable
@@ -31,10 +32,9 @@ from server.camera.thumbnails import encode_thumbnails
 from server.camera.tracking_backlog import TrackingBacklog
 from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
-from server.messaging.bus import Bus
+from server.messaging.bus import Bus, redact_endpoints
 from server.messaging.camera_status import CONDITION_TEXTS, CameraState
 from server.messaging.messages import CameraTracks, ZenohKeys
-from server.system.address_redaction import redact_zenoh_endpoint
 from tracking.types import PictureCondition
 
 log = logging.getLogger(__name__)
@@ -43,6 +43,8 @@ T = TypeVar("T")
 
 _STATUS_EVERY_S = 1.0
 _END_CONFIRMED_WITHIN_S = 10.0
+_FURTHER_SERVICES_S = 2.0
+"""How long to wait for the other best-view services once the first is there."""
 
 
 class CameraProcess:
@@ -137,17 +139,29 @@ class CameraProcess:
                 task.result()
 
     async def _wait_for_bestview(self, bus: Bus) -> None:
-        """Wait for the best-view service: frames published before it connects are lost, frame 0 included."""
-        present = asyncio.Event()
-        bus.watch_alive(self._keys.bestview("alive"), lambda _, alive: present.set() if alive else None)
+        """Wait for the best-view services: frames published before one connects are lost, frame 0 included.
+
+        Once one is there, the others are not waited for long: they may be down.
+        """
+        services = self._config.view.share.services
+        present, first, every = set[str](), asyncio.Event(), asyncio.Event()
+
+        def on_service(key: str, is_present: bool) -> None:
+            (present.add if is_present else present.discard)(key)
+            if present:
+                first.set()
+            if len(present) >= services:
+                every.set()
+
+        bus.watch_alive(self._keys.bestview("**"), on_service)
         try:
-            await asyncio.wait_for(present.wait(), self._config.sync.start_timeout_s)
+            await asyncio.wait_for(first.wait(), self._config.sync.start_timeout_s)
         except TimeoutError:
-            log.warning(
-                "camera %s: no best-view service at %s yet",
-                self._id,
-                redact_zenoh_endpoint(self._config.zenoh.connect),
-            )
+            text = "camera %s: no best-view service at %s yet"
+            log.warning(text, self._id, redact_endpoints(self._config.zenoh))
+            return
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(every.wait(), _FURTHER_SERVICES_S)
 
     async def _follow_pulses(self) -> None:
         sync, fps = self._config.sync, self._config.site.fps

@@ -37,7 +37,10 @@ class Bus:
 
     @classmethod
     def router(cls, settings: ZenohSettings, access: Mapping[str, Any] | None = None) -> Self:
-        """Open the session of the best-view service, to which all others connect.
+        """Open the session of a best-view service, to which cameras connect.
+
+        Routers do not forward to each other: a camera sends to all of them, so each message comes once, and a
+        router that stops takes nothing from the other services.
 
         ``access`` is zenoh's access control for the users in ``settings.users``.
 
@@ -64,50 +67,16 @@ class Bus:
 
     @classmethod
     def client(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session to the site's router; it connects and reconnects in the background.
+        """Open a session to all of the site's routers; it connects and reconnects in the background.
 
-        It exchanges messages with the router's process, the best-view service, not with other clients.
-        ``user`` is its user name, where the router requires one.
+        It exchanges messages with the routers' processes, the best-view services, not with other clients.
+        ``user`` is its user name, where the routers require one.
 
         Raises:
             UserError: zenoh does not support the address, or there is no such user.
         """
-        # A peer, not a client: a client session cannot be opened while the router is down.
-        return cls._connected(settings, "peer", user)
-
-    @classmethod
-    def further_service(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session for a further best-view service, which receives the messages of all clients.
-
-        Raises:
-            UserError: zenoh does not support the address.
-        """
-        # A router forwards peers' messages to routers, but not to other peers.
-        return cls._connected(settings, "router", user)
-
-    @classmethod
-    def peer_listener(cls, settings: ZenohSettings, user: str | None = None) -> Self:
-        """Open a session that also receives the messages of the router's other clients.
-
-        The router must be running; later the session reconnects. Blocks for some seconds at most.
-
-        Raises:
-            UserError: the router cannot be reached.
-        """
-        config = _config(settings, "client", user)
-        try:
-            config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
-            config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
-            return cls(zenoh.open(config))
-        except zenoh.ZError as error:
-            refusal = "" if settings.users is None else ", or it refuses this user"
-            raise UserError(
-                f"zenoh.connect: no router responds at {redact_zenoh_endpoint(settings.connect)}{refusal}"
-            ) from error
-
-    @classmethod
-    def _connected(cls, settings: ZenohSettings, mode: str, user: str | None) -> Self:
-        config = _config(settings, mode, user)
+        # A peer, not a client: a client session has one router, and cannot be opened while that is down.
+        config = _config(settings, "peer", user)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
         config.insert_json5("connect/exit_on_failure", "false")
         config.insert_json5("listen/endpoints", "[]")
@@ -115,13 +84,34 @@ class Bus:
             "connect/retry", '{"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}'
         )
         try:
-            config.insert_json5("connect/endpoints", json.dumps([settings.connect]))
+            config.insert_json5("connect/endpoints", json.dumps(settings.routers))
             return cls(zenoh.open(config))
         except zenoh.ZError:
             raise UserError(
-                f"zenoh.connect: cannot use {redact_zenoh_endpoint(settings.connect)}: does zenoh support "
+                f"zenoh.connect: cannot use {redact_endpoints(settings)}: does zenoh support "
                 "this protocol, and are the options after the port valid?"
             ) from None
+
+    @classmethod
+    def peer_listener(cls, settings: ZenohSettings, user: str | None = None) -> Self:
+        """Open a session that also receives the messages of the router's other clients.
+
+        It connects to one router, the first that answers. One must be running; later the session reconnects.
+        Blocks for some seconds at most.
+
+        Raises:
+            UserError: the router cannot be reached.
+        """
+        config = _config(settings, "client", user)
+        try:
+            config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
+            config.insert_json5("connect/endpoints", json.dumps(settings.routers))
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            refusal = "" if settings.users is None else ", or it refuses this user"
+            raise UserError(
+                f"zenoh.connect: no router responds at {redact_endpoints(settings)}{refusal}"
+            ) from error
 
     def publish(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send a message; it is dropped for receivers that are too slow."""
@@ -186,6 +176,11 @@ class Bus:
         self._undeclare.clear()
         self._publishers.clear()
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+def redact_endpoints(settings: ZenohSettings) -> str:
+    """Return where clients connect, without options, which may contain keys."""
+    return ", ".join(map(redact_zenoh_endpoint, settings.routers))
 
 
 def _sender(message: Message) -> str:

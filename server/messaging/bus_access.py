@@ -40,7 +40,7 @@ def build_access_control(
 
     A camera publishes under its own key, and the site's audio if it is the audio camera. It receives the
     other cameras' detections, and the best-view services' messages to it.
-    Further best-view services may do everything. Any other user may subscribe to everything and send nothing.
+    Other best-view services may do everything. Any other user may subscribe to everything and send nothing.
     """
     keys = ZenohKeys(site)
     everything = f"myview/{site}/**"
@@ -64,9 +64,9 @@ def build_access_control(
         )
         | {"permission": "deny"},
     ]
-    further = [bestview_client_name(index) for index in range(1, _MAX_SERVICES)]
-    listeners = [user for user in users if user not in {*cameras, *further, bestview_client_name(0)}]
-    subjects = [{"id": "services", "usernames": further}]
+    service_names = [bestview_client_name(index) for index in range(_MAX_SERVICES)]
+    listeners = [user for user in users if user not in {*cameras, *service_names}]
+    subjects = [{"id": "services", "usernames": service_names}]
     policies = [{"rules": ["services"], "subjects": ["services"]}]
     if listeners:
         subjects.append({"id": "listeners", "usernames": listeners})

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from server.config.pulse_access import bestview_client_name
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
@@ -33,7 +32,7 @@ class BusConnection:
         on_audio: MessageHandler | None,
         on_alive: Callable[[str, bool], None],
     ) -> None:
-        """Open the bus: the first service of a site is its router, further ones connect to it.
+        """Open the bus: this service is one of its routers.
 
         Args:
             camera_handlers: by the last part of a camera's key.
@@ -44,11 +43,7 @@ class BusConnection:
         Raises:
             UserError: the address is in use, or a password file cannot be read.
         """
-        if self._index:
-            bus = Bus.further_service(self._config.zenoh, bestview_client_name(self._index))
-        else:
-            bus = Bus.router(self._config.zenoh, access_control_of(self._config))
-        self._bus = bus
+        self._bus = bus = Bus.router(self._config.zenoh, access_control_of(self._config))
         for topic, handler in camera_handlers.items():
             self.inboxes.append(bus.subscribe(self._keys.camera("*", topic), handler))
         if on_audio is not None:

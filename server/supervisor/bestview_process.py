@@ -29,8 +29,7 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     """
     config = running.now
     check_viewers(config)
-    if config.view.share.index == 0:
-        check_bus(config)  # the other shards are not the router
+    check_bus(config)
     pipeline = BestViewPipeline(add_synthetic_homographies(config), out)
     reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:

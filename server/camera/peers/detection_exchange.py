@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections import defaultdict
 from collections.abc import Callable
+from functools import partial
 
 import msgspec
 
@@ -29,7 +31,8 @@ _DECODER = msgspec.json.Decoder(FrameDetections)
 class PeerDetectionExchange:
     """Exchanges detections between one camera and the others of the same ground.
 
-    It opens a second bus session: the camera's first one receives nothing from other cameras.
+    It opens a further bus session to each router, since the camera's first one receives nothing from other
+    cameras. Messages come once from each router: one that stops costs none.
     """
 
     def __init__(
@@ -41,13 +44,15 @@ class PeerDetectionExchange:
         self._wait_s = config.track.cross_view_wait_s
         view_overlaps = cross_view.view_overlaps if cross_view else lambda _: False
         self._buffer = PeerDetectionBuffer(self._peers, messages_max, view_overlaps)
-        self._listening: set[str] = set()
+        self._listening: set[tuple[str, str]] = set()
+        """Routers, and the peers that listen there."""
         self._changed = asyncio.Event()
-        self._join_task: asyncio.Task[None] | None = None
-        self._is_unreachable = asyncio.Event()
-        """Set once the router did not respond."""
-        self._open_task: asyncio.Task[Bus] | None = None
-        self._bus: Bus | None = None
+        self._join_tasks: list[asyncio.Task[None]] = []
+        """One for each router."""
+        self._is_tried: dict[str, asyncio.Event] = {}
+        """By router: set once it has responded, or has not in time."""
+        self._open_tasks: dict[str, asyncio.Task[Bus]] = {}
+        self._buses: list[Bus] = []
         self._has_published = False
         self._join_log = LogThrottle(quiet_s=0.0)
         self._late_log: dict[str, LogThrottle] = defaultdict(LogThrottle)
@@ -56,57 +61,60 @@ class PeerDetectionExchange:
         """Messages of peers that could not be parsed."""
 
     async def join(self) -> None:
-        """Connect to the peers; if no router responds, connecting continues in the background.
+        """Connect to the peers; if a router does not respond, connecting continues in the background.
 
         An error in the background is raised by the next :meth:`exchange`.
         """
         if not self._peers:
             return
-        self._join_task = asyncio.create_task(self._join(), name="join")
-        unreachable = asyncio.create_task(self._is_unreachable.wait())
+        for router in self._config.zenoh.routers:
+            tried = self._is_tried[router] = asyncio.Event()
+            task = asyncio.create_task(self._join(router), name="join")
+            task.add_done_callback(partial(_set, tried))
+            self._join_tasks.append(task)
         # A busy machine may take seconds to connect; peers would miss the first frames' detections.
-        await asyncio.wait(
-            {self._join_task, unreachable},
-            timeout=self._config.sync.start_timeout_s,
-            return_when=asyncio.FIRST_COMPLETED,
-        )
-        unreachable.cancel()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self._config.sync.start_timeout_s):
+                for tried in self._is_tried.values():
+                    await tried.wait()
 
     async def leave(self) -> None:
         """Disconnect from the peers."""
-        self._bus = None
-        if self._join_task is not None:
-            self._join_task.cancel()
-            await asyncio.gather(self._join_task, return_exceptions=True)
-        if self._open_task is not None:
-            (opened,) = await asyncio.gather(self._open_task, return_exceptions=True)
+        self._buses.clear()
+        for task in self._join_tasks:
+            task.cancel()
+        await asyncio.gather(*self._join_tasks, return_exceptions=True)
+        for opened in await asyncio.gather(*self._open_tasks.values(), return_exceptions=True):
             if isinstance(opened, Bus):
                 opened.close()
 
-    async def _join(self) -> None:
+    async def _join(self, router: str) -> None:
+        settings = self._config.zenoh.model_copy(update={"connect": router})
         while True:
-            self._open_task = asyncio.create_task(
-                asyncio.to_thread(Bus.peer_listener, self._config.zenoh, self._camera)
-            )
+            opening = asyncio.create_task(asyncio.to_thread(Bus.peer_listener, settings, self._camera))
+            self._open_tasks[router] = opening
             try:
                 # Shielded: a session opened after cancellation could not be closed, and the process hangs.
-                bus = await asyncio.shield(self._open_task)
+                bus = await asyncio.shield(opening)
                 break
             except UserError as error:
                 if (more := self._join_log.record(str(error))) is not None:
                     log.info(
                         "camera %s: cannot receive the peers' detections yet: %s%s", self._camera, error, more
                     )
-                self._is_unreachable.set()
+                self._is_tried[router].set()
                 await asyncio.sleep(_RETRY_S)
         if self._join_log.end():
             log.info("camera %s: receives the peers' detections", self._camera)
         for peer in self._peers:
             self._listen(bus, peer)
-        bus.watch_alive(self._keys.camera("*", "peer_listener"), self._on_listener)
+        bus.watch_alive(
+            self._keys.camera("*", "peer_listener"),
+            lambda key, is_present: self._on_listener(router, key, is_present=is_present),
+        )
         # After the subscriptions: a peer that sees this token can rely on them.
         bus.declare_alive(self._keys.camera(self._camera, "peer_listener"))
-        self._bus = bus
+        self._buses.append(bus)
 
     async def exchange(
         self, pulse: int, message: FrameDetections | None, captured: float, *, needed: bool
@@ -118,14 +126,15 @@ class PeerDetectionExchange:
         """
         if message is None:
             return PeerDetections()
-        if self._join_task is not None and self._join_task.done():
-            self._join_task.result()
+        for task in self._join_tasks:
+            if task.done():
+                task.result()
         await self._publish(message)
         deadline = captured + self._wait_s
         self._buffer.expect(pulse, deadline)
         if not needed:
             return PeerDetections()
-        if self._bus is not None:
+        if self._buses:
             await self._wait_until(lambda: not self._buffer.must_wait(pulse), deadline)
         for camera in self._buffer.give_up(pulse):
             self._log_late(camera, pulse)
@@ -150,13 +159,17 @@ class PeerDetectionExchange:
             await self._publish(message)
 
     async def _publish(self, message: FrameDetections) -> None:
-        if self._bus is None:
+        if not self._buses:
             return
         if not self._has_published:
             self._has_published = True
             deadline = asyncio.get_running_loop().time() + max(_LISTENERS_S, self._wait_s / 2)
-            await self._wait_until(lambda: self._listening.issuperset(self._peers), deadline)
-        self._bus.publish(self._keys.camera(self._camera, "detections"), msgspec.json.encode(message))
+            await self._wait_until(
+                lambda: {peer for _, peer in self._listening}.issuperset(self._peers), deadline
+            )
+        payload = msgspec.json.encode(message)
+        for bus in self._buses:
+            bus.publish(self._keys.camera(self._camera, "detections"), payload)
 
     async def _wait_until(self, done: Callable[[], bool], deadline: float) -> None:
         """Wait until a condition holds, checked on every event, or the deadline passes."""
@@ -194,6 +207,10 @@ class PeerDetectionExchange:
             log.info(text, self._camera, peer, ended.count)
         return message
 
-    def _on_listener(self, key: str, is_present: bool) -> None:
-        (self._listening.add if is_present else self._listening.discard)(camera_of_key(key))
+    def _on_listener(self, router: str, key: str, *, is_present: bool) -> None:
+        (self._listening.add if is_present else self._listening.discard)((router, camera_of_key(key)))
         self._changed.set()
+
+
+def _set(event: asyncio.Event, _: asyncio.Task[None]) -> None:
+    event.set()

@@ -37,7 +37,7 @@ def _checks(config: Config) -> Iterator[tuple[str, Callable[[], list[Finding]]]]
     yield "ground", lambda: [_ground(config)]
     yield "http.tls", lambda: _pair("http.tls", config.http.tls.certificate, config.http.tls.key)
     yield "sync.tls", lambda: _process_tls("sync.tls", config.sync.tls, config.sync.host)
-    router = host_and_port(config.zenoh.connect)
+    router = host_and_port(config.zenoh.routers[0])
     yield "zenoh.tls", lambda: _process_tls("zenoh.tls", config.zenoh.tls, router and router[0])
     if config.sync.users is not None:
         yield SETTING, partial(_users, SETTING, config.sync.users, pulse_clients(config))

@@ -20,9 +20,10 @@ async def reachability_findings(config: Config) -> list[Finding]:
     """Check that each address leads to a listener of this site, or to another machine that answers."""
     sync, findings = config.sync, list[Finding]()
     routes = [("sync.host", (sync.host, sync.port), "sync.bind", (sync.bind, sync.port))]
-    connect, listen = host_and_port(config.zenoh.connect), host_and_port(config.zenoh.listen)
-    if connect is not None and listen is not None:
-        routes.append(("zenoh.connect", connect, "zenoh.listen", listen))
+    listen = host_and_port(config.zenoh.listen)
+    if listen is not None:
+        routers = [router for router in map(host_and_port, config.zenoh.routers) if router is not None]
+        routes += [("zenoh.connect", router, "zenoh.listen", listen) for router in routers]
     for check, target, setting, listener in routes:
         with report_failure(check, findings):
             findings.append(await _check_route(check, target, setting, listener))

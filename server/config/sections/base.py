@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
 """Corners in pixels of the camera's own picture."""
@@ -31,7 +31,19 @@ _ENDPOINT = re.compile(r"[a-z]+/[^\s/]+:(?P<port>[0-9]{1,5})([?#]\S*)?")
 _PORT_MOST = 65535
 
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
-"""Where zenoh connects to or listens: protocol/host:port."""
+"""Where zenoh listens: protocol/host:port."""
+
+
+def _joined(value: object) -> object:
+    return ",".join(map(str, value)) if isinstance(value, list | tuple) else value
+
+
+def _endpoints(value: str) -> str:
+    return ",".join(map(_endpoint, value.split(",")))
+
+
+Endpoints = Annotated[str, BeforeValidator(_joined), AfterValidator(_endpoints)]
+"""Where zenoh connects to: endpoints separated by commas; a list is joined."""
 
 PictureSide = Annotated[int, Field(ge=16, le=8192), AfterValidator(_even)]
 """Width or height of a picture in pixels; x264 cannot encode much smaller or larger ones."""

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from server.config.sections.base import Endpoint, Identifier, PictureSide, Port, Section
+from server.config.sections.base import Endpoint, Endpoints, Identifier, PictureSide, Port, Section
 
 
 class SiteSettings(Section):
@@ -58,12 +58,12 @@ class SyncSettings(Section):
 
 
 class ZenohSettings(Section):
-    """The message bus. The best-view service is its router: no separate daemon is needed."""
+    """The message bus. Every best-view service is a router: no separate daemon is needed."""
 
-    connect: Endpoint = "tcp/127.0.0.1:7447"
-    """Where cameras find the router."""
+    connect: Endpoints = "tcp/127.0.0.1:7447"
+    """Where cameras find the routers, one for each best-view service: they connect to all of them."""
     listen: Endpoint = "tcp/127.0.0.1:7447"
-    """Where the best-view service's router listens."""
+    """Where this best-view service's router listens."""
     lease_s: PositiveFloat = 1.0
     """Seconds of silence after which a process counts as gone."""
     users: Path | None = None
@@ -74,3 +74,8 @@ class ZenohSettings(Section):
     """
     tls: ProcessTlsSettings = ProcessTlsSettings()
     """Encryption of the bus, where its addresses begin with tls/."""
+
+    @property
+    def routers(self) -> tuple[str, ...]:
+        """The endpoints of all routers."""
+        return tuple(self.connect.split(","))

@@ -27,21 +27,37 @@ Seconds = Annotated[float, Field(ge=0, le=3600)]
 
 
 class ShareSettings(Section):
-    """Sharding: several best-view services of one site, each for the objects of its index."""
+    """Several best-view services of one site: for one share of the people each, and to replace each other."""
 
     of: PositiveInt = 1
-    """Number of services: an object's number modulo this is the index of its service."""
+    """Number of shares: a service decides for people whose number has its index's remainder by this. Services
+    of one share replace each other."""
     index: NonNegativeInt = 0
-    """Index of this service; 0 is the router, which the others and the cameras connect to."""
+    """Index of this service."""
     servers: list[str] = []
-    """Base URLs of all services, by index: requests for another's objects are redirected there."""
+    """Base URLs of all services, by index; viewers go on there when this one dies. None: `of` services."""
+
+    @property
+    def services(self) -> int:
+        """Number of services."""
+        return len(self.servers) or self.of
+
+    @property
+    def share(self) -> int:
+        """The share of this service."""
+        return self.index % self.of
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if self.index >= self.of:
-            raise ValueError(f"index is {self.index}, but of {self.of} services the last is {self.of - 1}")
-        if self.servers and len(self.servers) != self.of:
-            raise ValueError(f"servers names {len(self.servers)}, but there are {self.of}; name all or none")
+        if self.servers and len(self.servers) % self.of:
+            raise ValueError(
+                f"servers names {len(self.servers)}, but there are {self.of} shares; "
+                "name as many for each, or none"
+            )
+        if self.index >= self.services:
+            raise ValueError(
+                f"index is {self.index}, but of {self.services} services the last is {self.services - 1}"
+            )
         for number, server in enumerate(self.servers):
             if not re.fullmatch(r"https?://[^\s/?#]+(/[^\s?#]*)?", server):
                 raise ValueError(f"servers.{number}: is not an address such as http://127.0.0.1:8081/")

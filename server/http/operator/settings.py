@@ -114,7 +114,7 @@ def _names(section: Any) -> list[str]:
 def _as_yaml(key: str, value: Any) -> str:
     """Return a value as YAML, without secrets."""
     if key in _ENDPOINTS:
-        return dump_yaml_inline(redact_zenoh_endpoint(value))
+        return dump_yaml_inline(",".join(map(redact_zenoh_endpoint, value.split(","))))
     if value is not None and _PASSWORD.fullmatch(key):
         return dump_yaml_inline(HIDDEN)
     return dump_yaml_inline(_redacted(value))

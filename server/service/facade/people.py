@@ -143,7 +143,7 @@ class PeopleService:
         """Return the service that a number belongs to, whether or not it is in use."""
         share = self._pipeline.config.view.share
         index = shard_of(number, share)
-        return Shard(index, index == share.index, shard_address(number, share))
+        return Shard(index, index == share.share, shard_address(number, share))
 
     def current_number(self, number: int) -> int:
         """Return the current number of a merged one, as far as decisions have been published."""
@@ -181,8 +181,8 @@ class PeopleService:
     @property
     def editing_blocked(self) -> str:
         """Why people cannot be renamed, merged or split here; empty: they can."""
-        if self._pipeline.config.view.share.of > 1:
-            return "several services share this site (view.share), and their person numbers must stay equal"
+        if self._pipeline.config.view.share.services > 1:
+            return "the site has several services (view.share), and their person numbers must stay equal"
         return ""
 
     def manual_overrides(self) -> PersonOverrides:

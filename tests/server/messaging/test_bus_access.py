@@ -234,18 +234,17 @@ async def test_cameras_receive_peers_detections_but_not_their_video(settings: Ze
         )
 
 
-async def test_a_further_service_may_subscribe_and_publish_everything(settings: ZenohSettings) -> None:
-    received, choices = ReceivedTexts(), ReceivedTexts()
-    with open_sessions(
-        lambda: router(settings),
-        lambda: Bus.client(settings, "c0"),
-        lambda: Bus.further_service(settings, "bestview-1"),
-    ) as (bestview, c0, second):
-        second.subscribe(SITE.camera("*", "tracks"), received)
-        bestview.subscribe(SITE.bestview("choices", 1), choices)
-        await received.until("c0/tracks here", lambda: c0.publish(SITE.camera("c0", "tracks"), b"here"))
-        key = SITE.bestview("choices", 1)
-        await choices.until(f"{key} chosen", lambda: second.publish(key, b"chosen"))
+async def test_another_service_exchanges_messages_with_the_router(settings: ZenohSettings) -> None:
+    received, sent = ReceivedTexts(), ReceivedTexts()
+    with open_sessions(lambda: router(settings), lambda: Bus.client(settings, "bestview-1")) as (
+        first,
+        second,
+    ):
+        first.subscribe(SITE.bestview("record", 1), received)
+        second.subscribe(SITE.bestview("record"), sent)
+        of_first, of_second = SITE.bestview("record"), SITE.bestview("record", 1)
+        await received.until(f"{of_second} here", lambda: second.publish(of_second, b"here"))
+        await sent.until(f"{of_first} there", lambda: first.publish(of_first, b"there"))
 
 
 def _users(folder: Path, text: str) -> Path:

@@ -270,10 +270,10 @@ async def test_invalid_messages_are_counted_and_ignored(
     _, one, two = pair
     await exchange_both(one, two, needed=False)
     key = ZenohKeys("hall").camera("c1", "detections")
-    assert two._bus is not None
+    assert two._buses
     far = msgspec.json.encode(detections("c0", 1))
     for payload in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
-        two._bus.publish(key, payload)
+        two._buses[0].publish(key, payload)
     await two.exchange(1, detections("c1", 1), now(), needed=False)
     assert (await one.exchange(1, detections("c0", 1), now(), needed=True)).messages == (detections("c1", 1),)
     assert one.bad_messages == 6
@@ -373,3 +373,29 @@ def test_a_site_with_fewer_than_two_homographies_has_no_peers(recording: Path) -
         pipeline.close()
     assert config.peers_of("c1") == ("c0", "c2")
     assert not config_of(recording, use=False).peers_of("c1")
+
+
+async def test_detections_are_exchanged_over_another_router_while_one_is_down(
+    recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.camera.peers.detection_exchange._LISTENERS_S", WAIT / 4)
+    config = config_of(recording, wait=WAIT)
+    listens = [config.zenoh.listen, f"tcp/127.0.0.1:{free_port()}"]
+    zenoh = [ZenohSettings(listen=listen, connect=listens) for listen in listens]
+    routers = [Bus.router(settings) for settings in zenoh]
+    config = config.model_copy(update={"zenoh": zenoh[0]})
+    one, two = exchanges = [
+        PeerDetectionExchange(config, camera, CrossViewScorer(config, camera, (192, 108), 1), 100)
+        for camera in ("c0", "c1")
+    ]
+    for exchange in exchanges:
+        await exchange.join()
+    for pulse in range(10):
+        if pulse == 5:
+            routers[0].close()
+        first, second = await exchange_both(one, two, pulse)
+        assert first.messages == (detections("c1", pulse),)
+        assert second.messages == (detections("c0", pulse),)
+    for exchange in exchanges:
+        await exchange.leave()
+    routers[1].close()

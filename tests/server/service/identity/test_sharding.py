@@ -117,7 +117,7 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
     ("share", "reason"),
     [
         ({"of": 2, "index": 2}, "index is 2, but of 2 services the last is 1"),
-        ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2"),
+        ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2 shares"),
         ({"of": 1, "servers": ["nowhere"]}, "servers.0: is not an address"),
         ({"of": 0}, "view.share.of"),
     ],
@@ -176,9 +176,13 @@ async def test_people_of_another_service_are_listed_and_redirected(
 @pytest.fixture
 def pair() -> Iterator[list[BestViewPipeline]]:
     """Two services of one site on a private bus."""
-    address = f"tcp/127.0.0.1:{free_port()}"
-    zenoh = {"zenoh": {"listen": address, "connect": address}}
-    services = [BestViewPipeline(small_config(**shard_settings(index), **zenoh)) for index in range(2)]
+    routers = [f"tcp/127.0.0.1:{free_port()}" for _ in range(2)]
+    services = [
+        BestViewPipeline(
+            small_config(**shard_settings(index), zenoh={"listen": routers[index], "connect": routers})
+        )
+        for index in range(2)
+    ]
     for service in services:
         service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     yield services
