@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from typing import Any
 
 import pytest
@@ -61,3 +62,11 @@ def test_the_services_find_each_other(services: dict[str, Any], monkeypatch: pyt
         assert {config.sync.bind, config.http.host} == {"0.0.0.0"}  # noqa: S104 — all addresses of a container
         assert config.http.port == 8080
         assert service["environment"]["MYVIEW_SYNC__PORT"] == 7400, "overrides the configuration"
+
+
+def test_the_image_is_built_from_all_packages() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    packages = {name.rstrip("*") for name in project["tool"]["setuptools"]["packages"]["find"]["include"]}
+    lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    sent = {line.removeprefix("!") for line in lines if line.startswith("!")}
+    assert {name for name in sent if (ROOT / name).is_dir()} == packages
