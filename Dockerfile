@@ -10,7 +10,7 @@ WORKDIR /src
 COPY . .
 RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheel .
 
-FROM ${BASE}
+FROM ${BASE} AS site
 
 # Not root, as a number, so that Kubernetes can check it; the group `video` may open /dev/video*.
 RUN useradd --uid 10001 --create-home --groups video myview
@@ -42,3 +42,13 @@ LABEL org.opencontainers.image.title="MyView" \
 EXPOSE 8080
 ENTRYPOINT ["myview"]
 CMD ["--help"]
+
+# The same with GStreamer's RTSP server, for the gateway: docker-compose.rtsp.yml. It runs on Debian's own Python.
+FROM site AS rtsp
+USER root
+RUN apt-get update && apt-get install -y --no-install-recommends python3-gi gir1.2-gst-rtsp-server-1.0 \
+    && rm -rf /var/lib/apt/lists/*
+USER 10001
+EXPOSE 8554
+
+FROM site

@@ -69,6 +69,7 @@ BENCHMARKS = (
     Benchmark("ablation", "tracking scores without each cost term; 15 minutes"),
     Benchmark("layout_gain", "what a layout term could gain, and one between companions does; 20 minutes"),
     Benchmark("paper_experiments", "the paper's experiments, repeated on synthetic scenes; 10 minutes"),
+    Benchmark("rtsp", "clients of the RTSP gateway, and what one sees when processes die; 8 minutes"),
     Benchmark("live_cameras", "real-time tracking of four live cameras, cost by stage; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),
     Benchmark("soak", "one hour of a whole site at 22 times the speed; 4 minutes", ("--hours", "1")),

@@ -53,6 +53,7 @@ for run in (
     site_commands.sync,
     site_commands.camera,
     site_commands.bestview,
+    site_commands.rtsp,
     file_commands.render,
     file_commands.track,
     file_commands.evaluate,

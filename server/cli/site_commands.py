@@ -82,6 +82,15 @@ def bestview(config: ConfigPath, out: LogFolder = None) -> None:
     run_process(lambda: bestview_process(running, out))
 
 
+def rtsp(config: ConfigPath) -> None:
+    """Serve the streams by RTSP: one process of a site."""
+    from server.supervisor.rtsp_process import rtsp_process
+
+    log_to_stderr("rtsp")
+    running = _read(config)
+    run_process(lambda: rtsp_process(running))
+
+
 def up(
     config: ConfigPath,
     port: Annotated[
@@ -90,6 +99,7 @@ def up(
     out: LogFolder = None,
 ) -> None:
     """Run a whole site on this machine: every process, watched and restarted."""
+    from server.supervisor.rtsp_process import check_gateway_installed
     from server.supervisor.site import check_exposure, run_up
     from server.supervisor.startup_checks import check_ports, check_sources_open
 
@@ -101,6 +111,8 @@ def up(
         check_output_folder(out)
     check_exposure(running.now)
     check_ports(running.now)
+    if running.now.rtsp.enabled:
+        check_gateway_installed(running.now)
     check_sources_open(running.now)
     run_process(lambda: run_up(running, environment, out), release_s=_UP_RELEASE_S)
 

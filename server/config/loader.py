@@ -21,6 +21,7 @@ from server.config.sections import (
     CameraSettings,
     ProcessTlsSettings,
     SyncSettings,
+    TlsSettings,
     ViewSettings,
     ZenohSettings,
 )
@@ -104,18 +105,24 @@ def resolve_ground_and_paths(config: Config, *, where: str, folder: Path) -> Con
 
 def _resolved_access(config: Config, folder: Path) -> dict[str, Any]:
     """Return the sections with files of tokens, passwords and certificates, with absolute paths."""
-    access, tls = config.access, config.http.tls
+    access, tls, rtsp = config.access, config.http.tls, config.rtsp
     if access.tokens is not None:
         access = access.model_copy(update={"tokens": folder / access.tokens})
-    if tls.certificate is not None and tls.key is not None:
-        files = {"certificate": folder / tls.certificate, "key": folder / tls.key}
-        tls = tls.model_copy(update=files)
+    certificate = None if rtsp.certificate is None else (folder / rtsp.certificate).absolute()
+    rtsp = rtsp.model_copy(update={"tls": _resolved_tls(rtsp.tls, folder), "certificate": certificate})
     return {
         "access": access,
-        "http": config.http.model_copy(update={"tls": tls}),
+        "http": config.http.model_copy(update={"tls": _resolved_tls(tls, folder)}),
+        "rtsp": rtsp,
         "sync": _process_files(config.sync, folder),
         "zenoh": _process_files(config.zenoh, folder),
     }
+
+
+def _resolved_tls(tls: TlsSettings, folder: Path) -> TlsSettings:
+    if tls.certificate is None or tls.key is None:
+        return tls
+    return tls.model_copy(update={"certificate": folder / tls.certificate, "key": folder / tls.key})
 
 
 def _process_files(section: ProcessSection, folder: Path) -> ProcessSection:

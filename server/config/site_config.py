@@ -21,6 +21,7 @@ from server.config.sections import (
     EncodeSettings,
     HttpSettings,
     RecordSettings,
+    RtspSettings,
     SiteSettings,
     SoundSettings,
     SyncSettings,
@@ -66,6 +67,7 @@ class Config(BaseSettings):
     http: HttpSettings = HttpSettings()
     access: AccessSettings = AccessSettings()
     record: RecordSettings = RecordSettings()
+    rtsp: RtspSettings = RtspSettings()
 
     @classmethod
     def settings_customise_sources(
@@ -164,6 +166,8 @@ class Config(BaseSettings):
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:
                 raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; use h264")
+        if self.encode.codec == "vp8" and self.rtsp.enabled:
+            raise ValueError("rtsp.enabled: a site whose encode.codec is vp8 has no RTSP; use h264")
         for camera in self.cameras:
             if self.encode.codec == "vp8" and camera.h264 != "encode":
                 raise ValueError(f"cameras: {camera.id}: h264: {camera.h264}: encode.codec is vp8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from urllib.parse import urlsplit
 
 from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
@@ -27,6 +28,25 @@ def check_viewers(config: Config) -> None:
             "set access.tokens to a file of them (`myview token NAME` makes a line), or "
             "access.open_to_all: true"
         )
+
+
+def check_rtsp(config: Config) -> None:
+    """Refuse to give streams to other machines by RTSP without tokens, unless `access.open_to_all` is set.
+
+    A gateway whose service is on another machine has that service's access rules.
+
+    Raises:
+        UserError: `rtsp.host` is not a loopback address.
+    """
+    rtsp, access = config.rtsp, config.access
+    if is_loopback(rtsp.host) or access.tokens is not None or access.open_to_all:
+        return
+    if rtsp.service is not None and not is_loopback(urlsplit(rtsp.service).hostname or ""):
+        return
+    raise UserError(
+        f"rtsp.host: {rtsp.host} lets other machines watch, and there are no tokens: set access.tokens to "
+        "a file of them (`myview token NAME` makes a line), or access.open_to_all: true"
+    )
 
 
 def check_pulses(config: Config) -> None:

@@ -1,6 +1,6 @@
 """Health check of a container that runs one process of a site.
 
-    python -m server.supervisor.healthcheck sync | bestview | camera ID
+    python -m server.supervisor.healthcheck sync | bestview | rtsp | camera ID
 
 Exit code 0: healthy; 1: unhealthy, with a one-line reason for the container engine. It runs every few seconds
 beside each process, so it loads little: no configuration, only environment variables of the compose files.
@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _URL = "http://bestview:8080"
-_SYNC_PORT = "7400"
+_SYNC_PORT, _RTSP_PORT = "7400", "8554"
 _TIMEOUT_S = 5.0
 
 
@@ -55,6 +55,23 @@ def check_service() -> None:
         OSError: it does not.
     """
     _get("/healthz")
+
+
+def check_gateway() -> None:
+    """Check whether the RTSP gateway answers.
+
+    Raises:
+        UnhealthyError: the answer is not an RTSP server's.
+        OSError: it does not.
+    """
+    address = "127.0.0.1", int(os.environ.get("MYVIEW_RTSP__PORT", _RTSP_PORT))
+    with contextlib.ExitStack() as opened:
+        gateway = opened.enter_context(socket.create_connection(address, timeout=_TIMEOUT_S))
+        if certificate := os.environ.get("MYVIEW_RTSP__TLS__CERTIFICATE"):
+            gateway = opened.enter_context(_trust_exactly(certificate).wrap_socket(gateway))
+        gateway.sendall(b"OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n\r\n")
+        if not gateway.recv(64).startswith(b"RTSP/1.0"):
+            raise UnhealthyError("the answer is not an RTSP server's")
 
 
 def check_camera_frames(camera: str) -> None:
@@ -96,8 +113,10 @@ def _token() -> str:
 def _trust() -> ssl.SSLContext | None:
     """Trust exactly the service's certificate: it names the public host, not the one used here."""
     file = os.environ.get("MYVIEW_HEALTH_CERTIFICATE")
-    if not file:
-        return None
+    return _trust_exactly(file) if file else None
+
+
+def _trust_exactly(file: str) -> ssl.SSLContext:
     trust = ssl.create_default_context(cafile=file)
     trust.check_hostname = False
     trust.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
@@ -115,10 +134,12 @@ def check(words: Sequence[str]) -> None:
             check_pulse_server()
         case ["bestview"]:
             check_service()
+        case ["rtsp"]:
+            check_gateway()
         case ["camera", camera]:
             check_camera_frames(camera)
         case _:
-            raise UnhealthyError("name what to check: sync, bestview or camera ID")
+            raise UnhealthyError("name what to check: sync, bestview, rtsp or camera ID")
 
 
 def main(words: Sequence[str]) -> int:

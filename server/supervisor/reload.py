@@ -20,6 +20,17 @@ _EPOCHS = ("track.window.length_s", "track.window.stride_s", "track.window.min_f
 """Of these, settings by which the best view aligns tracking windows: they need a restart of the site."""
 _BY_LAG = ("tracker", "temporal")
 """Of these, settings that may change the lag of final frames, and then need a restart of the site."""
+_GATEWAY = (
+    "rtsp.host",
+    "rtsp.port",
+    "rtsp.clients_max",
+    "rtsp.udp",
+    "rtsp.tls",
+    "rtsp.service",
+    "rtsp.certificate",
+    "rtsp.python",
+)
+"""Settings that only the RTSP gateway uses."""
 _BEST_VIEW_SECTIONS = ("view", "http", "access", "record")
 
 
@@ -31,6 +42,7 @@ class ReloadPlan:
         now: the configuration to activate: the old one with all settings that can change while running.
         live: settings that the best view applies without interrupting streams.
         cameras: cameras whose processes have to restart.
+        gateway: settings of the RTSP gateway, which restarts.
         best_view: settings that wait for a restart of the best view, which ends streams.
         site: settings that wait for a restart of all processes.
     """
@@ -38,6 +50,7 @@ class ReloadPlan:
     now: Config
     live: tuple[str, ...] = ()
     cameras: tuple[str, ...] = ()
+    gateway: tuple[str, ...] = ()
     best_view: tuple[str, ...] = ()
     site: tuple[str, ...] = ()
 
@@ -47,6 +60,7 @@ class ReloadPlan:
         parts = {
             "in force now": self.live,
             "these cameras restart": self.cameras,
+            "the RTSP gateway restarts": self.gateway,
             "waits for a restart of the best view, which ends streams": self.best_view,
             "waits for a restart of all processes": self.site,
         }
@@ -79,18 +93,21 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     restarted = tuple(
         camera for camera in running.camera_ids if shared or sharpness_toggled or camera_changes[camera]
     )
-    applied = {*live, *shared, *(key for names in camera_changes.values() for key in names)}
+    gateway = _of(keys, _GATEWAY)
+    applied = {*live, *shared, *gateway, *(key for names in camera_changes.values() for key in names)}
     waiting = tuple(key for key in keys if key not in applied)
     best_view = _of(waiting, _BEST_VIEW_SECTIONS)
     now = running.model_copy(
         update={
             "view": view,
             "detect": wanted.detect,
+            "rtsp": wanted.rtsp.model_copy(update={"enabled": running.rtsp.enabled}),
             "track": _track(running, wanted, unchanged),
             "cameras": [_camera(running, wanted, camera, camera_keys) for camera in running.camera_ids],
         }
     )
-    return ReloadPlan(now, live, restarted, best_view, tuple(key for key in waiting if key not in best_view))
+    site = tuple(key for key in waiting if key not in best_view)
+    return ReloadPlan(now, live, restarted, gateway, best_view, site)
 
 
 def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from server.config.running_config import (
     serialize_with_absolute_paths,
 )
 from server.config.site_config import Config
-from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
+from server.supervisor.exposure_checks import check_bus, check_pulses, check_rtsp, check_viewers
 from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_source_opens
@@ -65,6 +65,8 @@ def check_exposure(config: Config) -> None:
     """
     for check in (check_viewers, check_pulses, check_bus):
         check(config)
+    if config.rtsp.enabled:
+        check_rtsp(config)
 
 
 async def _follow(running: ActiveConfig, supervisor: Supervisor, write_config: Callable[[], None]) -> None:
@@ -74,6 +76,8 @@ async def _follow(running: ActiveConfig, supervisor: Supervisor, write_config: C
         running.now = reload.now
         write_config()
         supervisor.reload("bestview")
+        if reload.gateway:
+            supervisor.reload("rtsp")
         for number, camera in enumerate(reload.cameras):
             if number:
                 await asyncio.sleep(_RESTART_INTERVAL_S)

@@ -33,6 +33,8 @@ def check_ports(config: Config) -> None:
     """
     check_port_free(config.http.host, config.http.port, "http.port")
     check_port_free(config.sync.bind, config.sync.port, "sync.port")
+    if config.rtsp.enabled:
+        check_port_free(config.rtsp.host, config.rtsp.port, "rtsp.port")
     protocol, _, address = config.zenoh.listen.partition("/")
     host, _, port = address.rpartition(":")
     if protocol == "tcp" and port.isdecimal():

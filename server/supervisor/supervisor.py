@@ -79,7 +79,8 @@ class Supervisor:
             Child(camera, ["camera", path, camera], first, config.site.niceness)
             for camera in config.camera_ids
         ]
-        self.children = [*first, *cameras]
+        gateway = [Child("rtsp", ["rtsp", path], first[:1])] if config.rtsp.enabled else []
+        self.children = [*first, *gateway, *cameras]
 
     async def run(self) -> None:
         """Run everything until the best-view service has nothing left to do, or this task is cancelled.

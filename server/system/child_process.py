@@ -1,8 +1,8 @@
 """Child processes: all processes that the server starts, and their setup.
 
-There are four kinds: commands of this program (started by the supervisor), modules that answer over standard
-input and output (the best-view service's workers), functions in a new interpreter (`myview render`), and
-other programs that are waited for (`myview models`).
+There are five kinds: commands of this program (started by the supervisor), modules that answer over standard
+input and output (the best-view service's workers), modules on the system's Python (the RTSP gateway),
+functions in a new interpreter (`myview render`), and other programs that are waited for (`myview models`).
 """
 
 from __future__ import annotations
@@ -75,6 +75,46 @@ async def start_worker(module: str) -> asyncio.subprocess.Process:
     )
     lower_priority(process.pid, _WORKER_NICENESS)
     return process
+
+
+_ON_PYTHON = (
+    "import runpy, sys; sys.path.insert(0, sys.argv[1]); runpy.run_module(sys.argv[2], run_name='__main__')"
+)
+_ROOT = Path(__file__).parents[2]
+"""The folder of the package `server`."""
+
+
+async def start_on_python(python: Path, module: str, line_bytes: int) -> asyncio.subprocess.Process:
+    """Start a module of this program on another Python, which has none of this one's libraries.
+
+    It reads standard input; standard output and error are one pipe, of lines of at most ``line_bytes``.
+
+    Raises:
+        OSError: it cannot be started.
+    """
+    return await asyncio.create_subprocess_exec(
+        str(python),
+        "-IBc",
+        _ON_PYTHON,
+        str(_ROOT),
+        module,
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+        limit=line_bytes,
+    )
+
+
+def run_on_python(python: Path, code: str, timeout_s: float) -> subprocess.CompletedProcess[str]:
+    """Run code on another Python until it ends.
+
+    Raises:
+        OSError: it cannot be started.
+        subprocess.TimeoutExpired: it took longer; it has been killed.
+    """
+    return subprocess.run(  # noqa: S603 — no shell
+        [str(python), "-Ic", code], capture_output=True, text=True, timeout=timeout_s, check=False
+    )
 
 
 def run_program(command: Sequence[str], folder: Path, timeout_s: float) -> subprocess.CompletedProcess[str]:

@@ -10,6 +10,8 @@ import yaml
 
 from fakes.paths import ROOT
 from server.config.loader import load_config
+from server.supervisor.exposure_checks import check_rtsp
+from server.supervisor.rtsp_process import gateway_settings
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +72,20 @@ def test_the_image_is_built_from_all_packages() -> None:
     lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     sent = {line.removeprefix("!") for line in lines if line.startswith("!")}
     assert {name for name in sent if (ROOT / name).is_dir()} == packages
+
+
+def test_the_gateway_asks_the_best_view_service_and_is_published_to_this_host_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    content = yaml.safe_load((ROOT / "docker-compose.rtsp.yml").read_text(encoding="utf-8"))
+    (gateway,) = content["services"].values()
+    assert gateway["command"] == ["rtsp", "configs/${MYVIEW_CONFIG:-demo.yaml}"]
+    assert gateway["ports"] == ["${MYVIEW_PUBLISH_RTSP:-127.0.0.1:8554}:8554"]
+    assert f"FROM site AS {gateway['build']['target']}" in (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    for key, value in gateway["environment"].items():
+        if "__" in key:
+            monkeypatch.setenv(key, str(value))
+    config = load_config(ROOT / "configs" / "demo.yaml")
+    check_rtsp(config)
+    settings = gateway_settings(config)
+    assert (settings["service"], settings["port"], settings["udp"]) == ("http://bestview:8080", 8554, False)

@@ -6,6 +6,7 @@ from server.config.sections.base import Endpoint, Identifier, PictureSide, Polyg
 from server.config.sections.camera import CameraSettings, TrackSettings
 from server.config.sections.encode import EncodeSettings
 from server.config.sections.output import HttpSettings, RecordSettings, TlsSettings
+from server.config.sections.rtsp import RtspSettings
 from server.config.sections.site import ProcessTlsSettings, SiteSettings, SyncSettings, ZenohSettings
 from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShareSettings, ViewSettings
 
@@ -23,6 +24,7 @@ __all__ = [
     "Port",
     "ProcessTlsSettings",
     "RecordSettings",
+    "RtspSettings",
     "Section",
     "ShareSettings",
     "SiteSettings",

@@ -15,7 +15,13 @@ from fakes.service.scripted_cameras import small_config
 from server.cli.generated_config import DEMO
 from server.config.loader import load_config
 from server.config.sections import AccessSettings
-from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers, is_loopback
+from server.supervisor.exposure_checks import (
+    check_bus,
+    check_pulses,
+    check_rtsp,
+    check_viewers,
+    is_loopback,
+)
 from server.system.errors import UserError
 
 OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
@@ -54,6 +60,28 @@ def test_viewers_from_elsewhere_need_tokens_or_open_to_all(tmp_path: Path) -> No
         check_viewers(small_config(**settings))
     write_tokens(tokens, token_entry("lead"))
     check_viewers(small_config(**settings))
+
+
+@pytest.mark.parametrize(
+    ("rtsp", "access", "is_refused"),
+    [
+        ({}, {}, False),
+        ({"host": OUTSIDE}, {}, True),
+        ({"host": OUTSIDE, "service": "http://127.0.0.1:8080"}, {}, True),
+        ({"host": OUTSIDE, "service": "http://bestview:8080"}, {}, False),
+        ({"host": OUTSIDE}, {"tokens": "tokens.yaml"}, False),
+        ({"host": OUTSIDE}, {"open_to_all": True}, False),
+    ],
+)
+def test_rtsp_clients_from_elsewhere_need_what_viewers_need(
+    rtsp: dict[str, Any], access: dict[str, Any], *, is_refused: bool
+) -> None:
+    config = small_config(rtsp=rtsp, access=access)
+    if is_refused:
+        with pytest.raises(UserError, match=r"rtsp\.host: .* access\.tokens .* access\.open_to_all: true"):
+            check_rtsp(config)
+    else:
+        check_rtsp(config)
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,7 @@ from server.supervisor.reload import plan_reload
 from server.system.errors import UserError
 
 LIVE, CAMERA, ALL_CAMERAS, BEST_VIEW, SITE = "live", "camera c1", "all cameras", "best view", "site"
+GATEWAY = "RTSP gateway"
 
 CHANGES: dict[str, tuple[str, Any]] = {
     "view.switch_cost_s": (LIVE, 2.0),
@@ -46,6 +47,9 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "view.identity.merge_threshold": (BEST_VIEW, 1.0),
     "http.port": (BEST_VIEW, 8123),
     "record.keep_s": (BEST_VIEW, 5.0),
+    "rtsp.port": (GATEWAY, 8600),
+    "rtsp.udp": (GATEWAY, False),
+    "rtsp.enabled": (SITE, True),
     "cameras.c1.source": (CAMERA, "rtsp://elsewhere/1"),
     "cameras.c1.offset_s": (CAMERA, 0.12),
     "cameras.c1.options": (CAMERA, {"rtsp_transport": "tcp"}),
@@ -92,6 +96,7 @@ def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
     effects = {key: CHANGES[key][0] for key in keys}
     assert set(reload.live) == {key for key in keys if effects[key] == LIVE}
     assert set(reload.best_view) == {key for key in keys if effects[key] == BEST_VIEW}
+    assert set(reload.gateway) == {key for key in keys if effects[key] == GATEWAY}
     assert set(reload.site) == {key for key in keys if effects[key] == SITE}
     if ALL_CAMERAS in effects.values():
         assert reload.cameras == CAMERAS
@@ -101,7 +106,8 @@ def test_every_change_is_applied_or_named_as_pending(keys: set[str]) -> None:
     repeated = plan_reload(reload.now, wanted)
     assert (repeated.now, repeated.live, repeated.cameras) == (reload.now, (), ())
     assert all(
-        name in reload.line for name in {*reload.live, *reload.cameras, *reload.best_view, *reload.site}
+        name in reload.line
+        for name in {*reload.live, *reload.cameras, *reload.gateway, *reload.best_view, *reload.site}
     )
     assert (
         build_config(

@@ -1,0 +1,191 @@
+"""Feeds: each takes one stream from the service and pushes its samples into the pipeline of an RTSP media.
+
+A feed goes on through everything that passes: a restart of the service, a camera's death, other parameter
+sets. It ends when the service refuses the stream for good (a revoked token), when the stream is gone for a
+minute (a forgotten person), or when nobody watches.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import gi
+
+gi.require_version("Gst", "1.0")
+gi.require_version("GstApp", "1.0")
+from gi.repository import Gst, GstApp  # noqa: E402
+
+from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample, Track  # noqa: E402
+from server.rtsp.request import StreamAddress  # noqa: E402
+from server.rtsp.service_stream import (  # noqa: E402
+    Service,
+    ServiceAwayError,
+    ServiceStream,
+    StreamRefusedError,
+)
+from server.rtsp.stream_clock import StreamClock  # noqa: E402
+
+log = logging.getLogger(__name__)
+
+_ABANDON_S = 60.0
+"""How long the service may be away, or not know the stream, until its clients are sent away."""
+_UNUSED_S = 15.0
+"""How long a feed waits for the media that takes it."""
+_FIRST_SAMPLE_S = 5.0
+_RETRY_S = 0.5
+_REFUSED_FOR_GOOD = {401, 403}
+_QUEUE_BYTES = 4_000_000
+"""What waits for one pipeline at most; then the oldest is dropped."""
+_SLACK_S = 1.0
+
+
+class Feed:
+    """One stream of the service for one RTSP media and all its clients.
+
+    Attributes:
+        address: the stream.
+        tracks: its tracks, when it was opened.
+    """
+
+    def __init__(self, service: Service, address: StreamAddress, on_end: Callable[[Feed], None]) -> None:
+        """Open the stream and read its head.
+
+        Raises:
+            StreamRefusedError: the service refuses it.
+            ServiceAwayError: it does not answer, or sends nothing.
+        """
+        self._service, self.address, self._on_end = service, address, on_end
+        self._stream = service.open(address.path, address.token)
+        self._parts = _parts(self._stream)
+        self._early: list[Sample] = []
+        self.tracks = self._first_head().tracks
+        self._sources: dict[str, GstApp.AppSrc] = {}
+        """By codec, once a media has taken the feed."""
+        self._pipeline: Gst.Element | None = None
+        self._stopped = threading.Event()
+        self._taken = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=address.path, daemon=True)
+        self._thread.start()
+
+    def connect(self, media: Gst.Element) -> None:
+        """Push into the sources of a media's element from now on: its first, or another after that."""
+        self._clock = StreamClock(_SLACK_S)
+        for track in self.tracks:
+            source = media.get_by_name(source_name(track))
+            source.set_property("caps", caps_of(track))
+            source.set_property("max-bytes", _QUEUE_BYTES)
+            self._sources[track.codec] = source
+        self._pipeline = media
+        self._taken.set()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it pushes nothing more."""
+        return self._stopped.is_set()
+
+    def stop(self) -> None:
+        """End it, from any thread."""
+        self._stopped.set()
+        self._taken.set()
+        self._stream.close()
+
+    def _first_head(self) -> Head:
+        with contextlib.suppress(Mp4Error):
+            for part in self._parts:
+                if isinstance(part, Head):
+                    return part
+        self._stream.close()
+        raise ServiceAwayError("the service's stream has no head")
+
+    def _run(self) -> None:
+        try:
+            if self._taken.wait(_UNUSED_S):
+                self._push_all()
+        finally:
+            self._stopped.set()
+            self._stream.close()
+            for source in self._sources.values():
+                source.end_of_stream()
+            self._on_end(self)
+
+    def _push_all(self) -> None:
+        while not self._stopped.is_set():
+            try:
+                for part in self._parts:
+                    self._push(part)
+            except (ServiceAwayError, Mp4Error) as error:
+                log.debug("%s: %s", self.address.path, error)
+            if self._stopped.is_set() or not self._reopen():
+                return
+
+    def _reopen(self) -> bool:
+        """Wait for the service; return whether the stream is open again."""
+        until, reason = time.monotonic() + _ABANDON_S, "the service has ended the stream"
+        while not self._stopped.wait(_RETRY_S):
+            try:
+                self._stream = self._service.open(self.address.path, self.address.token)
+            except StreamRefusedError as error:
+                reason = str(error)
+                if error.status in _REFUSED_FOR_GOOD:
+                    break
+            except ServiceAwayError as error:
+                reason = str(error)
+            else:
+                if self._stopped.is_set():
+                    self._stream.close()
+                self._parts = _parts(self._stream)
+                return True
+            if time.monotonic() > until:
+                break
+        if not self._stopped.is_set():
+            log.info("%s ends: %s", self.address.path, reason)
+        return False
+
+    def _push(self, part: Head | Sample) -> None:
+        if isinstance(part, Head):
+            for track in part.tracks:
+                if (source := self._sources.get(track.codec)) is not None:
+                    source.set_property("caps", caps_of(track))
+            return
+        source = self._sources.get(part.track.codec)
+        if source is None or self._pipeline is None:
+            return
+        running = self._pipeline.get_current_running_time()
+        running_s = 0.0 if running == Gst.CLOCK_TIME_NONE else running / Gst.SECOND  # it does not play yet
+        due_s = self._clock.due(part.time_s, running_s, is_key=part.track.is_video and part.is_key)
+        buffer = Gst.Buffer.new_wrapped(part.data)
+        buffer.pts = buffer.dts = int(due_s * Gst.SECOND)
+        buffer.duration = int(part.duration_s * Gst.SECOND)
+        if not part.is_key:
+            buffer.set_flags(Gst.BufferFlags.DELTA_UNIT)
+        source.push_buffer(buffer)
+
+
+def _parts(stream: ServiceStream) -> Iterator[Head | Sample]:
+    reader = Mp4Reader()
+    for block in stream.blocks():
+        yield from reader.feed(block)
+
+
+def source_name(track: Track) -> str:
+    """Return the name of the element in a media that a track is pushed into."""
+    return f"source_{track.codec}"
+
+
+def caps_of(track: Track) -> Gst.Caps:
+    """Return the caps of a track's samples."""
+    match track.codec:
+        case "h264":
+            text = "video/x-h264,stream-format=avc,alignment=au"
+        case "aac":
+            text = f"audio/mpeg,mpegversion=4,stream-format=raw,rate={track.rate},channels={track.channels}"
+        case _:
+            text = f"audio/x-opus,rate={track.rate},channels={track.channels},channel-mapping-family=0"
+    caps = Gst.Caps.from_string(text)
+    if track.configuration:
+        caps.set_value("codec_data", Gst.Buffer.new_wrapped(track.configuration))
+    return caps

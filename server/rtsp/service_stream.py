@@ -1,0 +1,110 @@
+"""A stream of the best-view service over HTTP, as bytes, with the token of the RTSP client that asked."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import socket
+import ssl
+import urllib.parse
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+_CONNECT_S = 4.0
+"""Seconds for the connection and the answer's head: an RTSP client waits meanwhile."""
+_SILENT_S = 10.0
+"""Seconds without a byte after which the service counts as gone: streams have no gaps."""
+_READ_BYTES = 65_536
+_OK = 200
+
+
+class StreamRefusedError(Exception):
+    """The service does not give the stream: its HTTP status."""
+
+    def __init__(self, status: int) -> None:
+        super().__init__(f"the service answers {status}")
+        self.status = status
+
+
+class ServiceAwayError(Exception):
+    """The service does not answer, or its stream has broken off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """Where the best-view service is."""
+
+    url: str
+    certificate: str | None = None
+    """PEM file: trust exactly this certificate, whatever host it names; None: the system's authorities."""
+
+    def open(self, path: str, token: str | None) -> ServiceStream:
+        """Open a stream.
+
+        Raises:
+            StreamRefusedError: the service refuses it; 401: it needs a token, or another one.
+            ServiceAwayError: it does not answer.
+        """
+        address = urllib.parse.urlsplit(self.url)
+        host, port = address.hostname or "127.0.0.1", address.port
+        # Via: the server's own machine may operate, but what is sent on to other machines may not.
+        headers = {"Via": "1.1 myview-rtsp", "User-Agent": "myview-rtsp"}
+        if token is not None:
+            headers["Authorization"] = f"Bearer {token}"
+        connection: http.client.HTTPConnection
+        if address.scheme == "https":
+            connection = http.client.HTTPSConnection(host, port, timeout=_CONNECT_S, context=self._trust())
+        else:
+            connection = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
+        try:
+            connection.request("GET", path, headers=headers)
+            response = connection.getresponse()
+            connected = connection.sock
+            connected.settimeout(_SILENT_S)
+        except (OSError, http.client.HTTPException, ValueError) as error:  # ValueError: a token of odd bytes
+            connection.close()
+            raise ServiceAwayError(str(error) or type(error).__name__) from error
+        if response.status != _OK:
+            response.close()
+            connection.close()
+            raise StreamRefusedError(response.status)
+        return ServiceStream(response, connected)
+
+    def _trust(self) -> ssl.SSLContext:
+        trust = ssl.create_default_context(cafile=self.certificate)
+        if self.certificate is not None:
+            trust.check_hostname = False  # it names the public host, not the one used here
+            trust.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+        return trust
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceStream:
+    """An open stream."""
+
+    _response: http.client.HTTPResponse = field(repr=False)
+    _socket: socket.socket = field(repr=False)
+
+    def blocks(self) -> Iterator[bytes]:
+        """Yield the bytes as they come, until the service ends the stream.
+
+        Raises:
+            ServiceAwayError: it breaks off, or nothing comes for ten seconds.
+        """
+        try:
+            while block := self._response.read1(_READ_BYTES):
+                yield block
+        except (
+            OSError,
+            http.client.HTTPException,
+            ValueError,
+            AttributeError,
+        ) as error:  # the latter two: closed
+            raise ServiceAwayError(str(error) or type(error).__name__) from error
+        finally:
+            self._response.close()
+
+    def close(self) -> None:
+        """End it, from any thread."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
