@@ -49,6 +49,7 @@ def _myview(
 
 for run in (
     site_commands.demo,
+    site_commands.init,
     site_commands.up,
     site_commands.sync,
     site_commands.camera,

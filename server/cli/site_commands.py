@@ -1,4 +1,4 @@
-"""Commands that run a site or one of its processes: demo, up, sync, camera and bestview.
+"""Commands that set a site up, or run it or one of its processes: init, demo, up, sync, camera and bestview.
 
 Each imports its modules when it runs, so that a process loads no more than it needs.
 """
@@ -115,6 +115,20 @@ def up(
         check_gateway_installed(running.now)
     check_sources_open(running.now)
     run_process(lambda: run_up(running, environment, out), release_s=_UP_RELEASE_S)
+
+
+def init(
+    config: Annotated[
+        Path, typer.Argument(metavar="[CONFIG]", help="The file to write; an earlier one is kept beside it.")
+    ] = Path("site.yaml"),
+    search: Annotated[
+        float, typer.Option(min=0, max=60, help="Seconds to search for cameras; 0: only addresses.")
+    ] = 3.0,
+) -> None:
+    """Set a site up: find cameras or take addresses, try each, and write the configuration."""
+    from server.cli.setup_dialog import run_setup_dialog
+
+    run_setup_dialog(config, search)
 
 
 def demo(

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import hashlib
+import re
 import socketserver
 import struct
 import threading
+import time
 from collections.abc import Iterator, Sequence
 
 from server.camera.encoder import AccessUnit
@@ -18,11 +21,27 @@ _MAX_BYTES = 200
 _FU_A = 28
 
 
-class RtspCamera:
-    """Serves access units at a frame rate over TCP, up to the GOP number `gop_limit`."""
+_REALM, _NONCE = "a camera", "0123456789abcdef"
 
-    def __init__(self, gops: Sequence[Sequence[AccessUnit]], fps: float) -> None:
+
+class RtspCamera:
+    """Serves access units at a frame rate over TCP, up to the GOP number `gop_limit`.
+
+    ``login`` is a user and a password, asked for by Digest (RFC 2617). ``live``: sends in real time and
+    endlessly, to each client what a common clock says.
+    """
+
+    def __init__(
+        self,
+        gops: Sequence[Sequence[AccessUnit]],
+        fps: float,
+        *,
+        login: tuple[str, str] | None = None,
+        live: bool = False,
+    ) -> None:
         self.gops, self.fps, self.gop_limit = gops, fps, 40
+        self.login, self.live = login, live
+        self.began = time.monotonic()
         self.stop = threading.Event()
         self._server = _Server(self)
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
@@ -64,7 +83,10 @@ class _Handler(socketserver.StreamRequestHandler):
 
     def _answer(self, method: str, address: str, headers: dict[str, str]) -> None:
         status, headers_out, body = "200 OK", [f"CSeq: {headers['cseq']}"], b""
-        if method == "OPTIONS":
+        if not _is_permitted(method, headers.get("authorization", ""), self.server.camera.login):
+            status = "401 Unauthorized"
+            headers_out.append(f'WWW-Authenticate: Digest realm="{_REALM}", nonce="{_NONCE}"')
+        elif method == "OPTIONS":
             headers_out.append("Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN")
         elif method == "DESCRIBE":
             body = _describe(self.server.camera.gops[0][0])
@@ -78,17 +100,54 @@ class _Handler(socketserver.StreamRequestHandler):
 
     def _play(self, camera: RtspCamera) -> None:
         number = 0
-        for place, gop in enumerate(camera.gops):
-            while place >= camera.gop_limit:
-                if camera.stop.wait(0.002):
-                    return
-            for unit in gop:
-                time = round(unit.pulse * 90_000 / camera.fps)
-                for payload, is_last in _payloads(unit):
-                    kind = _PAYLOAD_TYPE | is_last << 7
-                    packet = struct.pack(">BBHII", 0x80, kind, number % 2**16, time, 1) + payload
-                    self.wfile.write(struct.pack(">cBH", b"$", 0, len(packet)) + packet)
-                    number += 1
+        for time_s, unit in _live_units(camera) if camera.live else _units(camera):
+            stamp = round(time_s * 90_000) % 2**32
+            for payload, is_last in _payloads(unit):
+                kind = _PAYLOAD_TYPE | is_last << 7
+                packet = struct.pack(">BBHII", 0x80, kind, number % 2**16, stamp, 1) + payload
+                self.wfile.write(struct.pack(">cBH", b"$", 0, len(packet)) + packet)
+                number += 1
+
+
+def _units(camera: RtspCamera) -> Iterator[tuple[float, AccessUnit]]:
+    """Yield all access units, with their times in seconds, up to the limit."""
+    for place, gop in enumerate(camera.gops):
+        while place >= camera.gop_limit:
+            if camera.stop.wait(0.002):
+                return
+        yield from ((unit.pulse / camera.fps, unit) for unit in gop)
+
+
+def _live_units(camera: RtspCamera) -> Iterator[tuple[float, AccessUnit]]:
+    """Yield access units when they are due, from the next GOP on, again and again."""
+    frames = sum(map(len, camera.gops))
+    starts = [sum(map(len, camera.gops[:place])) for place in range(len(camera.gops))]
+    now = (time.monotonic() - camera.began) * camera.fps
+    rounds, place = int(now // frames), next((p for p, s in enumerate(starts) if s >= now % frames), 0)
+    rounds += place == 0 and now % frames > 0
+    while True:
+        for unit_place, unit in enumerate(camera.gops[place], starts[place]):
+            due = (rounds * frames + unit_place) / camera.fps
+            if camera.stop.wait(max(0.0, camera.began + due - time.monotonic())):
+                return
+            yield due, unit
+        place = (place + 1) % len(camera.gops)
+        rounds += place == 0
+
+
+def _is_permitted(method: str, header: str, login: tuple[str, str] | None) -> bool:
+    """Check a Digest response (RFC 2617, 3.2.2) without quality of protection."""
+    if login is None or method == "OPTIONS":
+        return True
+    fields = dict(re.findall(r'(\w+)="([^"]*)"', header))
+    own = _md5(f"{login[0]}:{_REALM}:{login[1]}")
+    request = _md5(f"{method}:{fields.get('uri', '')}")
+    wanted = _md5(f"{own}:{_NONCE}:{request}")
+    return fields.get("response") == wanted and fields.get("username") == login[0]
+
+
+def _md5(text: str) -> str:
+    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
 
 
 def _describe(key: AccessUnit) -> bytes:

@@ -1,0 +1,99 @@
+"""Addresses of cameras: which are accepted, and the separation of a password from the rest."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from urllib.parse import quote, unquote, urlsplit, urlunsplit
+
+from server.config.camera_password import PLACEHOLDER
+from server.config.sections import CameraSettings
+from server.system.address_redaction import redact_to_host
+from server.system.errors import UserError
+
+_SCHEMES = ("rtsp", "rtsps", "http", "https")
+_RTSP = ("rtsp", "rtsps")
+_DEVICE = re.compile(r"/dev/(video[0-9]{1,3}|v4l/by-(id|path)/[\w.:+-]{1,200})")
+_MAX_ADDRESS = 1000
+_MAX_LOGIN = 200
+_HELP = "enter an address such as rtsp://10.0.0.11/stream1, http://10.0.0.14/video.mjpeg or /dev/video0"
+_NAME_BREAKS = re.compile(r"[^A-Za-z0-9_-]+")
+_SERVICE = re.compile(r"bestview(-\d+)?")
+_MAX_NAME = 32
+
+
+@dataclass(frozen=True, slots=True)
+class CameraAddress:
+    """Where a camera is, with its password apart.
+
+    Attributes:
+        source: the configuration's source; if there is a password, with a placeholder for it.
+        password: None: there is none.
+        options: for FFmpeg's opener.
+    """
+
+    source: str
+    password: str | None = field(default=None, repr=False)
+    options: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def with_password(self) -> str:
+        """The source to open."""
+        password = "" if self.password is None else quote(self.password, safe="")
+        return self.source.replace(PLACEHOLDER, password)
+
+    @property
+    def shown(self) -> str:
+        """The source without anything that may be secret."""
+        return redact_to_host(self.source)
+
+
+def parse_address(text: str, user: str = "", password: str = "") -> CameraAddress:
+    """Parse an address that a user entered; a login beside it takes precedence over one in it.
+
+    Raises:
+        UserError: it is not the address of a camera.
+    """
+    address = text.strip()
+    if max(len(user), len(password)) > _MAX_LOGIN or not (user + password).isprintable():
+        raise UserError(f"user and password have at most {_MAX_LOGIN} printable characters")
+    if _DEVICE.fullmatch(address):
+        return CameraAddress(address)
+    if not address or len(address) > _MAX_ADDRESS or not address.isprintable() or " " in address:
+        raise UserError(_HELP)
+    try:
+        parts = urlsplit(address)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        raise UserError(_HELP) from None
+    if parts.scheme not in _SCHEMES or not host:
+        raise UserError(_HELP)
+    user = user or unquote(parts.username or "")
+    password = password or unquote(parts.password or "")
+    place = f"[{host}]" if ":" in host else host
+    place = place if port is None else f"{place}:{port}"
+    login = (
+        f"{quote(user, safe='')}:{PLACEHOLDER}@" if password else f"{quote(user, safe='')}@" if user else ""
+    )
+    path = parts.path.replace(PLACEHOLDER, quote(PLACEHOLDER))
+    source = urlunsplit((parts.scheme, f"{login}{place}", path, parts.query.replace(PLACEHOLDER, ""), ""))
+    options = {"rtsp_transport": "tcp"} if parts.scheme in _RTSP else {}
+    return CameraAddress(source, password or None, options)
+
+
+def address_of(camera: CameraSettings) -> CameraAddress:
+    """Return a configured camera's address, without its password, which stays in its file."""
+    return CameraAddress(camera.source, None, dict(camera.options))
+
+
+def free_name(wanted: str, taken: set[str]) -> str:
+    """Return a camera's id that is not taken, made from any text; ``camera-1`` if it has no letters."""
+    name = _NAME_BREAKS.sub("-", wanted).strip("-_")[: _MAX_NAME - 3].strip("-_")
+    if name and name not in taken and not _SERVICE.fullmatch(name):
+        return name
+    base = name or "camera"
+    return next(
+        candidate
+        for candidate in (f"{base}-{number}" for number in range(1, len(taken) + 2))
+        if candidate not in taken
+    )

@@ -1,0 +1,194 @@
+"""The state of a set-up: cameras that were found, their streams, and those that were tried and taken."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import re
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypeVar
+
+from server.setup import discovery
+from server.setup.camera_address import CameraAddress, free_name, parse_address
+from server.setup.discovery import FoundCamera
+from server.setup.proposal import SiteProposal, propose_site
+from server.setup.site_file import NewCamera, NewSite, write_site
+from server.setup.trial_messages import (
+    ProfileList,
+    ProfilesRequest,
+    StreamRequest,
+    StreamTrial,
+    list_profiles,
+    try_stream,
+)
+from server.system.errors import UserError
+
+DISCOVERY_S = 3.0
+MAX_CAMERAS = 64
+"""Most cameras of a set-up."""
+_TRIALS_AT_ONCE = 2
+"""Trials that run at a time; each decodes video."""
+_MAX_WAITING = 16
+Request = TypeVar("Request")
+Answer = TypeVar("Answer")
+_IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
+
+
+@dataclass(frozen=True, slots=True)
+class TriedCamera:
+    """A camera that sends pictures, and its name in the site."""
+
+    key: int
+    name: str
+    address: CameraAddress
+    trial: StreamTrial
+
+    @property
+    def sends(self) -> str:
+        """What it sends, in a few words."""
+        rate = f", {self.trial.fps:g} fps" if self.trial.fps else ""
+        return f"{self.trial.codec} {self.trial.width}x{self.trial.height}{rate}"
+
+
+@dataclass(slots=True)
+class SetupSession:
+    """One set-up, in memory; ``path`` is the configuration file that it will write."""
+
+    path: Path
+    found: list[FoundCamera] = field(default_factory=list)
+    cameras: list[TriedCamera] = field(default_factory=list)
+    kept: Path | None = None
+    """Where the earlier file is, after writing."""
+    _streams: dict[int, CameraAddress] = field(default_factory=dict)
+    """Streams that cameras offered, by key, with their passwords."""
+    _keys: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
+    _trials: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(_TRIALS_AT_ONCE))
+    _waiting: int = 0
+
+    async def discover(self, seconds: float = DISCOVERY_S) -> Sequence[FoundCamera]:
+        """Look for cameras in the network.
+
+        Raises:
+            UserError: there is no network.
+        """
+        self.found = await discovery.discover(seconds)
+        return self.found
+
+    async def profiles(
+        self, host: str, port: int, user: str, password: str
+    ) -> tuple[ProfileList, Sequence[int]]:
+        """Ask a found camera for its streams; return them, and their keys for :meth:`try_stream`.
+
+        Raises:
+            UserError: no such camera was found, or too many are asked.
+        """
+        if not any((camera.host, camera.port) == (host, port) for camera in self.found):
+            raise UserError("no such camera was found; search again")
+        encrypted = next(one.encrypted for one in self.found if (one.host, one.port) == (host, port))
+        request = ProfilesRequest(host, port, user, password, encrypted)
+        answer = await self._limited(list_profiles, request)
+        keys = []
+        for profile in answer.profiles:
+            key = next(self._keys)
+            self._streams[key] = parse_address(profile.address, user, password)
+            keys.append(key)
+        return answer, keys
+
+    async def try_address(self, text: str, user: str, password: str, name: str = "") -> TriedCamera:
+        """Try an address, and add the camera if it sends pictures.
+
+        Raises:
+            UserError: it is no address, or no picture arrives.
+        """
+        return await self._try(parse_address(text, user, password), name)
+
+    async def try_stream(self, key: int, name: str = "") -> TriedCamera:
+        """Try a stream that a camera offers, and add the camera.
+
+        Raises:
+            UserError: there is no such stream, or no picture arrives.
+        """
+        if key not in self._streams:
+            raise UserError("no such stream; ask the camera again")
+        return await self._try(self._streams[key], name)
+
+    async def _try(self, address: CameraAddress, name: str) -> TriedCamera:
+        if any(camera.address.source == address.source for camera in self.cameras):
+            raise UserError(f"{address.shown}: this camera is in the list already")
+        if len(self.cameras) >= MAX_CAMERAS:
+            raise UserError(f"a site set up here has at most {MAX_CAMERAS} cameras")
+        trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options))
+        if trial.error:
+            raise UserError(f"{address.shown}: {trial.error}")
+        taken = {camera.name for camera in self.cameras}
+        camera = TriedCamera(next(self._keys), free_name(name, taken), address, trial)
+        self.cameras.append(camera)
+        return camera
+
+    async def _limited(self, ask: Callable[[Request], Awaitable[Answer]], request: Request) -> Answer:
+        """Speak to a camera when few others are spoken to.
+
+        Raises:
+            UserError: too many wait already.
+        """
+        if self._waiting >= _MAX_WAITING:
+            raise UserError("too many cameras are being tried; wait for them")
+        self._waiting += 1
+        try:
+            async with self._trials:
+                return await ask(request)
+        finally:
+            self._waiting -= 1
+
+    def rename(self, key: int, name: str) -> None:
+        """Rename a camera.
+
+        Raises:
+            UserError: there is none, or the name is invalid or taken.
+        """
+        camera = self.camera(key)
+        if _IDENTIFIER.fullmatch(name) is None or free_name(name, set()) != name:
+            raise UserError(
+                "a name has letters, digits, - and _, at most 32, begins with a letter or digit, "
+                "and is not bestview"
+            )
+        if any(other.name == name and other.key != key for other in self.cameras):
+            raise UserError(f"another camera is called {name}")
+        self.cameras = [replace(one, name=name) if one is camera else one for one in self.cameras]
+
+    def remove(self, key: int) -> None:
+        """Remove a camera.
+
+        Raises:
+            UserError: there is none.
+        """
+        self.cameras.remove(self.camera(key))
+
+    def camera(self, key: int) -> TriedCamera:
+        """Return a camera.
+
+        Raises:
+            UserError: there is none.
+        """
+        for camera in self.cameras:
+            if camera.key == key:
+                return camera
+        raise UserError("no such camera")
+
+    @property
+    def proposal(self) -> SiteProposal:
+        """The proposed size and rate."""
+        return propose_site([camera.trial for camera in self.cameras])
+
+    def write(self, name: str, chosen: SiteProposal) -> None:
+        """Write the configuration.
+
+        Raises:
+            UserError: there is no camera, a value is invalid, or the file cannot be written.
+        """
+        if not self.cameras:
+            raise UserError("add a camera first")
+        cameras = [NewCamera(camera.name, camera.address, camera.sends) for camera in self.cameras]
+        self.kept = write_site(NewSite(name, chosen, cameras), self.path)

@@ -1,0 +1,157 @@
+"""The configuration file of a site that was set up: commented YAML; passwords in files of their own."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from server.config.loader import build_config
+from server.config.site_config import Config
+from server.config.yaml_file import dump_yaml_inline
+from server.setup.camera_address import CameraAddress
+from server.setup.proposal import SiteProposal
+from server.system.atomic_write import atomic_file
+from server.system.errors import UserError
+from server.system.private_files import FILE, make_private_folder, write_private
+
+_HEAD = """\
+# {name}: written by MyView's set-up on {day}. Start it with
+#
+#   myview up {file}
+#
+# Every setting, with its default, is explained in configs/demo.yaml.
+
+site:
+  name: {name}
+  fps: {fps:g}  # a slower camera repeats pictures, a faster one skips some
+  width: {width}  # every camera's picture is fitted into this size
+  height: {height}
+
+cameras:
+"""
+_FILE_LINE = "    password: {file}  # replaces {{password}}; only you can read this file\n"
+
+
+@dataclass(frozen=True, slots=True)
+class NewCamera:
+    """A camera to write: its id, its address, and what it sends, for a comment."""
+
+    id: str
+    address: CameraAddress
+    sends: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class NewSite:
+    """A site to write."""
+
+    name: str
+    proposal: SiteProposal
+    cameras: Sequence[NewCamera]
+
+
+def site_text(site: NewSite, path: Path) -> str:
+    """Return the text of a configuration file that will be at a path."""
+    head = _HEAD.format(
+        name=site.name,
+        day=dt.date.today().isoformat(),  # noqa: DTZ011 — the user's day
+        file=path.name,
+        fps=site.proposal.fps,
+        width=site.proposal.width,
+        height=site.proposal.height,
+    )
+    return head + "".join(_camera_text(camera, path) for camera in site.cameras)
+
+
+def write_site(site: NewSite, path: Path) -> Path | None:
+    """Write a site's configuration and passwords; an earlier file is kept.
+
+    Returns:
+        where the earlier file is now; None: there was none.
+
+    Raises:
+        UserError: something is invalid, or the files cannot be written.
+    """
+    text = site_text(site, path)
+    check_text(text, path)
+    _write_passwords(site.cameras, path)
+    return replace_file(text, path)
+
+
+def check_text(text: str, path: Path) -> Config:
+    """Check a configuration before it is written.
+
+    Raises:
+        UserError: it is invalid.
+    """
+    return build_config(yaml.safe_load(text), where=str(path), folder=path.parent)
+
+
+def replace_file(text: str, path: Path) -> Path | None:
+    """Write a file that only its owner can read; return where the earlier one is kept.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    kept = None
+    with atomic_file(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+        if path.exists():
+            kept = _free_path(path)
+            os.link(path, kept)  # so that at no moment there is no file
+    path.chmod(FILE)
+    return kept
+
+
+def password_file(path: Path, camera: str) -> Path:
+    """Return the file of a camera's password, relative to the folder of the configuration at ``path``."""
+    return Path(f"{path.stem}.passwords") / camera
+
+
+def _camera_text(camera: NewCamera, path: Path) -> str:
+    address = camera.address
+    lines = f"  - id: {camera.id}\n    source: {_scalar(address.source)}"
+    lines += f"  # {camera.sends}\n" if camera.sends else "\n"
+    if address.password is not None:
+        lines += _FILE_LINE.format(file=_scalar(str(password_file(path, camera.id))))
+    if address.options:
+        lines += f"    options: {dump_yaml_inline(address.options)}\n"
+    return lines
+
+
+def _scalar(text: str) -> str:
+    """Return a text as YAML; quoted only where it must be."""
+    return dump_yaml_inline(text)
+
+
+def _write_passwords(cameras: Sequence[NewCamera], path: Path) -> None:
+    secret = {camera.id: camera.address.password for camera in cameras if camera.address.password is not None}
+    if not secret:
+        return
+    try:
+        for camera, password in secret.items():
+            file = path.parent / password_file(path, camera)
+            make_private_folder(file.parent)
+            write_private(file, f"{password}\n".encode())
+            file.chmod(FILE)
+    except OSError as error:
+        raise UserError(f"{path}: cannot write the passwords beside it: {error.strerror}") from error
+
+
+def _free_path(path: Path) -> Path:
+    """Return a free path for the earlier file, with the time in its name."""
+    now = dt.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 — the user's clock
+    names = (f"{path.stem}.{now}{more}{path.suffix}" for more in ("", *(f"-{n}" for n in range(2, 1000))))
+    return next(free for name in names if not (free := path.with_name(name)).exists())
+
+
+def content_of(text: str) -> dict[str, Any]:
+    """Return the sections of a configuration text."""
+    content = yaml.safe_load(text)
+    return content if isinstance(content, dict) else {}

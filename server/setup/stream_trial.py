@@ -1,0 +1,93 @@
+"""Trial of a source: opens it, measures what it sends, and takes a picture."""
+
+from __future__ import annotations
+
+import time
+
+import av
+import cv2
+import numpy as np
+from av.video.frame import VideoFrame
+
+from server.camera.sources.opening import OpenedVideo, open_video
+from server.camera.sources.orientation import parse_orientation, pixel_aspect
+from server.setup.trial_messages import StreamRequest, StreamTrial
+from server.system.address_redaction import redact_to_host
+from server.system.errors import UserError
+
+_OPEN_S, _READ_S = 8.0, 5.0
+_WATCHED_S = 1.5
+_LEAST_PICTURES = 8
+"""Pictures from which a rate is computed."""
+_LONGEST_S = 6.0
+_PICTURE_WIDTH = 480
+_QUALITY = 80
+_RATES = (5, 6, 7.5, 8, 10, 12, 12.5, 15, 20, 24, 25, 30, 50, 60)
+"""Usual rates, to which a measured one is rounded."""
+_NEARLY = 0.04
+
+
+def run_trial(request: StreamRequest) -> StreamTrial:
+    """Open a source and return what it sends, or why nothing arrives."""
+    name = redact_to_host(request.source)
+    try:
+        opened = open_video(request.source, request.options, (_OPEN_S, _READ_S))
+    except UserError as error:
+        return StreamTrial(error=str(error).removeprefix(f"{name}: "))
+    try:
+        return _watch(opened)
+    finally:
+        opened.container.close()
+
+
+def _watch(opened: OpenedVideo) -> StreamTrial:
+    times, arrivals = list[float](), list[float]()
+    picture: VideoFrame | None = None
+    size_bytes, began = 0, time.monotonic()
+    try:
+        for packet in opened.container.demux(opened.stream):
+            size_bytes += packet.size or 0
+            try:
+                pictures = [frame for frame in packet.decode() if isinstance(frame, VideoFrame)]
+            except av.error.FFmpegError:
+                pictures = []  # damaged; the next keyframe repairs it
+            for picture in pictures:
+                arrivals.append(time.monotonic())
+                times += [] if picture.time is None else [picture.time]
+            seconds = time.monotonic() - began
+            if seconds > _LONGEST_S or (seconds > _WATCHED_S and len(arrivals) >= _LEAST_PICTURES):
+                break
+    except (av.error.FFmpegError, OSError):
+        pass  # it stopped sending: what was received counts
+    if picture is None:
+        return StreamTrial(error="it was opened, but sends no picture that can be decoded")
+    orientation = parse_orientation(picture, pixel_aspect(opened.stream))
+    width, height = orientation.size((picture.width, picture.height))
+    # Arrivals only where there are no times: what waited in buffers arrives at once.
+    times = times if len(times) > 1 else arrivals
+    span = times[-1] - times[0]
+    fps = (len(times) - 1) / span if len(times) >= _LEAST_PICTURES and span > 0 else 0.0
+    return StreamTrial(
+        width=width,
+        height=height,
+        fps=usual_rate(fps) if fps else 0.0,
+        codec=opened.stream.codec_context.name,
+        kbps=round(8 * size_bytes / span / 1000) if span > 0 else 0.0,
+        has_sound=bool(opened.container.streams.audio),
+        picture=_jpeg(orientation.image(picture)),
+    )
+
+
+def usual_rate(fps: float) -> float:
+    """Return the usual rate that a measured one is close to, else the measured one with one decimal."""
+    nearest = min(_RATES, key=lambda rate: abs(rate - fps))
+    return float(nearest) if abs(nearest / fps - 1) < _NEARLY else round(fps, 1)
+
+
+def _jpeg(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> bytes:
+    height, width = image.shape[:2]
+    if width > _PICTURE_WIDTH:
+        size = (_PICTURE_WIDTH, max(1, round(height * _PICTURE_WIDTH / width)))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    is_encoded, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    return np.asarray(jpeg).tobytes() if is_encoded else b""

@@ -1,0 +1,142 @@
+"""Cameras are asked for their streams and tried over real RTSP; hostile ones harm nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from fakes.media.rtsp_camera import RtspCamera
+from fakes.service.scripted_cameras import encoded
+from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
+from server.setup.onvif_profiles import INSTALL, query_profiles, stream_address
+from server.setup.session import SetupSession
+from server.setup.trial_messages import ProfilesRequest
+from server.system.errors import UserError
+
+LOGIN = ("viewer", "p@ss:/w ord")
+FPS = 12.5
+pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
+
+
+@contextmanager
+def rtsp() -> Iterator[RtspCamera]:
+    units = encoded(0, 40)
+    camera = RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], FPS, login=LOGIN, live=True)
+    try:
+        yield camera
+    finally:
+        camera.close()
+
+
+async def test_a_found_camera_is_asked_tried_named_and_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = SetupSession(tmp_path / "site.yaml")
+    with rtsp() as stream:
+        reported = stream.url.replace("127.0.0.1", "10.99.99.99")  # as behind a router
+        profiles = [FakeProfile("sub", reported, 32, 24, 12), FakeProfile("main", reported, 64, 48, 12)]
+        camera = OnvifCamera("front door", profiles, LOGIN)
+        with onvif_cameras(camera) as targets:
+            monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+            (found,) = await session.discover(1.0)
+            refused, _ = await session.profiles(found.host, found.port, "viewer", "wrong")
+            answer, keys = await session.profiles(found.host, found.port, *LOGIN)
+        assert refused.needs_password
+        assert "password" in refused.error
+        assert [(profile.name, profile.width) for profile in answer.profiles] == [("main", 64), ("sub", 32)]
+        tried = await session.try_stream(keys[0], found.name)
+        with pytest.raises(UserError, match="in the list already"):
+            await session.try_stream(keys[1])
+        with pytest.raises(UserError, match="401") as unauthorized:
+            await session.try_address(f"{stream.url}/sub", "viewer", "wr0ng")
+    assert "wr0ng" not in str(unauthorized.value)
+    assert (tried.name, tried.sends) == ("front-door", "h264 64x48, 12.5 fps")
+    assert tried.trial.picture.startswith(b"\xff\xd8")
+    session.rename(tried.key, "door")
+    session.write("hall", session.proposal)
+    assert "rtsp://viewer:{password}@127.0.0.1" in session.path.read_text()
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"",
+        b"<html>no</html>",
+        b"\xff" * 4096,
+        b'<!DOCTYPE x [<!ENTITY a "' + b"a" * 9999 + b'"><!ENTITY b "' + b"&a;" * 9999 + b'">]><x>&b;</x>',
+        b"<x>" * 100_000,
+        b"x" * 50_000_000,
+    ],
+    ids=["empty", "html", "bytes", "entities", "depth", "length"],
+)
+def test_a_camera_that_answers_nonsense_is_one_line(answer: bytes) -> None:
+    camera = OnvifCamera("door", [], answer=answer)
+    with onvif_cameras(camera):
+        found = query_profiles(ProfilesRequest("127.0.0.1", camera.port, *LOGIN))
+    assert found.error
+    assert len(found.error.splitlines()) == 1
+    assert not found.profiles
+
+
+@pytest.mark.parametrize("sent", [b"", b"RTSP/1.0 200 OK\r\n\r\n", b"HTTP/1.1 200 OK\r\n\r\n" + b"\0" * 5000])
+async def test_a_source_that_sends_nonsense_is_one_line(tmp_path: Path, sent: bytes) -> None:
+    session = SetupSession(tmp_path / "site.yaml")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        threading.Thread(target=_answer, args=(server, sent), daemon=True).start()
+        port = server.getsockname()[1]
+        with pytest.raises(UserError, match=f"127.0.0.1:{port}/\\.\\.\\.: ") as refused:
+            await session.try_address(f"rtsp://127.0.0.1:{port}/live", "viewer", "s3cret")
+    assert "s3cret" not in str(refused.value)
+    assert session.cameras == []
+
+
+def _answer(server: socket.socket, sent: bytes) -> None:
+    while True:
+        try:
+            client, _ = server.accept()
+        except OSError:
+            return
+        with client:
+            client.recv(4096)
+            client.sendall(sent)
+
+
+async def test_only_found_cameras_get_a_password_and_only_few_are_tried_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.setup.session._MAX_WAITING", 2)
+    session = SetupSession(tmp_path / "site.yaml")
+    with pytest.raises(UserError, match="search again"):
+        await session.profiles("10.0.0.1", 80, *LOGIN)
+    with pytest.raises(UserError, match="ask the camera again"):
+        await session.try_stream(7)
+    addresses = [session.try_address(f"rtsp://127.0.0.1:{port}/", "", "") for port in range(1, 6)]
+    problems = await asyncio.gather(*addresses, return_exceptions=True)
+    assert sum("too many" in str(problem) for problem in problems) == 3
+
+
+@pytest.mark.parametrize(
+    ("address", "local"),
+    [
+        ("rtsp://u:p@10.0.0.9:8554/a?b=1", "rtsp://10.0.0.1:8554/a?b=1"),
+        ("rtsp://10.0.0.9/a", "rtsp://10.0.0.1/a"),
+        ("http://10.0.0.9/a", None),
+        ("file:///etc/passwd", None),
+        ("rtsp://[/", None),
+        ("rtsp://h:99999/", None),
+        ("rtsp://h/\n", None),
+    ],
+)
+def test_a_stream_is_taken_from_the_camera_that_was_asked(address: str, local: str | None) -> None:
+    assert stream_address(address, "10.0.0.1") == local
+
+
+def test_without_the_library_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.setup.onvif_profiles.is_installed", lambda: False)
+    assert query_profiles(ProfilesRequest("127.0.0.1", 80)).error == INSTALL
