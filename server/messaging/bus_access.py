@@ -12,7 +12,8 @@ from server.messaging.messages import ZenohKeys
 
 SETTING = "zenoh.users"
 _SEND = ["put", "delete", "liveliness_token"]
-_SUBSCRIBE = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
+_WATCH = ["declare_liveliness_subscriber", "liveliness_query"]
+_SUBSCRIBE = ["declare_subscriber", *_WATCH]
 _FORWARD = [*_SEND, "declare_subscriber"]
 """What the router forwards: messages, liveliness tokens, and subscriptions."""
 _COMMANDS = ("position_corrections", "identities", "end_received")
@@ -39,22 +40,22 @@ def build_access_control(
     """Build zenoh's ``access_control``; everything not allowed is denied.
 
     A camera publishes under its own key, and the site's audio if it is the audio camera. It receives the
-    other cameras' detections, and the best-view services' messages to it.
-    Other best-view services may do everything. Any other user may subscribe to everything and send nothing.
+    other cameras' detections, and the best-view services' messages to it, but not their choices, which tell
+    where everybody is. Other best-view services may do everything. Any other user may subscribe to everything
+    and send nothing.
     """
     keys = ZenohKeys(site)
     everything = f"myview/{site}/**"
-    detections, peer_listeners, services = (
-        keys.camera("*", "detections"),
-        keys.camera("*", "peer_listener"),
-        keys.bestview("**"),
-    )
+    detections = [keys.camera("*", "detections")]
+    alive = [keys.camera("*", "peer_listener"), keys.bestview("**")]
     rules = [
         _rule("services", "both", [*_SEND, *_SUBSCRIBE], [everything]),
         _rule("may subscribe to all", "ingress", _SUBSCRIBE, [everything]),
         _rule("receives all", "egress", _FORWARD, [everything]),
-        _rule("may subscribe to peers", "ingress", _SUBSCRIBE, [detections, peer_listeners, services]),
-        _rule("receives peers", "egress", _SEND, [detections, peer_listeners, services]),
+        _rule("may subscribe to peers", "ingress", ["declare_subscriber"], detections),
+        _rule("receives peers", "egress", ["put", "delete"], detections),
+        _rule("may watch peers and services", "ingress", _WATCH, alive),
+        _rule("watches peers and services", "egress", ["liveliness_token"], alive),
         _rule("learns subscriptions", "egress", ["declare_subscriber"], [everything]),
         _rule(
             "may not command cameras",
@@ -87,6 +88,8 @@ def build_access_control(
             "may not command cameras",
             "may subscribe to peers",
             "receives peers",
+            "may watch peers and services",
+            "watches peers and services",
             "learns subscriptions",
         ]
         policies.append({"rules": camera_rules, "subjects": [f"camera {camera}"]})

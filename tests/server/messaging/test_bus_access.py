@@ -112,6 +112,37 @@ async def test_a_camera_publishes_under_its_own_key_only(settings: ZenohSettings
         )
 
 
+async def test_a_camera_receives_detections_of_others_and_nothing_else_of_them_or_the_service(
+    settings: ZenohSettings,
+) -> None:
+    received, alive, peers = ReceivedTexts(), asyncio.Event(), asyncio.Event()
+    with open_sessions(
+        lambda: router(settings),
+        lambda: Bus.peer_listener(settings, "c0"),
+        lambda: Bus.client(settings, "c1"),
+    ) as (bestview, c0, c1):
+        for key in ("**", SITE.bestview("choices"), SITE.sound, SITE.camera("c1", "video")):
+            c0.subscribe(key, received)
+        c0.subscribe(SITE.camera("*", "detections"), received)
+        c0.watch_alive(SITE.bestview("**"), lambda *_: alive.set())
+        c0.watch_alive(SITE.camera("*", "peer_listener"), lambda *_: peers.set())
+        bestview.declare_alive(SITE.bestview("alive"))
+        c1.declare_alive(SITE.camera("c1", "peer_listener"))
+
+        def send_all() -> None:
+            bestview.publish(SITE.bestview("choices"), b"choices")
+            bestview.publish(SITE.sound, b"sound")
+            for topic in ("video", "tracks", "status", "detections"):
+                c1.publish(SITE.camera("c1", topic), topic.encode())
+
+        for _ in range(10):  # time enough for everything to arrive
+            received.texts.clear()
+            await received.until("c1/detections detections", send_all)
+        assert set(received.texts) == {"c1/detections detections"}
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.gather(alive.wait(), peers.wait())
+
+
 async def test_audio_is_published_by_the_audio_camera_only(settings: ZenohSettings) -> None:
     received = ReceivedTexts()
     with open_sessions(
