@@ -13,6 +13,7 @@ import aiohttp
 import typer
 
 from server.cli.generated_config import demo_config, free_port
+from server.config.site_config import Config
 from server.supervisor.startup_checks import check_port_free
 from server.supervisor.supervisor import Supervisor
 from server.system.processors import available_processors
@@ -48,7 +49,7 @@ async def run_demo(
     with tempfile.TemporaryDirectory(prefix="myview-demo-") as folder:
         path, config = demo_config(Path(folder), http_port, fps or demo_fps(processors))
         typer.echo(_rate_line(config.site.fps, processors))
-        supervisor = asyncio.create_task(Supervisor(path, config, {}, None).run())
+        supervisor = asyncio.create_task(_run(path, config))
         announcement = asyncio.create_task(
             _announce(f"http://127.0.0.1:{http_port}/", open_browser=open_browser)
         )
@@ -60,6 +61,15 @@ async def run_demo(
             for task in (announcement, supervisor):
                 task.cancel()
             await asyncio.gather(announcement, supervisor, return_exceptions=True)
+
+
+async def _run(path: Path, config: Config) -> None:
+    """Run the site, again when an operator restarts it."""
+    while True:
+        supervisor = Supervisor(path, config, {}, None)
+        await supervisor.run()
+        if not supervisor.restart_wanted:
+            return
 
 
 def _rate_line(fps: float, processors: float) -> str:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from server.config.running_config import ActiveConfig
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")]
+_DEFAULT_CONFIG = Path("site.yaml")
 _UP_RELEASE_S = 1.9
 """Longer than the release time of child processes."""
 LogFolder = Annotated[
@@ -92,21 +93,35 @@ def rtsp(config: ConfigPath) -> None:
 
 
 def up(
-    config: ConfigPath,
+    config: Annotated[
+        Path | None,
+        typer.Argument(metavar="[CONFIG]", help="The site's configuration; site.yaml, if there is one."),
+    ] = None,
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="HTTP port, instead of the configuration's.")
     ] = None,
     out: LogFolder = None,
+    setup: Annotated[
+        bool, typer.Option("--setup", help="First set the site up in a browser, even if it has a file.")
+    ] = False,
 ) -> None:
-    """Run a whole site on this machine: every process, watched and restarted."""
+    """Run a whole site on this machine: every process, watched and restarted.
+
+    Without a configuration, the site is first set up in a browser.
+    """
     from server.supervisor.rtsp_process import check_gateway_installed
     from server.supervisor.site import check_exposure, run_up
     from server.supervisor.startup_checks import check_ports, check_sources_open
 
     log_to_stderr("up")
+    path = _DEFAULT_CONFIG if config is None else config
+    if setup or (config is None and not path.exists()):
+        from server.cli.setup_page import set_up_in_page
+
+        port = set_up_in_page(path, port)
     environment = {} if port is None else {"MYVIEW_HTTP__PORT": str(port)}
     os.environ.update(environment)
-    running = _read(config)
+    running = _read(path)
     if out is not None:
         check_output_folder(out)
     check_exposure(running.now)
@@ -120,7 +135,7 @@ def up(
 def init(
     config: Annotated[
         Path, typer.Argument(metavar="[CONFIG]", help="The file to write; an earlier one is kept beside it.")
-    ] = Path("site.yaml"),
+    ] = _DEFAULT_CONFIG,
     search: Annotated[
         float, typer.Option(min=0, max=60, help="Seconds to search for cameras; 0: only addresses.")
     ] = 3.0,

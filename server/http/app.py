@@ -24,7 +24,7 @@ from server.http.api import openapi, recordings
 from server.http.api import routes as api
 from server.http.api.events import EVENTS, Events
 from server.http.api.shard_redirect import redirect_to_shard
-from server.http.app_keys import ON_DISK, SERVICE
+from server.http.app_keys import CONTROL, ON_DISK, SERVICE, SiteControl
 from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
 from server.http.connections.connection_limiter import ConnectionLimiter, ConnectionLimits
 from server.http.connections.listener import Listener
@@ -67,7 +67,9 @@ _ROUTES = (
 
 
 def make_app(
-    service: BestViewService, on_disk: Callable[[], ConfigFileState] = lambda: ConfigFileState("", ())
+    service: BestViewService,
+    on_disk: Callable[[], ConfigFileState] = lambda: ConfigFileState("", ()),
+    control: SiteControl | None = None,
 ) -> web.Application:
     """Build the application on top of a service; ``on_disk`` returns how the configuration file differs.
 
@@ -87,6 +89,7 @@ def make_app(
         client_max_size=_BODY_MAX_BYTES,
     )
     app[SERVICE], app[ON_DISK], app[FAILURES] = service, on_disk, LogThrottle()
+    app[CONTROL] = control or SiteControl()
     app[EVENTS], app[TRAFFIC] = Events(service), Traffic()
     app[VIEWER_SLOTS], app[EVENT_SLOTS] = FairShare(), FairShare()
     app[HLS_SESSIONS] = HlsSessions(service.streams.segment_plan.target_s, app[VIEWER_SLOTS])

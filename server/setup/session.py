@@ -61,6 +61,8 @@ class SetupSession:
     cameras: list[TriedCamera] = field(default_factory=list)
     kept: Path | None = None
     """Where the earlier file is, after writing."""
+    written: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set when the configuration is written."""
     _streams: dict[int, CameraAddress] = field(default_factory=dict)
     """Streams that cameras offered, by key, with their passwords."""
     _keys: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
@@ -192,3 +194,4 @@ class SetupSession:
             raise UserError("add a camera first")
         cameras = [NewCamera(camera.name, camera.address, camera.sends) for camera in self.cameras]
         self.kept = write_site(NewSite(name, chosen, cameras), self.path)
+        self.written.set()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import os
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,18 +95,18 @@ def check_text(text: str, path: Path) -> Config:
 
 
 def replace_file(text: str, path: Path) -> Path | None:
-    """Write a file that only its owner can read; return where the earlier one is kept.
+    """Write a file; return where the earlier one, whose mode it gets, is kept. A new one is private.
 
     Raises:
         UserError: it cannot be written.
     """
-    kept = None
+    kept, mode = None, FILE
     with atomic_file(path) as draft:
         draft.write_text(text, encoding="utf-8")
         if path.exists():
-            kept = _free_path(path)
+            kept, mode = _free_path(path), stat.S_IMODE(path.stat().st_mode)
             os.link(path, kept)  # so that at no moment there is no file
-    path.chmod(FILE)
+    path.chmod(mode)
     return kept
 
 

@@ -9,13 +9,22 @@ from pathlib import Path
 from camsync import SyncError
 from server.config.running_config import ActiveConfig
 from server.http.app import make_app, serving
+from server.http.app_keys import SiteControl
 from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.supervisor.exposure_checks import check_bus, check_viewers
+from server.supervisor.shutdown import EXIT_RESTART, is_supervised
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_signal import signal_started
 from server.supervisor.synthetic_homographies import add_synthetic_homographies
 from server.system.errors import UnavailableError, UserError
+
+
+class RestartError(UserError):
+    """All processes of the site are to start again; the supervisor does so."""
+
+    code = EXIT_RESTART
+
 
 log = logging.getLogger(__name__)
 
@@ -34,16 +43,38 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
         pipeline.open_bus()
-        async with serving(make_app(BestViewService(pipeline), running.on_disk), config.http) as port:
+        control = SiteControl(running.path, asyncio.Event() if is_supervised() else None)
+        app = make_app(BestViewService(pipeline), running.on_disk, control)
+        async with serving(app, config.http) as port:
             scheme = "http" if config.http.tls.key is None else "https"
             log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)
             signal_started()
-            await pipeline.run()
+            await _run_until_restart(pipeline, control.restart)
     except SyncError as error:
         raise UnavailableError(f"bestview: {error}") from error
     finally:
         reload_task.cancel()
         pipeline.close()
+
+
+async def _run_until_restart(pipeline: BestViewPipeline, restart: asyncio.Event | None) -> None:
+    """Run the service until it has nothing left to do.
+
+    Raises:
+        RestartError: an operator wants all processes to start again.
+    """
+    run = asyncio.create_task(pipeline.run(), name="service")
+    wanted = asyncio.create_task((restart or asyncio.Event()).wait(), name="restart")
+    try:
+        await asyncio.wait({run, wanted}, return_when=asyncio.FIRST_COMPLETED)
+        if run.done():
+            run.result()
+            return
+        raise RestartError("an operator restarts the site")
+    finally:
+        for task in (run, wanted):
+            task.cancel()
+        await asyncio.gather(run, wanted, return_exceptions=True)
 
 
 async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:

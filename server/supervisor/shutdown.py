@@ -20,8 +20,15 @@ SUPERVISED_VARIABLE = "MYVIEW_SUPERVISED"
 """Set in the environment of a supervised process."""
 EXIT_FINISHED = 4
 """Exit code of a supervised process that has nothing left to do; 0: it was terminated."""
+EXIT_RESTART = 5
+"""Exit code of a supervised best-view service whose operator wants all processes to start again."""
 _RELEASE_S = 1.2
 """Time limit for releasing everything after a signal; a silent camera would block for longer."""
+
+
+def is_supervised() -> bool:
+    """Return whether this process belongs to a supervisor, which starts it again."""
+    return bool(os.environ.get(SUPERVISED_VARIABLE))
 
 
 async def run_until_signal(
@@ -68,7 +75,7 @@ def run_process(
     camera may block a thread.
     """
     finished = asyncio.run(run_until_signal(main, lambda: _end_after(release_s), end_on_sighup=end_on_sighup))
-    if finished and os.environ.get(SUPERVISED_VARIABLE):
+    if finished and is_supervised():
         sys.exit(EXIT_FINISHED)
 
 

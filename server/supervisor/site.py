@@ -20,7 +20,7 @@ from server.config.site_config import Config
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_rtsp, check_viewers
 from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
-from server.supervisor.startup_checks import check_source_opens
+from server.supervisor.startup_checks import check_source_opens, check_sources_open
 from server.supervisor.supervisor import Supervisor
 from server.system.errors import UserError
 
@@ -33,9 +33,26 @@ _RESTART_INTERVAL_S = 4.0
 async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Path | None) -> None:
     """Run a site until the best-view service has nothing left to do, or this task is cancelled.
 
+    When an operator wants it, all processes start again, with the file's configuration.
+
     Raises:
         UserError: a process refused its input.
     """
+    while await _run_once(running, environment, out):
+        try:
+            wanted = await asyncio.to_thread(running.read_config_to_activate)
+            check_exposure(wanted)
+            await asyncio.to_thread(check_sources_open, wanted)
+        except UserError as error:
+            log.warning("%s; the previous configuration stays in force", error)
+        else:
+            running.now = wanted
+        out = None  # its folder belongs to the first run
+        log.info("all processes start again")
+
+
+async def _run_once(running: ActiveConfig, environment: Mapping[str, str], out: Path | None) -> bool:
+    """Run all processes until the site ends; return whether it is to start again."""
     with _folder() as folder:
         active_file, write_failures = Path(folder) / "site.yaml", LogThrottle()
         # Rewritten before each start: old temporary files may be deleted while a site runs for months.
@@ -55,6 +72,7 @@ async def run_up(running: ActiveConfig, environment: Mapping[str, str], out: Pat
         finally:
             reload_task.cancel()
             await asyncio.gather(reload_task, return_exceptions=True)
+        return supervisor.restart_wanted
 
 
 def check_exposure(config: Config) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.site_config import Config
-from server.supervisor.shutdown import EXIT_FINISHED, SUPERVISED_VARIABLE
+from server.supervisor.shutdown import EXIT_FINISHED, EXIT_RESTART, SUPERVISED_VARIABLE
 from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
 from server.system.child_process import start_cli_command
 from server.system.errors import UserError
@@ -54,7 +54,8 @@ class Supervisor:
     """Starts one process each for the pulses, every camera and the best view, and restarts those that die.
 
     A camera whose recording is over exits with `EXIT_FINISHED` and is not restarted; when the best-view
-    service does, the whole site ends. ``before_start`` is called whenever a process is about to be started.
+    service does, the whole site ends, and so it does when that service exits with `EXIT_RESTART`.
+    ``before_start`` is called whenever a process is about to be started.
 
     The best view and the pulse server start first. Then the cameras, of which only as many load at a time as
     there are processors: the site answers meanwhile.
@@ -81,6 +82,8 @@ class Supervisor:
         ]
         gateway = [Child("rtsp", ["rtsp", path], first[:1])] if config.rtsp.enabled else []
         self.children = [*first, *gateway, *cameras]
+        self.restart_wanted = False
+        """Whether the site ended because an operator wants it to start again."""
 
     async def run(self) -> None:
         """Run everything until the best-view service has nothing left to do, or this task is cancelled.
@@ -116,6 +119,10 @@ class Supervisor:
                 started = loop.time()
                 process = await self._start(child)
             code = await process.wait()
+            if code == EXIT_RESTART:
+                self.restart_wanted = True
+                child.done.set()
+                return
             if code == EXIT_FINISHED:
                 log.info("%s has ended", child.name)
                 child.done.set()

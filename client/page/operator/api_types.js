@@ -32,6 +32,11 @@
  * @property {{text: string, at: number} | null} last_error
  * @property {CameraPicture | null} picture
  *
+ * @typedef {object} RestartStatus /api/operator/restart
+ * @property {boolean} possible
+ * @property {string} error why the configuration file cannot be used; empty: it can
+ * @property {string[]} changed_keys settings of the file that are not in force
+ *
  * @typedef {object} PulseClients /api/operator/pulses
  * @property {string} server
  * @property {string} error

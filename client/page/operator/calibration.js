@@ -37,9 +37,13 @@ export class CalibrationWalk {
   #state = element('walk-state');
   #shownResult = '';
 
-  /** @param {ShowError} showError */
-  constructor(showError) {
+  /**
+   * @param {ShowError} showError
+   * @param {() => Promise<void>} fileChanged called when the result was written into the configuration
+   */
+  constructor(showError, fileChanged) {
     this.showError = showError;
+    this.fileChanged = fileChanged;
     this.#repeater = new Repeater(async () => this.#show(await requestOperator('walk')), INTERVAL_MS, showError);
     this.#start.addEventListener('click', () => void this.#request('POST', { action: 'start' }));
     this.#finish.addEventListener('click', () => {
@@ -47,6 +51,11 @@ export class CalibrationWalk {
     });
     this.#resume.addEventListener('click', () => void this.#request('POST', { action: 'resume' }));
     this.#discard.addEventListener('click', () => void this.#request('DELETE'));
+    element('walk-apply').addEventListener('click', async () => {
+      if (!(await this.#request('POST', { action: 'apply' }))) return;
+      setText(this.#state, 'Written into the configuration; the earlier file is kept beside it.');
+      await this.fileChanged();
+    });
     element('walk-copy').addEventListener('click', async () => {
       const copied = await copy(this.#lines.value);
       setText(this.#state, copied ? 'Copied.' : 'Select the lines and copy them.');
@@ -65,13 +74,16 @@ export class CalibrationWalk {
   /**
    * @param {'POST' | 'DELETE'} method
    * @param {object} [content]
+   * @returns {Promise<boolean>} whether it was accepted
    */
   async #request(method, content) {
     try {
       this.#show(await requestOperator('walk', method, content));
       this.showError(null);
+      return true;
     } catch (error) {
       this.showError(error);
+      return false;
     }
   }
 

@@ -14,6 +14,7 @@ import { ZoneEditor } from './zones.js';
 import { PeopleEditor } from './people_editor.js';
 import { CalibrationWalk } from './calibration.js';
 import { Palette } from '../people/palette.js';
+import { SiteRestart } from './site_restart.js';
 import { SignIn } from '../shared/sign_in.js';
 
 /** @import {Session, Site} from '../shared/api_types.js' */
@@ -72,12 +73,14 @@ function createSections(site) {
   sections.set('flags', flags);
   sections.set('downloads', downloads);
   sections.set('zones', new ZoneEditor(site, showError));
-  sections.set('calibration', new CalibrationWalk(showError));
+  const restart = new SiteRestart(showError);
+  sections.set('calibration', new CalibrationWalk(showError, () => restart.check()));
   sections.set('view-selection', new ViewSelectionForm(showError));
   sections.set('configuration', new ConfigurationTable(showError));
   new ServerEvents({
     opened: () => {
       showError(null);
+      void restart.check();
       flags.open(); // a restarted service has other flags
     },
     lost: () => showError(new Error('Connection lost; retrying.')),

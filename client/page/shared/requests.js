@@ -35,12 +35,13 @@ export async function getJson(path) {
  * @param {string} name below api/operator/
  * @param {'GET' | 'POST' | 'PUT' | 'DELETE'} [method]
  * @param {object} [content] the request's JSON
+ * @param {number} [timeoutMs]
  * @returns {Promise<any>}
  * @throws {HttpError} with the server's error message
  * @throws {Error} the server does not answer
  */
-export function requestOperator(name, method = 'GET', content) {
-  return requestJson(`api/operator/${name}`, method, content);
+export function requestOperator(name, method = 'GET', content, timeoutMs = OPERATOR_TIMEOUT_MS) {
+  return requestJson(`api/operator/${name}`, method, content, timeoutMs);
 }
 
 /**
@@ -49,12 +50,13 @@ export function requestOperator(name, method = 'GET', content) {
  * @param {string} path relative to the page
  * @param {'GET' | 'POST' | 'PUT' | 'DELETE'} [method]
  * @param {object} [content] the request's JSON
+ * @param {number} [timeoutMs]
  * @returns {Promise<any>}
  * @throws {HttpError} with the server's error message
  * @throws {Error} the server does not answer
  */
-export async function requestJson(path, method = 'GET', content) {
-  const response = await send(path, method, content);
+export async function requestJson(path, method = 'GET', content, timeoutMs = OPERATOR_TIMEOUT_MS) {
+  const response = await send(path, method, content, timeoutMs);
   const answer = await response.json().catch(() => ({}));
   if (!response.ok) throw new HttpError(answer.error ?? `The server answers ${response.status}.`, response.status);
   return answer;
@@ -63,16 +65,17 @@ export async function requestJson(path, method = 'GET', content) {
 /**
  * @param {string} path
  * @param {string} method
- * @param {object} [content]
+ * @param {object | undefined} content
+ * @param {number} timeoutMs
  */
-async function send(path, method, content) {
+async function send(path, method, content, timeoutMs) {
   try {
     return await fetch(path, {
       method,
       cache: 'no-store',
       headers: method === 'GET' ? {} : { 'X-MyView-Changes': '1', 'Content-Type': 'application/json' },
       body: content && JSON.stringify(content),
-      signal: AbortSignal.timeout(OPERATOR_TIMEOUT_MS),
+      signal: AbortSignal.timeout(timeoutMs),
     });
   } catch {
     throw new Error('The server does not answer.');

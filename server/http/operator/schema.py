@@ -37,6 +37,17 @@ class Settings(msgspec.Struct, frozen=True):
     """Keys in which the file differs from the configuration in force."""
 
 
+class RestartStatus(msgspec.Struct, frozen=True):
+    """Whether the site can be restarted here, and what that would bring into force."""
+
+    possible: bool
+    """Whether a supervisor (`myview up`) would start the processes again."""
+    error: str
+    """Why the configuration file cannot be used; empty: it can."""
+    changed_keys: list[str]
+    """Settings of the file that are not in force."""
+
+
 class SelectionSettings(msgspec.Struct, frozen=True):
     """View-selection settings by key, such as switch_cost_s and quality.size."""
 
@@ -89,6 +100,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/people": IdentityOverrides,
     "/api/operator/position_corrections": CorrectionStatus,
     "/api/operator/config": Settings,
+    "/api/operator/restart": RestartStatus,
     "/api/operator/view_selection": SelectionSettings,
 }
 """The answer to GET of each path; POST, PUT and DELETE answer with the new state."""

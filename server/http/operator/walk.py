@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated, Literal
 
 import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
-from server.http.app_keys import SERVICE
+from server.http.app_keys import CONTROL, SERVICE
 from server.http.json_responses import error_response, json_response, read_json
+from server.setup.ground import apply_ground
+from server.system.errors import UserError
 
 routes = web.RouteTableDef()
+
+_NO_FILE = "this service has no configuration file"
 
 
 class WalkCommand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A command to the calibration walk."""
 
-    action: Literal["start", "resume", "finish"]
+    action: Literal["start", "resume", "finish", "apply"]
     person: Annotated[float, msgspec.Meta(ge=0.1, le=1000)] = 1.75
     """With finish: the height of the person who walked, in meters."""
 
@@ -30,7 +35,7 @@ async def get_walk(request: web.Request) -> web.Response:
 
 @routes.post(f"{OPERATOR_PATH}/walk")
 async def post_walk(request: web.Request) -> web.Response:
-    """Start or resume a walk, or finish it and calibrate from it."""
+    """Start or resume a walk, finish it and calibrate from it, or write the result into the configuration."""
     calibration = request.app[SERVICE].calibration
     command = await read_json(request, WalkCommand)
     match command.action:
@@ -40,6 +45,14 @@ async def post_walk(request: web.Request) -> web.Response:
             calibration.resume()
         case "finish":
             calibration.finish(command.person)
+        case "apply":
+            ground, path = calibration.ground_file(), request.app[CONTROL].path
+            if ground is None or path is None:
+                return error_response(409, "there is no calibration result yet" if path else _NO_FILE)
+            try:
+                await asyncio.to_thread(apply_ground, path, ground.decode())
+            except UserError as error:
+                return error_response(409, str(error))
     return json_response(calibration.status())
 
 

@@ -13,7 +13,7 @@ import pytest
 from fakes.service.scripted_cameras import CAMERAS, small_config
 from fakes.timeouts import PATIENCE
 from server.supervisor import supervisor
-from server.supervisor.shutdown import EXIT_FINISHED
+from server.supervisor.shutdown import EXIT_FINISHED, EXIT_RESTART
 from server.supervisor.startup_signal import STARTED_FD_VARIABLE
 from server.supervisor.supervisor import Supervisor
 from server.system.errors import UserError
@@ -60,6 +60,7 @@ class Machine:
         self.loads_at_once = True
         self.started: asyncio.Queue[Process] = asyncio.Queue()
         self.task: asyncio.Task[None] | None = None
+        self.supervisor: Supervisor | None = None
 
     async def start(self, *command: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
         assert env[STARTED_FD_VARIABLE] == str(pass_fds[0])
@@ -88,8 +89,8 @@ class Machine:
         before_start: Callable[[], None] = lambda: None,
         cameras: tuple[str, ...] = CAMERAS,
     ) -> asyncio.Task[None]:
-        supervisor = Supervisor(Path("site.yaml"), small_config(cameras=cameras), {}, out, before_start)
-        self.task = asyncio.create_task(supervisor.run())
+        self.supervisor = Supervisor(Path("site.yaml"), small_config(cameras=cameras), {}, out, before_start)
+        self.task = asyncio.create_task(self.supervisor.run())
         return self.task
 
 
@@ -202,6 +203,16 @@ async def test_a_finished_camera_is_not_restarted_and_a_finished_best_view_ends_
     await task
     assert machine.started.empty()
     assert processes["c1"].returncode == processes["sync"].returncode == -15
+
+
+async def test_the_site_ends_to_start_again_if_the_best_view_says_so(machine: Machine) -> None:
+    task = machine.run()
+    processes = await machine.processes(4)
+    processes["bestview"].end(EXIT_RESTART)
+    await task
+    assert machine.supervisor is not None
+    assert machine.supervisor.restart_wanted
+    assert all(process.returncode is not None for process in processes.values())
 
 
 async def test_a_process_that_refuses_its_input_at_the_start_ends_the_site(machine: Machine) -> None:
