@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -25,7 +25,9 @@ from server.service.ingest.epoch_aligner import Epoch, EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.ingest.loss_recorder import LossRecorder
 from server.service.joint_tracking.worker import JointWorker
+from server.service.metrics.delay_meter import DelayMeter
 from server.service.metrics.stage_timers import StageTimers
+from server.service.mode_publisher import ModePublisher
 from server.service.operator_assist.operator_assist import OperatorAssist
 from server.service.pulse_follower import PulseFollower
 from server.service.recording.recorder import Recorder
@@ -33,6 +35,7 @@ from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
+from server.service.view_selection.delay_modes import ModeDecision
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -55,7 +58,12 @@ class BestViewPipeline:
         fps, stride = config.site.fps, config.window.stride
         grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
         # Frames must still be buffered when the last camera that is waited for has reported.
-        frames = max(round(config.view.buffer_s * fps), backlog + 4 * (config.lookahead + grace + stride))
+        smooth = round(config.view.smooth_lookahead_s * fps) + config.gop
+        frames = max(
+            round(config.view.buffer_s * fps),
+            backlog + 4 * (config.lookahead + grace + stride),
+            backlog + 2 * (grace + stride) + smooth,
+        )
         self.max_lookahead = (frames - backlog) // 2 - grace - stride
         """The longest look-ahead, in frames, that can be set at run time: half of what the buffers allow."""
         self.stream_format = stream_format_for(
@@ -77,11 +85,13 @@ class BestViewPipeline:
         """Epochs that were not decided because decisions had fallen too far behind."""
         self._skip_log = LogThrottle()
         self.splicer = Splicer(self.frame_buffers, self.stream_format, config, self.audio_buffer)
+        meter = DelayMeter(self.pulses.seconds_since, self.frame_buffers.values(), fps)
+        self.mode_publisher = ModePublisher(self.splicer, meter)
         self.bus = BusConnection(config)
         self.ingest = Ingest(
             self.frame_buffers,
             self.aligner,
-            self.splicer.publish_frame,
+            self.mode_publisher.publish_frame,
             self.audio_buffer,
             audio_sender=config.audio_sender,
             current_pulse=lambda: self.pulses.newest,
@@ -156,6 +166,7 @@ class BestViewPipeline:
                     await self.decide_or_skip()
             for decision in self.finish():
                 self._publish(decision)
+            self._publish_modes(self.decider.modes.take(), live=False)
             log.info("every camera's recording has ended")
         finally:
             first_pulse_timeout.cancel()
@@ -279,9 +290,16 @@ class BestViewPipeline:
         with self.stage_timers.deciding():
             decisions = self.decider.step(epoch)
         self.state_replication.advance(epoch.last)  # before publishing, so that names are restored
+        others = self.decider.modes.take()
+        self._publish_modes(others, live=True)
         for decision in decisions:
             self._publish(decision)
+        self._publish_modes(others, live=False)
         self.assist.step(epoch, self.config)
+
+    def _publish_modes(self, decisions: Sequence[ModeDecision], *, live: bool) -> None:
+        merged = self.decider.people.registry.merged
+        self.mode_publisher.publish(decisions, merged, self._decision_writer, live=live)
 
     def _publish(self, decision: GopDecision) -> None:
         """Publish a GOP's choices, then its frames."""
@@ -290,6 +308,7 @@ class BestViewPipeline:
 
     def _send(self, decision: GopDecision) -> None:
         choices = self.decision_state.put(decision)
+        self.mode_publisher.usual(choices)
         self.recorder.put(choices, self.pulses.pulse0, self.state_replication.numbers_since)
         for callback in self.on_decision:
             callback(choices)

@@ -82,11 +82,13 @@ class Renderer:
         for epoch in self._aligner.take_ready(now=-1):
             for decision in self._decider.step(self._joint.step(epoch)):
                 self._write(decision)
+            self._write_views()
 
     def finish(self) -> RenderedPeople:
         """Decide and write the remaining GOPs; return all people."""
         for decision in self._decider.finish(max(self.ended.values())):
             self._write(decision)
+        self._write_views()
         self.close()
         write_site(self._folder, self._config, self._sizes)
         plot_choices(self._folder / "choices.csv", self._config.camera_ids, self._folder / "choices.png")
@@ -98,6 +100,10 @@ class Renderer:
         """Close all files; :meth:`finish` does it, too."""
         self._recorder.close()
         self._films.close()
+
+    def _write_views(self) -> None:
+        for decision in self._decider.modes.take():
+            self._recorder.write_views(decision)
 
     def _write(self, decision: GopDecision) -> None:
         self._recorder.write(decision)

@@ -83,6 +83,12 @@ class ViewSettings(Section):
     lookahead_s: Annotated[float, Field(gt=0, le=600)] = 1.0
     """Seconds that view selection looks ahead: N of the paper's section III; all of it is delay. By default a
     second, or as long as the tracks need."""
+    live_lag_s: Annotated[float, Field(ge=0, le=60)] = 0.2
+    """Delay live: seconds before a GOP whose frames no longer count for its view: tracking takes them."""
+    live_horizon_s: Annotated[float, Field(gt=0, le=60)] = 1.5
+    """Delay live: seconds for which the newest views are taken to stay; a cut must gain its cost in them."""
+    smooth_lookahead_s: Annotated[float, Field(gt=0, le=600)] = 3.0
+    """Delay smooth: its look-ahead, in whole GOPs more than `lookahead_s`; at least that."""
     switch_cost_s: Seconds = 0.3
     """λ: a cut costs as much as so many seconds of not seeing the person while another camera does; or twice
     as many of a view worth half the best one."""

@@ -41,6 +41,7 @@ _BY_ROUTE = {
     "/readyz": Permission.PUBLIC,
     SESSION_PATH: Permission.ANY_TOKEN,
     "/api/site": Permission.ANY_TOKEN,
+    "/api/delays": Permission.ANY_TOKEN,
     "/api/objects": Permission.ANY_TOKEN,
     "/api/cameras": Permission.ANY_TOKEN,
     "/api/events": Permission.ANY_TOKEN,

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import Scope
-from server.http.api.responses import cameras_info, objects_info, site_info
+from server.http.api.responses import cameras_info, delays_info, objects_info, site_info
 from server.http.api.scope_filter import (
     filter_cameras,
     filter_choices,
@@ -22,7 +23,7 @@ from server.http.api.scope_filter import (
 from server.http.periodic import run_periodically
 from server.messaging.messages import GopChoices
 from server.service.facade.assist import Flag
-from server.service.facade.streams import Broadcaster, BytesChunk, Subscriber
+from server.service.facade.streams import Broadcaster, BytesChunk, DelayMode, Subscriber
 from server.service.service import BestViewService
 
 _LISTS_EVERY_S = 1.0
@@ -40,9 +41,17 @@ def event(name: str, content: Any, event_id: int | None = None) -> bytes:
     return head.encode() + b"data: " + msgspec.json.encode(content) + b"\n\n"
 
 
+@dataclass(frozen=True, slots=True)
+class _Audience:
+    """Subscribers who receive the same events."""
+
+    scope: Scope
+    delay: DelayMode
+
+
 @dataclass(slots=True)
 class _ScopedEvents:
-    """The event stream shared by all subscribers of one scope."""
+    """The event stream shared by all subscribers of one scope and delay."""
 
     channel: Broadcaster
     last_sent: dict[str, bytes] = field(default_factory=dict)
@@ -52,15 +61,18 @@ class _ScopedEvents:
 class Events:
     """Publishes GOPs and flags at once, and the lists of people and cameras when they change.
 
-    Events are filtered and encoded once for all subscribers of one scope.
+    Events are filtered and encoded once for all subscribers of one scope and delay.
     """
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
-        self._by_scope: dict[Scope, _ScopedEvents] = {}
-        self._recent: deque[GopChoices] = deque(maxlen=_GOPS_KEPT)
+        self._by_scope: dict[_Audience, _ScopedEvents] = {}
+        self._recent: dict[DelayMode, deque[GopChoices]] = {
+            delay: deque(maxlen=_GOPS_KEPT) for delay in DelayMode
+        }
         self._closed = False
-        service.people.subscribe_decisions(self._on_decision)
+        service.people.subscribe_decisions(partial(self._on_decision, DelayMode.BALANCED))
+        service.people.subscribe_other_decisions(self._on_decision)
         service.assist.subscribe_flags(self._on_flag)
 
     @property
@@ -68,9 +80,10 @@ class Events:
         """The number of subscribers."""
         return sum(scoped.channel.viewers for scoped in self._by_scope.values())
 
-    def join(self, scope: Scope) -> Subscriber:
-        """Add a subscriber; it receives the current lists and open flags first."""
-        scoped = self._by_scope.get(scope) or self._add_scope(scope)
+    def join(self, scope: Scope, delay: DelayMode = DelayMode.BALANCED) -> Subscriber:
+        """Add a subscriber to a delay's decisions; it receives the current lists and open flags first."""
+        audience = _Audience(scope, delay)
+        scoped = self._by_scope.get(audience) or self._add_audience(audience)
         subscriber = scoped.channel.subscribe()
         for flag in self._service.assist.open_flags:
             chunk = self._flag_event(scope, flag)
@@ -80,12 +93,13 @@ class Events:
             subscriber.put_first(BytesChunk(event(name, content), random_access=True))
         return subscriber
 
-    def leave(self, scope: Scope, subscriber: Subscriber) -> None:
+    def leave(self, scope: Scope, subscriber: Subscriber, delay: DelayMode = DelayMode.BALANCED) -> None:
         """Remove a subscriber."""
-        scoped = self._by_scope[scope]
+        audience = _Audience(scope, delay)
+        scoped = self._by_scope[audience]
         scoped.channel.unsubscribe(subscriber)
         if not scoped.channel.viewers:
-            del self._by_scope[scope]
+            del self._by_scope[audience]
 
     async def run(self) -> None:
         """Publish changed lists, and comments that keep silent connections open."""
@@ -97,19 +111,19 @@ class Events:
         for scoped in self._by_scope.values():
             scoped.channel.close()
 
-    def _add_scope(self, scope: Scope) -> _ScopedEvents:
-        scoped = self._by_scope[scope] = _ScopedEvents(
+    def _add_audience(self, audience: _Audience) -> _ScopedEvents:
+        scoped = self._by_scope[audience] = _ScopedEvents(
             Broadcaster(backlog_gops=_GOPS_KEPT, queue_gops=_QUEUE)
         )
-        for choices in self._recent:
-            scoped.channel.publish(self._gop_event(scope, choices))
+        for choices in self._recent[audience.delay]:
+            scoped.channel.publish(self._gop_event(audience.scope, choices))
         if self._closed:
             scoped.channel.close()
         return scoped
 
     async def _publish_lists(self) -> None:
-        for scope, scoped in self._by_scope.items():
-            self._publish_changed(scope, scoped)
+        for audience, scoped in self._by_scope.items():
+            self._publish_changed(audience.scope, scoped)
 
     def _publish_changed(self, scope: Scope, scoped: _ScopedEvents) -> None:
         lists = self._lists(scope)
@@ -138,6 +152,7 @@ class Events:
     def _lists(self, scope: Scope) -> dict[str, Any]:
         service = self._service
         return {
+            "delays": delays_info(service, scope),
             "cameras": filter_cameras(cameras_info(service), scope),
             "objects": filter_objects(objects_info(service), scope, service.people.current_number),
             "site": filter_site(site_info(service), scope),
@@ -152,15 +167,16 @@ class Events:
         return None if visible is None else BytesChunk(event("flag", visible), random_access=True)
 
     def _on_flag(self, flag: Flag) -> None:
-        for scope, scoped in self._by_scope.items():
-            chunk = self._flag_event(scope, flag)
+        for audience, scoped in self._by_scope.items():
+            chunk = self._flag_event(audience.scope, flag)
             if chunk is not None:
                 scoped.channel.publish_once(chunk)
 
-    def _on_decision(self, choices: GopChoices) -> None:
-        self._recent.append(choices)
-        for scope, scoped in self._by_scope.items():
-            scoped.channel.publish(self._gop_event(scope, choices))
+    def _on_decision(self, delay: DelayMode, choices: GopChoices) -> None:
+        self._recent[delay].append(choices)
+        for audience, scoped in self._by_scope.items():
+            if audience.delay is delay:
+                scoped.channel.publish(self._gop_event(audience.scope, choices))
 
 
 EVENTS = web.AppKey("events", Events)

@@ -14,10 +14,11 @@ from aiohttp import web
 
 from server.http.access.permissions import Permission, permission_for
 from server.http.access.session_routes import SessionInfo
-from server.http.api.schema import Cameras, FlagList, Objects, Past, SiteInfo
+from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
-from server.http.streams.request_validation import CAMERA_QUERY, OVERLAY, TIME_SHIFT
+from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT
+from server.service.facade.streams import DelayMode
 from server.service.facade.view_selection import ViewSelection
 
 routes = web.RouteTableDef()
@@ -25,6 +26,7 @@ routes = web.RouteTableDef()
 _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/site": SiteInfo,
     "/api/session": SessionInfo,
+    "/api/delays": Delays,
     "/api/objects": Objects,
     "/api/cameras": Cameras,
     "/api/flags": FlagList,
@@ -86,6 +88,11 @@ _SCHEMAS: dict[str, Any] = {
         "type": "integer",
         "minimum": 0,
         "description": "The answer waits for this part.",
+    },
+    "delay": {
+        "enum": list(DelayMode),
+        "default": DelayMode.BALANCED,
+        "description": "How much is known of what follows when a view is selected; HLS is never live.",
     },
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: with boxes burnt in."},
     "from": {**_MOMENT, "description": "The start: seconds back, a pulse, or a time."},
@@ -174,7 +181,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     if path in _UNAVAILABLE | _MAY_BE_UNAVAILABLE_FOR_OPERATORS | _RECORDED_SPANS or "object" in names:
         responses["503"] = {"description": "Temporarily unavailable; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
-    queries = ["prefer"] * (path in CAMERA_QUERY)
+    queries = ["prefer"] * (path in CAMERA_QUERY) + ["delay"] * (path in DELAY)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
     queries += ["from", "to"] * (path in TIME_SHIFT | _RECORDED_SPANS | OPERATOR_FILES.keys())
     queries += ["at"] * path.endswith("/choice")

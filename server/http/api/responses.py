@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 
-from server.http.api.schema import Cameras, Elsewhere, ObjectInfo, Objects, SiteInfo
+from server.http.access.permissions import Scope
+from server.http.api.schema import Cameras, Delays, Elsewhere, ObjectInfo, Objects, SiteInfo
+from server.service.facade.streams import DelayMode
 from server.service.service import BestViewService
 
 
@@ -24,6 +26,13 @@ def site_info(service: BestViewService) -> SiteInfo:
         pulse0=service.pulse0,
         now=time.time(),
         cameras=list(config.camera_ids),
+    )
+
+
+def delays_info(service: BestViewService, scope: Scope) -> Delays:
+    """Return the delays that viewers of a scope may choose; of one person there is no live best view."""
+    return Delays(
+        [delay for delay in service.streams.delays() if scope.object is None or delay.delay != DelayMode.LIVE]
     )
 
 

@@ -6,11 +6,16 @@ from aiohttp import web
 
 from server.http.access.authorization import ACCESS
 from server.http.api.events import EVENTS
-from server.http.api.responses import cameras_info, objects_info, site_info
+from server.http.api.responses import cameras_info, delays_info, objects_info, site_info
 from server.http.api.schema import FlagList
 from server.http.api.scope_filter import filter_cameras, filter_flag, filter_objects, filter_site
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, json_response
+from server.http.streams.request_validation import (
+    invalid_event_query,
+    refuse_live_if_scoped,
+    requested_delay,
+)
 from server.http.streams.sending import send_viewer
 from server.http.viewers.viewer_limits import event_slot, evict_or_refuse_listener
 from server.service.facade.recordings import TimeReferenceError
@@ -23,6 +28,12 @@ async def get_site(request: web.Request) -> web.Response:
     """Describe the site."""
     scope = request.app[ACCESS].grant(request).scope
     return json_response(filter_site(site_info(request.app[SERVICE]), scope))
+
+
+@routes.get("/api/delays")
+async def get_delays(request: web.Request) -> web.Response:
+    """List the delays that viewers may choose, each with its measured delay and regret."""
+    return json_response(delays_info(request.app[SERVICE], request.app[ACCESS].grant(request).scope))
 
 
 @routes.get("/api/objects")
@@ -52,15 +63,19 @@ async def get_flags(request: web.Request) -> web.Response:
 async def get_events(request: web.Request) -> web.StreamResponse:
     """Stream events as server-sent events."""
     events, scope = request.app[EVENTS], request.app[ACCESS].grant(request).scope
-    refused = evict_or_refuse_listener(request)
+    error = invalid_event_query(request)
+    if error is not None:
+        return error_response(400, error)
+    refused = refuse_live_if_scoped(request) or evict_or_refuse_listener(request)
     if refused is not None:
         return refused
+    delay = requested_delay(request)
     with event_slot(request):
-        subscriber = events.join(scope)
+        subscriber = events.join(scope, delay)
         try:
             return await send_viewer(request, subscriber, b"", {"Content-Type": "text/event-stream"})
         finally:
-            events.leave(scope, subscriber)
+            events.leave(scope, subscriber, delay)
 
 
 @routes.get("/api/objects/{object:[0-9]{1,9}}/choice")

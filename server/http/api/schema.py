@@ -6,6 +6,7 @@ import msgspec
 
 from server.service.facade.assist import Flag
 from server.service.facade.cameras import CameraInfo
+from server.service.facade.streams import ViewerDelay
 
 
 class SiteInfo(msgspec.Struct, frozen=True):
@@ -28,6 +29,12 @@ class SiteInfo(msgspec.Struct, frozen=True):
     now: float
     """Unix time by the server's clock."""
     cameras: list[str]
+
+
+class Delays(msgspec.Struct, frozen=True):
+    """The delays that viewers may choose, shortest first."""
+
+    delays: list[ViewerDelay]
 
 
 class ObjectInfo(msgspec.Struct, frozen=True):

@@ -115,11 +115,14 @@ def playlist_response(text: str) -> web.Response:
     return web.Response(text=text, content_type=_CONTENT_TYPE, charset="utf-8", headers=headers)
 
 
-def with_token(request: web.Request, response: web.Response) -> web.Response:
-    """Append the token of the request's query, if any, to every URI of a playlist: players do not add it."""
-    token = request.query.get("token")
-    if token is not None and response.status == HTTPStatus.OK and response.text is not None:
-        query = f"token={quote(token, safe='')}"
+def with_query(request: web.Request, response: web.Response) -> web.Response:
+    """Append the request's token and delay, if any, to every URI of a playlist: players do not add them."""
+    query = "&".join(
+        f"{name}={quote(request.query[name], safe='')}"
+        for name in ("token", "delay")
+        if name in request.query
+    )
+    if query and response.status == HTTPStatus.OK and response.text is not None:
         lines = response.text.split("\n")  # there may be thousands; #EXTINF lines have no URI
         response.text = "\n".join(
             [line if line.startswith("#EXTINF") else _with_query(line, query) for line in lines]

@@ -10,9 +10,10 @@ from aiohttp import web
 from server.http.access.authorization import ACCESS, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.hls.live_playlist import live_playlist, wait_for_part
-from server.http.hls.playlist import with_token
+from server.http.hls.playlist import with_query
 from server.http.hls.time_shift_playlist import HlsStream, time_shift_playlist, time_shift_segment
 from server.http.json_responses import error_response, unavailable
+from server.http.streams.request_validation import requested_delay
 from server.http.streams.time_range import is_time_shifted
 from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsClient
 from server.http.viewers.viewer_limits import (
@@ -22,6 +23,7 @@ from server.http.viewers.viewer_limits import (
     person_slot_name,
 )
 from server.service.facade.errors import RefusedError
+from server.service.facade.streams import DelayMode
 
 routes = web.RouteTableDef()
 
@@ -67,10 +69,10 @@ def _counted(blocking_kind: str | None = None) -> Callable[[_StreamHandler], _Ha
 async def get_playlist(request: web.Request, stream: HlsStream) -> web.Response:
     """Return the playlist of a stream (HLS), live or from a moment on."""
     if is_time_shifted(request):
-        return with_token(request, await time_shift_playlist(request, stream))
+        return with_query(request, await time_shift_playlist(request, stream))
     if stream.live is None:
         raise _unknown(request)
-    return with_token(request, await live_playlist(request, stream.live, request.app[SERVICE].pulse0))
+    return with_query(request, await live_playlist(request, stream.live, request.app[SERVICE].pulse0))
 
 
 @routes.get(_OBJECT + "/init.mp4")
@@ -90,7 +92,7 @@ async def get_segment(request: web.Request, stream: HlsStream) -> web.Response:
     """Return a media segment of a stream (HLS), live or recorded."""
     number = int(request.match_info["segment"])
     segment = None if stream.live is None else stream.live.listed_segment(number)
-    if segment is None:
+    if segment is None and not _is_smooth(request):
         segment = await time_shift_segment(request, stream, number)
     if segment is None:
         return error_response(404, f"no segment {number}: expired, or not available yet")
@@ -131,11 +133,17 @@ def _stream(request: web.Request) -> HlsStream:
         recorded = service.recordings.of_camera(camera)
         return HlsStream(service.streams.segments_of_camera(camera), recorded)
     number, scoped = int(request.match_info["object"]), is_scoped_to_person(request)
-    live = service.streams.segments_of_person(service.people.current_number(number), scoped_to_person=scoped)
+    live = service.streams.segments_of_person(
+        service.people.current_number(number), scoped_to_person=scoped, is_smooth=_is_smooth(request)
+    )
     stream = HlsStream(live, service.recordings.of_person(number, scoped_to_person=scoped))
     if not stream.exists:
         raise _unknown(request)
     return stream
+
+
+def _is_smooth(request: web.Request) -> bool:
+    return requested_delay(request) is DelayMode.SMOOTH
 
 
 def _client(request: web.Request) -> HlsClient:

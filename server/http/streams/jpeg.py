@@ -12,6 +12,7 @@ from server.http.access.authorization import is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.containers import MP4
+from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay
 from server.http.streams.sending import send_stream, send_viewer
 from server.http.viewers.viewer_limits import evict_or_refuse_viewer, viewer_slot
 from server.service.facade.rendering import (
@@ -143,7 +144,9 @@ def _person(request: web.Request) -> Subject:
     current, scoped = service.people.current_number(number), is_scoped_to_person(request)
     if service.streams.of_person(current, scoped_to_person=scoped) is None:
         raise service.people.unknown(number)
-    return PersonView(current, scoped)
+    if (refused := refuse_live_if_scoped(request)) is not None:
+        raise _ResponseError(refused)
+    return PersonView(current, scoped, requested_delay(request))
 
 
 def _camera(request: web.Request) -> Subject:

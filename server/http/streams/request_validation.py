@@ -10,8 +10,10 @@ from collections.abc import Awaitable, Callable
 
 from aiohttp import web
 
+from server.http.access.authorization import is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response
+from server.service.facade.streams import DelayMode
 
 OVERLAY = {
     "/objects/{object}/best.mp4",
@@ -33,6 +35,19 @@ TIME_SHIFT = {
 """Routes that support from= and to= (time shift)."""
 CAMERA_QUERY = {"/objects/{object}/best.mp4", "/objects/{object}/best.webm", "/objects/{object}/best.ts"}
 """Routes that support camera= and prefer=, a fixed or a preferred camera."""
+DELAY = {
+    "/objects/{object}/best.mp4",
+    "/objects/{object}/best.webm",
+    "/objects/{object}/best.ts",
+    "/objects/{object}/best.mjpeg",
+    "/objects/{object}/best.jpg",
+    "/objects/{object}/hls/index.m3u8",
+    "/objects/{object}/hls/init.mp4",
+    "/objects/{object}/hls/{segment}.m4s",
+    "/objects/{object}/hls/{segment}.{part}.m4s",
+    "/api/events",
+}
+"""Routes that support delay=, a choice of how much is known of what follows."""
 _STREAM_PREFIXES = ("/objects/", "/cameras/")
 _CONTAINER_PATH = re.compile(
     r"/(?:objects|cameras)/[^/]+/(?:(?:best|live)\.[a-z0-9]+|hls/.*)|/api/(?:objects|cameras)/[^/]+/past"
@@ -71,12 +86,55 @@ async def check_container(
     return await handler(request)
 
 
+def requested_delay(request: web.Request) -> DelayMode:
+    """Return the delay that a request chooses."""
+    return DelayMode(request.query.get("delay", DelayMode.BALANCED))
+
+
+def refuse_live_if_scoped(request: web.Request) -> web.Response | None:
+    """Return 403 for a live best view with a token for one person: when they left is known only later."""
+    if requested_delay(request) is DelayMode.LIVE and is_scoped_to_person(request):
+        return error_response(
+            403, "delay=live: a token for one person has none: it would show others after the person left"
+        )
+    return None
+
+
+def _invalid_delay(request: web.Request, path: str) -> str | None:
+    delay = request.query.get("delay")
+    if delay is None:
+        return None
+    if path not in DELAY:
+        return "delay: only best views and /api/events have a choice of delay"
+    if delay not in list(DelayMode):
+        return f"delay={delay}: must be one of {', '.join(DelayMode)}"
+    if request.query.keys() & {"from", "to", "prefer"}:
+        return "delay: not in the past, and not with a preferred camera"
+    return _not_live(request, path) if delay == DelayMode.LIVE else None
+
+
+def _not_live(request: web.Request, path: str) -> str | None:
+    if "/hls/" in path:
+        return "delay=live: HLS players stay seconds behind; use best.mp4 or best.ts"
+    if request.query.get("overlay", "0") == "1":
+        return "delay=live: the boxes of these pictures are not known yet"
+    return None
+
+
+def invalid_event_query(request: web.Request) -> str | None:
+    """Return why the query of a request for events is invalid; None: it is valid."""
+    return _invalid_delay(request, "/api/events")
+
+
 def _invalid_query(request: web.Request, path: str) -> str | None:
     overlay = request.query.get("overlay", "0")
     if overlay not in {"0", "1"}:
         return f"overlay={overlay}: must be 0 or 1"
     if overlay == "1" and path not in OVERLAY:
         return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
+    delay_error = _invalid_delay(request, path)
+    if delay_error is not None:
+        return delay_error
     for name, effect in (("camera", "be fixed to one"), ("prefer", "prefer a camera")):
         excluded = {"overlay", "from", "to", "camera", "prefer"} - {name}
         if name in request.query and (path not in CAMERA_QUERY or request.query.keys() & excluded):

@@ -9,6 +9,7 @@ from server.http.app_keys import SERVICE
 from server.http.json_responses import unavailable
 from server.http.streams.containers import MP4, TS, WEBM, Container
 from server.http.streams.jpeg import stream_boxed_mp4, wants_boxes
+from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay
 from server.http.streams.sending import send_stream
 from server.http.streams.time_range import is_time_shifted
 from server.http.streams.time_shift import time_shifted_best, time_shifted_camera
@@ -21,7 +22,7 @@ from server.http.viewers.viewer_limits import (
     person_slot_name,
     viewer_slot,
 )
-from server.service.facade.streams import Broadcaster
+from server.service.facade.streams import Broadcaster, DelayMode
 
 routes = web.RouteTableDef()
 
@@ -68,9 +69,11 @@ async def _best(request: web.Request, container: Container) -> web.StreamRespons
     if is_time_shifted(request):
         return await time_shifted_best(request, container)
     service, number = request.app[SERVICE], int(request.match_info["object"])
-    streams, scoped = service.streams, is_scoped_to_person(request)
+    streams, scoped, delay = service.streams, is_scoped_to_person(request), requested_delay(request)
+    if (refused := refuse_live_if_scoped(request)) is not None:
+        return refused
     person = service.people.current_number(number)
-    channel = streams.of_person(person, scoped_to_person=scoped)
+    channel = streams.of_person(person, scoped_to_person=scoped, delay=delay)
     if channel is None:
         raise service.people.unknown(number)
     fixed, preferred = request.query.get("camera"), request.query.get("prefer")
@@ -83,7 +86,7 @@ async def _best(request: web.Request, container: Container) -> web.StreamRespons
     )
     hls_name: str | None = slot_name
     if fixed is not None:
-        channel = streams.of_camera_decided(fixed)
+        channel = streams.of_camera(fixed) if delay is DelayMode.LIVE else streams.of_camera_decided(fixed)
         slot_name, hls_name, other_viewers = fixed_view_slot_name(fixed), hls_camera_slot_name(fixed), 0
     elif preferred is not None:
         channel = streams.of_person_preferring(person, preferred, scoped_to_person=scoped)

@@ -14,6 +14,7 @@ from bestview import Merge, Split
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.view_selection.decider import GopDecision
+from server.service.view_selection.delay_modes import DelayMode, ModeDecision
 from server.system.private_files import make_private_folder, open_private
 from tracking.motchallenge import MotRow, format_row
 
@@ -24,6 +25,8 @@ LATE_HEADER = "frame,camera,reason\n"
 
 class DecisionWriter:
     """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
+
+    ``choices-live.csv`` and ``choices-smooth.csv`` are the choices for viewers with these delays.
 
     ``letterboxes`` may grow: a camera is added with its first window. A choice is the camera that a
     person's stream shows, even if no camera sees the person.
@@ -53,10 +56,14 @@ class DecisionWriter:
             (folder / "tracks").mkdir(parents=True, exist_ok=True)
         self._tracks = {camera: folder / "tracks" / f"{camera}.txt" for camera in cameras}
         self._choices = folder / "choices.csv"
+        self._mode_choices = {
+            mode: folder / f"choices-{mode}.csv" for mode in (DelayMode.LIVE, DelayMode.SMOOTH)
+        }
         self._corrections = folder / "corrections.csv"
         self._late = folder / "late.csv"
         headers = {
             self._choices: CHOICES_HEADER,
+            **dict.fromkeys(self._mode_choices.values(), CHOICES_HEADER),
             self._corrections: CORRECTIONS_HEADER,
             self._late: LATE_HEADER,
         }
@@ -84,6 +91,20 @@ class DecisionWriter:
         )
         texts[self._late] += late
         self._files.append({path: "".join(rows) for path, rows in texts.items() if rows})
+
+    def write_views(self, decision: ModeDecision) -> None:
+        """Write the choices for viewers with another delay.
+
+        Raises:
+            OSError: as :meth:`write`.
+        """
+        rows = [
+            f"{pulse + 1},{number},{camera}\n"
+            for pulse in range(decision.first, decision.first + decision.frames)
+            for number, camera in decision.cameras.items()
+            if camera is not None
+        ]
+        self._files.append({self._mode_choices[decision.mode]: "".join(rows)} if rows else {})
 
     def write_late(self, rows: Sequence[str]) -> None:
         """Write rows of ``late.csv`` alone.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from pathlib import Path
 from server.media.letterbox import Letterbox
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.view_selection.decider import GopDecision
+from server.service.view_selection.delay_modes import ModeDecision
 
 log = logging.getLogger(__name__)
 
@@ -61,6 +63,11 @@ class LiveDecisionWriter:
             log.info("%s: writing again; %d frames are missing", self._folder, len(self._missing))
         self._missing = range(0)
         self._late.clear()
+
+    def write_views_or_skip(self, decision: ModeDecision) -> None:
+        """Write the choices for viewers with another delay; skip them if writing fails."""
+        with contextlib.suppress(OSError):  # the usual decisions report it
+            self._writer.write_views(decision)
 
     def close(self) -> None:
         """Write the pending late frames, and close the files."""

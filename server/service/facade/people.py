@@ -17,6 +17,7 @@ from server.service.facade.view_selection import ViewSelection, view_selection_o
 from server.service.identity.sharding import shard_address, shard_of
 from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
+from server.service.view_selection.delay_modes import DelayMode
 
 __all__ = [
     "MergePeople",
@@ -177,6 +178,10 @@ class PeopleService:
     def subscribe_decisions(self, callback: Callable[[GopChoices], None]) -> None:
         """Call back with the choices of every GOP, as it is decided."""
         self._pipeline.on_decision.append(callback)
+
+    def subscribe_other_decisions(self, callback: Callable[[DelayMode, GopChoices], None]) -> None:
+        """Call back with the choices of every GOP for viewers who have chosen another delay."""
+        self._pipeline.mode_publisher.on_decision.append(callback)
 
     @property
     def editing_blocked(self) -> str:

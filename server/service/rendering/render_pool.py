@@ -11,9 +11,11 @@ from functools import partial
 
 from logthrottle import LogThrottle
 from server.media.rendering_messages import RenderSettings
+from server.messaging.messages import GopChoices
 from server.service.pipeline import BestViewPipeline
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay
 from server.service.rendering.rendered_stream import RenderedStream
+from server.service.view_selection.delay_modes import DelayMode
 
 log = logging.getLogger(__name__)
 
@@ -33,9 +35,11 @@ class PersonView:
 
     number: int
     scoped_to_person: bool = False
+    delay: DelayMode = DelayMode.BALANCED
 
     def __str__(self) -> str:
-        return f"object {self.number}{' scoped' * self.scoped_to_person}"
+        delay = "" if self.delay is DelayMode.BALANCED else f" {self.delay}"
+        return f"object {self.number}{' scoped' * self.scoped_to_person}{delay}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +85,8 @@ class RenderPool:
         decisions = self._queue_gops + _EXTRA_DECISIONS
         self._decided = DecidedBoxes(pipeline.decision_state.resolve, config.site.fps, decisions)
         pipeline.on_decision.append(self._decided.put)
+        self._smooth = DecidedBoxes(pipeline.decision_state.resolve, config.site.fps, decisions)
+        pipeline.mode_publisher.on_decision.append(self._put_mode)
         self._running: dict[Subject, _RunningStream] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         """The tasks of streams that are running or ending."""
@@ -138,7 +144,12 @@ class RenderPool:
         pipeline = self._pipeline
         if isinstance(subject, PersonView):
             view = pipeline.decision_state.selected_views[subject.number]
-            return None if view.choice.camera is None else view.first + view.frames - 1
+            newest = {
+                DelayMode.LIVE: max(buffer.newest for buffer in pipeline.frame_buffers.values()),
+                DelayMode.BALANCED: view.first + view.frames - 1,
+                DelayMode.SMOOTH: self._smooth.newest,
+            }
+            return None if view.choice.camera is None else newest[subject.delay]
         if pipeline.ingest.states[subject.camera].label not in {"live", "ended"}:
             return None
         if subject.decided:
@@ -179,6 +190,13 @@ class RenderPool:
         splicer, decided = self._pipeline.splicer, self._decided
         overlay_of: Callable[[bytes], GopOverlay]
         match subject:
+            case PersonView(number, delay=DelayMode.LIVE):
+                broadcaster, overlay_of = splicer.live_persons.broadcaster(number), _no_overlay
+            case PersonView(number, scoped_to_person, DelayMode.SMOOTH):
+                broadcaster = splicer.smooth_person(number, scoped_to_person=scoped_to_person)
+                overlay_of = partial(
+                    self._smooth.overlay_of_person, number, scoped_to_person=scoped_to_person
+                )
             case PersonView(number, scoped_to_person):
                 broadcaster = (splicer.scoped_persons if scoped_to_person else splicer.persons)[number]
                 overlay_of = partial(decided.overlay_of_person, number, scoped_to_person=scoped_to_person)
@@ -187,7 +205,7 @@ class RenderPool:
                 overlay_of = partial(decided.overlay_of_camera, camera)
             case CameraView(camera):
                 broadcaster, overlay_of = splicer.cameras[camera], _no_overlay
-        live = isinstance(subject, CameraView) and not subject.decided
+        live = subject.delay is DelayMode.LIVE if isinstance(subject, PersonView) else not subject.decided
         return RenderedStream(
             str(subject),
             broadcaster,
@@ -199,6 +217,10 @@ class RenderPool:
             # The person may not have been present in a gap.
             mute_gaps=isinstance(subject, PersonView) and subject.scoped_to_person,
         )
+
+    def _put_mode(self, mode: DelayMode, choices: GopChoices) -> None:
+        if mode is DelayMode.SMOOTH:
+            self._smooth.put(choices)
 
     def _end(self, subject: Subject, running: _RunningStream) -> None:
         running.task.cancel()

@@ -34,14 +34,19 @@ class PersonStreams:
     def show(self, cameras: Mapping[int, str | None], merged: Mapping[int, int], gop: GopAssembler) -> None:
         """Publish a GOP of every person's chosen camera."""
         for number, camera in cameras.items():
-            if number not in self._streams:
-                stream = self._streams[number] = self._new_stream()
-                self.broadcasters[number] = stream.broadcaster
+            self.begin(number)
             self._streams[number].show(camera, gop, self._picture_of(number))
         # The stream of a number that was merged into another continues with that person.
         for lost, kept in merged.items():
             if lost in self._streams and kept in cameras and lost not in cameras:
                 self._streams[lost].show(cameras[kept], gop, self._picture_of(kept))
+
+    def begin(self, number: int) -> Broadcaster:
+        """Return a person's stream, which exists from now on."""
+        if number not in self._streams:
+            stream = self._streams[number] = self._new_stream()
+            self.broadcasters[number] = stream.broadcaster
+        return self.broadcasters[number]
 
     def forget(self, known: Collection[int]) -> None:
         """End the streams of persons that are not known any more."""

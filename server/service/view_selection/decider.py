@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots
 from server.service.view_selection.explanation import SelectionReasons
 from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.mode_selection import ModeSelection
 from server.service.view_selection.recent_views import RecentViews
 from server.service.view_selection.undetected_view_inference import UndetectedViewInference
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
@@ -79,6 +81,8 @@ class ViewDecider:
         has: Callable[[str, int], bool],
     ) -> None:
         self._config = config
+        self.modes = ModeSelection(config)
+        """The views of viewers who choose another delay."""
         self._apply(config.view)
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
@@ -131,6 +135,7 @@ class ViewDecider:
         self.min_shot_gops = -(-round(view.min_shot_s * fps) // self._config.gop)
         """The minimum length of a shot, in GOPs."""
         self._extrapolated_frames = view.extrapolate_s * fps
+        self.modes.change(view)
 
     def step(self, epoch: Epoch) -> list[GopDecision]:
         """Process an epoch; return decisions for the GOPs whose look-ahead it completes.
@@ -142,10 +147,13 @@ class ViewDecider:
             start = epoch.last - self._config.window.stride + 1
             self._next_gop = -(-start // gop) * gop
         self._quality_buffer.put(self.people.update(epoch))
+        window_of_epoch = cache(partial(self._window, self._next_gop, epoch.last))
+        if self._next_gop <= epoch.last:
+            self.modes.step(epoch.last, window_of_epoch, skipped=bool(epoch.skipped))
         last = epoch.last - lookahead + 1
         if self._next_gop > last:
             return []
-        window = self._window(self._next_gop, epoch.last)
+        window = window_of_epoch()
         weight = self._weight(lookahead)
         gop_starts = range(self._next_gop, last + 1, gop)[: self._max_gops_per_epoch]
         decided = [self._decide(window, first, gop, weight) for first in gop_starts]
@@ -159,10 +167,12 @@ class ViewDecider:
             return []
         gop, lookahead = self._config.gop, self._config.lookahead
         window = self._window(self._next_gop, last)
-        return [
+        decided = [
             self._decide(window, first, min(gop, last + 1 - first), np.ones(min(lookahead, last + 1 - first)))
             for first in range(self._next_gop, last + 1, gop)
         ]
+        self.modes.finish()
+        return decided
 
     def _window(self, first: int, last: int) -> LookaheadWindow:
         """Return the look-ahead window of the frames from `first` to `last`, as known now."""
@@ -190,9 +200,7 @@ class ViewDecider:
 
     def _decide(self, window: LookaheadWindow, first: int, frames: int, weight: Floats) -> GopDecision:
         people, lookahead = self.people, len(weight)
-        numbers, first_seen = window.numbers, people.registry.first_seen
-        since = np.fromiter((first_seen[number] for number in numbers.tolist()), np.int64, len(numbers))
-        part = window.part(first, lookahead, since < first + frames)
+        part = window.part(first, lookahead, window.seen_since(first + frames - 1))
         before = self._shots.of(part.numbers)
         starts = np.arange(lookahead) % self._config.gop == 0
         gops = part.gops(starts, weight, mark_hidden=self.min_shot_gops > 1)
@@ -201,6 +209,7 @@ class ViewDecider:
         )
         self._shots = before.then(views)
         self._next_gop = first + self._config.gop
+        self.modes.add(part, frames, gops, weight, views, before.cameras)
         boxes = {camera: people.boxes(camera, first, frames) for camera in self._cameras}
         self._quality_buffer.forget_before(self._next_gop)
         people.forget_before(self._next_gop)

@@ -50,6 +50,10 @@ class LookaheadWindow:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
         """(K,) the people's numbers, rising."""
+        first_seen = people.registry.first_seen
+        self._first_seen = np.fromiter(
+            (first_seen[number] for number in self.numbers.tolist()), np.int64, len(self.numbers)
+        )
         pulses, count = range(first, last + 1), len(self.numbers)
         undetected = np.array([people.undetected.over(camera, first, len(pulses)) for camera in cameras])
         tracks = WindowTracks(
@@ -98,6 +102,10 @@ class LookaheadWindow:
             missed, inferred.frame, inferred.camera, inferred.person, inferred_quality
         )
         """Detected views, those assumed after missed detections, and those inferred from other cameras."""
+
+    def seen_since(self, last: int) -> Mask:
+        """Return who was seen in or before a frame, (K,)."""
+        return np.asarray(self._first_seen <= last)
 
     def recent_views(self, pulse: int) -> RecentViews:
         """Return the last views before a pulse, for the next window."""

@@ -33,9 +33,9 @@ async def test_events_begin_with_the_current_state_and_continue_with_every_gop(
 ) -> None:
     async with site_with_people.session.get("/api/events") as answer:
         assert answer.content_type == "text/event-stream"
-        received = await events(answer, 5)
-        assert [name for name, _ in received] == ["site", "objects", "cameras", "gop", "gop"]
-        assert [content["first"] for _, content in received[3:]] == [0, GOP]
+        received = await events(answer, 6)
+        assert [name for name, _ in received] == ["site", "objects", "cameras", "delays", "gop", "gop"]
+        assert [content["first"] for _, content in received[4:]] == [0, GOP]
         assert received[1][1] == await site_with_people.get_json("/api/objects")
         site_with_people.service.feed(3, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
         while (event := (await events(answer, 1))[0])[0] != "gop":
