@@ -1,9 +1,23 @@
 """The Python client of MyView's HTTP interface; ``page/`` is the browser's."""
 
-from client.api import cameras, choice, objects, past, site, spans
+from client.api import cameras, choice, delays, objects, past, site, spans
 from client.events import events
 from client.http import AwayError, ClientError, ContractError, HttpSettings, NotFoundError, RefusedError
-from client.model import Box, Camera, Cameras, Choice, Cut, Event, Flag, Gop, Objects, SeenObject, Site, Span
+from client.model import (
+    Box,
+    Camera,
+    Cameras,
+    Choice,
+    Cut,
+    Delay,
+    Event,
+    Flag,
+    Gop,
+    Objects,
+    SeenObject,
+    Site,
+    Span,
+)
 from client.player import WatchResult, record, watch
 from client.session import Progress
 from client.status.model import CameraNow, PersonNow, ServiceNow, SiteNow
@@ -19,6 +33,7 @@ __all__ = [
     "ClientError",
     "ContractError",
     "Cut",
+    "Delay",
     "Event",
     "Flag",
     "Gop",
@@ -36,6 +51,7 @@ __all__ = [
     "WatchResult",
     "cameras",
     "choice",
+    "delays",
     "events",
     "objects",
     "past",

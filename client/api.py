@@ -5,7 +5,19 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 
 from client.http import ContractError, HttpSettings, decode_json, get, get_json, read_lines, server_url
-from client.model import Camera, Cameras, Choice, Gop, Objects, Past, SeenObject, Site, Span
+from client.model import (
+    Camera,
+    Cameras,
+    Choice,
+    Delay,
+    Delays,
+    Gop,
+    Objects,
+    Past,
+    SeenObject,
+    Site,
+    Span,
+)
 from client.sse_parser import MAX_EVENT
 
 _DEFAULT = HttpSettings()
@@ -19,6 +31,11 @@ async def site(url: str, settings: HttpSettings = _DEFAULT) -> Site:
         ClientError: the server cannot be reached or is not MyView.
     """
     return await get_json(server_url(url) / "api/site", Site, settings)
+
+
+async def delays(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Delay, ...]:
+    """Return the delays to choose from, each as it is measured now; errors as ``site``."""
+    return (await get_json(server_url(url) / "api/delays", Delays, settings)).delays
 
 
 async def objects(url: str, settings: HttpSettings = _DEFAULT) -> tuple[SeenObject, ...]:

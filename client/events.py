@@ -14,8 +14,12 @@ from client.sse_parser import OverlongEventError, SentEvent, SseParser
 _DEFAULT = HttpSettings()
 
 
-async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[Event]:
+async def events(
+    url: str, settings: HttpSettings = _DEFAULT, *, delay: str | None = None
+) -> AsyncIterator[Event]:
     """Yield Site, Objects, Cameras, Gop and Flag events without end; events of other names are ignored.
+
+    Gop events have the choices of a ``delay``, by default ``balanced``.
 
     When the connection is lost the client connects again. The server then sends its state once more, so an
     event may come twice.
@@ -26,6 +30,8 @@ async def events(url: str, settings: HttpSettings = _DEFAULT) -> AsyncIterator[E
         ClientError: the server refuses the request, or an event is invalid.
     """
     address = server_url(url) / "api/events"
+    if delay is not None:
+        address = address.with_query({"delay": delay})
     backoff = settings.backoff()
     while True:
         try:

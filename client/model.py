@@ -110,6 +110,28 @@ class Choice(msgspec.Struct, frozen=True):
     cut_to: str | None = None
 
 
+class Delay(msgspec.Struct, frozen=True):
+    """A delay that viewers may choose, as measured in the last minutes; None: not measured yet."""
+
+    delay: str
+    """live, balanced or smooth."""
+    lookahead_s: float
+    """Seconds of look-ahead of its view selection."""
+    delay_s: float | None = None
+    """Median of the seconds from when a frame was due until it is sent."""
+    delay_p95_s: float | None = None
+    """The 95th percentile of that."""
+    regret_s: float | None = None
+    """Cost beyond the best views in hindsight: seconds of not seeing the object, per minute."""
+    cuts_per_minute: float | None = None
+
+
+class Delays(msgspec.Struct, frozen=True):
+    """All delays, shortest first."""
+
+    delays: tuple[Delay, ...]
+
+
 class Box(msgspec.Struct, frozen=True, array_like=True):
     """A box in pixels of the site's picture."""
 

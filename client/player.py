@@ -42,12 +42,14 @@ async def watch(
     *,
     start: str | None = None,
     end: str | None = None,
+    delay: str | None = None,
     settings: HttpSettings = _DEFAULT,
 ) -> WatchResult:
     """Follow the best view of object ``number`` for ``seconds`` of media time (None: until cancelled).
 
     ``start`` and ``end`` are moments: seconds back (``-60``), pulses (``p1250``) or times (ISO 8601); without
-    them the stream begins now, and does not end.
+    them the stream begins now, and does not end. ``delay`` is one of ``delays``: live, balanced or smooth;
+    there is none in the past.
 
     The pictures are the server's own, unchanged; whole fragments only. With ``out`` they are recorded in
     ``out.part``, which is remuxed into a progressive MP4 at the end, with the boxes beside it: WebVTT and
@@ -58,7 +60,7 @@ async def watch(
     Raises:
         ValueError: ``url`` is no address.
         NotFoundError: the object is unknown.
-        RefusedError: ``start`` or ``end`` is not a time, or that time is not recorded.
+        RefusedError: ``start`` or ``end`` is not a time, that time is not recorded, or no such delay.
         AwayError: the server could not be reached at all, or never sent any media.
         ContractError: the response is not such a stream.
         OSError: the file cannot be written.
@@ -70,8 +72,8 @@ async def watch(
         history = ViewHistory(number, spool=None if out is None else spool)
         try:
             with recording(out, seconds, container) as record:
-                async with following(url, history, settings, start, end):
-                    session = Session(record, history, progress, start, end)
+                async with following(url, history, settings, start, end, delay):
+                    session = Session(record, history, progress, start, end, delay)
                     complete = await session.run(server / f"objects/{number}/best.{container}", settings)
                     if out is not None and record.media_time is not None:
                         await history.reach(record.media_time)

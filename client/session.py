@@ -42,8 +42,9 @@ class Session:
         report: Report | None,
         start: str | None,
         end: str | None,
+        delay: str | None = None,
     ) -> None:
-        self._start, self._end = start, end
+        self._start, self._end, self._delay = start, end, delay
         self._record = record
         self._history = history
         self._report = report
@@ -81,6 +82,8 @@ class Session:
     def _resume_address(self, address: URL) -> URL:
         """Return the address of the remaining stream, which begins after the last received frame."""
         query = {} if self._end is None else {"to": self._end}
+        if self._delay is not None:
+            query["delay"] = self._delay
         at, site = self._record.media_time, self._history.site
         if at is not None and site is not None and self._start is not None:
             return address.with_query({"from": f"p{round(at * site.fps) + 1}", **query})

@@ -127,6 +127,7 @@ async def following(
     settings: HttpSettings,
     start: str | None = None,
     end: str | None = None,
+    delay: str | None = None,
 ) -> AsyncIterator[None]:
     """Feed the server's events to ``history`` inside the block; without events the stream still plays.
 
@@ -139,7 +140,7 @@ async def following(
 
     async def follow() -> None:
         try:
-            async for event in events(url, settings):
+            async for event in events(url, settings, delay=delay):
                 history.take(event)
         except ClientError as error:
             _log.info("no events: %s", error)

@@ -10,7 +10,7 @@ import secrets
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -68,12 +68,16 @@ def watch(
         typer.Option("--from", help="Start: -60 (seconds back), p1250 (a pulse) or a time (ISO 8601)."),
     ] = None,
     end: Annotated[str | None, typer.Option("--to", help="End, likewise.")] = None,
+    delay: Annotated[
+        Literal["live", "balanced", "smooth"] | None,
+        typer.Option("--delay", help="How much is known of what follows when a view is selected."),
+    ] = None,
     token: _AccessToken = None,
 ) -> None:
     """List people, or watch or record a person's best view."""
     from server.cli.watch import run_watch
 
-    asyncio.run(run_until_signal(lambda: run_watch(url, number, out, seconds, start, end, token)))
+    asyncio.run(run_until_signal(lambda: run_watch(url, number, out, seconds, start, end, token, delay)))
 
 
 def token(

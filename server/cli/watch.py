@@ -26,6 +26,7 @@ async def run_watch(
     start: str | None = None,
     end: str | None = None,
     token: str | None = None,
+    delay: str | None = None,
 ) -> None:
     """List people, or watch one person.
 
@@ -35,6 +36,8 @@ async def run_watch(
     """
     if number is None and (out or seconds is not None or start or end):
         raise UserError("watch: --out, --seconds, --from and --to need --object")
+    if delay is not None and (number is None or start or end):
+        raise UserError("watch: --delay needs --object, and is not for the past")
     if out is not None:
         check_output_file(out)
     settings, before = HttpSettings(token=token), _file_at(out)
@@ -43,7 +46,15 @@ async def run_watch(
             await _list(url, settings)
             return
         watched = await watch(
-            url, number, out, seconds, _ProgressPrinter(), start=start, end=end, settings=settings
+            url,
+            number,
+            out,
+            seconds,
+            _ProgressPrinter(),
+            start=start,
+            end=end,
+            delay=delay,
+            settings=settings,
         )
     except ServerAway as error:
         raise UnavailableError(f"watch: {error}") from error

@@ -73,7 +73,7 @@ CHOICE: dict[str, Any] = {
     "camera": "c0",
     "since": 40,
     "costs": {"c0": 0.31, "c1": None},
-    "switch_cost": 25.0,
+    "switch_cost_s": 25.0,
     "reason": "c0 shows it largest",
 }
 
