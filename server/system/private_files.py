@@ -58,6 +58,24 @@ def mode_if_shared(path: Path) -> str:
     return f"{mode:o}" if mode & _OTHERS else ""
 
 
+def rights_of_others(path: Path) -> int:
+    """Return the mode bits of a file that are effective for group and others.
+
+    A class that may not enter one of its folders has none. (Of several groups, each counts as the same.)
+
+    Raises:
+        OSError: it does not exist.
+    """
+    path = path.resolve(strict=True)
+    rights = path.stat().st_mode & _OTHERS
+    for folder in path.parents:
+        mode = folder.stat().st_mode
+        for search, every in ((stat.S_IXGRP, stat.S_IRWXG), (stat.S_IXOTH, stat.S_IRWXO)):
+            if not mode & search:
+                rights &= ~every
+    return rights
+
+
 def close_to_others(path: Path) -> None:
     """Remove the rights of others from a file or folder that this user owns; otherwise do nothing.
 

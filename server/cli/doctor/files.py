@@ -18,6 +18,7 @@ from server.config.site_config import Config
 from server.config.tokens_file import read_tokens
 from server.supervisor.exposure_checks import check_bus, check_pulses, check_viewers
 from server.system.errors import UserError
+from server.system.private_files import rights_of_others
 
 _LINES = "write name:password, one a line, in a file that this user can read: docs/how-to/secure.md"
 
@@ -90,7 +91,7 @@ def _tokens(config: Config) -> list[Finding]:
     findings = [ok("access.tokens", f"{path}: {len(tokens)} tokens, {operators} of them for operators")]
     if not tokens:
         findings = [warning("access.tokens", f"{path} lets no one in", "`myview token NAME` makes one")]
-    if path.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    if rights_of_others(path) & (stat.S_IWGRP | stat.S_IWOTH):
         findings.append(
             warning(
                 "access.tokens", f"others may write {path} and give themselves access", f"chmod 644 {path}"
@@ -118,7 +119,7 @@ def _users(check: str, path: Path, names: Sequence[str]) -> list[Finding]:
 
 def _private(check: str, path: Path) -> list[Finding]:
     try:
-        open_to_others = path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO)
+        open_to_others = rights_of_others(path)
     except OSError:
         return []  # reported already
     if not open_to_others:

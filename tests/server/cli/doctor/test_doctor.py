@@ -8,6 +8,7 @@ import json
 import os
 import socket
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -240,7 +241,8 @@ def test_a_camera_that_does_not_fit_the_site_is_a_warning(
     assert words in doubt.text
 
 
-def test_a_password_file_is_used_and_should_be_private(tmp_path: Path, used_port: int) -> None:
+def test_a_password_file_is_used_and_should_be_private(folder_of_all: Path, used_port: int) -> None:
+    tmp_path = folder_of_all
     cameras = [
         {"id": "gate", "source": f"rtsp://me:{{password}}@127.0.0.1:{used_port}/live", "password": "secret"}
     ]
@@ -327,7 +329,31 @@ def test_a_folder_that_cannot_be_written_is_bad(tmp_path: Path) -> None:
     )
 
 
-def test_files_that_others_can_read_or_write_are_reported(tmp_path: Path) -> None:
+@pytest.fixture
+def folder_of_all() -> Iterator[Path]:
+    """A folder that other users may enter, unlike those of pytest."""
+    with tempfile.TemporaryDirectory(prefix="myview-doctor-", dir="/tmp") as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
+
+
+def test_secret_files_in_a_folder_that_others_may_not_enter_are_private(folder_of_all: Path) -> None:
+    inner = folder_of_all / "secrets" / "web"
+    inner.mkdir(parents=True)
+    (inner / "tokens.yaml").write_text("tokens: []\n")
+    (inner / "tokens.yaml").chmod(0o666)
+    site_config = load_site(folder_of_all, access={"tokens": str(inner / "tokens.yaml")})
+    for folder in (inner, inner.parent):
+        folder.chmod(0o755)
+    assert "others may write" in " ".join(finding.text for finding in file_findings(site_config))
+    for folder in (inner, inner.parent):
+        folder.chmod(0o700)
+        assert "others may" not in " ".join(finding.text for finding in file_findings(site_config))
+        folder.chmod(0o755)
+
+
+def test_files_that_others_can_read_or_write_are_reported(folder_of_all: Path) -> None:
+    tmp_path = folder_of_all
     tokens, users = tmp_path / "tokens.yaml", tmp_path / "users"
     tokens.write_text("tokens: []\n")
     users.write_text("bestview:secret word\n")
