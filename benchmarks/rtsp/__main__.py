@@ -13,6 +13,7 @@ import asyncio
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -101,7 +102,8 @@ async def try_client(client: Client, site: GatewaySite, path: str, transport: st
         return "401"
     if process.returncode == 0:
         return f"{_FRAMES} frames in {time.monotonic() - began:.1f} s"
-    return f"exit code {process.returncode}"
+    print(text, file=sys.stderr)
+    return "refused" if token != TOKEN else f"exit code {process.returncode}"
 
 
 async def clients_table(report: Report, site: GatewaySite) -> None:

@@ -14,8 +14,11 @@ import av
 
 from benchmarks.rtsp.site import GatewaySite
 
-_BEFORE_S, _AFTER_S = 4.0, 30.0
-_AGAIN_S = 60.0
+_BEFORE_S, _AFTER_S, _WITHIN_S = 4.0, 20.0, 150.0
+"""Seconds to watch before a death, and after frames have come again, for which so many seconds are waited."""
+_SETTLED_S = 2.0
+"""Until then frames may come that were sent before."""
+_AGAIN_S = 120.0
 
 
 class Watcher:
@@ -67,7 +70,11 @@ async def _watch(site: GatewaySite, name: str, command: str, path: str) -> Seque
     await asyncio.sleep(_BEFORE_S)
     os.kill(site.child(command), signal.SIGKILL)
     killed = time.monotonic()
-    await asyncio.sleep(_AFTER_S)
+    while watcher.is_watching and time.monotonic() < killed + _WITHIN_S:
+        if watcher.arrivals[-1] > killed + _SETTLED_S:
+            await asyncio.sleep(_AFTER_S)
+            break
+        await asyncio.sleep(0.2)
     watcher.stop()
     arrivals = list(watcher.arrivals)
     told = "goes on" if watcher.is_watching or not watcher.error else watcher.error
@@ -76,7 +83,7 @@ async def _watch(site: GatewaySite, name: str, command: str, path: str) -> Seque
         told += f"; plays again when it connects after {again.arrivals[0] - killed:.1f} s"
         again.stop()
     pause = max((late - early for early, late in pairwise(arrivals)), default=0.0)
-    after = sum(arrival > killed + 1.0 for arrival in arrivals)
+    after = sum(arrival > killed + _SETTLED_S for arrival in arrivals)
     return name, f"{pause:.1f}", str(after), told
 
 

@@ -8,6 +8,7 @@ minute (a forgotten person), or when nobody watches.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
 import threading
 import time
@@ -19,7 +20,14 @@ gi.require_version("Gst", "1.0")
 gi.require_version("GstApp", "1.0")
 from gi.repository import Gst, GstApp  # noqa: E402
 
-from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample, Track  # noqa: E402
+from server.rtsp.mp4_reader import (  # noqa: E402
+    Head,
+    Mp4Error,
+    Mp4Reader,
+    Sample,
+    Track,
+    with_parameter_sets,
+)
 from server.rtsp.request import StreamAddress  # noqa: E402
 from server.rtsp.service_stream import (  # noqa: E402
     Service,
@@ -43,11 +51,15 @@ _QUEUE_BYTES = 4_000_000
 _SLACK_S = 1.0
 
 
+_numbers = itertools.count()
+
+
 class Feed:
     """One stream of the service for one RTSP media and all its clients.
 
     Attributes:
         address: the stream.
+        number: of this feed, never used again.
         tracks: its tracks, when it was opened.
     """
 
@@ -59,6 +71,7 @@ class Feed:
             ServiceAwayError: it does not answer, or sends nothing.
         """
         self._service, self.address, self._on_end = service, address, on_end
+        self.number = next(_numbers)
         self._stream = service.open(address.path, address.token)
         self._parts = _parts(self._stream)
         self._early: list[Sample] = []
@@ -154,10 +167,12 @@ class Feed:
         source = self._sources.get(part.track.codec)
         if source is None or self._pipeline is None:
             return
+        is_keyframe = part.track.is_video and part.is_key
         running = self._pipeline.get_current_running_time()
         running_s = 0.0 if running == Gst.CLOCK_TIME_NONE else running / Gst.SECOND  # it does not play yet
-        due_s = self._clock.due(part.time_s, running_s, is_key=part.track.is_video and part.is_key)
-        buffer = Gst.Buffer.new_wrapped(part.data)
+        due_s = self._clock.due(part.time_s, running_s, is_key=is_keyframe)
+        data = with_parameter_sets(part.data, part.track.configuration) if is_keyframe else part.data
+        buffer = Gst.Buffer.new_wrapped(data)
         buffer.pts = buffer.dts = int(due_s * Gst.SECOND)
         buffer.duration = int(part.duration_s * Gst.SECOND)
         if not part.is_key:

@@ -19,6 +19,7 @@ _TRUN_OFFSET, _TRUN_FIRST_FLAGS, _TRUN_DURATION, _TRUN_SIZE, _TRUN_FLAGS, _TRUN_
     0x1, 0x4, 0x100, 0x200, 0x400, 0x800,
 )  # fmt: skip
 _TFHD_BASE, _TFHD_DESCRIPTION, _TFHD_DURATION, _TFHD_SIZE, _TFHD_FLAGS = 0x1, 0x2, 0x8, 0x10, 0x20
+_NAL_SPS = 7
 _SAMPLE_ENTRY_VIDEO, _SAMPLE_ENTRY_AUDIO = 78, 28
 """Bytes of a sample entry before its boxes."""
 
@@ -65,6 +66,32 @@ class Sample:
     duration_s: float
     is_key: bool
     data: bytes = field(repr=False)
+
+
+def with_parameter_sets(sample: bytes, configuration: bytes) -> bytes:
+    """Return a keyframe with its track's parameter sets before it, unless it has its own.
+
+    Not by the payloader, which would put them between the slices of a picture, too. Lengths have four bytes.
+
+    Raises:
+        Mp4Error: the configuration is not an AVCDecoderConfigurationRecord (ISO/IEC 14496-15, 5.3.3.1).
+    """
+    at = 0
+    while at + 5 <= len(sample):
+        if sample[at + 4] & 0x1F == _NAL_SPS:
+            return sample
+        at += 4 + int.from_bytes(sample[at : at + 4], "big")
+    sets, at = b"", 5
+    try:
+        for mask in (0x1F, 0xFF):  # SPS, then PPS
+            count, at = configuration[at] & mask, at + 1
+            for _ in range(count):
+                size = int.from_bytes(configuration[at : at + 2], "big")
+                sets += size.to_bytes(4, "big") + configuration[at + 2 : at + 2 + size]
+                at += 2 + size
+    except IndexError as error:
+        raise Mp4Error("the description of H.264 is incomplete") from error
+    return sets + sample
 
 
 class Mp4Reader:

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 _Status = GstRtsp.RTSPStatusCode
 _STATUS: Mapping[int, Any] = {401: _Status.UNAUTHORIZED, 403: _Status.FORBIDDEN, 404: _Status.NOT_FOUND}
 """The RTSP status of the service's; others are 503."""
-_PAYLOADERS = {"h264": "rtph264pay config-interval=-1", "aac": "rtpmp4gpay", "opus": "rtpopuspay"}
+_PAYLOADERS = {"h264": "rtph264pay config-interval=0", "aac": "rtpmp4gpay", "opus": "rtpopuspay"}
 _OPENING = GstRtsp.RTSPMethod.DESCRIBE | GstRtsp.RTSPMethod.SETUP
 """Requests that name a stream; others need a session."""
 _IDLE_CONNECTIONS = 64
@@ -74,8 +74,8 @@ class _Factory(GstRtspServer.RTSPMediaFactory):  # type: ignore[misc]
         self.set_protocols(protocols)
 
     def do_gen_key(self, _: Any) -> str:
-        address = self._gateway.feed_of_request().address
-        return f"{address.token or ''}@{address.path}"
+        # By feed: the media of one that has just ended may still be there.
+        return str(self._gateway.feed_of_request().number)
 
     def do_create_element(self, _: Any) -> Gst.Element:
         feed = self._gateway.feed_of_request()

@@ -33,6 +33,8 @@ from server.system.errors import UserError
 
 _CHECKED_GOPS = 2
 """GOPs to check before a camera counts as compatible."""
+_EXTRA_KEYFRAMES = 2
+"""Keyframes out of turn that are passed over: many cameras make one for each client that connects."""
 
 
 class PassthroughStream(LiveStream):
@@ -111,13 +113,15 @@ def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> No
     try:
         check.check_video(opened)
         aspect = pixel_aspect(opened.stream)
-        packing, start = parse_packing(opened.stream.codec_context.extradata), -1
+        packing, start, extra = parse_packing(opened.stream.codec_context.extradata), -1, 0
         for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
             for picture in decode_pictures(packet):
                 check.check_orientation(parse_orientation(picture, aspect))
-            if start < 0 and is_keyframe(data):
+            if is_keyframe(data) and start < 0:
                 start = frame
+            elif is_keyframe(data) and frame - start < required.gop and extra < _EXTRA_KEYFRAMES:
+                start, extra = frame, extra + 1
             if start >= 0:
                 check.check_access_unit(frame - start, frame - start, data, packet.pts, packet.dts)
             if frame - max(start, 0) >= _CHECKED_GOPS * required.gop:

@@ -194,6 +194,12 @@ async def test_clients_beyond_the_most_are_refused_until_one_leaves(gateway: Run
         await asyncio.sleep(0.05)
 
 
+@pytest.mark.parametrize("path", ["/cameras/c0", "/objects/1"])
+async def test_clients_that_come_as_others_leave_get_pictures(gateway: RunningGateway, path: str) -> None:
+    for _ in range(12):
+        assert len(await frames_of(gateway.url(path, token_of("desk")), 3)) == 3
+
+
 async def test_a_client_goes_on_when_the_connection_to_the_service_breaks(site: ServedSite) -> None:
     own = await asyncio.to_thread(own_pictures, 1)
     async with broken_connections(site.port) as (port, break_all), run_gateway(port) as gateway:

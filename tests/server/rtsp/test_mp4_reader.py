@@ -13,8 +13,8 @@ from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment, still_fragment
 from server.media.containers.mp4_audio import audio_fragment
-from server.media.h264.annexb import join_sample, nal_units, parameter_sets
-from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample
+from server.media.h264.annexb import join_sample, nal_units, parameter_sets, split_sample
+from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample, with_parameter_sets
 
 UNITS = encoded(0, 10)
 SAMPLES = [join_sample(nal_units(unit.data)) for unit in UNITS]
@@ -82,3 +82,22 @@ def test_damaged_bytes_are_an_error_or_other_samples(at: int, damage: bytes) -> 
 def test_any_bytes_are_an_error_or_wait_for_more(data: bytes) -> None:
     with contextlib.suppress(Mp4Error):
         list(Mp4Reader().feed(data))
+
+
+def test_a_keyframe_has_its_parameter_sets_once_before_all_slices() -> None:
+    head, *_ = Mp4Reader().feed(stream())
+    assert isinstance(head, Head)
+    (track,) = head.tracks
+    parameters = parameter_sets(nal_units(UNITS[0].data))
+    assert parameters is not None
+    slices = [b"\x65first", b"\x65second"]
+    sample = b"".join(len(nal).to_bytes(4, "big") + nal for nal in slices)
+    whole = with_parameter_sets(sample, track.configuration)
+    assert list(split_sample(whole)) == [parameters.sps, parameters.pps, *slices]
+    assert with_parameter_sets(whole, track.configuration) == whole, "avc3 has its own"
+
+
+@given(st.binary(max_size=40), st.binary(max_size=40))
+def test_any_configuration_is_an_error_or_ignored(sample: bytes, configuration: bytes) -> None:
+    with contextlib.suppress(Mp4Error):
+        with_parameter_sets(sample, configuration)

@@ -400,6 +400,22 @@ def test_a_network_cameras_video_is_passed_through_in_whole_gops(
             assert unit.pulse % GOP == number % GOP
 
 
+@pytest.mark.parametrize(("lengths", "passes"), [((1,), True), ((3, 2), True), ((2,) * 40, False)])
+def test_a_camera_may_begin_a_gop_out_of_turn_for_a_new_client(
+    lengths: tuple[int, ...], *, passes: bool
+) -> None:
+    units = encoded(0, 1000)
+    gops = [units[first : first + GOP] for first in range(0, 1000, GOP)]
+    short = [gop[:length] for gop, length in zip(gops, lengths, strict=False)]
+    camera = RtspCamera([*short, *gops[len(short) :]], FPS)
+    try:
+        pipeline = CameraPipeline(site(camera.url, "auto"), "c0")
+        assert pipeline.is_passthrough == passes
+        pipeline.close()
+    finally:
+        camera.close()
+
+
 @pytest.mark.parametrize("h264", ["pass", "auto"])
 def test_a_network_camera_that_stops_during_the_check_is_unavailable(
     network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, h264: str
