@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import secrets
 import socket
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,6 +20,8 @@ from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 _NAME_CHARACTERS = 32
+_LOWEST_PORT, _PORT_TRIES = 15_000, 50
+_OUTGOING_PORTS = Path("/proc/sys/net/ipv4/ip_local_port_range")
 
 DEMO: dict[str, Any] = {
     "site": {"name": "demo", "fps": 25, "width": 640, "height": 360},
@@ -121,11 +125,27 @@ def demo_config(folder: Path, port: int, fps: float) -> tuple[Path, Config]:
 
 
 def free_port(preferred: int = 0) -> int:
-    """Return the preferred port if it is free, otherwise any free port."""
+    """Return the preferred port if it is free, otherwise any free port.
+
+    The process that listens there starts later. So the port is none that the system could give to another
+    process's connection meanwhile, if there is such a port.
+    """
+    usual = _listening_ports()
+    others = [secrets.choice(usual) for _ in range(_PORT_TRIES)] if usual else []
+    for port in [*([preferred] if preferred else []), *others]:
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
+            return port
     with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", preferred))
-        except OSError:
-            probe.bind(("127.0.0.1", 0))
+        probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def _listening_ports() -> range:
+    """Return the ports below those of outgoing connections (ip(7)); Linux's usual ones on other systems."""
+    try:
+        lowest = int(_OUTGOING_PORTS.read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError, IndexError):
+        lowest = 32768
+    return range(_LOWEST_PORT, lowest)

@@ -10,6 +10,7 @@ from functools import cache
 import aiohttp
 import av
 import numpy as np
+import pytest
 from aiohttp import web
 from numpy.typing import NDArray
 
@@ -30,7 +31,9 @@ from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, GopChoices, TrackMessage
+from server.service.rendering import rendered_stream
 from server.service.service import BestViewService
+from server.system.worker import process
 from synthetic import Scene
 
 SIZE = (320, 180)
@@ -105,6 +108,18 @@ class DrawnSite(ServedSite):
 
 
 async def drawn_room(**changes: object) -> AsyncIterator[DrawnSite]:
+    """Yield the site; its rendering processes may take as long as a loaded machine needs."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module, bound in (
+            (process, "START_S"),
+            *((rendered_stream, bound) for bound in ("START_S", "_ANSWER_S", "_PICTURE_TIMEOUT_S")),
+        ):
+            patch.setattr(module, bound, PATIENCE)
+        async for site in _drawn_room(**changes):
+            yield site
+
+
+async def _drawn_room(**changes: object) -> AsyncIterator[DrawnSite]:
     service = FedService(small_config(site={"width": SIZE[0], "height": SIZE[1]}, **changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decisions: dict[int, GopChoices] = {}

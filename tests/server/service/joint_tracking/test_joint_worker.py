@@ -13,10 +13,13 @@ from fakes.timeouts import PATIENCE
 from server.service.joint_tracking import worker as worker_module
 from server.service.joint_tracking.stage import JointStage
 from server.service.joint_tracking.worker import JointWorker
+from server.system.worker import process as process_module
 from server.system.worker.process import WorkerDiedError, WorkerProcess
 
 
-async def test_the_process_gives_the_same_tracks() -> None:
+async def test_the_process_gives_the_same_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_module, "_ANSWER_S", PATIENCE)
+    monkeypatch.setattr(process_module, "START_S", PATIENCE)
     config, epochs = joint_config(), list(walked_epochs(walk_past(16)))
     worker, stage = JointWorker(config), JointStage(config)
     try:
@@ -30,6 +33,8 @@ async def test_the_process_gives_the_same_tracks() -> None:
 async def test_a_process_that_dies_or_hangs_is_replaced(
     how: signal.Signals, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
+    monkeypatch.setattr(worker_module, "_ANSWER_S", PATIENCE)
+    monkeypatch.setattr(process_module, "START_S", PATIENCE)
     epochs = list(walked_epochs(walk_past()))
     worker = JointWorker(joint_config())
     try:
