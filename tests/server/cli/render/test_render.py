@@ -56,6 +56,8 @@ def test_two_views_become_films_tracks_choices_and_plots_with_one_warning_of_len
     assert films
     assert files - films == {
         "choices.csv",
+        "choices-live.csv",
+        "choices-smooth.csv",
         "choices.png",
         "corrections.csv",
         "late.csv",
