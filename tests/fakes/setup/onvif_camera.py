@@ -9,7 +9,7 @@ import http.server
 import re
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
@@ -63,7 +63,7 @@ class OnvifCamera:
     """Answers probes at UDP port :attr:`discovery_port`, and SOAP at :attr:`port`, both of 127.0.0.1.
 
     ``login``: user and password of a WS-UsernameToken, whose digest is checked. ``answer`` replaces every
-    SOAP answer, ``match`` every answer to a probe.
+    SOAP answer, ``match`` every answer to a probe; ``damage`` changes what is sent.
     """
 
     def __init__(
@@ -73,10 +73,11 @@ class OnvifCamera:
         login: tuple[str, str] | None = None,
         *,
         answer: bytes | None = None,
+        damage: Callable[[bytes], bytes] = lambda body: body,
         match: bytes | None = None,
     ) -> None:
         self.name, self.profiles, self.login = name, profiles, login
-        self.answer, self.match = answer, match
+        self.answer, self.match, self.damage = answer, match, damage
         self._http = _Server(self)
         self.port = int(self._http.server_address[1])
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -148,6 +149,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         request = self.rfile.read(int(self.headers["Content-Length"])).decode()
         camera = self.server.camera
         body = camera.respond(request).encode() if camera.answer is None else camera.answer
+        body = camera.damage(body)
         self.send_response(400 if b"Fault>" in body else 200)
         self.send_header("Content-Type", "application/soap+xml; charset=utf-8")
         self.send_header("Content-Length", str(len(body)))

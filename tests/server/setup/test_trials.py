@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.service.scripted_cameras import encoded
@@ -82,6 +84,32 @@ def test_a_camera_that_answers_nonsense_is_one_line(answer: bytes) -> None:
     assert found.error
     assert len(found.error.splitlines()) == 1
     assert not found.profiles
+
+
+@settings(max_examples=40)
+@given(st.floats(0, 1), st.binary(max_size=8), st.integers(0, 60), st.integers(0, 4))
+def test_a_damaged_answer_is_read_or_refused_in_one_line(
+    place: float, put: bytes, removed: int, spared: int
+) -> None:
+    answers = 0
+
+    def damage(body: bytes) -> bytes:
+        nonlocal answers
+        answers += 1
+        at = int(place * len(body))
+        return body if answers <= spared else body[:at] + put + body[at + removed :]
+
+    camera = OnvifCamera(
+        "door", [FakeProfile("main", "rtsp://127.0.0.1/live", 64, 48, 12)], LOGIN, damage=damage
+    )
+    with onvif_cameras(camera):
+        found = query_profiles(ProfilesRequest("127.0.0.1", camera.port, *LOGIN))
+    assert len(found.error.splitlines()) <= 1
+    assert LOGIN[1] not in found.error
+    for profile in found.profiles:
+        assert profile.address.startswith("rtsp://127.0.0.1")
+        assert profile.name.isprintable()
+        assert 0 <= profile.width <= 16_384
 
 
 @pytest.mark.parametrize("sent", [b"", b"RTSP/1.0 200 OK\r\n\r\n", b"HTTP/1.1 200 OK\r\n\r\n" + b"\0" * 5000])
