@@ -19,10 +19,10 @@ RELAXATION_SHARE = 0.6
 
 _PASS_ARC = 3e-9
 """Seconds for an arc of a Viterbi pass."""
-_LAYOUT_ARC = 4e-9
-"""Seconds for an arc, a side of the box and another object of the layout term."""
-_MOVEMENT_ARC, _MOVEMENT_CELL = 1.4e-8, 1e-9
-"""Seconds for an arc with a price of its movement, and for a cell of movements and another object."""
+_LIST_ARC = 1.5e-7
+"""Seconds for an arc of a list in a Viterbi pass, with the layout term."""
+_MOVEMENT_STEP, _MOVEMENT_ARC, _MOVEMENT_CELL = 6e-5, 2.5e-8, 1e-9
+"""Seconds for a step with prices of movements, and more for each arc, and each cell and other object."""
 _ITERATION, _ITERATION_ENTRY = 1e-5, 5e-9
 """Seconds for a simplex iteration, and more for each entry of the matrix."""
 _INTERIOR_ENTRY = 3e-7
@@ -85,13 +85,14 @@ class BudgetMeter:
         """Add a Viterbi pass of each object."""
         self.work_s += _PASS_ARC * objects * frames * states**2
 
-    def add_layout(self, others: int, frames: int, states: int) -> None:
-        """Add the layout term of one object's arcs with the others."""
-        self.work_s += 4.0 * _LAYOUT_ARC * others * frames * states**2
+    def add_arcs(self, objects: int, arcs: int) -> None:
+        """Add a pass over the arcs of each object one by one, as they are in a sparse trellis."""
+        self.work_s += _LIST_ARC * objects * arcs
 
-    def add_movement_prices(self, objects: int, steps: int, cells: int, states: int) -> None:
+    def add_movement_prices(self, objects: int, steps: int, cells: int, arcs: int) -> None:
         """Add a step of the prices of movements: all arcs, and all pairs of objects in all cells."""
-        self.work_s += objects * steps * (_MOVEMENT_ARC * states**2 + _MOVEMENT_CELL * objects * cells)
+        self.work_s += steps * _MOVEMENT_STEP
+        self.work_s += objects * (_MOVEMENT_ARC * arcs + _MOVEMENT_CELL * steps * objects * cells)
 
     def add_iterations(self, iterations: int, entries: int) -> None:
         """Add simplex iterations on a matrix of so many entries."""

@@ -23,6 +23,7 @@ from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
+from tracking.solvers.local_search import LocalSearch
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.programs.arc_master import path_arcs
 from tracking.solvers.programs.linear_program import WorkLimitError
@@ -33,7 +34,6 @@ from tracking.solvers.relaxation import (
     add_conflict_prices,
     try_warm_start,
 )
-from tracking.solvers.rounding import LocalSearch
 from tracking.solvers.solution_builder import empty_solution, solution_from_relaxation
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis
 from tracking.solvers.warm_start import WarmStart
@@ -247,8 +247,7 @@ def solve_relaxation(
     network, meter = allow_hiding(network), meter or BudgetMeter()
     if not network.layout or min(network.objects, network.frames) < 2:  # noqa: PLR2004 — nothing moves apart
         return PathGeneration(network, meter).run(warm_start)
-    pricing = PathPricer(Trellis.of(network))
-    return LayoutAscent(network, pricing, ConflictSeparator(network), meter).run()
+    return LayoutAscent(network, ConflictSeparator(network), meter).run()
 
 
 _SQUARED_POWER = 2

@@ -18,6 +18,9 @@ from tracking.solvers.warm_start import ConflictPrice, WarmStart
 OPTIMALITY_TOLERANCE = 1e-11
 """Relative distance of cost and bound at which the optimum is proven; far below the documented 1e-9."""
 
+CLOSE_GAP = 2e-3
+"""Relative distance of an answer and a bound at which no better ones are searched, with a layout term."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelaxedSolution:
@@ -35,6 +38,7 @@ class RelaxedSolution:
         limit: the limit at which the search ended before the optimum, None if it is the optimum. Then y may
             violate rows, and the bound is lower.
         is_optimum: False: it is not the optimum of a relaxation, but near that of one, as an ascent finds it.
+        answer: the cheapest nodes (n, M) without conflicts that the search came across, if any.
     """
 
     usage: Floats
@@ -45,6 +49,7 @@ class RelaxedSolution:
     bound_reductions: Floats = field(default_factory=lambda: np.empty(0))
     limit: Limit | None = None
     is_optimum: bool = True
+    answer: Ints | None = None
 
     @property
     def is_integral(self) -> bool:

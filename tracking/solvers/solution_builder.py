@@ -12,9 +12,11 @@ from tracking.solvers.budget import BudgetMeter, Limit
 from tracking.solvers.candidates import candidate_nodes
 from tracking.solvers.dynamic_programming import greedy_paths
 from tracking.solvers.hidden_paths import allow_hiding
+from tracking.solvers.local_search import LocalSearch
 from tracking.solvers.objective import Ints, conflict_count, states_from_nodes, total_cost
-from tracking.solvers.relaxation import RelaxedSolution
-from tracking.solvers.rounding import LocalSearch, round_relaxation
+from tracking.solvers.recombination import recombine
+from tracking.solvers.relaxation import CLOSE_GAP, RelaxedSolution
+from tracking.solvers.rounding import round_relaxation
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 
@@ -41,8 +43,8 @@ def integer_nodes(
     """Return nodes (n, M) without conflicts for the relaxation's y.
 
     If y is integral, they are its paths. Otherwise y is rounded (II.D) and improved by local search, and so
-    are the greedy paths and the cheapest of `candidate_nodes`; the cheapest of the three are returned, the
-    rounded ones if equal. So no answer is dearer than hiding everybody.
+    are the relaxation's answer, the greedy paths and the cheapest of `candidate_nodes`, until one is close to
+    the bound. The cheapest of all are returned, so no answer is dearer than hiding everybody.
     """
     if found.limit or not found.is_optimum:
         # The flow of a search that has not ended may violate rows; shares below 1 are rounded in each frame.
@@ -52,12 +54,23 @@ def integer_nodes(
         if found.is_integral and np.isfinite(total_cost(network, nodes, power)):
             return nodes
     network = allow_hiding(network)
+    starts = [nodes] if found.answer is None else [nodes, found.answer]
     improver = LocalSearch(network, power, meter)
     candidates = candidate_nodes(network, improver.alone, warm_start)
-    greedy = greedy_paths(network, improver.alone).nodes
-    starts = [nodes, greedy, min(candidates, key=lambda found: total_cost(network, found, power))]
-    improved = [improver.improve(start) for start in starts if not conflict_count(network, start)]
-    return min(improved, key=lambda found: total_cost(network, found, power))
+    starts.append(min(candidates, key=lambda start: total_cost(network, start, power)))
+    starts = [start for start in starts if not conflict_count(network, start)]
+    starts.sort(key=lambda start: total_cost(network, start, power))
+    close = 0.0 if found.is_optimum else CLOSE_GAP
+    improved: list[Ints] = []
+    for start in [*starts, None]:
+        nodes = greedy_paths(network, improver.alone).nodes if start is None else start
+        if not conflict_count(network, nodes):
+            improved.append(improver.improve(nodes))
+        best = min(improved, key=lambda nodes: total_cost(network, nodes, power))
+        cost = total_cost(network, best, power)
+        if cost - found.bound <= close * max(1.0, abs(cost)):
+            return best
+    return improver.improve(recombine(network, [best, *improved, *starts], power, improver.meter))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,18 +12,15 @@ from tracking.solvers.cutting_planes import ConflictRow
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import PrunedStates
 
-_MOMENTUM, _DECAY, _EPSILON = 0.6, 0.9, 1e-3
-
 
 class ConflictDuals:
     """Prices of conflict rows on a pruned trellis, not negative; new rows start at 0."""
 
-    def __init__(self, packed: PrunedStates) -> None:
-        self._packed = packed
+    def __init__(self, packed: PrunedStates, steps: AdamSteps) -> None:
+        self._packed, self._steps = packed, steps
         objects, self._frames, width = packed.index.shape
         self._members = np.zeros((0, objects, width))
         self._frame = np.empty(0, dtype=np.int64)
-        self._steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON)
         self.rows: list[ConflictRow] = []
         self.prices = np.empty(0)
 
@@ -40,11 +37,13 @@ class ConflictDuals:
 
     def add_to(self, node: Floats) -> Floats:
         """Return node costs `node` (n, M, W) with the prices."""
-        if not len(self.prices):
-            return node
-        frame_prices = (self._frame == np.arange(self._frames)[:, None]) * self.prices
-        added = frame_prices @ self._members.reshape(len(self.prices), -1)
-        return np.asarray(node + np.swapaxes(added.reshape(self._frames, *self._members.shape[1:]), 0, 1))
+        return node + self.price_nodes(self.prices) if len(self.prices) else node
+
+    def price_nodes(self, prices: Floats) -> Floats:
+        """Return what each node pays, (n, M, W), at prices (R,) of the first R rows."""
+        count = len(prices)
+        frame_prices = (self._frame[:count] == np.arange(self._frames)[:, None]) * prices
+        return np.swapaxes(np.tensordot(frame_prices, self._members[:count], axes=1), 0, 1)
 
     def loads_of_paths(self, slots: Ints) -> Floats:
         """Return how many of the objects in `slots` (n, M) are in each row, (R,)."""

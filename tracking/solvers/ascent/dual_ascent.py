@@ -8,6 +8,7 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.model.network import Network
+from tracking.solvers.ascent.adam import AdamSteps
 from tracking.solvers.ascent.conflict_duals import ConflictDuals, typical_price
 from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator
@@ -16,6 +17,9 @@ from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, bes
 
 _STEPS, _STEP_DECAY, _FIRST_STEP = 25, 0.92, 0.2
 """Steps, the length of each over the one before, and that of the first as a share of a typical price."""
+
+_MOMENTUM, _DECAY, _EPSILON = 0.6, 0.9, 1e-3
+"""Decays of the moments of the slopes, and what is added to the typical slope."""
 
 _STATES = 10
 """States per frame and object, the cheapest without prices."""
@@ -52,7 +56,7 @@ def guess_duals(
     passes = MinMarginals.of(pricing.trellis, pricing.forward)
     packed = PrunedStates.cheapest(passes.through, _STATES)
     trellis = packed.trellis(pricing.trellis)
-    prices = ConflictDuals(packed)
+    prices = ConflictDuals(packed, AdamSteps(_MOMENTUM, _DECAY, _EPSILON))
     typical = typical_price(packed.states(passes.through, np.inf), passes.least)
     best, best_prices = -np.inf, prices.prices
     last_paths: list[Ints] = []

@@ -2,58 +2,78 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tracking.boxes import Floats
+from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.ascent.adam import AdamSteps
 from tracking.solvers.ascent.conflict_duals import ConflictDuals, typical_price
 from tracking.solvers.ascent.dual_ascent import usage_of_paths
+from tracking.solvers.ascent.leap_tolls import leap_tolls
 from tracking.solvers.ascent.movement_prices import (
     MovementCells,
     MovementLengths,
-    hiding_tolls,
     slopes_from_tensions,
 )
-from tracking.solvers.ascent.soft_paths import node_shares, soft_paths
+from tracking.solvers.ascent.soft_paths import soft_paths
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
+from tracking.solvers.candidates import without_conflicts
 from tracking.solvers.cutting_planes import ConflictSeparator
-from tracking.solvers.objective import Ints, conflict_count, total_cost
-from tracking.solvers.relaxation import OPTIMALITY_TOLERANCE, RelaxedSolution, add_conflict_prices
-from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, Trellis, trace_back
+from tracking.solvers.hidden_paths import hidden_nodes
+from tracking.solvers.objective import Ints, total_cost
+from tracking.solvers.recombination import recombine
+from tracking.solvers.relaxation import CLOSE_GAP, RelaxedSolution
+from tracking.solvers.sparse_trellis import SparseTrellis
+from tracking.solvers.viterbi import PrunedStates, Trellis
 
-_STEPS = 80
+_STEPS = 64
 """Steps where the budget allows them."""
 
-_PROOFS = 8
-"""How often all paths are priced on the way, which proves a bound and finds violated conflict rows."""
+_PROOF_INTERVAL = 8
+"""Steps after which all paths are priced, which proves a bound and finds violated conflict rows."""
 
-_EARLY_PROOFS, _LEAST_GAIN = 2, 5e-4
-"""Proofs that need not raise the bound, and the relative gain below which a later one is the last."""
+_STEPS_OF_PROOF, _PROOFS_OF_START = 2, 2
+"""Work of a proof in steps, and that of the start in proofs."""
 
-_FIRST_TEMPERATURE, _LAST_TEMPERATURE = 0.2, 0.02
-"""Temperatures of the soft paths, relative to what all others can charge for a movement by a height."""
+_IDLE_PROOFS, _LEAST_GAIN = 2, 3e-4
+"""The ascent ends after so many proofs that raise the bound by less than this share."""
+
+_WORTH_DROPPING = 0.7
+"""Arcs are dropped if no more than this share of them is kept."""
+
+_TOLERANCE = 1e-9
+"""Relative rounding error of sums of costs."""
+
+_FIRST_TEMPERATURE, _LAST_TEMPERATURE = 0.2, 0.03
+"""Temperatures of the soft paths, relative to the geometric mean of the typical excess cost of the second
+best state and what all others charge for a movement by a height."""
+
+_LEAST_HEAT = 0.05
+"""The former excess cost relative to that charge at least: with ties it is zero."""
 
 _FIRST_STEP, _LAST_STEP = 0.5, 0.1
 """Lengths of the steps of tensions; a difference of 1 is the most that counts."""
 
-_MOMENTUM, _DECAY, _EPSILON = 0.9, 0.95, 0.03
+_MOMENTUM, _DECAY, _EPSILON = 0.8, 0.95, 0.03
 """Decays of the moments of the slopes, and what is added to the typical slope."""
 
-_FIRST_SHARE, _LARGEST_SHARE, _SHARE_STEP = 0.3, 0.95, 0.1
-"""Share of the layout term for the tolls of hiding, and length of its steps relative to those of tensions."""
+_CONFLICT_STEP, _CONFLICT_EPSILON = 0.4, 1e-3
+"""Length of the steps of conflict prices, relative to those of tensions and the typical excess cost."""
+
+_FIRST_SHARE, _LARGEST_SHARE, _SHARE_STEP = 0.7, 0.95, 0.1
+"""Share of the layout term of leaps for their tolls; length of its steps relative to those of tensions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Proof:
-    """A pass over all paths at some prices, and the bound that it proves."""
+    """The prices that prove a bound: of movements and tolls on each arc (n, E), and of conflict rows (R,)."""
 
-    trellis: Trellis
-    passes: MinMarginals
     bound: float
-    frame_prices: Floats
+    arcs: Floats
+    rows: Floats
 
 
 class LayoutAscent:
@@ -62,134 +82,169 @@ class LayoutAscent:
     A step follows the gradient of soft paths, which grow harder; the bound is that of the cheapest ones.
     """
 
-    def __init__(
-        self, network: Network, pricing: PathPricer, finder: ConflictSeparator, meter: BudgetMeter
-    ) -> None:
+    def __init__(self, network: Network, finder: ConflictSeparator, meter: BudgetMeter) -> None:
         self._network, self._finder, self._meter = network, finder, meter
+        trellis = SparseTrellis.of(network)
+        forward, backward = trellis.forward(trellis.costs), trellis.backward(trellis.costs)
+        alone = trellis.best_paths(trellis.costs, forward)
+        through = np.swapaxes(forward + backward, 0, 1)
+        self._typical = typical_price(through, alone.costs)
+        states = PrunedStates.cheapest(through, trellis.states)
+        self._conflicts = ConflictDuals(states, AdamSteps(_MOMENTUM, _DECAY, _CONFLICT_EPSILON))
+        self._answer = hidden_nodes(network)
+        self._paths = [self._answer]
+        self._learn(alone.nodes)
+        self._usage = usage_of_paths(network, alone.nodes)
+        bound = float(alone.costs.sum())
+        kept = self._worth_keeping(trellis.excess(trellis.costs, forward, backward), bound)
+        self._trellis = trellis = trellis.select(kept)
+        self._best = _Proof(bound, np.zeros_like(trellis.costs), np.zeros(0))
+        self._fixed = trellis.costs.astype(np.float32)
         cells = MovementCells.of(network)
-        self._lengths = MovementLengths(network, cells)
-        self._tolls = hiding_tolls(network)
+        self._lengths = MovementLengths.of(network, trellis, cells)
+        self._leaps = cells.are_leaps()
+        self._tolls = leap_tolls(network, trellis, cells.leap)
         self._scale = (1.0 / cells.widths()).astype(np.float32)
-        self._charge = network.layout * (network.objects - 1) * cells.height
+        charge = network.layout * (network.objects - 1) * cells.height
+        self._heat = float(np.sqrt(max(self._typical, _LEAST_HEAT * charge) * charge))
         self._tensions = np.zeros((network.objects, network.frames - 1, len(self._scale)), dtype=np.float32)
         self._shares = np.full(network.frames - 1, _FIRST_SHARE if self._tolls.any() else 0.0)
         self._tension_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON)
         self._share_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON * float(self._tolls.max(initial=1.0)))
-        passes = MinMarginals.of(pricing.trellis, pricing.forward)
-        self._typical = typical_price(passes.through, passes.least)
-        states = network.max_places + 1
-        self._conflicts = ConflictDuals(PrunedStates.cheapest(passes.through, states))
-        self._conflicts.add_rows(finder.find_new_violated(usage_of_paths(network, pricing.alone.nodes)))
-        self._best = _Proof(pricing.trellis, passes, float(passes.least.sum()), np.zeros(network.frames))
-        self._usage = usage_of_paths(network, pricing.alone.nodes)
-        # Prices of nodes change in each step, the rest of the costs of arcs does not.
-        self._pair = network.pair[network.pair_sets].copy()
-        self._pair[:, 0] += network.source[:, :, None]
-        self._pair[:, -1] += network.sink[:, None]
-        self._fixed = self._pair.astype(np.float32)
+        for _ in range(_PROOFS_OF_START):
+            self._add_proof(meter)
 
     def run(self) -> RelaxedSolution:
         """Return the best bound, and the last soft paths as the flow."""
-        steps = self._affordable_steps()
-        proofs = [(part * steps) // _PROOFS - 1 for part in range(1, _PROOFS + 1)]
-        is_closed = self._prove()
-        for step in range(steps):
-            if is_closed or self._meter.reached(RELAXATION_SHARE):
-                break
-            self._step(step / max(steps - 1, 1))
-            if step in proofs:
-                before, is_closed = self._best.bound, self._prove()
+        is_done = self._prove()
+        steps, idle_proofs, progress = 0, 0, 0.0
+        while progress < 1.0 and not is_done and not self._meter.reached(RELAXATION_SHARE):
+            self._step(progress)
+            # Arcs are dropped on the way, so that more steps become affordable.
+            progress += (1.0 - progress) / max(min(self._affordable_steps(), _STEPS - steps), 1)
+            steps += 1
+            if steps % _PROOF_INTERVAL == 0 or progress >= 1.0:
+                before = self._best.bound
+                is_done = self._prove()
                 gain = self._best.bound - before
-                if proofs.index(step) >= _EARLY_PROOFS and gain < _LEAST_GAIN * max(1.0, abs(before)):
-                    break
-        is_cut = not is_closed and steps < _STEPS
+                idle_proofs = idle_proofs + 1 if gain < _LEAST_GAIN * max(1.0, abs(before)) else 0
+                is_done |= idle_proofs >= _IDLE_PROOFS
+        is_cut = not is_done and steps < _STEPS
+        network, best = self._network, self._best
+        frames = np.array([row.frame for row in self._conflicts.rows[: len(best.rows)]], dtype=np.int64)
         return RelaxedSolution(
             usage=self._usage,
-            bound=self._best.bound,
-            priced=self._best.trellis,
+            # Without the dropped arcs the bound may exceed what the known answer costs.
+            bound=min(best.bound, self._answer_cost),
+            priced=self._priced_trellis(),
             rounds=0,
-            bound_reductions=self._best.frame_prices,
+            bound_reductions=np.bincount(frames, best.rows, network.frames).astype(np.float64),
             limit=(self._meter.reached(RELAXATION_SHARE) or "work") if is_cut else None,
             is_optimum=False,
+            answer=self._answer,
         )
 
+    def _priced_trellis(self) -> Trellis:
+        """Return the trellis with the prices of the best bound."""
+        network, best = self._network, self._best
+        node = network.node + self._conflicts.price_nodes(best.rows)
+        pair = self._trellis.dense(self._trellis.pairs(network.pair) + best.arcs)
+        return Trellis(network.source, node, pair, network.sink)
+
     def _affordable_steps(self) -> int:
-        """Return how many steps the budget allows beside the proofs."""
-        one, proofs = BudgetMeter(), BudgetMeter()
-        self._add_step(one)
-        for _ in range(_PROOFS + 1):
-            self._add_proof(proofs)
-        left = (self._meter.left(RELAXATION_SHARE) - proofs.work_s) / one.work_s
-        return int(min(max(left, 1), _STEPS))
+        """Return how many steps the budget allows beside their proofs."""
+        step, proof = BudgetMeter(), BudgetMeter()
+        self._add_step(step)
+        self._add_proof(proof)
+        left = self._meter.left(RELAXATION_SHARE) - proof.work_s
+        return int(min(max(left, 0.0) / (step.work_s + proof.work_s / _PROOF_INTERVAL), _STEPS))
 
     def _add_step(self, meter: BudgetMeter) -> None:
-        meter.add_step()
-        meter.add_movement_prices(*self._tensions.shape, self._network.max_places + 1)
+        meter.add_movement_prices(*self._tensions.shape, len(self._trellis))
 
     def _add_proof(self, meter: BudgetMeter) -> None:
-        self._add_step(meter)
-        meter.add_passes(2 * self._network.objects, self._network.frames, self._network.max_places + 1)
+        for _ in range(_STEPS_OF_PROOF):
+            self._add_step(meter)
+
+    def _limits(self) -> Floats:
+        """Return how much a pair pays at most for each pixel of movement in each cell, (M - 1, 4 C)."""
+        return self._network.layout * (1.0 - self._shares[:, None] * self._leaps)
 
     def _step(self, progress: float) -> None:
         """Step along the gradient; `progress` is 0 in the first and 1 in the last step."""
-        network = self._network
+        network, trellis = self._network, self._trellis
         length = _FIRST_STEP * (_LAST_STEP / _FIRST_STEP) ** progress
-        heat = self._charge * _FIRST_TEMPERATURE * (_LAST_TEMPERATURE / _FIRST_TEMPERATURE) ** progress
-        limits = network.layout * (1.0 - self._shares)
-        prices = self._lengths.prices(slopes_from_tensions(self._tensions, limits))
-        node = self._conflicts.add_to(network.node).astype(np.float32)
-        tolls = (network.layout * self._shares[:, None, None] * self._tolls).astype(np.float32)
-        costs = prices + self._fixed
-        costs += tolls
-        costs += node[:, 1:, None]
-        costs[:, 0] += node[:, 0][:, :, None]
-        arcs = soft_paths(costs, heat)
-        nodes = node_shares(arcs).astype(np.float64)
-        self._tensions += np.float32(length) * self._tension_steps.step(
-            self._lengths.moved(arcs) * self._scale
+        heat = self._heat * _FIRST_TEMPERATURE * (_LAST_TEMPERATURE / _FIRST_TEMPERATURE) ** progress
+        slopes = slopes_from_tensions(self._tensions, self._limits())
+        costs = self._lengths.prices(slopes)
+        costs += self._fixed
+        costs += (network.layout * self._shares[trellis.step] * self._tolls).astype(np.float32)
+        if len(self._conflicts.prices):
+            costs += trellis.nodes(self._conflicts.price_nodes(self._conflicts.prices).astype(np.float32))
+        soft = soft_paths(trellis, costs, heat)
+        moved, nodes = self._lengths.moved(soft.arcs), soft.nodes.astype(np.float64)
+        self._tensions += np.float32(length) * self._tension_steps.step(moved * self._scale)
+        self._conflicts.ascend(
+            self._conflicts.loads_of_shares(nodes), _CONFLICT_STEP * length * self._typical
         )
-        self._conflicts.ascend(self._conflicts.loads_of_shares(nodes), length * self._typical)
         if self._tolls.any():
-            paid = np.einsum("nmij,pmij->m", arcs, self._tolls)
-            lost = np.einsum("nmij,nmij->m", arcs, prices) / limits
+            paid = np.bincount(trellis.step, soft.arcs.sum(axis=0) * self._tolls)
+            charged = np.einsum("nmc,nmc->m", moved, slopes * self._leaps)
+            lost = charged / (network.layout * (1.0 - self._shares))
             self._shares += _SHARE_STEP * length * self._share_steps.step(paid - lost)
             np.clip(self._shares, 0.0, _LARGEST_SHARE, out=self._shares)
         self._usage = nodes
         self._add_step(self._meter)
 
     def _prove(self) -> bool:
-        """Price all paths, remember the best bound, and return whether it is the optimum."""
-        network, conflicts = self._network, self._conflicts
-        limits = network.layout * (1.0 - self._shares)
-        slopes = slopes_from_tensions(self._tensions.astype(np.float64), limits)
-        pair = np.asarray(self._lengths.prices(slopes), dtype=np.float64)
-        pair += network.layout * self._shares[:, None, None] * self._tolls
-        pair += network.pair
-        node = add_conflict_prices(network, conflicts.rows, conflicts.prices)
-        trellis = Trellis(network.source, node, pair, network.sink)
-        passes = MinMarginals.of(trellis)
-        frame_prices = np.zeros(network.frames)
-        np.add.at(
-            frame_prices, np.array([row.frame for row in conflicts.rows], dtype=np.int64), conflicts.prices
-        )
-        proof = _Proof(trellis, passes, float(passes.least.sum() - frame_prices.sum()), frame_prices)
-        if proof.bound > self._best.bound:
-            self._best = proof
-        nodes = trace_back(trellis, passes.forward).nodes
-        conflicts.add_rows(self._finder.find_new_violated(usage_of_paths(network, nodes)))
+        """Price all paths, remember the best bound, and return whether an answer is close to it."""
+        network, trellis = self._network, self._trellis
+        slopes = slopes_from_tensions(self._tensions.astype(np.float64), self._limits())
+        prices = np.asarray(self._lengths.prices(slopes), dtype=np.float64)
+        prices += network.layout * self._shares[trellis.step] * self._tolls
+        rows = self._conflicts.prices
+        costs = trellis.costs + prices + trellis.nodes(self._conflicts.price_nodes(rows))
+        forward = trellis.forward(costs)
+        paths = trellis.best_paths(costs, forward)
+        bound = float(paths.costs.sum() - rows.sum())
+        if bound > self._best.bound:
+            self._best = _Proof(bound, prices, rows)
+        self._learn(paths.nodes)
+        backward = trellis.backward(costs)
         # Relative to the cost ahead, arcs of good paths cost about as much as the cheapest of their step.
-        ahead = np.swapaxes(passes.backward, 0, 1)
+        ahead = np.swapaxes(backward, 0, 1)
         ahead = np.where(np.isfinite(ahead), ahead, 0.0)
         ahead -= ahead.min(axis=2, keepdims=True)
-        self._fixed = self._pair.astype(np.float32)
-        self._fixed[:, :-1] += ahead[:, 1:-1, None].astype(np.float32)
-        self._fixed[:, 1:] -= ahead[:, 1:-1, :, None].astype(np.float32)
+        ahead[:, [0, -1]] = 0.0
+        self._fixed = (trellis.costs + trellis.differences(ahead)).astype(np.float32)
         self._add_proof(self._meter)
-        return self._is_closed(nodes)
+        self._drop(self._worth_keeping(trellis.excess(costs, forward, backward), bound))
+        gap = self._answer_cost - self._best.bound
+        return gap <= CLOSE_GAP * max(1.0, abs(self._answer_cost))
 
-    def _is_closed(self, nodes: Ints) -> bool:
-        """Return whether paths without conflicts cost no more than the bound."""
-        if conflict_count(self._network, nodes):
-            return False
-        cost = total_cost(self._network, nodes)
-        return cost - self._best.bound <= OPTIMALITY_TOLERANCE * max(1.0, abs(cost))
+    def _worth_keeping(self, excess: Floats, bound: float) -> Bools:
+        """Return which arcs (E,) may be on an answer that is cheaper than the known one.
+
+        `excess` (n, E) is that of the paths through each arc at the prices that prove the `bound`.
+        """
+        limit = self._answer_cost - bound + _TOLERANCE * max(1.0, abs(bound))
+        return np.asarray((excess <= limit).any(axis=0))
+
+    def _drop(self, kept: Bools) -> None:
+        """Drop the arcs that are not kept, if they are many."""
+        if kept.sum() > _WORTH_DROPPING * len(kept):
+            return
+        self._trellis = self._trellis.select(kept)
+        self._lengths = self._lengths.select(self._trellis, kept)
+        self._tolls, self._fixed = self._tolls[kept], self._fixed[:, kept]
+        self._best = replace(self._best, arcs=self._best.arcs[:, kept])
+
+    def _learn(self, nodes: Ints) -> None:
+        """Add the conflict rows that paths `nodes` (n, M) violate; search a cheaper answer with the paths."""
+        network = self._network
+        self._conflicts.add_rows(self._finder.find_new_violated(usage_of_paths(network, nodes)))
+        self._paths.insert(0, nodes)
+        answers = [self._answer, without_conflicts(network, nodes)]
+        cheapest = min(answers, key=lambda answer: total_cost(network, answer))
+        self._answer = recombine(network, [cheapest, *answers, *self._paths], 1, self._meter)
+        self._answer_cost = total_cost(network, self._answer)

@@ -17,14 +17,18 @@ from numpy.typing import NDArray
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.network import Network
+from tracking.solvers.sparse_trellis import SparseTrellis
 
 Slopes = NDArray[np.floating[Any]]
 
 _LEAST_MOVED = 1e-6
 """Pixels below which movements are none: arithmetic with the smallest numbers is slow."""
 
-_CELL_ENDS = 0.02 * 2.0 ** np.arange(8)
+_CELL_ENDS = np.array([0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28])
 """Ends of the cells of positive movements, in heights of a box; the last cell has none."""
+
+_FIRST_LEAP_CELL = 5
+"""The cells from this one on are those of leaps: nobody walks .32 heights in a frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +56,16 @@ class MovementCells:
         """The number C of cells of a side."""
         return len(self.edges) - 1
 
+    @property
+    def leap(self) -> float:
+        """The pixels per frame beyond which movements go through cells of leaps."""
+        return float(self.edges[self.count // 2 + _FIRST_LEAP_CELL])
+
+    def are_leaps(self) -> NDArray[np.bool_]:
+        """Return which of the cells of a box are those of leaps, (4 C,)."""
+        outside = (self.edges[:-1] >= self.leap) | (self.edges[1:] <= -self.leap)
+        return np.tile(outside, BOX_SIDES)
+
     def lengths(self, movements: Floats) -> Floats:
         """Return how far movements (..., 4) go through each cell, (..., 4 C), negative to the left and up.
 
@@ -70,74 +84,50 @@ class MovementCells:
 def slopes_from_tensions(tensions: Slopes, limits: Slopes) -> Slopes:
     """Return the slope of each object's price in each cell, (n, M - 1, 4 C): valid ones for any tensions.
 
-    Two objects pull each other by the difference of their tensions, by the step's limit (M - 1,) at most: the
-    slope of an object is the sum over all others.
+    Two objects pull each other by the difference of their tensions, by the limits (M - 1, 4 C) of step and
+    cell at most: the slope of an object is the sum over all others.
     """
     slopes = np.zeros_like(tensions)
     for owner in range(1, len(tensions)):
         pulls = np.clip(tensions[owner] - tensions[:owner], -1.0, 1.0)
         slopes[owner] += pulls.sum(axis=0)
         slopes[:owner] -= pulls
-    return slopes * limits[:, None].astype(slopes.dtype)
+    return slopes * limits.astype(slopes.dtype)
 
 
 class MovementLengths:
-    """The lengths of the movements of all arcs: (P, M - 1, S S, 4 C), in single or double precision."""
+    """The lengths of the movements of all arcs, `exact` (P, E, 4 C), and in single precision."""
 
-    def __init__(self, network: Network, cells: MovementCells) -> None:
-        before, after = network.locations[:, :-1, :, None], network.locations[:, 1:, None]
-        sets, steps, states = network.locations[:, 1:, :, 0].shape
-        self._shape = (network.objects, steps, states, states)
-        self._exact: Slopes = cells.lengths(after - before).reshape(
-            sets, steps, states**2, BOX_SIDES * cells.count
-        )
-        self._singles: Slopes = self._exact.astype(np.float32)
+    def __init__(self, trellis: SparseTrellis, exact: Slopes) -> None:
+        self._steps = trellis.steps
+        self._exact = exact
+        self._singles: Slopes = exact.astype(np.float32)
+
+    @classmethod
+    def of(cls, network: Network, trellis: SparseTrellis, cells: MovementCells) -> MovementLengths:
+        """Return the lengths of a network's arcs."""
+        return cls(trellis, cells.lengths(trellis.movements(network.locations)))
+
+    def select(self, trellis: SparseTrellis, kept: NDArray[np.bool_]) -> MovementLengths:
+        """Return the lengths of the arcs where `kept` (E,) is true, which are those of `trellis`."""
+        return MovementLengths(trellis, self._exact[:, kept])
 
     def prices(self, slopes: Slopes) -> Slopes:
-        """Return the price of each arc, (n, M - 1, S, S), in the precision of the slopes (n, M - 1, 4 C)."""
+        """Return the price of each arc, (n, E), in the precision of the slopes (n, M - 1, 4 C)."""
         lengths = self._singles if slopes.dtype == np.float32 else self._exact
-        prices = np.empty((len(slopes), lengths.shape[1], lengths.shape[2]), dtype=slopes.dtype)
+        prices = np.empty((len(slopes), lengths.shape[1]), dtype=slopes.dtype)
         for p, own in enumerate(lengths):
             owners = slice(None) if len(lengths) == 1 else slice(p, p + 1)
-            for m, of_step in enumerate(own):
-                prices[owners, m] = slopes[owners, m] @ of_step.T
-        return prices.reshape(self._shape)
+            for m, step in enumerate(self._steps):
+                prices[owners, step.span] = slopes[owners, m] @ own[step.span].T
+        return prices
 
-    def moved(self, arcs: Slopes) -> Slopes:
-        """Return how far objects move through each cell, (n, M - 1, 4 C), at shares in single precision."""
-        flat = arcs.reshape(*arcs.shape[:2], -1)
-        moved = np.empty((*arcs.shape[:2], self._singles.shape[3]), dtype=np.float32)
+    def moved(self, shares: Slopes) -> Slopes:
+        """Return how far objects move through each cell, (n, M - 1, 4 C), at shares of arcs (n, E)."""
+        moved = np.empty((len(shares), len(self._steps), self._singles.shape[2]), dtype=np.float32)
         for p, own in enumerate(self._singles):
             owners = slice(None) if len(self._singles) == 1 else slice(p, p + 1)
-            for m, of_step in enumerate(own):
-                moved[owners, m] = flat[owners, m] @ of_step
+            for m, step in enumerate(self._steps):
+                moved[owners, m] = shares[owners, step.span] @ own[step.span]
         moved[np.abs(moved) < _LEAST_MOVED] = 0.0
         return moved
-
-
-def hiding_tolls(network: Network) -> Floats:
-    """Return what hiding and reappearing can cost on every arc beside these prices, (1, M - 1, S, S), pixels.
-
-    Two objects that hide, or reappear, in the same step come from or go to places that do not conflict, so
-    that their movements differ by the distance of these places at least. From all other movements theirs
-    differ by the sizes at least that the box takes or gives. So each can be charged half of the least of
-    these distances for each other object. Zero where objects do not share their observations.
-    """
-    places, frames = network.max_places, network.frames
-    tolls = np.zeros((1, frames - 1, places + 1, places + 1))
-    if not network.shared or not places:
-        return tolls
-    boxes, hidden = network.locations[0, :, :places], network.locations[0, :, places:]
-    apart = np.abs(boxes[:, :, None] - boxes[:, None]).sum(axis=3)
-    apart[network.exclusions() | ~network.present[0][:, None]] = np.inf
-    nearest = np.minimum(apart.min(axis=2), np.abs(boxes - hidden).sum(axis=2))
-    sizes = boxes[:, :, 2:] - boxes[:, :, :2]
-    for m in range(frames - 1):
-        usable = np.isfinite(network.pair[:, m, :places, :places]).any(axis=0)
-        growth = (sizes[m + 1] - sizes[m][:, None])[usable]
-        grown, shrunk = growth.max(axis=0, initial=0.0), (-growth).max(axis=0, initial=0.0)
-        taken = np.maximum(sizes[m + 1] - grown, 0.0).sum(axis=1)
-        given = np.maximum(sizes[m] - shrunk, 0.0).sum(axis=1)
-        tolls[0, m, places, :places] = np.minimum(nearest[m + 1], taken)
-        tolls[0, m, :places, places] = np.minimum(nearest[m], given)
-    return tolls * (network.objects - 1) / 2.0

@@ -7,8 +7,12 @@ and prove nothing.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
+
+from tracking.solvers.sparse_trellis import SparseTrellis
 
 Singles = NDArray[np.float32]
 
@@ -22,36 +26,56 @@ _LEAST_ARC = np.float32(1e-12)
 """Added to the share of each arc, for the same reason."""
 
 
-def soft_paths(costs: Singles, temperature: float) -> Singles:
-    """Turn the costs of arcs between frames, (n, M - 1, S, S), into their shares, in place.
+@dataclass(frozen=True, slots=True, eq=False)
+class SoftPaths:
+    """Shares of the paths of each object.
 
-    The shares of an object's arcs of a step sum to 1. The costs of arcs include nodes, source and sink.
+    Attributes:
+        arcs: (n, E) the shares of arcs, which sum to 1 in each step.
+        nodes: (n, M, S) those of states.
     """
-    costs -= costs.min(axis=(2, 3), keepdims=True)
+
+    arcs: Singles
+    nodes: Singles
+
+
+def soft_paths(trellis: SparseTrellis, costs: Singles, temperature: float) -> SoftPaths:
+    """Compute the shares from the costs of arcs, (n, E), which are overwritten."""
+    for step in trellis.steps:
+        costs[:, step.span] -= costs[:, step.span].min(axis=1, keepdims=True)
     costs *= np.float32(-1.0 / temperature)
     np.maximum(costs, _LEAST_EXPONENT, out=costs)
     shares = np.exp(costs, out=costs)
-    objects, steps, states, _ = shares.shape
-    ahead = np.empty((steps, objects, states, 1), dtype=np.float32)
-    ahead[-1] = 1.0
-    for m in range(steps - 1, 0, -1):
-        ahead[m - 1] = _normalized(shares[:, m] @ ahead[m])
-    behind = np.ones((objects, 1, states), dtype=np.float32)
-    for m in range(steps):
-        arcs = shares[:, m]
-        through = _normalized(behind @ arcs)
-        arcs *= np.swapaxes(behind, 1, 2)
-        arcs *= np.swapaxes(ahead[m], 1, 2)
-        arcs /= arcs.sum(axis=(1, 2), keepdims=True)
-        behind = through
+    nodes = np.zeros((len(shares), len(trellis.steps) + 1, trellis.states), dtype=np.float32)
+    ahead = _shares_ahead(trellis, shares, np.zeros_like(nodes))
+    behind = np.ones_like(nodes[:, 0])
+    for m, step in enumerate(trellis.steps):
+        arcs, entering = shares[:, step.span], step.entering
+        arcs *= behind[:, step.origin]
+        through = _normalized(np.add.reduceat(arcs, entering.starts, axis=1))
+        arcs *= ahead[:, m + 1, step.target]
+        arcs /= arcs.sum(axis=1, keepdims=True)
+        nodes[:, m + 1, entering.states] = np.add.reduceat(arcs, entering.starts, axis=1)
+        behind = np.zeros_like(behind)
+        behind[:, entering.states] = through
+    first = trellis.steps[0]
+    leaving = shares[:, first.span][:, first.order]
+    nodes[:, 0, first.leaving.states] = np.add.reduceat(leaving, first.leaving.starts, axis=1)
     shares += _LEAST_ARC
-    return shares
+    return SoftPaths(shares, nodes)
 
 
-def node_shares(arcs: Singles) -> Singles:
-    """Return the shares of the nodes, (n, M, S)."""
-    return np.concatenate([arcs[:, :1].sum(axis=3), arcs.sum(axis=2)], axis=1)
+def _shares_ahead(trellis: SparseTrellis, shares: Singles, ahead: Singles) -> Singles:
+    """Fill `ahead` (n, M, S) with the shares of the paths from each state on, up to a factor."""
+    ahead[:, -1] = 1.0
+    ordered = shares[:, trellis.by_origin]
+    for m in range(len(trellis.steps) - 1, 0, -1):
+        step = trellis.steps[m]
+        arcs = ordered[:, step.span]
+        arcs *= ahead[:, m + 1, step.target[step.order]]
+        ahead[:, m, step.leaving.states] = _normalized(np.add.reduceat(arcs, step.leaving.starts, axis=1))
+    return ahead
 
 
 def _normalized(shares: Singles) -> Singles:
-    return np.asarray(shares / shares.sum(axis=(1, 2), keepdims=True) + _LEAST_SHARE)
+    return np.asarray(shares / shares.sum(axis=1, keepdims=True) + _LEAST_SHARE)
