@@ -1,4 +1,4 @@
-"""Windows to time solvers on: random observations, as in the paper's Fig. 21, and walking people."""
+"""Windows to time solvers on: random observations, as in the paper's Fig. 21, and people who walk or meet."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from tracking.types import Detections
 BINS = 64
 PERSON = np.array([40.0, 100.0])
 CIF, VGA = np.array([352.0, 288.0]), np.array([640.0, 480.0])
-SEEN = 0.9
+SEEN, COVERED = 0.9, 0.4
+"""Share of people who are detected, and the distance in sizes of a person within which one covers another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,19 @@ class Walkers:
             for n in range(self._size.objects)
         ]
 
+    def meet(self, frames: int) -> None:
+        """Let people walk in pairs towards each other, at the same place after so many frames."""
+        for first in range(0, self._size.objects - 1, 2):
+            self._speed[first + 1] = -self._speed[first]
+            self.corners[first + 1] = self.corners[first] + 2.0 * frames * self._speed[first]
+
+    def _visible(self) -> np.ndarray:
+        """Return who is detected: few are missed, and those whom somebody else covers are."""
+        apart = np.abs(self.corners[:, None] - self.corners) / PERSON
+        covered = np.tril((apart < COVERED).all(axis=2), -1).any(axis=1)
+        seen = (self._rng.uniform(size=self._size.objects) < SEEN) & ~covered
+        return np.flatnonzero(seen)[: self._size.places]
+
     def step(self) -> Detections:
         """Move by a frame, turning back at the edges; return the observations."""
         rng, size = self._rng, self._size
@@ -64,7 +78,7 @@ class Walkers:
         out = ((self.corners < 0) & (self._speed < 0)) | ((self.corners > VGA) & (self._speed > 0))
         self._speed[out] *= -1.0
         self.corners += self._speed
-        visible = np.flatnonzero(rng.uniform(size=size.objects) < SEEN)[: size.places]
+        visible = self._visible()
         stray = size.places - len(visible)
         corners = np.vstack(
             [
@@ -86,6 +100,14 @@ class Walkers:
 def walking_window(size: WindowSize, settings: CostSettings, seed: int) -> Network:
     """Build a window of walking people."""
     people = Walkers(size, seed)
+    templates = people.templates()
+    return build_network(templates, [people.step() for _ in range(size.frames)], settings)
+
+
+def meeting_window(size: WindowSize, settings: CostSettings, seed: int) -> Network:
+    """Build a window in whose middle people meet in pairs, and walk on."""
+    people = Walkers(size, seed)
+    people.meet(size.frames // 2)
     templates = people.templates()
     return build_network(templates, [people.step() for _ in range(size.frames)], settings)
 

@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.solvers.random_windows import WindowSize, moving_windows, random_window, walking_window
+from benchmarks.solvers.random_windows import (
+    WindowSize,
+    meeting_window,
+    moving_windows,
+    random_window,
+    walking_window,
+)
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import Solution, SolverBudget, create_solver
@@ -42,10 +48,11 @@ class WindowCase:
 CASES = (
     WindowCase("random", random_window, WindowSize(3, 50)),
     WindowCase("walking", walking_window, WindowSize(3, 50)),
+    WindowCase("meeting", meeting_window, WindowSize(3, 50)),
     WindowCase("random", random_window, WindowSize(10, 40)),
-    WindowCase("random", random_window, WindowSize(20, 40)),
-    WindowCase("walking", walking_window, WindowSize(20, 40)),
-    WindowCase("walking", walking_window, WindowSize(3, 50), layout=0.001),
+    WindowCase("random", random_window, WindowSize(20, 40, 15)),
+    WindowCase("meeting", meeting_window, WindowSize(20, 40, 15)),
+    WindowCase("meeting", meeting_window, WindowSize(3, 50), layout=0.001),
     WindowCase("random", random_window, WindowSize(3, 50), layout=0.001),
 )
 
@@ -58,9 +65,10 @@ EXACT_CASES = (
 
 BUDGET_CASES = (
     WindowCase("random", random_window, WindowSize(60, 60, 15)),
-    WindowCase("walking", walking_window, WindowSize(60, 60, 15)),
+    WindowCase("meeting", meeting_window, WindowSize(60, 60, 15)),
     WindowCase("walking", walking_window, WindowSize(8, 20, 15), layout=0.001),
     WindowCase("walking", walking_window, WindowSize(20, 40, 15), layout=0.001),
+    WindowCase("meeting", meeting_window, WindowSize(20, 40, 15), layout=0.001),
     WindowCase("random", random_window, WindowSize(20, 40, 15), layout=0.001),
     WindowCase("walking", walking_window, WindowSize(40, 60, 15), layout=0.001),
 )

@@ -22,8 +22,8 @@ from tracking.solvers.base import Solution, TimedSolver
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter, Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices, group_objects
 from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.heuristics.local_search import LocalSearch
 from tracking.solvers.hidden_paths import allow_hiding
-from tracking.solvers.local_search import LocalSearch
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.programs.arc_master import path_arcs
 from tracking.solvers.programs.linear_program import WorkLimitError
@@ -134,8 +134,9 @@ class PathGeneration:
         search = ArcGeneration(self._network, starts, self._master.rows, self._finder, self._meter)
         found = search.run()
         if found.bound < self._bound:
-            found = replace(found, bound=self._bound, priced=self._priced)
-        return replace(found, rounds=found.rounds + rounds, prices=())
+            prices = conflict_prices(self._network, self._master.rows[: len(self._prices)], self._prices)
+            found = replace(found, bound=self._bound, priced=self._priced, prices=prices)
+        return replace(found, rounds=found.rounds + rounds)
 
     def _solve(self) -> None:
         self._point = self._master.solve()

@@ -10,8 +10,8 @@ from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.budget import Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
+from tracking.solvers.heuristics.rounding import is_integral
 from tracking.solvers.objective import Ints, conflict_count, path_costs
-from tracking.solvers.rounding import is_integral
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis, best_paths
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 

@@ -9,14 +9,14 @@ import numpy as np
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.budget import BudgetMeter, Limit
-from tracking.solvers.candidates import candidate_nodes
 from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.heuristics.candidates import candidate_nodes
+from tracking.solvers.heuristics.local_search import LocalSearch
+from tracking.solvers.heuristics.recombination import recombine
+from tracking.solvers.heuristics.rounding import round_relaxation
 from tracking.solvers.hidden_paths import allow_hiding
-from tracking.solvers.local_search import LocalSearch
 from tracking.solvers.objective import Ints, conflict_count, states_from_nodes, total_cost
-from tracking.solvers.recombination import recombine
 from tracking.solvers.relaxation import CLOSE_GAP, RelaxedSolution
-from tracking.solvers.rounding import round_relaxation
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
 

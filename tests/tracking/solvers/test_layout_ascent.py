@@ -15,11 +15,16 @@ from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import SolverBudget, create_solver
 from tracking.solvers.ascent.leap_tolls import leap_tolls
-from tracking.solvers.ascent.movement_prices import MovementCells, MovementLengths, slopes_from_tensions
+from tracking.solvers.ascent.movement_prices import (
+    MovementCells,
+    MovementLengths,
+    MovementPrices,
+    slopes_from_tensions,
+)
 from tracking.solvers.budget import BudgetMeter
+from tracking.solvers.heuristics.recombination import recombine
 from tracking.solvers.hidden_paths import allow_hiding, hidden_nodes
 from tracking.solvers.objective import conflict_count, total_cost, unweighted_layout_cost
-from tracking.solvers.recombination import recombine
 from tracking.solvers.sparse_trellis import SparseTrellis
 from tracking.types import Detections
 
@@ -68,7 +73,9 @@ def test_no_paths_without_conflicts_pay_more_than_the_layout_term(case: Case, se
     tensions = rng.normal(0.0, 2.0, (network.objects, network.frames - 1, len(cells.widths())))
     share = rng.uniform(size=network.frames - 1)
     slopes = slopes_from_tensions(tensions, 1.0 - share[:, None] * cells.are_leaps())
-    prices = MovementLengths.of(network, trellis, cells).prices(slopes)
+    prices = MovementPrices(cells, trellis, trellis.movements(network.locations)).of_slopes(slopes)
+    single = MovementLengths(MovementPrices(cells, trellis, trellis.movements(network.locations)))
+    np.testing.assert_allclose(single.prices(slopes.astype(np.float32)), prices, rtol=1e-4, atol=1e-2)
     prices = trellis.dense(prices + share[trellis.step] * leap_tolls(network, trellis, cells.leap))
     each, steps = np.indices(prices.shape[:2])
     paid = prices[each, steps, nodes[:, :-1], nodes[:, 1:]].sum()

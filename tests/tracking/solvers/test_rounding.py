@@ -11,9 +11,9 @@ from fakes.tracking.random_networks import Case, cases, network_of
 from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers.dynamic_programming import greedy_paths
-from tracking.solvers.local_search import LocalSearch
+from tracking.solvers.heuristics.local_search import LocalSearch
+from tracking.solvers.heuristics.rounding import is_integral, round_relaxation
 from tracking.solvers.objective import conflict_count, path_cost, path_costs, total_cost
-from tracking.solvers.rounding import is_integral, round_relaxation
 from tracking.types import Detections
 
 many = settings(deadline=None, max_examples=60)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import Case, cases, network_of
 from tracking.model.network import Network
+from tracking.solvers.heuristics.local_search import MovementChanges
 from tracking.solvers.hidden_paths import allow_hiding
-from tracking.solvers.local_search import MovementChanges
 from tracking.solvers.objective import path_costs
 from tracking.solvers.sparse_trellis import SparseTrellis
 from tracking.solvers.viterbi import MinMarginals, Trellis, best_paths

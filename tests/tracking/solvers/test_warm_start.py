@@ -63,6 +63,22 @@ def test_an_arbitrary_warm_start_changes_nothing(case: Case, seed: int) -> None:
     same_optimum(network, WarmStart(tuple(rows), states))
 
 
+def test_arcs_that_take_over_from_paths_keep_the_prices_for_the_next_window(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without them the next window would begin from nothing."""
+    monkeypatch.setattr("tracking.solvers.column_generation._MAX_ROUNDS_SMALL_GROUP", 0)
+    costs = replace(PAPER_COSTS, conflict_rows="clique", conflict_distance=120.0)
+    networks = [network_of(Case(5, 6, 6, shared=True, settings=costs, seed=2 * seed)) for seed in range(4)]
+    solved = [create_solver("columns").solve(network) for network in networks]
+    assert all(solution.report.integral and solution.prices for solution in solved)
+    again = [
+        create_solver("columns").solve(network, solution.warm_start)
+        for network, solution in zip(networks, solved, strict=True)
+    ]
+    assert all(solution.report.rounds == 0 for solution in again)
+
+
 @bounded
 @given(case=cases(objects=6, frames=5, places=6))
 def test_the_same_warm_start_gives_the_same_solution(case: Case) -> None:

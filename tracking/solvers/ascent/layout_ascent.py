@@ -16,15 +16,16 @@ from tracking.solvers.ascent.leap_tolls import leap_tolls
 from tracking.solvers.ascent.movement_prices import (
     MovementCells,
     MovementLengths,
+    MovementPrices,
     slopes_from_tensions,
 )
 from tracking.solvers.ascent.soft_paths import soft_paths
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
-from tracking.solvers.candidates import without_conflicts
 from tracking.solvers.cutting_planes import ConflictSeparator
+from tracking.solvers.heuristics.candidates import without_conflicts
+from tracking.solvers.heuristics.recombination import recombine
 from tracking.solvers.hidden_paths import hidden_nodes
 from tracking.solvers.objective import Ints, total_cost
-from tracking.solvers.recombination import recombine
 from tracking.solvers.relaxation import CLOSE_GAP, RelaxedSolution
 from tracking.solvers.sparse_trellis import SparseTrellis
 from tracking.solvers.viterbi import PrunedStates, Trellis
@@ -43,6 +44,9 @@ _IDLE_PROOFS, _LEAST_GAIN = 2, 3e-4
 
 _WORTH_DROPPING = 0.7
 """Arcs are dropped if no more than this share of them is kept."""
+
+_MANY_ARCS, _NEAR = 6000, 0.3
+"""Of more arcs than that, the steps look only at those near the bound: within this share of the gap."""
 
 _TOLERANCE = 1e-9
 """Relative rounding error of sums of costs."""
@@ -95,22 +99,21 @@ class LayoutAscent:
         self._paths = [self._answer]
         self._learn(alone.nodes)
         self._usage = usage_of_paths(network, alone.nodes)
-        bound = float(alone.costs.sum())
-        kept = self._worth_keeping(trellis.excess(trellis.costs, forward, backward), bound)
-        self._trellis = trellis = trellis.select(kept)
-        self._best = _Proof(bound, np.zeros_like(trellis.costs), np.zeros(0))
-        self._fixed = trellis.costs.astype(np.float32)
         cells = MovementCells.of(network)
-        self._lengths = MovementLengths.of(network, trellis, cells)
+        bound, excess = float(alone.costs.sum()), trellis.excess(trellis.costs, forward, backward)
+        kept = self._worth_keeping(excess, bound)
+        self._best = _Proof(bound, np.zeros((network.objects, int(kept.sum()))), np.zeros(0))
+        self._all = MovementPrices(cells, trellis, trellis.movements(network.locations)).select(kept)
+        self._all_tolls = leap_tolls(network, self._all.trellis, cells.leap)
+        self._focus(excess[:, kept], bound, self._all.trellis.costs)
         self._leaps = cells.are_leaps()
-        self._tolls = leap_tolls(network, trellis, cells.leap)
         self._scale = (1.0 / cells.widths()).astype(np.float32)
         charge = network.layout * (network.objects - 1) * cells.height
         self._heat = float(np.sqrt(max(self._typical, _LEAST_HEAT * charge) * charge))
         self._tensions = np.zeros((network.objects, network.frames - 1, len(self._scale)), dtype=np.float32)
-        self._shares = np.full(network.frames - 1, _FIRST_SHARE if self._tolls.any() else 0.0)
+        self._shares = np.full(network.frames - 1, _FIRST_SHARE if self._all_tolls.any() else 0.0)
         self._tension_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON)
-        self._share_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON * float(self._tolls.max(initial=1.0)))
+        self._share_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON * float(self._all_tolls.max(initial=1.0)))
         for _ in range(_PROOFS_OF_START):
             self._add_proof(meter)
 
@@ -148,7 +151,8 @@ class LayoutAscent:
         """Return the trellis with the prices of the best bound."""
         network, best = self._network, self._best
         node = network.node + self._conflicts.price_nodes(best.rows)
-        pair = self._trellis.dense(self._trellis.pairs(network.pair) + best.arcs)
+        trellis = self._all.trellis
+        pair = trellis.dense(trellis.pairs(network.pair) + best.arcs)
         return Trellis(network.source, node, pair, network.sink)
 
     def _affordable_steps(self) -> int:
@@ -198,10 +202,10 @@ class LayoutAscent:
 
     def _prove(self) -> bool:
         """Price all paths, remember the best bound, and return whether an answer is close to it."""
-        network, trellis = self._network, self._trellis
+        network, trellis = self._network, self._all.trellis
         slopes = slopes_from_tensions(self._tensions.astype(np.float64), self._limits())
-        prices = np.asarray(self._lengths.prices(slopes), dtype=np.float64)
-        prices += network.layout * self._shares[trellis.step] * self._tolls
+        prices = self._all.of_slopes(slopes)
+        prices += network.layout * self._shares[trellis.step] * self._all_tolls
         rows = self._conflicts.prices
         costs = trellis.costs + prices + trellis.nodes(self._conflicts.price_nodes(rows))
         forward = trellis.forward(costs)
@@ -216,28 +220,35 @@ class LayoutAscent:
         ahead = np.where(np.isfinite(ahead), ahead, 0.0)
         ahead -= ahead.min(axis=2, keepdims=True)
         ahead[:, [0, -1]] = 0.0
-        self._fixed = (trellis.costs + trellis.differences(ahead)).astype(np.float32)
+        relative = trellis.costs + trellis.differences(ahead)
+        excess = trellis.excess(costs, forward, backward)
+        kept = self._worth_keeping(excess, bound)
+        if kept.sum() < _WORTH_DROPPING * len(kept):
+            self._all, self._all_tolls = self._all.select(kept), self._all_tolls[kept]
+            self._best = replace(self._best, arcs=self._best.arcs[:, kept])
+            excess, relative = excess[:, kept], relative[:, kept]
+        self._focus(excess, bound, relative)
         self._add_proof(self._meter)
-        self._drop(self._worth_keeping(trellis.excess(costs, forward, backward), bound))
         gap = self._answer_cost - self._best.bound
         return gap <= CLOSE_GAP * max(1.0, abs(self._answer_cost))
 
-    def _worth_keeping(self, excess: Floats, bound: float) -> Bools:
+    def _worth_keeping(self, excess: Floats, bound: float, share: float = 1.0) -> Bools:
         """Return which arcs (E,) may be on an answer that is cheaper than the known one.
 
-        `excess` (n, E) is that of the paths through each arc at the prices that prove the `bound`.
+        `excess` (n, E) is that of the paths through each arc at the prices that prove the `bound`. `share`:
+        only those on answers that are nearer to the bound by this factor.
         """
-        limit = self._answer_cost - bound + _TOLERANCE * max(1.0, abs(bound))
+        limit = share * (self._answer_cost - bound) + _TOLERANCE * max(1.0, abs(bound))
         return np.asarray((excess <= limit).any(axis=0))
 
-    def _drop(self, kept: Bools) -> None:
-        """Drop the arcs that are not kept, if they are many."""
-        if kept.sum() > _WORTH_DROPPING * len(kept):
-            return
-        self._trellis = self._trellis.select(kept)
-        self._lengths = self._lengths.select(self._trellis, kept)
-        self._tolls, self._fixed = self._tolls[kept], self._fixed[:, kept]
-        self._best = replace(self._best, arcs=self._best.arcs[:, kept])
+    def _focus(self, excess: Floats, bound: float, costs: Floats) -> None:
+        """Choose the arcs that the next steps look at, all or the best of many; `costs` (n, E) are theirs."""
+        near = np.ones(excess.shape[1], dtype=np.bool_)
+        if len(near) > _MANY_ARCS:
+            near = self._worth_keeping(excess, bound, _NEAR)
+        arcs = self._all.select(near)
+        self._trellis, self._lengths = arcs.trellis, MovementLengths(arcs)
+        self._tolls, self._fixed = self._all_tolls[near], costs[:, near].astype(np.float32)
 
     def _learn(self, nodes: Ints) -> None:
         """Add the conflict rows that paths `nodes` (n, M) violate; search a cheaper answer with the paths."""

@@ -8,6 +8,7 @@ their leaps differ.
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from tracking.boxes import Floats
 from tracking.model.network import Network
@@ -50,7 +51,7 @@ def leap_tolls(network: Network, trellis: SparseTrellis, leap: float) -> Floats:
 
 def _differences(first: Floats, second: Floats) -> Floats:
     """Return the city-block distances of vectors (A, 4) and (B, 4), (A, B)."""
-    return np.asarray(np.abs(first[:, None] - second).sum(axis=2))
+    return np.asarray(cdist(first, second, "cityblock"))
 
 
 def _least(first: Floats, second: Floats) -> Floats:

@@ -95,38 +95,63 @@ def slopes_from_tensions(tensions: Slopes, limits: Slopes) -> Slopes:
     return slopes * limits.astype(slopes.dtype)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MovementPrices:
+    """The prices of arcs of a trellis for their movements (P, E, 4), in pixels."""
+
+    cells: MovementCells
+    trellis: SparseTrellis
+    movements: Floats
+
+    def select(self, kept: NDArray[np.bool_]) -> MovementPrices:
+        """Return those of the arcs where `kept` (E,) is true."""
+        return MovementPrices(self.cells, self.trellis.select(kept), self.movements[:, kept])
+
+    def of_slopes(self, slopes: Slopes) -> Floats:
+        """Return the price of each arc, (n, E), from the slopes (n, M - 1, 4 C)."""
+        count = self.cells.count
+        by_side = slopes.reshape(*slopes.shape[:2], BOX_SIDES, count)
+        # Within a cell a price is a line: its slope, and where it would cross zero.
+        ends = self.cells.edges[1:-1]
+        widths = np.diff(self.cells.edges)[1:-1]
+        at_ends = np.concatenate(
+            [np.zeros((*by_side.shape[:3], 1)), np.cumsum(by_side[..., 1:-1] * widths, axis=3)], axis=3
+        )
+        at_ends -= at_ends[..., [count // 2 - 1]]
+        offsets = at_ends[..., np.maximum(np.arange(count) - 1, 0)]
+        offsets -= by_side * ends[np.maximum(np.arange(count) - 1, 0)]
+        prices = np.zeros((len(slopes), len(self.trellis)))
+        for side in range(BOX_SIDES):
+            for p, movements in enumerate(self.movements[:, :, side]):
+                owners = slice(None) if len(self.movements) == 1 else slice(p, p + 1)
+                cell = np.searchsorted(ends, movements, side="right")
+                at = self.trellis.step, cell
+                prices[owners] += offsets[owners, :, side][:, *at]
+                prices[owners] += by_side[owners, :, side][:, *at] * movements
+        return prices
+
+
 class MovementLengths:
-    """The lengths of the movements of all arcs, `exact` (P, E, 4 C), and in single precision."""
+    """How far the movements of arcs go through each cell, (P, E, 4 C) in single precision."""
 
-    def __init__(self, trellis: SparseTrellis, exact: Slopes) -> None:
-        self._steps = trellis.steps
-        self._exact = exact
-        self._singles: Slopes = exact.astype(np.float32)
-
-    @classmethod
-    def of(cls, network: Network, trellis: SparseTrellis, cells: MovementCells) -> MovementLengths:
-        """Return the lengths of a network's arcs."""
-        return cls(trellis, cells.lengths(trellis.movements(network.locations)))
-
-    def select(self, trellis: SparseTrellis, kept: NDArray[np.bool_]) -> MovementLengths:
-        """Return the lengths of the arcs where `kept` (E,) is true, which are those of `trellis`."""
-        return MovementLengths(trellis, self._exact[:, kept])
+    def __init__(self, arcs: MovementPrices) -> None:
+        self._steps = arcs.trellis.steps
+        self._lengths: Slopes = arcs.cells.lengths(arcs.movements.astype(np.float32)).astype(np.float32)
 
     def prices(self, slopes: Slopes) -> Slopes:
-        """Return the price of each arc, (n, E), in the precision of the slopes (n, M - 1, 4 C)."""
-        lengths = self._singles if slopes.dtype == np.float32 else self._exact
-        prices = np.empty((len(slopes), lengths.shape[1]), dtype=slopes.dtype)
-        for p, own in enumerate(lengths):
-            owners = slice(None) if len(lengths) == 1 else slice(p, p + 1)
+        """Return the price of each arc, (n, E), from the slopes (n, M - 1, 4 C) in single precision."""
+        prices = np.empty((len(slopes), self._lengths.shape[1]), dtype=np.float32)
+        for p, own in enumerate(self._lengths):
+            owners = slice(None) if len(self._lengths) == 1 else slice(p, p + 1)
             for m, step in enumerate(self._steps):
                 prices[owners, step.span] = slopes[owners, m] @ own[step.span].T
         return prices
 
     def moved(self, shares: Slopes) -> Slopes:
         """Return how far objects move through each cell, (n, M - 1, 4 C), at shares of arcs (n, E)."""
-        moved = np.empty((len(shares), len(self._steps), self._singles.shape[2]), dtype=np.float32)
-        for p, own in enumerate(self._singles):
-            owners = slice(None) if len(self._singles) == 1 else slice(p, p + 1)
+        moved = np.empty((len(shares), len(self._steps), self._lengths.shape[2]), dtype=np.float32)
+        for p, own in enumerate(self._lengths):
+            owners = slice(None) if len(self._lengths) == 1 else slice(p, p + 1)
             for m, step in enumerate(self._steps):
                 moved[owners, m] = shares[owners, step.span] @ own[step.span]
         moved[np.abs(moved) < _LEAST_MOVED] = 0.0

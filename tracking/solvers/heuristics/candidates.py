@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.model.network import Network
+from tracking.solvers.heuristics.rounding import round_relaxation
 from tracking.solvers.hidden_paths import hidden_nodes
 from tracking.solvers.objective import Ints, conflict_count
 from tracking.solvers.relaxation import follow_warm_start
-from tracking.solvers.rounding import round_relaxation
 from tracking.solvers.viterbi import Paths, Trellis
 from tracking.solvers.warm_start import WarmStart
 
