@@ -31,12 +31,14 @@ in_container() {  # NAME CLONE "OPTIONS OF docker run" BEFORE
             $4 bash -ceu '$COMMANDS'"
 }
 
+failed=0
 case "${1:-both}" in
-    root | both) in_container "as root" /myview "" "" ;;&
+    root | both) in_container "as root" /myview "" "" || failed=$? ;;&
     awkward | both)
         in_container "as somebody, in an awkward place" "/home/somebody/my own view" \
             "--sysctl net.ipv6.conf.all.disable_ipv6=1 --env LANG=C --env TZ=Pacific/Chatham
              --env npm_config_registry=http://127.0.0.1:9" \
-            "setpriv --reuid=somebody --regid=somebody --init-groups env HOME=/home/somebody"
+            "setpriv --reuid=somebody --regid=somebody --init-groups env HOME=/home/somebody" || failed=$?
         ;;
 esac
+exit $failed
