@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterator
 
 import gi
 
-gi.require_version("Gst", "1.0")
-gi.require_version("GstApp", "1.0")
-from gi.repository import Gst, GstApp  # noqa: E402
+for _name in ("Gst", "GstApp", "GstRtspServer"):
+    gi.require_version(_name, "1.0")
+from gi.repository import Gst, GstApp, GstRtspServer  # noqa: E402
 
 from server.rtsp.mp4_reader import (  # noqa: E402
     Head,
@@ -49,8 +49,12 @@ _REFUSED_FOR_GOOD = {401, 403}
 _QUEUE_BYTES = 4_000_000
 """What waits for one pipeline at most; then the oldest is dropped."""
 _SLACK_S = 1.0
+_LEAST_STEP_S = 0.001
+"""Between two samples of a track: times must ascend."""
 
 
+_Status = GstRtspServer.RTSPMediaStatus
+_DEAD = {_Status.UNPREPARING, _Status.ERROR}
 _numbers = itertools.count()
 
 
@@ -59,7 +63,7 @@ class Feed:
 
     Attributes:
         address: the stream.
-        number: of this feed, never used again.
+        number: of this feed and its media, never used again.
         tracks: its tracks, when it was opened.
     """
 
@@ -72,12 +76,14 @@ class Feed:
         """
         self._service, self.address, self._on_end = service, address, on_end
         self.number = next(_numbers)
+        self._media: GstRtspServer.RTSPMedia | None = None
         self._stream = service.open(address.path, address.token)
         self._parts = _parts(self._stream)
         self._early: list[Sample] = []
         self.tracks = self._first_head().tracks
         self._sources: dict[str, GstApp.AppSrc] = {}
         """By codec, once a media has taken the feed."""
+        self._last_due_s: dict[str, float] = {}
         self._pipeline: Gst.Element | None = None
         self._stopped = threading.Event()
         self._taken = threading.Event()
@@ -86,7 +92,8 @@ class Feed:
 
     def connect(self, media: Gst.Element) -> None:
         """Push into the sources of a media's element from now on: its first, or another after that."""
-        self._clock = StreamClock(_SLACK_S)
+        self._clock = StreamClock(_SLACK_S if self.address.is_paced else 0.0)
+        self._last_due_s.clear()
         for track in self.tracks:
             source = media.get_by_name(source_name(track))
             source.set_property("caps", caps_of(track))
@@ -94,6 +101,16 @@ class Feed:
             self._sources[track.codec] = source
         self._pipeline = media
         self._taken.set()
+
+    def media_key(self) -> str:
+        """Return the key of its media; another one if that is being taken down, as its last client leaves."""
+        if self._media is not None and self._media.get_status() in _DEAD:
+            self._media, self.number = None, next(_numbers)
+        return str(self.number)
+
+    def set_media(self, media: GstRtspServer.RTSPMedia) -> None:
+        """Set the media that has taken it."""
+        self._media = media
 
     @property
     def has_ended(self) -> bool:
@@ -171,6 +188,8 @@ class Feed:
         running = self._pipeline.get_current_running_time()
         running_s = 0.0 if running == Gst.CLOCK_TIME_NONE else running / Gst.SECOND  # it does not play yet
         due_s = self._clock.due(part.time_s, running_s, is_key=is_keyframe)
+        due_s = max(due_s, self._last_due_s.get(part.track.codec, 0.0) + _LEAST_STEP_S)
+        self._last_due_s[part.track.codec] = due_s
         data = with_parameter_sets(part.data, part.track.configuration) if is_keyframe else part.data
         buffer = Gst.Buffer.new_wrapped(data)
         buffer.pts = buffer.dts = int(due_s * Gst.SECOND)

@@ -75,7 +75,7 @@ class _Factory(GstRtspServer.RTSPMediaFactory):  # type: ignore[misc]
 
     def do_gen_key(self, _: Any) -> str:
         # By feed: the media of one that has just ended may still be there.
-        return str(self._gateway.feed_of_request().number)
+        return self._gateway.feed_of_request().media_key()
 
     def do_create_element(self, _: Any) -> Gst.Element:
         feed = self._gateway.feed_of_request()
@@ -87,6 +87,9 @@ class _Factory(GstRtspServer.RTSPMediaFactory):  # type: ignore[misc]
         element = Gst.parse_launch(f"( {' '.join(parts)} )")
         feed.connect(element)
         return element
+
+    def do_configure(self, media: Any) -> None:
+        self._gateway.feed_of_request().set_media(media)
 
 
 class _Access(GstRtspServer.RTSPAuth):  # type: ignore[misc]
@@ -246,15 +249,7 @@ class Gateway:
             self._opened.setdefault(client, set())
         client.connect("pre-describe-request", self._answer)
         client.connect("pre-setup-request", self._answer)
-        client.connect("play-request", self._on_play)
         client.connect("closed", self._on_closed)
-
-    def _on_play(self, client: Any, context: Any) -> None:
-        """Send a camera's frames as they come, whatever their time: PLAY has set the opposite."""
-        with self._lock:
-            is_paced = any(address.is_paced for address in self._opened.get(client, ()))
-        if not is_paced:
-            context.media.set_rate_control(False)
 
     def _on_closed(self, client: Any) -> None:
         with self._lock:

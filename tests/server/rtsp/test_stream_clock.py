@@ -43,3 +43,15 @@ def test_no_time_is_negative() -> None:
     clock = StreamClock(0.0)
     clock.due(10.0, 0.0, is_key=True)
     assert clock.due(9.5, 0.1, is_key=True) == 0.0
+
+
+def test_without_slack_nothing_is_held_back_and_later_frames_keep_their_pace() -> None:
+    clock = StreamClock(0.0)
+    burst = [clock.due(100 + frame / 25, 5.0, is_key=frame == 0) for frame in range(10)]
+    assert burst == pytest.approx([5.0] * 10)
+    jitter = [0.0, 0.03, 0.01, 0.0, 0.02]
+    live = [
+        clock.due(100.4 + frame / 25, 5.04 + frame / 25 + late, is_key=False)
+        for frame, late in enumerate(jitter)
+    ]
+    assert live == pytest.approx([5.04 + frame / 25 for frame in range(5)])
