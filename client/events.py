@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 
 from yarl import URL
 
-from client.http import AwayError, ContractError, HttpSettings, decode_json, get, server_url
+from client.http import AwayError, ContractError, HttpSettings, decode_json, get
 from client.model import EVENTS, Event
 from client.sse_parser import OverlongEventError, SentEvent, SseParser
 
@@ -21,19 +21,20 @@ async def events(
 
     Gop events have the choices of a ``delay``, by default ``balanced``.
 
-    When the connection is lost the client connects again. The server then sends its state once more, so an
-    event may come twice.
+    When the connection is lost the client connects again, to another server of ``settings`` where there is
+    one. That sends its state once more, so an event may come twice.
 
     Raises:
         ValueError: ``url`` is no address.
         AwayError: ``settings.stream_retries`` attempts in a row brought no event.
         ClientError: the server refuses the request, or an event is invalid.
     """
-    address = server_url(url) / "api/events"
+    addresses = [server / "api/events" for server in settings.servers(url)]
     if delay is not None:
-        address = address.with_query({"delay": delay})
-    backoff = settings.backoff()
+        addresses = [address.with_query({"delay": delay}) for address in addresses]
+    backoff, attempts = settings.backoff(), 0
     while True:
+        address = addresses[attempts % len(addresses)]
         try:
             async for event in _once(address, settings):
                 backoff.reset()
@@ -44,7 +45,10 @@ async def events(
             problem = AwayError(f"{address.origin()}: the stream of events has ended")
         if backoff.failures >= settings.stream_retries:
             raise problem
-        await asyncio.sleep(backoff.next())
+        attempts += 1
+        wait = backoff.next()
+        if attempts % len(addresses) == 0:
+            await asyncio.sleep(wait)
 
 
 async def _once(address: URL, settings: HttpSettings) -> AsyncIterator[Event]:

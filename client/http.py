@@ -6,8 +6,8 @@ import asyncio
 import os
 import re
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import aiohttp
@@ -22,6 +22,8 @@ _MAX_ERROR_BODY = 64_000
 """Largest error response in bytes."""
 _MAX_SHOWN = 300
 """Characters of a library's message."""
+_SILENT_S, _SILENT_GOPS = 1.0, 2.5
+"""Silence after which a server that can be replaced counts as gone."""
 _NOT_FOUND = 404
 _CLIENT_ERRORS = range(400, 500)
 _ANSWER = TypeVar("_ANSWER")
@@ -65,6 +67,39 @@ class HttpSettings:
     """Maximum of the seconds between attempts."""
     token: str | None = field(default=None, repr=False)
     """Bearer token, for a server that requires one."""
+    others: tuple[str, ...] = ()
+    """Further servers of the same site, in the order in which they replace one that does not answer."""
+
+    def servers(self, url: str) -> list[URL]:
+        """Return the addresses of all servers, first that of ``url``.
+
+        Raises:
+            ValueError: one is no address.
+        """
+        return list(dict.fromkeys(map(server_url, (url, *self.others))))
+
+    def failing_over(self, url: str, others: tuple[str, ...], gop_s: float) -> HttpSettings:
+        """Return the settings for a site that also has these servers, and sends something every GOP.
+
+        A server that is silent for more than two GOPs, and at least a second, is then left for another one.
+        Servers without TLS are left out where ``url`` has it, and addresses that are none.
+        """
+        servers = [str(server) for server in self.servers(url)]
+        for other in others:
+            with suppress(ValueError):
+                server = server_url(other)
+                if server.scheme == server_url(url).scheme or server.scheme == "https":
+                    servers.append(str(server))
+        _, *more = dict.fromkeys(servers)
+        if not more:
+            return self
+        silence = max(_SILENT_S, _SILENT_GOPS * gop_s)
+        return replace(
+            self,
+            others=tuple(more),
+            connect_timeout=min(self.connect_timeout, _SILENT_S),
+            read_timeout=min(self.read_timeout, silence),
+        )
 
     def backoff(self) -> Backoff:
         """Return the delays between attempts of a stream."""

@@ -32,6 +32,8 @@ class Site(msgspec.Struct, frozen=True):
     """Container of the streams: mp4, or webm if the codec is vp8."""
     sound: str | None = None
     """Audio codec; None: the site has no sound."""
+    others: tuple[str, ...] = ()
+    """Base URLs of the services that replace this one when it does not answer."""
 
 
 class SeenObject(msgspec.Struct, frozen=True):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from client.api import site
-from client.http import ClientError, HttpSettings, server_url
+from client.http import ClientError, HttpSettings
 from client.recording import Recording, recording
 from client.session import Report, Session
 from client.sidecar import write_sidecars
@@ -54,8 +54,8 @@ async def watch(
     The pictures are the server's own, unchanged; whole fragments only. With ``out`` they are recorded in
     ``out.part``, which is remuxed into a progressive MP4 at the end, with the boxes beside it: WebVTT and
     ASS. A name that ends in ``.webm`` makes a WebM; the site's codec must then be VP8. Cancelling keeps what
-    was recorded. A server that goes away is tried again; if it does not come back, what was recorded is kept
-    and ``complete`` is False.
+    was recorded. A server that goes away is replaced by another one of ``settings`` or of the site, or tried
+    again; if none comes back, what was recorded is kept and ``complete`` is False.
 
     Raises:
         ValueError: ``url`` is no address.
@@ -65,8 +65,7 @@ async def watch(
         ContractError: the response is not such a stream.
         OSError: the file cannot be written.
     """
-    server = server_url(url)
-    container = await _container(url, out, settings)
+    container, settings = await _prepare(url, out, settings)
     record: Recording | None = None
     with closing(Spool(Path() if out is None else out.parent)) as spool:
         history = ViewHistory(number, spool=None if out is None else spool)
@@ -74,7 +73,10 @@ async def watch(
             with recording(out, seconds, container) as record:
                 async with following(url, history, settings, start, end, delay):
                     session = Session(record, history, progress, start, end, delay)
-                    complete = await session.run(server / f"objects/{number}/best.{container}", settings)
+                    streams = [
+                        server / f"objects/{number}/best.{container}" for server in settings.servers(url)
+                    ]
+                    complete = await session.run(streams, settings)
                     if out is not None and record.media_time is not None:
                         await history.reach(record.media_time)
         finally:  # after the film itself
@@ -98,14 +100,18 @@ async def record(
     return await watch(url, number, out, seconds, settings=settings)
 
 
-async def _container(url: str, out: Path | None, settings: HttpSettings) -> str:
-    """Return the container to request: that of the file's name, or else the site's."""
-    if out is not None:
-        return "webm" if out.suffix.lower() == ".webm" else "mp4"
-    try:
-        return (await site(url, settings)).container
-    except ClientError:
-        return "mp4"  # the request for the stream will report the error
+async def _prepare(url: str, out: Path | None, settings: HttpSettings) -> tuple[str, HttpSettings]:
+    """Return the container to request, that of the file's name or else the site's, and all servers' settings.
+
+    Raises:
+        ValueError: ``url`` is no address.
+    """
+    wanted = None if out is None else "webm" if out.suffix.lower() == ".webm" else "mp4"
+    for server in settings.servers(url):
+        with suppress(ClientError):  # if all fail, the request for the stream will report the error
+            found = await site(str(server), settings)
+            return wanted or found.container, settings.failing_over(url, found.others, found.gop / found.fps)
+    return wanted or "mp4", settings
 
 
 def _write_sidecars(out: Path | None, record: Recording, history: ViewHistory) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from yarl import URL
@@ -52,10 +52,14 @@ class Session:
         self.cuts = 0
         self.reconnections = 0
 
-    async def run(self, address: URL, settings: HttpSettings) -> bool:
-        """Stream until the recording is complete (return True) or the server stays away (return False)."""
-        backoff = settings.backoff()
+    async def run(self, addresses: Sequence[URL], settings: HttpSettings) -> bool:
+        """Stream until the recording is complete (return True) or the servers stay away (return False).
+
+        ``addresses`` are those of the stream at the site's servers, which replace each other.
+        """
+        backoff, attempts = settings.backoff(), 0
         while True:
+            address = addresses[attempts % len(addresses)]
             before = self._record.fragments
             try:
                 if await self._connection(self._resume_address(address), settings):
@@ -76,7 +80,9 @@ class Session:
                 if self._record.fragments:
                     return False
                 raise failure
-            await asyncio.sleep(backoff.next())
+            attempts += 1
+            delay = backoff.next()
+            await asyncio.sleep(0.0 if attempts % len(addresses) else delay)  # once every server was tried
             self.reconnections += 1
 
     def _resume_address(self, address: URL) -> URL:

@@ -117,13 +117,13 @@ def _load(
 
 @contextlib.contextmanager
 def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
-    sync, bus, *https = (free_port() for _ in range(2 + services))
+    sync, *https = (free_port() for _ in range(1 + services))
     config = folder / "site.yaml"
-    address = f"tcp/127.0.0.1:{bus}"
+    routers = [f"tcp/127.0.0.1:{free_port()}" for _ in range(services)]
     content = {
         "site": {"name": "hall", "fps": fps, "width": WIDTH, "height": HEIGHT},
         "sync": {"port": sync, "start_timeout_s": 3.0},
-        "zenoh": {"connect": address, "listen": address},
+        "zenoh": {"connect": routers, "listen": routers[0]},
         # The configured rate is the measured one, not the viewers': timeouts are counted in frames.
         "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
         "cameras": [
@@ -138,7 +138,11 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         running = []
         for index, port in enumerate(https):
             times = folder / f"times{index}.json"
-            own = {"MYVIEW_VIEW__SHARE__INDEX": f"{index}", "MYVIEW_HTTP__PORT": f"{port}"}
+            own = {
+                "MYVIEW_VIEW__SHARE__INDEX": f"{index}",
+                "MYVIEW_HTTP__PORT": f"{port}",
+                "MYVIEW_ZENOH__LISTEN": routers[index],
+            }
             words = ["benchmarks.scaling.timed_service", str(times), "bestview", str(config)]
             started.append(_start(log, *words, **own))
             running.append(_Service(started[-1], times, f"http://127.0.0.1:{port}/"))

@@ -5,8 +5,9 @@ confused people, `affinity` and `appearance` add up evidence about pairs of trac
 into persons, and `registry` assigns, corrects and remembers person ids.
 """
 
-from bestview.association.registry.corrections import Merge, Split
-from bestview.association.registry.identity_registry import IdentityRegistry, IdentityUpdate
+from bestview.association.registry.corrections import IdentityUpdate, Merge, Split
+from bestview.association.registry.identity_registry import IdentityRegistry
+from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import AppearanceHistogram, TrackUpdate
 from bestview.association.tracklet import TrackKey, TrackletKey
@@ -17,6 +18,7 @@ __all__ = [
     "IdentitySettings",
     "IdentityUpdate",
     "Merge",
+    "Person",
     "Split",
     "TrackKey",
     "TrackUpdate",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -117,6 +118,14 @@ class Tracklet:
         """Apply an operator's correction: the person, and the tracklet that this one continues."""
         self.reassign_id(person_id)
         self.predecessor, self.crowd_frames_before, self.confirmed_continuation = predecessor, 0, True
+
+    def renumber(self, ids: Mapping[int, int]) -> None:
+        """Replace person ids by others, one to one."""
+        self.published_frames = {
+            ids.get(person_id, person_id): frames for person_id, frames in self.published_frames.items()
+        }
+        self.person_id = ids.get(self.person_id, self.person_id)
+        self.settled_id = ids.get(self.settled_id, self.settled_id)
 
     def merge_ids(self, lost: int, kept: int) -> None:
         """Count frames published with the id `lost` as `kept`: both are one person."""

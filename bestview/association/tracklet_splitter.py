@@ -177,6 +177,20 @@ class TrackletSplitter:
             track: kept if person_id == lost else person_id for track, person_id in self._recalled_ids.items()
         }
 
+    def renumber(self, ids: Mapping[int, int]) -> None:
+        """Replace person ids by others, one to one."""
+        for tracklet in {
+            id(tracklet): tracklet for tracklet in chain(self.active, self._current.values())
+        }.values():
+            tracklet.renumber(ids)
+        self._pending_splits = {
+            track: (ids.get(person_id, person_id), predecessor)
+            for track, (person_id, predecessor) in self._pending_splits.items()
+        }
+        self._recalled_ids = {
+            track: ids.get(person_id, person_id) for track, person_id in self._recalled_ids.items()
+        }
+
     def settleable_rows(self, last_frame: int) -> list[int]:
         """Return the rows of tracklets that are old enough to be settled, in order.
 

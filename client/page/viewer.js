@@ -5,6 +5,7 @@ import { CurrentFrame } from './player/current_frame.js';
 import { Decisions } from './timeline/decisions.js';
 import { RecordedViews } from './timeline/recorded_views.js';
 import { setNames } from './people/names.js';
+import { setServers } from './shared/servers.js';
 import { Notice } from './shared/notice.js';
 import { ViewPreference } from './people/view_preference.js';
 import { Palette } from './people/palette.js';
@@ -82,6 +83,7 @@ export class Viewer {
       this.#renameDecisions();
       this.timeShift.pulsesRestarted();
     }
+    setServers(site.others ?? [], site.gop / site.fps);
     this.preference.configure(site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);

@@ -57,7 +57,12 @@ def status(
 
 
 def watch(
-    url: Annotated[str, typer.Argument(metavar="URL", help="The server, e.g. http://localhost:8080")],
+    urls: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="URL…", help="The server, http://localhost:8080, and others of the same site."
+        ),
+    ],
     number: Annotated[
         int | None, typer.Option("--object", help="Whose best view to watch; without it, people are listed.")
     ] = None,
@@ -77,7 +82,7 @@ def watch(
     """List people, or watch or record a person's best view."""
     from server.cli.watch import run_watch
 
-    asyncio.run(run_until_signal(lambda: run_watch(url, number, out, seconds, start, end, token, delay)))
+    asyncio.run(run_until_signal(lambda: run_watch(urls, number, out, seconds, start, end, token, delay)))
 
 
 def token(

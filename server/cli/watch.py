@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import typer
@@ -19,7 +20,7 @@ _PRINT_EVERY_S = 1.0
 
 
 async def run_watch(
-    url: str,
+    urls: Sequence[str],
     number: int | None,
     out: Path | None,
     seconds: float | None,
@@ -28,7 +29,7 @@ async def run_watch(
     token: str | None = None,
     delay: str | None = None,
 ) -> None:
-    """List people, or watch one person.
+    """List people, or watch one person, on the first of the site's servers that answers.
 
     Raises:
         UnavailableError: the server cannot be reached.
@@ -40,7 +41,8 @@ async def run_watch(
         raise UserError("watch: --delay needs --object, and is not for the past")
     if out is not None:
         check_output_file(out)
-    settings, before = HttpSettings(token=token), _file_at(out)
+    url, *others = urls
+    settings, before = HttpSettings(token=token, others=tuple(others)), _file_at(out)
     try:
         if number is None:
             await _list(url, settings)

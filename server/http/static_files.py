@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
 from aiohttp import web
+from yarl import URL
 
+from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response
 
 routes = web.RouteTableDef()
@@ -14,25 +17,28 @@ routes = web.RouteTableDef()
 _FOLDER = Path(str(files("client") / "page")).resolve()
 _HEADERS = {
     "Cache-Control": "no-cache",  # revalidate each time: an upgraded server must not meet an old page
-    "Content-Security-Policy": (
-        "default-src 'self'; media-src 'self' blob:; img-src 'self' data: blob:; "
-        "frame-ancestors 'none'"  # against clickjacking of the operator's page
-    ),
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",  # a URL may contain the number of the watched person
 }
 
 
-def page_file(name: str) -> web.FileResponse:
-    """Return a file of the page; it must exist."""
-    return web.FileResponse(_FOLDER / name, headers=_HEADERS)
+def page_file(name: str, servers: Sequence[str] = ()) -> web.FileResponse:
+    """Return a file of the page; it must exist.
+
+    Besides its own server a page may use ``servers``, the site's services, which replace each other.
+    """
+    own = " ".join(["'self'", *(str(URL(server).origin()) for server in servers)])
+    policy = (
+        f"default-src 'self'; connect-src {own}; media-src {own} blob:; img-src {own} data: blob:; "
+        "frame-ancestors 'none'"  # against clickjacking of the operator's page
+    )
+    return web.FileResponse(_FOLDER / name, headers=_HEADERS | {"Content-Security-Policy": policy})
 
 
 @routes.get("/")
 async def get_index(request: web.Request) -> web.StreamResponse:
     """Return the page."""
-    del request
-    return page_file("index.html")
+    return page_file("index.html", request.app[SERVICE].config.view.share.servers)
 
 
 @routes.get("/page/{file:.+}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Callable, Mapping
 from typing import Any, Self
@@ -168,6 +169,24 @@ class Bus:
 
         subscriber = self._session.liveliness().declare_subscriber(key, receive, history=True)
         self._undeclare.append(subscriber.undeclare)
+
+    def answer(self, key: str, respond: Callable[[], bytes]) -> None:
+        """Answer queries of a key by what ``respond``, called on the event loop, returns."""
+        loop = asyncio.get_running_loop()
+
+        def reply(query: zenoh.Query) -> None:
+            with query:
+                query.reply(key, respond())
+
+        def receive(query: zenoh.Query) -> None:
+            loop.call_soon_threadsafe(reply, query)
+
+        self._undeclare.append(self._session.declare_queryable(key, receive).undeclare)
+
+    def query(self, key: str, timeout_s: float) -> list[bytes]:
+        """Return the answers to a query of a key expression; blocks, at most until the timeout."""
+        replies = self._session.get(key, timeout=timeout_s, target=zenoh.QueryTarget.ALL)
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def close(self) -> None:
         """Undeclare everything and close the session."""

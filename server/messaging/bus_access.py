@@ -14,6 +14,7 @@ SETTING = "zenoh.users"
 _SEND = ["put", "delete", "liveliness_token"]
 _WATCH = ["declare_liveliness_subscriber", "liveliness_query"]
 _SUBSCRIBE = ["declare_subscriber", *_WATCH]
+_EXCHANGE = ["query", "reply", "declare_queryable"]
 _FORWARD = [*_SEND, "declare_subscriber"]
 """What the router forwards: messages, liveliness tokens, and subscriptions."""
 _COMMANDS = ("position_corrections", "identities", "end_received")
@@ -49,7 +50,7 @@ def build_access_control(
     detections = [keys.camera("*", "detections")]
     alive = [keys.camera("*", "peer_listener"), keys.bestview("**")]
     rules = [
-        _rule("services", "both", [*_SEND, *_SUBSCRIBE], [everything]),
+        _rule("services", "both", [*_SEND, *_SUBSCRIBE, *_EXCHANGE], [everything]),
         _rule("may subscribe to all", "ingress", _SUBSCRIBE, [everything]),
         _rule("receives all", "egress", _FORWARD, [everything]),
         _rule("may subscribe to peers", "ingress", ["declare_subscriber"], detections),

@@ -19,7 +19,9 @@ key                                              payload                        
 ``myview/SITE/camera/ID/alive``                  liveliness token
 ``myview/SITE/sound``                            consecutive frames of audio          :class:`AudioHeader`
 ``myview/SITE/bestview/choices``                 :class:`GopChoices`
-``myview/SITE/bestview/INDEX/choices``           of a further service that shares the site
+``myview/SITE/bestview/INDEX/choices``           of a further service, and so on
+``myview/SITE/bestview/record``                  ``ServiceRecord``, to the other services
+``myview/SITE/bestview/state``                   a query: ``ServiceState``, to a service that starts
 ``myview/SITE/bestview/alive``                   liveliness token
 ``myview/SITE/bestview/INDEX/alive``             of a further service
 ===============================================  ===================================  =======================

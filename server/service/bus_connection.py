@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
+from server.config.pulse_access import bestview_client_name
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
@@ -23,6 +24,10 @@ class BusConnection:
         self._index = config.view.share.index
         self._keys = ZenohKeys(config.site.name)
         self._bus: Bus | None = None
+        self._others: Bus | None = None
+        """A session to all routers, for what services say to each other."""
+        self.other_services: set[int] = set()
+        """The indices of the other services that are present."""
         self.inboxes: list[Inbox[Message]] = []
         """The queues of received messages."""
 
@@ -51,6 +56,43 @@ class BusConnection:
         bus.watch_alive(self._keys.camera("*", "alive"), on_alive)
         bus.declare_alive(self._keys.bestview("alive", self._index))
 
+    def exchange_records(
+        self, on_record: MessageHandler, state: Callable[[], bytes], on_service: Callable[[], None]
+    ) -> None:
+        """Receive the other services' records, tell them this one's state, and watch their presence.
+
+        Args:
+            on_record: called with each record, this service's own included.
+            state: returns this service's encoded state.
+            on_service: called when `other_services` has changed.
+        """
+        if self._bus is None:
+            return
+        others = self._others = Bus.client(self._config.zenoh, bestview_client_name(self._index))
+        alive = {
+            self._keys.bestview("alive", index): index
+            for index in range(self._config.view.share.services)
+            if index != self._index
+        }
+
+        def on_alive(key: str, is_present: bool) -> None:
+            if key in alive:
+                (self.other_services.add if is_present else self.other_services.discard)(alive[key])
+                on_service()
+
+        self._bus.answer(self._keys.bestview("state", self._index), state)
+        others.subscribe(self._keys.bestview("**/record"), on_record)
+        others.watch_alive(self._keys.bestview("**/alive"), on_alive)
+
+    def query_states(self, timeout_s: float) -> list[bytes]:
+        """Return the states of the services that answer; blocks, at most until the timeout."""
+        return [] if self._others is None else self._others.query(self._keys.bestview("**/state"), timeout_s)
+
+    def publish_record(self, payload: bytes) -> None:
+        """Publish this service's record."""
+        if self._bus is not None:
+            self._bus.publish(self._keys.bestview("record", self._index), payload)
+
     @property
     def has_waiting_messages(self) -> bool:
         """Whether a message waits in any inbox."""
@@ -73,5 +115,6 @@ class BusConnection:
 
     def close(self) -> None:
         """Close the bus."""
-        if self._bus is not None:
-            self._bus.close()
+        for bus in (self._others, self._bus):
+            if bus is not None:
+                bus.close()

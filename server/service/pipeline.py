@@ -31,6 +31,7 @@ from server.service.mode_publisher import ModePublisher
 from server.service.operator_assist.operator_assist import OperatorAssist
 from server.service.pulse_follower import PulseFollower
 from server.service.recording.recorder import Recorder
+from server.service.replication.service_replication import ServiceReplication
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
@@ -111,8 +112,9 @@ class BestViewPipeline:
             cameras,
             fps,
             partial(self.bus.send_to_camera, "identities"),
-            sends=config.view.share.index == 0,
+            sends=lambda: self.replication.leads,
         )
+        self.replication = ServiceReplication(config, self.decider.people, self.state_replication, self.bus)
         self.walk_session = WalkSession(config)
         self.recorder = Recorder(config, self.frame_buffers, self.stream_format, frames, self.audio_buffer)
         self._last_decided = -1
@@ -151,6 +153,7 @@ class BestViewPipeline:
         """
         if self._out is not None:  # once all ports are open: a failed start leaves no files
             self._decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
+        await self.replication.take_over()
         self.recorder.open()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
@@ -290,6 +293,7 @@ class BestViewPipeline:
         with self.stage_timers.deciding():
             decisions = self.decider.step(epoch)
         self.state_replication.advance(epoch.last)  # before publishing, so that names are restored
+        self.replication.step(epoch)
         others = self.decider.modes.take()
         self._publish_modes(others, live=True)
         for decision in decisions:

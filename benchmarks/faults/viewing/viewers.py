@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import io
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -15,13 +16,13 @@ import numpy as np
 from benchmarks.faults.video.stamped_views import FPS, FrameStamp, read_stamp
 from client import Cameras, ClientError, Event, Gop, HttpSettings, events
 from client.fmp4 import BoxReader, decode_time
-from client.http import server_url
 from client.recording import Recording
 from client.session import Session
 from client.stream_events import ViewHistory
 
 _TICKS = 90_000
 _RETRY_S = 0.2
+_GOP_S = 10 / FPS
 _SETTINGS = HttpSettings()
 
 
@@ -71,15 +72,16 @@ class StreamRecorder:
 
 
 class Viewer:
-    """Watches the best view of one object."""
+    """Watches the best view of one object; where its server is gone, at one of the others of the site."""
 
-    def __init__(self, url: str, number: int) -> None:
+    def __init__(self, url: str, number: int, others: Sequence[str] = ()) -> None:
         self.number = number
         self.recorders: list[StreamRecorder] = []
         self.restarts = 0
         """Number of restarts of the player."""
         self._sessions: list[Session] = []
-        self._address = server_url(url) / f"objects/{number}/best.mp4"
+        self._settings = _SETTINGS.failing_over(url, tuple(others), _GOP_S) if others else _SETTINGS
+        self._streams = [server / f"objects/{number}/best.mp4" for server in self._settings.servers(url)]
 
     @property
     def reconnections(self) -> int:
@@ -93,7 +95,7 @@ class Viewer:
             record = Recording(cast("io.BufferedWriter", self.recorders[-1]), None)
             self._sessions.append(Session(record, ViewHistory(self.number), None, None, None))
             with contextlib.suppress(ClientError):
-                await self._sessions[-1].run(self._address, _SETTINGS)
+                await self._sessions[-1].run(self._streams, self._settings)
             self.restarts += 1
             await asyncio.sleep(_RETRY_S)
 

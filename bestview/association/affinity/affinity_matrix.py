@@ -8,7 +8,7 @@ time have an entry, so memory grows with encounters instead of with the square o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +97,12 @@ class AffinityMatrix:
         """Append those of these rows that are missing, without evidence."""
         new = [row for row in dict.fromkeys(rows) if row not in self._row_of]
         self.set_rows([*self._row_of, *new])
+
+    def rename_people(self, ids: Mapping[int, int]) -> None:
+        """Replace the ids of people's rows, one to one; their evidence stays."""
+        self._row_of = {
+            ids.get(row, row) if isinstance(row, int) else row: i for row, i in self._row_of.items()
+        }
 
     def add_cannot_links(self, first: Ints, second: Ints) -> None:
         """Add a cannot-link between (P,) pairs of rows that were seen simultaneously in one camera."""

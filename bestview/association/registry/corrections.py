@@ -29,6 +29,28 @@ class Split:
     camera: str
 
 
+@dataclass(frozen=True, slots=True)
+class IdentityUpdate:
+    """Person ids after one update; every tuple is in rising order.
+
+    Attributes:
+        person_ids: the id of each tracklet that may still change; 0: none yet. A track is the person of its
+            newest tracklet that has started.
+        created: ids assigned for the first time.
+        returned: ids of people who had departed and are back.
+        departed: ids of people that no camera has seen for a while; they are remembered.
+        merged: ids that turned out to be one person.
+        split: tracks that turned out to show another person.
+    """
+
+    person_ids: Mapping[TrackletKey, int]
+    created: tuple[int, ...]
+    returned: tuple[int, ...]
+    departed: tuple[int, ...]
+    merged: tuple[Merge, ...]
+    split: tuple[Split, ...]
+
+
 class IdCorrections:
     """Detects splits by comparing each tracklet's id with the last published one."""
 
@@ -52,6 +74,10 @@ class IdCorrections:
         }
         self._last.update(person_ids)
         return tuple(sorted(splits))
+
+    def renumber(self, ids: Mapping[int, int]) -> None:
+        """Replace ids by others, one to one; these are no splits."""
+        self._last = {key: ids.get(person_id, person_id) for key, person_id in self._last.items()}
 
     def split_off(self, keys: Iterable[TrackletKey], person_id: int) -> None:
         """Store ids that an operator assigned, so that they are not reported as splits."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,36 +16,15 @@ from bestview.association.co_occurrence import (
     score_ground_proximity,
 )
 from bestview.association.ghost_check import GhostCheck
-from bestview.association.registry.corrections import IdCorrections, Merge, Split, swap_tracks
+from bestview.association.registry.corrections import IdCorrections, IdentityUpdate, Merge, Split, swap_tracks
 from bestview.association.registry.people import PersonStore
+from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import FootPointError, TrackObservations, TrackUpdate, align_tracks
 from bestview.association.tracklet import TrackKey, TrackletKey
 from bestview.association.tracklet_clusters import TrackletCluster, collect_clusters
 from bestview.association.tracklet_splitter import TrackletSplitter
 from bestview.geometry.ground_plane import PersonHeightEstimate, validate_homography
-
-
-@dataclass(frozen=True, slots=True)
-class IdentityUpdate:
-    """Person ids after one update; every tuple is in rising order.
-
-    Attributes:
-        person_ids: the id of each tracklet that may still change; 0: none yet. A track is the person of its
-            newest tracklet that has started.
-        created: ids assigned for the first time.
-        returned: ids of people who had departed and are back.
-        departed: ids of people that no camera has seen for a while; they are remembered.
-        merged: ids that turned out to be one person.
-        split: tracks that turned out to show another person.
-    """
-
-    person_ids: Mapping[TrackletKey, int]
-    created: tuple[int, ...]
-    returned: tuple[int, ...]
-    departed: tuple[int, ...]
-    merged: tuple[Merge, ...]
-    split: tuple[Split, ...]
 
 
 class IdentityRegistry:
@@ -227,6 +205,24 @@ class IdentityRegistry:
         """
         self._people.recall(person_id, frame)
         self._splitter.recall(track, person_id)
+
+    @property
+    def people(self) -> Sequence[Person]:
+        """All remembered people, by id: another run can `restore` them."""
+        return self._people.all_people
+
+    def restore(self, people: Iterable[Person]) -> None:
+        """Add people whom another run remembers, before their first track is observed here."""
+        self._people.restore(people)
+
+    def renumber(self, ids: Mapping[int, int]) -> None:
+        """Replace ids by those of another run, one to one: by id, the new one, which nobody else has."""
+        self._people.renumber(ids)
+        self._splitter.renumber(ids)
+        self._affinity.rename_people(ids)
+        self._corrections.renumber(ids)
+        renumbered = [ids.get(person_id, person_id) for person_id in self._visible_settled_ids.tolist()]
+        self._visible_settled_ids = np.array(sorted(renumbered), dtype=np.int64)
 
     def _gate(self) -> float:
         """Return the ground distance at which two foot points are as likely of one person as of two."""

@@ -163,6 +163,24 @@ class PersonStore:
         self.reserve_below(person_id + 1)
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
+    @property
+    def all_people(self) -> list[Person]:
+        """All people, by id."""
+        return [person for _, person in sorted(self._by_id.items())]
+
+    def restore(self, people: Iterable[Person]) -> None:
+        """Add people whom another run knows; those known here stay as they are."""
+        for person in people:
+            self.reserve_below(person.person_id + 1)
+            self._by_id.setdefault(person.person_id, person)
+
+    def renumber(self, ids: Mapping[int, int]) -> None:
+        """Replace ids by others, one to one."""
+        self._by_id = {ids.get(person_id, person_id): person for person_id, person in self._by_id.items()}
+        for person_id, person in self._by_id.items():
+            person.person_id = person_id
+        self.reserve_below(max(ids.values(), default=0) + 1)
+
     def include_in_clustering(self, person_ids: Iterable[int]) -> None:
         """Make people take part in clustering, so that they can have cannot-links."""
         for person_id in person_ids:

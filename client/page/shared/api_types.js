@@ -16,6 +16,7 @@
  * @property {number | null} pulse0 Unix seconds at which pulse 0 was due; null before the first pulse
  * @property {number} now Unix seconds of the server's clock
  * @property {string[]} cameras
+ * @property {string[]} [others] base URLs of the services that replace this one
  *
  * @typedef {object} Session rights of the visitor
  * @property {boolean} by_token signed in by a token; false: the site needs none

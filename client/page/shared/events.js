@@ -7,14 +7,17 @@
 
 import { Backoff } from './backoff.js';
 import { getJson } from './requests.js';
+import { currentServer, leaveServer, onServerChange } from './servers.js';
 
 const NAMES = ['site', 'objects', 'cameras', 'gop', 'flag'];
 const IDLE_MS = 6000;
 const CHECK_MS = 2000;
+const REPLACED_MS = 100; // before another service is asked
 
 export class ServerEvents {
   /** @type {EventSource | null} */
   #source = null;
+  #server = '';
   #backoff = new Backoff();
   #activeAt = 0; // performance.now()
   #checking = false;
@@ -29,11 +32,13 @@ export class ServerEvents {
     this.listener = listener;
     this.#open();
     setInterval(() => this.#check(), CHECK_MS);
+    onServerChange(() => this.#source && this.#lose(this.#source));
   }
 
   #open() {
     const source = new EventSource('api/events');
     this.#source = source;
+    this.#server = currentServer();
     this.#activeAt = performance.now();
     source.onopen = () => {
       this.#backoff.reset();
@@ -55,7 +60,9 @@ export class ServerEvents {
     source.close();
     this.#source = null;
     this.listener.lost();
-    setTimeout(() => this.#open(), this.#backoff.next());
+    const replaced = leaveServer(this.#server);
+    const wait = this.#backoff.next();
+    setTimeout(() => this.#open(), replaced ? Math.min(wait, REPLACED_MS) : wait);
   }
 
   async #check() {

@@ -26,6 +26,7 @@ def site_info(service: BestViewService) -> SiteInfo:
         pulse0=service.pulse0,
         now=time.time(),
         cameras=list(config.camera_ids),
+        others=service.people.replacements,
     )
 
 

@@ -29,6 +29,8 @@ class SiteInfo(msgspec.Struct, frozen=True):
     now: float
     """Unix time by the server's clock."""
     cameras: list[str]
+    others: list[str]
+    """Base URLs of the services that replace this one when it does not answer."""
 
 
 class Delays(msgspec.Struct, frozen=True):

@@ -14,7 +14,7 @@ from server.service.facade.errors import (
     UnknownObjectError,
 )
 from server.service.facade.view_selection import ViewSelection, view_selection_of
-from server.service.identity.sharding import shard_address, shard_of
+from server.service.identity.sharding import replacement_addresses, shard_address, shard_of
 from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
 from server.service.view_selection.delay_modes import DelayMode
@@ -139,6 +139,11 @@ class PeopleService:
             RemotePerson(number, shard_address(number, share))
             for number in self._pipeline.decider.people.of_other_shards
         ]
+
+    @property
+    def replacements(self) -> list[str]:
+        """Addresses of the services that serve the same people."""
+        return replacement_addresses(self._pipeline.config.view.share)
 
     def shard_of(self, number: int) -> Shard:
         """Return the service that a number belongs to, whether or not it is in use."""

@@ -6,7 +6,7 @@ the evidence, and to the page, the streams and the files it is like any other me
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
 from bestview import IdentityUpdate, Merge, Split
@@ -41,6 +41,13 @@ class ManualOverrides:
         }
         for raw in self.automatic_numbers(lost):
             self._person_of[raw] = kept
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Replace numbers by others, one to one."""
+        self._person_of = {
+            numbers.get(raw, raw): numbers.get(kept, kept) for raw, kept in self._person_of.items()
+        }
+        self._departed = {numbers.get(number, number) for number in self._departed}
 
     def apply(self, update: IdentityUpdate) -> IdentityUpdate:
         """Return an update with all numbers mapped by the manual merges."""

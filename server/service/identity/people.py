@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, Merge, Split, TrackKey
+from bestview import IdentityRegistry, IdentitySettings, Merge, Person, Split, TrackKey
 from server.config.sections import ShareSettings
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
@@ -98,7 +98,7 @@ class PersonTracker:
         if epoch.joint is not None:
             tracks += self._ground.updates(epoch.joint.tracks, [window.message for window in joint])
         since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
-        image_sizes = self._detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
+        image_sizes = self.undetected.detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
         update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, image_sizes))
         for key, parts in track_parts(update.person_ids).items():
@@ -192,6 +192,32 @@ class PersonTracker:
         ]
         return new
 
+    @property
+    def newest(self) -> int:
+        """The last frame of the newest epoch; -1: none."""
+        return self._newest
+
+    @property
+    def remembered(self) -> Sequence[Person]:
+        """What identity knows about each person, by number."""
+        return self._registry.people
+
+    def restore(self, people: Iterable[Person]) -> None:
+        """Add what another service knows about people."""
+        self._registry.restore(people)
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Replace people's numbers by those of another service, one to one.
+
+        A number that nobody has any more counts as merged, so that its viewers stay with the person.
+        """
+        self._registry.renumber(numbers)
+        self.registry.renumber(numbers)
+        self._overrides.renumber(numbers)
+        self._replace(numbers)
+        gone = [old for old in numbers if old not in numbers.values()]
+        self._corrections += [Merge(numbers[old], old) for old in gone]
+
     def number(self, camera: str, local: int, pulse: int) -> int | None:
         """Return the person of a camera's local track in a frame; None while it is not confirmed."""
         number = int(self.numbers([TrackKey(camera, local)], pulse, 1)[0, 0])
@@ -241,16 +267,6 @@ class PersonTracker:
         for history in self._histories.values():
             history.forget_before(pulse)
 
-    def _detecting_cameras(
-        self, windows: Sequence[CameraWindow], first: int, last: int
-    ) -> dict[str, tuple[int, int]]:
-        """Return the image sizes of the cameras that ran detection in any of these frames."""
-        return {
-            window.message.camera: window.message.size
-            for window in windows
-            if not self.undetected.over(window.message.camera, first, last + 1 - first).all()
-        }
-
     def _store(self, window: CameraWindow) -> CameraWindow:
         """Store a window, after repairing identity switches where it revises the past."""
         self.undetected.add(window.message)
@@ -277,9 +293,13 @@ class PersonTracker:
 
     def _merge(self, kept: int, lost: int) -> None:
         self.registry.merge(kept, lost)
-        self._id_switch_repair.merge({lost: kept})
+        self._replace({lost: kept})
+
+    def _replace(self, numbers: Mapping[int, int]) -> None:
+        """Replace numbers in the tracks."""
+        self._id_switch_repair.merge(numbers)
         self._parts = {
-            key: [TrackPart(part.first, kept) if part.number == lost else part for part in parts]
+            key: [TrackPart(part.first, numbers.get(part.number, part.number)) for part in parts]
             for key, parts in self._parts.items()
         }
 

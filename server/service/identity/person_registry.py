@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from server.service.identity.track_parts import UNCONFIRMED, TrackPart
 
@@ -74,6 +74,27 @@ class PersonRegistry:
         if first is not None and last is not None:
             self.first_seen[kept] = min(first, self.first_seen.get(kept, first))
             self.last_seen[kept] = max(last, self.last_seen.get(kept, last))
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Replace people's numbers by others, one to one."""
+
+        def new(number: int) -> int:
+            return numbers.get(number, number)
+
+        self.first_seen = {new(number): frame for number, frame in self.first_seen.items()}
+        self.last_seen = {new(number): frame for number, frame in self.last_seen.items()}
+        self.names = {new(number): name for number, name in self.names.items()}
+        self.departed = set(map(new, self.departed))
+        merged = {old: new(number) for old, number in self.merged.items() if old not in numbers.values()}
+        gone = {old: number for old, number in numbers.items() if old not in numbers.values()}
+        self.merged = dict(list((merged | gone).items())[-self._max_merged :] if self._max_merged else [])
+
+    def restore(self, number: int, first_seen: int, last_seen: int, *, departed: bool) -> None:
+        """Add a person whom another service knows."""
+        self.first_seen.setdefault(number, first_seen)
+        self.last_seen.setdefault(number, last_seen)
+        if departed:
+            self.departed.add(number)
 
     def forget_unseen_since(self, frame: int) -> None:
         """Forget people who were last seen before this frame."""

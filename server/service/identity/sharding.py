@@ -24,6 +24,15 @@ def own_numbers(numbers: Iterable[int], merged: Mapping[int, int], share: ShareS
     return [number for number in numbers if shard_of(number, share) == share.share or number in kept_numbers]
 
 
+def replacement_addresses(share: ShareSettings) -> list[str]:
+    """Return the addresses of the other services of this one's share."""
+    return [
+        server.rstrip("/") + "/"
+        for index, server in enumerate(share.servers)
+        if index != share.index and index % share.of == share.share
+    ]
+
+
 def shard_address(number: int, share: ShareSettings) -> str | None:
     """Return the address of the first service of a number's share; None where the configuration has none."""
     return share.servers[shard_of(number, share)].rstrip("/") + "/" if share.servers else None

@@ -20,6 +20,8 @@ SINGLE_CAMERA_NUMBER_MAX = 1_000_000
 """The largest first free number that is accepted from a single camera; another must confirm larger ones."""
 _NUMBER_SLACK = 10_000
 """Numbers by which the newest snapshot may be ahead of the one before: far more than a second's."""
+RECENT_S = 10.0
+"""Tracks reported this recently are replicated: a camera on a busy machine reports late."""
 MAX_DOWNTIME_S = 30.0
 """The longest downtime that tracks are recovered after: in more time a track may have switched people."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 
@@ -15,6 +15,7 @@ from server.messaging.messages import camera_of_key
 from server.service.identity.people import PersonTracker
 from server.service.identity.state_recovery import (
     MAX_DOWNTIME_S,
+    RECENT_S,
     StateRecovery,
     first_free_number,
     state_for_cameras,
@@ -25,8 +26,6 @@ log = logging.getLogger(__name__)
 
 SNAPSHOT_WAIT_S = 1.0
 """Seconds to wait for the snapshot of a camera that has connected."""
-_RECENT_S = 10.0
-"""Tracks reported this recently are replicated: a camera on a busy machine reports late."""
 _JOIN_S = 10.0
 """How long after the start a camera may still connect with more people in its snapshot."""
 _INTERVAL_S = 1.0
@@ -41,7 +40,7 @@ class StateReplication:
         cameras: all cameras.
         fps: frames a second.
         send: sends a camera its snapshot.
-        sends: whether this service sends snapshots; of several services one is enough, since they agree.
+        sends: returns whether this service sends snapshots; of several services one is enough.
         clock: monotonic seconds.
     """
 
@@ -52,7 +51,7 @@ class StateReplication:
         fps: float,
         send: Callable[[str, bytes], None],
         *,
-        sends: bool = True,
+        sends: Callable[[], bool] = lambda: True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._people, self._cameras, self._fps = people, cameras, fps
@@ -65,7 +64,7 @@ class StateReplication:
         """By camera, the first free number of its last snapshot."""
         self._recoveries: list[StateRecovery] = []
         """The first for all cameras present at the start, then one for each later camera."""
-        self._any_camera = False
+        self._any_camera = self._took_over = False
         self._started_at: float | None = None
         self._free = math.inf
         """The first number that this run assigns; infinite before the start."""
@@ -110,6 +109,16 @@ class StateReplication:
         else:
             self._snapshots[camera] = snapshot
 
+    def take_over(self, snapshots: Mapping[str, CameraIdentitySnapshot]) -> None:
+        """Use the snapshots, by camera, that another service has made for the cameras, before the start."""
+        self._any_camera = self._took_over = True
+        for camera, snapshot in snapshots.items():
+            if camera in self._cameras:
+                self._connected_at.pop(camera, None)
+                self._reported.add(camera)
+                self._snapshots[camera] = snapshot
+                self._first_free[camera] = first_free_number(snapshot)
+
     @property
     def is_waiting(self) -> bool:
         """Whether a snapshot is still expected, so that nothing should be decided yet."""
@@ -153,6 +162,11 @@ class StateReplication:
             log.warning("camera %s: snapshot ignored: it alone has person numbers beyond %d", camera, most)
             del self._snapshots[camera]
         snapshot = {camera: _below(self._free, snapshot) for camera, snapshot in self._snapshots.items()}
+        if self._took_over and self._started_at is None:  # the other service may be ahead
+            snapshot = {
+                camera: msgspec.structs.replace(known, pulse=max(0, min(known.pulse, pulse - 1)))
+                for camera, known in snapshot.items()
+            }
         self._snapshots = {}
         recovery = StateRecovery(snapshot, pulse, round(MAX_DOWNTIME_S * self._fps))
         recovery.begin(self._people, pulse)
@@ -170,11 +184,11 @@ class StateReplication:
         for recovery in self._recoveries:
             recovery.advance(self._people, pulse)
         self._recoveries = [recovery for recovery in self._recoveries if not recovery.has_ended]
-        if self._started_at is not None and self._sends:
+        if self._started_at is not None and self._sends():
             self._send_state(pulse)
 
     def _send_state(self, pulse: int) -> None:
-        recent = round(_RECENT_S * self._fps)
+        recent = round(RECENT_S * self._fps)
         for camera, now in state_for_cameras(self._people, self._cameras, pulse, recent, self._since).items():
             if camera not in self._reported:
                 continue

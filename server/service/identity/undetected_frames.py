@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from server.messaging.messages import CameraTracks
+from server.service.identity.camera_window import CameraWindow
 
 
 class UndetectedFrames:
@@ -24,6 +26,16 @@ class UndetectedFrames:
         """Return for each of a camera's frames from `first` on whether it could not detect, (frames,)."""
         known = self._frames.get(camera, set())
         return np.array([pulse in known for pulse in range(first, first + frames)], dtype=np.bool_)
+
+    def detecting_cameras(
+        self, windows: Iterable[CameraWindow], first: int, last: int
+    ) -> dict[str, tuple[int, int]]:
+        """Return the image sizes of the cameras that ran detection in any of these frames."""
+        return {
+            window.message.camera: window.message.size
+            for window in windows
+            if not self.over(window.message.camera, first, last + 1 - first).all()
+        }
 
     def forget_before(self, pulse: int) -> None:
         """Forget the frames before a pulse."""

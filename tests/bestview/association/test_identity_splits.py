@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bestview import Split, TrackKey
-from bestview.association.registry.identity_registry import IdentityUpdate
+from bestview.association.registry.corrections import IdentityUpdate
 from fakes.bestview.identity_scenes import (
     OPEN_TRACKLET_LIMITS,
     collect_updates,

@@ -5,6 +5,7 @@ import { atLeastTwoGops } from '../latency_control.js';
 import { SegmentSplitter } from './mp4.js';
 import { ClusterSplitter } from './webm.js';
 import { HttpError, pause } from '../../shared/requests.js';
+import { currentServer, leaveServer, silenceS } from '../../shared/servers.js';
 import { streamUrl } from '../stream_selection.js';
 
 /** @import {Segment} from './mp4.js' */
@@ -12,6 +13,7 @@ import { streamUrl } from '../stream_selection.js';
 /** @import {StreamSelection} from '../stream_selection.js' */
 
 const IDLE_S = 6; // a live stream without data for this long is treated as broken
+const REPLACED_MS = 100; // before another service is asked
 
 /**
  * @typedef {object} DownloadListener
@@ -63,6 +65,8 @@ export class StreamDownload {
     while (!this.cancelled) {
       let refused = false;
       let broken = false;
+      let replaced = false;
+      const server = currentServer();
       try {
         for await (const segments of downloadSegments(streamUrl(this.selection, container, from), signal, this.gopS)) {
           await received(this, segments);
@@ -74,13 +78,15 @@ export class StreamDownload {
         if (!this.cancelled) console.info(`stream of person ${this.selection.object}: ${error}`);
         refused = error instanceof HttpError && error.permanent;
         broken = !refused;
+        replaced = broken && !this.cancelled && leaveServer(server);
       }
       if (this.cancelled) return;
       if (from && !broken) return ended(refused);
       if (from && this.hasFrames) from = advance(from, bufferedEnd());
       this.start = this.bufferedAt = NaN;
       this.earlyAudio = [];
-      await pause(backoff.next(), signal);
+      const wait = backoff.next();
+      await pause(replaced ? Math.min(wait, REPLACED_MS) : wait, signal);
     }
   }
 }
@@ -105,8 +111,8 @@ function advance(from, time) {
  */
 async function* downloadSegments(address, signal, gopS) {
   const request = new AbortController();
-  const idleMs = 1000 * atLeastTwoGops(IDLE_S, gopS);
-  let timer = setTimeout(() => request.abort(), idleMs);
+  // A busy service may begin late; what has begun and then is silent has stopped.
+  let timer = setTimeout(() => request.abort(), 1000 * atLeastTwoGops(IDLE_S, gopS));
   const abort = () => request.abort(); // AbortSignal.any is missing on the oldest supported iPhones
   signal.addEventListener('abort', abort);
   if (signal.aborted) abort();
@@ -119,7 +125,7 @@ async function* downloadSegments(address, signal, gopS) {
       const { done, value } = await reader.read();
       if (done) return;
       clearTimeout(timer);
-      timer = setTimeout(() => request.abort(), idleMs);
+      timer = setTimeout(() => request.abort(), 1000 * atLeastTwoGops(silenceS(IDLE_S), gopS));
       const segments = splitter.push(value);
       if (segments.length) yield segments;
     }

@@ -59,7 +59,7 @@ async def test_a_name_is_listed_unchanged(
     site_with_people: ServedSite, capsys: pytest.CaptureFixture[str]
 ) -> None:
     await post_edit(site_with_people, object=1, name="Ann [bold]")
-    await run_watch(f"http://127.0.0.1:{site_with_people.port}", None, None, None, None, None)
+    await run_watch([f"http://127.0.0.1:{site_with_people.port}"], None, None, None, None, None)
     lines = capsys.readouterr().out.splitlines()
     assert any(line.split()[:3] == ["1", "Ann", "[bold]"] for line in lines)
     assert any(line.split()[:2] == ["2", "yes"] for line in lines)

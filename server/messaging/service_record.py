@@ -1,0 +1,81 @@
+"""The record of who is who, which the best-view services of a site exchange.
+
+Every service computes identities by itself, the same from the same messages. Once a second it publishes its
+record; the others compare it with their own of the same pulse, and follow the leading service where they
+differ. A service that starts takes over the state of the leading one: the record, and what is known about
+people besides their tracks.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from server.messaging.camera_identity_snapshot import (
+    ALIASES_MAX,
+    NAME_LENGTH_MAX,
+    CameraIdentitySnapshot,
+    PersonNumber,
+)
+from server.messaging.messages import HISTOGRAM_BINS_MAX
+from server.messaging.number_types import Number, Pulse
+
+SERVICES_MAX = 64
+"""Best-view services of a site, at most."""
+RECORD_BYTES_MAX = 1 << 24
+"""Size limit of a record, and of a state, in bytes."""
+_CAMERAS_MAX = 1024
+_PEOPLE_MAX = 100_000
+
+Sum = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
+
+
+class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """The people that a service tracks at a pulse."""
+
+    service: Annotated[int, msgspec.Meta(ge=0, lt=SERVICES_MAX)]
+    """Its index."""
+    pulse: Pulse
+    unbroken_since: Pulse
+    """Since then the service has decided every epoch. The service with the lowest leads; of equal ones, that
+    with the lowest index. One that was stopped, or cut off from all cameras, therefore follows the others."""
+    cameras: Annotated[dict[str, CameraIdentitySnapshot], msgspec.Meta(max_length=_CAMERAS_MAX)]
+    """What each camera tracks."""
+
+    @property
+    def rank(self) -> tuple[int, int]:
+        """The service with the lowest leads."""
+        return self.unbroken_since, self.service
+
+
+class CameraLooks(msgspec.Struct, frozen=True, kw_only=True):
+    """A person's color histograms in one camera."""
+
+    frames: Annotated[int, msgspec.Meta(ge=1, le=2**40)]
+    sums: Annotated[list[Sum], msgspec.Meta(min_length=1, max_length=HISTOGRAM_BINS_MAX)]
+    """Sum of the frames' histograms."""
+
+
+class PersonState(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What is known about a person besides the tracks that a record has."""
+
+    number: PersonNumber
+    first_seen: Pulse
+    last_seen: Pulse
+    departed: bool = False
+    camera: str = ""
+    """Of the last sighting."""
+    settled_frames: Number = 0
+    """Frames behind the histograms that were published with this number."""
+    aliases: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALIASES_MAX)] = []
+    name: Annotated[str, msgspec.Meta(max_length=NAME_LENGTH_MAX)] = ""
+    looks: Annotated[dict[str, CameraLooks], msgspec.Meta(max_length=_CAMERAS_MAX)] = {}
+    """By camera."""
+
+
+class ServiceState(msgspec.Struct, frozen=True, kw_only=True):
+    """What a service that starts takes over from the leading one."""
+
+    record: ServiceRecord
+    people: Annotated[list[PersonState], msgspec.Meta(max_length=_PEOPLE_MAX)]

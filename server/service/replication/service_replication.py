@@ -1,0 +1,233 @@
+"""Keeps the people's numbers of a site's best-view services equal, whichever of them dies or starts.
+
+All services compute the same identities from the same messages. Where they differ, since a message was lost
+or late to one of them, the others follow the leading service. Which one leads follows from the records alone:
+the one that has decided every epoch for longest. When its liveliness token is gone, or no record came for
+`LEASE_S`, the next one leads. A service that was stopped, or cut off from the cameras, has a later beginning
+when it returns, and so follows.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import msgspec
+
+from server.config.site_config import Config
+from server.messaging.inbox import Message
+from server.messaging.messages import DECODE_ERRORS
+from server.messaging.service_record import RECORD_BYTES_MAX, ServiceRecord, ServiceState
+from server.service.bus_connection import BusConnection
+from server.service.identity.people import PersonTracker
+from server.service.identity.state_recovery import RECENT_S, state_for_cameras
+from server.service.identity.state_replication import StateReplication
+from server.service.ingest.epoch_aligner import Epoch
+from server.service.replication.disagreements import Disagreements, find_disagreements, follow
+from server.service.replication.state import restore_people, state_of
+
+log = logging.getLogger(__name__)
+
+LEASE_S = 3.0
+"""Seconds for which a record counts."""
+_INTERVAL_S = 1.0
+"""Seconds between two records."""
+_CONNECT_S = 1.0
+"""How long a service that starts waits for the others' sessions; those that are down do not come."""
+_STATE_S = 2.0
+"""How long it waits for their states."""
+_OWN_RECORDS = 30
+"""Own records kept, to be compared with the others' of the same pulse."""
+_NUMBERS_AHEAD_MAX = 10_000
+"""Numbers by which another service may be ahead."""
+_RECORD = msgspec.json.Decoder(ServiceRecord)
+_STATE = msgspec.json.Decoder(ServiceState)
+
+
+@dataclass(frozen=True, slots=True)
+class _Received:
+    """The newest record of another service, and when it came, by the monotonic clock."""
+
+    record: ServiceRecord
+    at: float
+
+
+class ServiceReplication:
+    """Publishes this service's record, follows the leading one's, and takes over its state at the start."""
+
+    def __init__(
+        self,
+        config: Config,
+        people: PersonTracker,
+        of_cameras: StateReplication,
+        bus: BusConnection,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        share = config.view.share
+        self._index, self._services = share.index, share.services
+        self._cameras, self._fps = config.camera_ids, config.site.fps
+        self._interval = max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))
+        """Epochs between two records; those whose number it divides have one, in every service."""
+        self._people, self._of_cameras, self._bus, self._clock = people, of_cameras, bus, clock
+        self._received: dict[int, _Received] = {}
+        self._own: dict[int, ServiceRecord] = {}
+        """By pulse."""
+        self._unbroken_since: int | None = None
+        self._newest_epoch = -1
+        self._last_found = Disagreements()
+        self._leader = self._index
+        self.followed = 0
+        """Records of the leading service whose numbers replaced own ones."""
+        self.bad_messages = 0
+        """Records and states that could not be parsed."""
+        self._changed = asyncio.Event()
+
+    @property
+    def leads(self) -> bool:
+        """Whether this service leads."""
+        return self._leading() is None
+
+    async def take_over(self) -> None:
+        """Take over the state of the leading service, where another one is running."""
+        if self._services == 1:
+            return
+        self._bus.exchange_records(self.receive, self._encoded_state, self._on_service)
+        try:
+            async with asyncio.timeout(_CONNECT_S):
+                while len(self._bus.other_services) < self._services - 1:
+                    self._changed.clear()
+                    await self._changed.wait()
+        except TimeoutError:
+            log.info("%d of %d services are there", 1 + len(self._bus.other_services), self._services)
+        answers = await asyncio.to_thread(self._bus.query_states, _STATE_S)
+        states = [state for answer in answers if (state := self._decode_state(answer)) is not None]
+        if not states:
+            return
+        state = min(states, key=lambda state: state.record.rank)
+        self._received[state.record.service] = _Received(state.record, self._clock())
+        self.restore(state)
+
+    def restore(self, state: ServiceState) -> None:
+        """Take over a state, before the first epoch."""
+        restore_people(self._people, state)
+        self._of_cameras.take_over(state.record.cameras)
+        text = "took over the state of best-view service %d: %d people"
+        log.info(text, state.record.service, len(state.people))
+
+    def receive(self, message: Message) -> None:
+        """Keep another service's record; it is compared once this one is at its pulse."""
+        try:
+            if len(message.payload) > RECORD_BYTES_MAX:
+                raise msgspec.ValidationError("too long")
+            record = _RECORD.decode(message.payload)
+        except DECODE_ERRORS:
+            self.bad_messages += 1
+            return
+        if record.service < self._services and record.service != self._index:
+            self._received[record.service] = _Received(record, self._clock())
+
+    def step(self, epoch: Epoch) -> None:
+        """Publish a record where one is due, and follow the leading service, after an epoch was decided."""
+        if self._services == 1:
+            return
+        is_broken = epoch.number != self._newest_epoch + 1 or not epoch.tracks
+        if self._unbroken_since is None or is_broken:
+            self._unbroken_since = epoch.last
+        self._newest_epoch = epoch.number
+        if epoch.number % self._interval == 0:
+            record = self._record()
+            self._own[epoch.last] = record
+            self._own = dict(list(self._own.items())[-_OWN_RECORDS:])
+            payload = msgspec.json.encode(record)
+            if len(payload) <= RECORD_BYTES_MAX:
+                self._bus.publish_record(payload)
+        self._compare()
+
+    def _compare(self) -> None:
+        """Compare the records of pulses that this service has reached with its own."""
+        leader = self._leading()
+        if (index := self._index if leader is None else leader.service) != self._leader:
+            self._leader = index
+            log.info("best-view service %d leads", index)
+        for received in self._live():
+            record = received.record
+            own = self._own.get(record.pulse)
+            if own is None:
+                continue
+            del self._own[record.pulse]
+            self._reserve(own, record)
+            if record is leader:
+                self._follow(find_disagreements(own.cameras, record.cameras))
+
+    def _follow(self, found: Disagreements) -> None:
+        """Follow the leading service where two records in a row differ in the same way."""
+        if found and found == self._last_found:
+            follow(self._people, found)
+            self.followed += 1
+            log.warning(
+                "people's numbers were not those of service %d: %s",
+                self._leader,
+                msgspec.json.encode(found).decode(),
+            )
+            found = Disagreements()
+        self._last_found = found
+
+    def _reserve(self, own: ServiceRecord, other: ServiceRecord) -> None:
+        """Skip the numbers that another service has assigned and this one has not."""
+        ahead = _next_number(other) - _next_number(own)
+        if 0 < ahead <= _NUMBERS_AHEAD_MAX:
+            self._people.reserve_numbers_below(self._people.next_number + ahead)
+
+    def _leading(self) -> ServiceRecord | None:
+        """Return the record of the leading service; None: this one leads."""
+        live = min(
+            (received.record for received in self._live()), key=lambda record: record.rank, default=None
+        )
+        if live is None:
+            return None
+        since = self._unbroken_since
+        return live if since is None or live.rank < (since, self._index) else None
+
+    def _live(self) -> list[_Received]:
+        """Return the other services' records that count."""
+        now = self._clock()
+        present = self._bus.other_services
+        return [
+            received
+            for index, received in sorted(self._received.items())
+            if index in present and now < received.at + LEASE_S
+        ]
+
+    def _record(self) -> ServiceRecord:
+        assert self._unbroken_since is not None  # noqa: S101 — set by the first epoch
+        newest = self._people.newest
+        snapshots = state_for_cameras(
+            self._people, self._cameras, newest, round(RECENT_S * self._fps), self._of_cameras.numbers_since
+        )
+        return ServiceRecord(
+            service=self._index, pulse=newest, unbroken_since=self._unbroken_since, cameras=snapshots
+        )
+
+    def _encoded_state(self) -> bytes:
+        """Return the state for a service that starts; empty: there is none yet."""
+        if self._unbroken_since is None:
+            return b""
+        return msgspec.json.encode(state_of(self._people, self._record()))
+
+    def _decode_state(self, answer: bytes) -> ServiceState | None:
+        try:
+            state = _STATE.decode(answer) if answer else None
+        except DECODE_ERRORS:
+            self.bad_messages += 1
+            return None
+        return None if state is None or state.record.service == self._index else state
+
+    def _on_service(self) -> None:
+        self._changed.set()
+
+
+def _next_number(record: ServiceRecord) -> int:
+    return max((snapshot.next_number for snapshot in record.cameras.values()), default=1)
