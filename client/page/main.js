@@ -3,6 +3,7 @@
 import { FlagBanner } from './operator/assist/flag_banner.js';
 import { CameraLegend } from './people/camera_legend.js';
 import { listenToControls } from './controls.js';
+import { DELAY_REASONS, DelayChoice } from './player/delay_choice.js';
 import { element, setText } from './shared/dom.js';
 import { ServerEvents } from './shared/events.js';
 import { SelectionCosts } from './people/selection_costs.js';
@@ -27,6 +28,8 @@ const stage = element('stage');
 const video = element('video');
 const [title, text] = /** @type {HTMLElement[]} */ ([...element('status').children]);
 
+/** @type {ServerEvents | null} */
+let events = null;
 const viewer = new Viewer(video, update);
 const cards = new PersonCards(
   element('people'),
@@ -40,6 +43,7 @@ const overlay = new Overlay(element('boxes'));
 const strip = new TimelineStrip(element('strip'));
 const range = new RangeSelect(element('span'), element('strip'), updateReadout);
 const reason = new SelectionReason(element('reason'));
+const delayChoice = new DelayChoice(element('delay-choice'), (delay) => viewer.chooseDelay(delay));
 const costs = new SelectionCosts(viewer, strip, element('why'));
 const sitePoller = new SitePoller(viewer);
 const painter = new Painter(video, viewer, overlay, showCamera, () => pointing.addFrame());
@@ -66,6 +70,8 @@ function update() {
     cards.show(viewer.people, viewer.object, viewer.tiles, viewer.palette, (person) => viewer.isGone(person));
     element('no-people').hidden = viewer.people.length > 0;
   }
+  delayChoice.show(viewer.delays, viewer.delay);
+  events?.choose(viewer.delay);
   tiles.show(viewer.tiles);
   document.title = viewer.object === null ? 'MyView' : `${longLabel(viewer.object)} · MyView`;
   updateReadout();
@@ -95,7 +101,9 @@ function updateReadout() {
   costs.update();
   const best = viewer.decisionsAt(probe.pulse).camera(viewer.object, probe.pulse);
   const preferenceReason = preference.reason(best, probe.camera, live);
+  const delayReason = live && viewer.delay !== null ? DELAY_REASONS[viewer.delay] : undefined;
   if (preferenceReason !== null) reason.replace(preferenceReason);
+  else if (delayReason !== undefined) reason.replace(delayReason);
   else void reason.refresh(viewer.object, probe.camera, live ? null : probe.pulse);
 }
 
@@ -134,7 +142,7 @@ function showPointingError(error) {
 
 listenToControls({ video, viewer, painter, overlay, strip, costs, banner });
 await signIn.signInByLink();
-new ServerEvents({
+events = new ServerEvents({
   opened: () => {
     viewer.setConnected(true);
     void sitePoller.connected();
@@ -150,9 +158,10 @@ new ServerEvents({
     else if (name === 'site') viewer.setSite(data);
     else if (name === 'objects') viewer.setPeople(data.objects);
     else if (name === 'cameras') viewer.setCameras(data.cameras);
+    else if (name === 'delays') viewer.setDelays(data.delays);
     else if (name === 'flag') banner.update(data);
   },
-});
+}, viewer.delay);
 new ResizeObserver(() => {
   painter.repaint();
   tiles.repaint();

@@ -16,7 +16,7 @@ import { describe } from './shared/status.js';
 import { TileSelection } from './people/tiles.js';
 import { TimeShift } from './timeline/time_shift.js';
 
-/** @import {Camera, Gop, Person, Site} from './shared/api_types.js' */
+/** @import {Camera, Gop, Person, Site, ViewerDelay} from './shared/api_types.js' */
 /** @import {View} from './timeline/recorded_views.js' */
 /** @import {StreamFormat} from './player/create_player.js' */
 /** @import {Status} from './shared/status.js' */
@@ -36,6 +36,10 @@ export class Viewer {
   object = readAddress().object;
   preference = new ViewPreference(readAddress());
   tileSelection = new TileSelection(readAddress().beside);
+  /** @type {string | null} the chosen delay; null: balanced */
+  delay = readAddress().delay;
+  /** @type {ViewerDelay[]} that the site offers */
+  delays = [];
   currentFrame = new CurrentFrame(this);
   notice = new Notice();
   palette = new Palette([]);
@@ -67,6 +71,7 @@ export class Viewer {
     onAddressChange((view) => {
       if (this.preference.set(view)) this.timeShift.keepMoment();
       this.tileSelection.numbers = view.beside;
+      this.delay = view.delay;
       if (view.object !== null) this.#setObject(view.object, true);
       this.changed();
     });
@@ -114,6 +119,23 @@ export class Viewer {
   /** @param {Camera[]} cameras */
   setCameras(cameras) {
     this.cameras = cameras;
+    this.changed();
+  }
+
+  /** @param {ViewerDelay[]} delays */
+  setDelays(delays) {
+    this.delays = delays;
+    // A token for one person has no live view.
+    if (this.delay !== null && !delays.some(({ delay }) => delay === this.delay)) this.delay = null;
+    this.#updatePlayer();
+    this.changed();
+  }
+
+  /** @param {string | null} delay of live pictures; null: balanced */
+  chooseDelay(delay) {
+    this.delay = delay;
+    this.#writeAddress(true);
+    this.#updatePlayer();
     this.changed();
   }
 
@@ -257,7 +279,7 @@ export class Viewer {
 
   /** @param {boolean} byUser */
   #writeAddress(byUser) {
-    writeAddress({ object: this.object, ...this.preference.addressPart, beside: this.tileSelection.numbers }, byUser);
+    writeAddress({ object: this.object, ...this.preference.addressPart, beside: this.tileSelection.numbers, delay: this.delay }, byUser);
   }
 
   /**
@@ -290,6 +312,7 @@ export class Viewer {
     if (this.object === null || !this.selected) return this.player.stop();
     const past = this.timeShift.moment;
     const { held, preferred } = this.preference;
-    this.player.select({ object: this.object, camera: held, prefer: past ? null : preferred, past });
+    const delay = past ? null : this.delay;
+    this.player.select({ object: this.object, camera: held, prefer: past ? null : preferred, delay, past });
   }
 }

@@ -9,7 +9,14 @@ import pytest
 
 from fakes.running.site import CAMERAS, MYVIEW, configuration, running, with_timeout
 
-WRITTEN = ("choices.csv", "corrections.csv", "late.csv", *(f"tracks/{camera}.txt" for camera in CAMERAS))
+WRITTEN = (
+    "choices.csv",
+    "choices-live.csv",
+    "choices-smooth.csv",
+    "corrections.csv",
+    "late.csv",
+    *(f"tracks/{camera}.txt" for camera in CAMERAS),
+)
 
 pytestmark = [pytest.mark.live]
 

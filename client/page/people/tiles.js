@@ -21,6 +21,7 @@ const MAX_TILES = 3; // of six connections per server; the events, the large pla
  * @property {StreamFormat} format
  * @property {Decisions} decisions
  * @property {boolean} boxesOn
+ * @property {string | null} delay
  */
 
 /** Which people are on tiles. */
@@ -144,7 +145,8 @@ class PersonTile {
 
   play() {
     if (!this.player.configure(this.context.format)) return;
-    this.player.select({ object: this.object, camera: null, prefer: null, past: null });
+    const { delay } = this.context;
+    this.player.select({ object: this.object, camera: null, prefer: null, delay, past: null });
     // A tile has no pause button: the browser paused it while the page was hidden.
     if (this.player.shown && this.video.paused && !document.hidden) this.video.play().catch(() => undefined);
   }

@@ -6,6 +6,7 @@ import { atLeastTwoGops } from './latency_control.js';
 
 const RESTARTED_S = 10; // a stream that starts this far back belongs to a site whose pulses have restarted
 const CATCH_UP_MS = 300; // how long a new stream may take to reach the displayed media time
+const LATER_S = 1.2;
 const INSIDE_S = 0.001; // a seek to the very start of a range may round to just before it
 
 /**
@@ -28,6 +29,8 @@ export function hasRestarted(start, time, gopS) {
 export function switchTime({ start, bufferedAt, gopS, selection: { past } }, end, time, now) {
   if (past) return end > past.time ? Math.max(past.time, start) + INSIDE_S : null;
   if (start <= time && time < end) return time;
-  const unreachable = time < start || hasRestarted(start, time, gopS);
+  // A stream that ends further back is later than the displayed one: it will not catch up.
+  const isLater = end < time - atLeastTwoGops(LATER_S, gopS);
+  const unreachable = time < start || isLater || hasRestarted(start, time, gopS);
   return unreachable || now - bufferedAt >= CATCH_UP_MS ? start + INSIDE_S : null;
 }

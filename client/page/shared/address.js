@@ -6,9 +6,11 @@
  * @property {string | null} camera the held camera
  * @property {string | null} prefer the preferred camera
  * @property {number[]} beside people on small tiles
+ * @property {string | null} delay live or smooth; null: balanced
  */
 
 const NUMBER = /^\d{1,9}$/;
+const DELAYS = ['live', 'smooth'];
 
 /** @returns {AddressView} */
 export function readAddress() {
@@ -20,6 +22,7 @@ export function readAddress() {
     camera: query.get('camera'),
     prefer: query.get('prefer'),
     beside: [...new Set(beside.map(Number))],
+    delay: DELAYS.find((delay) => delay === query.get('delay')) ?? null,
   };
 }
 
@@ -27,11 +30,11 @@ export function readAddress() {
  * @param {AddressView} view
  * @param {boolean} addStep whether to add a step to the browser's history
  */
-export function writeAddress({ object, camera, prefer, beside }, addStep) {
-  if (JSON.stringify(readAddress()) === JSON.stringify({ object, camera, prefer, beside })) return;
+export function writeAddress({ object, camera, prefer, beside, delay }, addStep) {
+  if (JSON.stringify(readAddress()) === JSON.stringify({ object, camera, prefer, beside, delay })) return;
   const address = new URL(location.href);
   address.searchParams.set('object', String(object));
-  for (const [name, value] of Object.entries({ camera, prefer, beside: beside.join() || null })) {
+  for (const [name, value] of Object.entries({ camera, prefer, beside: beside.join() || null, delay })) {
     if (value === null) address.searchParams.delete(name);
     else address.searchParams.set(name, value);
   }

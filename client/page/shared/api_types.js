@@ -18,6 +18,14 @@
  * @property {string[]} cameras
  * @property {string[]} [others] base URLs of the services that replace this one
  *
+ * @typedef {object} ViewerDelay an entry of /api/delays
+ * @property {string} delay live, balanced or smooth
+ * @property {number} lookahead_s
+ * @property {number | null} delay_s from when a frame was due until it is sent, median; null: not measured yet
+ * @property {number | null} delay_p95_s
+ * @property {number | null} regret_s seconds of not seeing the person per minute, beyond the best views in hindsight
+ * @property {number | null} cuts_per_minute
+ *
  * @typedef {object} Session rights of the visitor
  * @property {boolean} by_token signed in by a token; false: the site needs none
  * @property {string | null} name of the token

@@ -9,7 +9,7 @@ import { Backoff } from './backoff.js';
 import { getJson } from './requests.js';
 import { currentServer, leaveServer, onServerChange } from './servers.js';
 
-const NAMES = ['site', 'objects', 'cameras', 'gop', 'flag'];
+const NAMES = ['site', 'objects', 'cameras', 'delays', 'gop', 'flag'];
 const IDLE_MS = 6000;
 const CHECK_MS = 2000;
 const REPLACED_MS = 100; // before another service is asked
@@ -21,22 +21,35 @@ export class ServerEvents {
   #backoff = new Backoff();
   #activeAt = 0; // performance.now()
   #checking = false;
+  /** @type {string | null} */
+  #delay;
 
   /**
    * @param {object} listener
    * @param {(name: string, data: any) => void} listener.received
    * @param {() => void} listener.opened
    * @param {() => void} listener.lost
+   * @param {string | null} [delay] whose decisions are received; null: balanced
    */
-  constructor(listener) {
+  constructor(listener, delay = null) {
     this.listener = listener;
+    this.#delay = delay;
     this.#open();
     setInterval(() => this.#check(), CHECK_MS);
     onServerChange(() => this.#source && this.#lose(this.#source));
   }
 
+  /** @param {string | null} delay whose decisions to receive from now on */
+  choose(delay) {
+    if (delay === this.#delay) return;
+    this.#delay = delay;
+    if (!this.#source) return; // it is about to be opened
+    this.#source.close();
+    this.#open();
+  }
+
   #open() {
-    const source = new EventSource('api/events');
+    const source = new EventSource(`api/events${this.#delay ? `?delay=${this.#delay}` : ''}`);
     this.#source = source;
     this.#server = currentServer();
     this.#activeAt = performance.now();

@@ -41,6 +41,11 @@ test('a stream ahead of the displayed time, or with restarted pulses, is joined 
   assert.ok(!hasRestarted(45, 60, 12), 'within two GOPs');
 });
 
+test('a stream that is later for good is joined at its start at once', () => {
+  const time = switchTime(stream({ start: 10 }), 10.4, 12, 0) ?? NaN;
+  assert.ok(time >= 10 && time < 10 + TOLERANCE_S);
+});
+
 test('a past stream is joined at the requested time once that is buffered', () => {
   assert.equal(switchTime(stream({ start: 9, past: 10 }), 10, 60, 5000), null);
   const time = switchTime(stream({ start: 9, past: 10 }), 11, 60, 0) ?? NaN;
