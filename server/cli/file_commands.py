@@ -6,8 +6,10 @@ Each imports its modules when it runs, so that a process loads no more than it n
 from __future__ import annotations
 
 import logging
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
+from zoneinfo import ZoneInfo
 
 import typer
 
@@ -30,6 +32,13 @@ def render(
         ),
     ] = None,
     ground: Annotated[Path | None, typer.Option("--ground", help="Homographies (JSON) per view.")] = None,
+    begins: Annotated[
+        datetime | None,
+        typer.Option(
+            formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M:%S", "%Y-%m-%dT%H:%M"],
+            help="When the views begin, for rules with a schedule; in the site's time zone.",
+        ),
+    ] = None,
 ) -> None:
     """Render the best view of each person in recorded views: videos, tracks, choices and plots."""
     from server.cli.generated_config import config_for_videos
@@ -47,9 +56,16 @@ def render(
         ground=ground,
         detections=det or [],
     )
+    if begins is not None and begins.tzinfo is None and loaded.site.time_zone is not None:
+        begins = begins.replace(tzinfo=ZoneInfo(loaded.site.time_zone))
     with atomic_folder(out) as folder, bar("frames") as progress:
         task = progress.add_task("rendering", total=total_frames(videos, loaded.site.fps))
-        people = render_views(loaded, folder, lambda done: progress.update(task, completed=done))
+        people = render_views(
+            loaded,
+            folder,
+            lambda done: progress.update(task, completed=done),
+            None if begins is None else begins.timestamp(),
+        )
     numbers = ", ".join(map(str, people.numbers)) or "none"
     typer.echo(
         f"{out}: best views of {len(people.numbers)} people ({numbers}), tracks, choices.csv and plots"

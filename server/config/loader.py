@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -100,6 +100,7 @@ def resolve_ground_and_paths(config: Config, *, where: str, folder: Path) -> Con
     if record.folder is not None:
         record = record.model_copy(update={"folder": folder / record.folder})
     update = {"cameras": cameras, "detect": detect, "sound": sound, "record": record}
+    update |= _resolved_integrations(config, folder)
     return config.model_copy(update={**update, **_resolved_access(config, folder)})
 
 
@@ -123,6 +124,17 @@ def _resolved_tls(tls: TlsSettings, folder: Path) -> TlsSettings:
     if tls.certificate is None or tls.key is None:
         return tls
     return tls.model_copy(update={"certificate": folder / tls.certificate, "key": folder / tls.key})
+
+
+def _resolved_integrations(config: Config, folder: Path) -> dict[str, Any]:
+    """Return the sections of other systems, with absolute paths of their secrets."""
+    files = {name: getattr(config.mqtt, name) for name in ("password", "authority")}
+    mqtt = config.mqtt.model_copy(update={name: folder / path for name, path in files.items() if path})
+    webhooks = [
+        webhook.model_copy(update={"secret": folder / webhook.secret}) if webhook.secret else webhook
+        for webhook in config.webhooks
+    ]
+    return {"mqtt": mqtt, "webhooks": webhooks}
 
 
 def _process_files(section: ProcessSection, folder: Path) -> ProcessSection:
@@ -252,7 +264,7 @@ def _known_keys(section: tuple[int | str, ...]) -> list[str]:
     model: Any = Config
     for part in section:
         if isinstance(part, int):
-            model = CameraSettings
+            (model,) = get_args(model) or (None,)  # the items of a list
         elif isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
             model = model.model_fields[part].annotation
     return list(model.model_fields) if isinstance(model, type) and issubclass(model, BaseModel) else []

@@ -20,14 +20,19 @@ from server.config.sections import (
     CameraSettings,
     EncodeSettings,
     HttpSettings,
+    MqttSettings,
     RecordSettings,
     RtspSettings,
+    RuleSettings,
     SiteSettings,
     SoundSettings,
     SyncSettings,
     TrackSettings,
     ViewSettings,
+    WebhookSettings,
     ZenohSettings,
+    ZoneSettings,
+    check_zones_and_rules,
 )
 from server.config.sections.detect import DetectSettings
 from server.config.unknown_keys import no_unknown_keys
@@ -68,6 +73,10 @@ class Config(BaseSettings):
     access: AccessSettings = AccessSettings()
     record: RecordSettings = RecordSettings()
     rtsp: RtspSettings = RtspSettings()
+    zones: Annotated[list[ZoneSettings], Field(max_length=200)] = []
+    rules: Annotated[list[RuleSettings], Field(max_length=200)] = []
+    webhooks: Annotated[list[WebhookSettings], Field(max_length=20)] = []
+    mqtt: MqttSettings = MqttSettings()
 
     @classmethod
     def settings_customise_sources(
@@ -91,6 +100,17 @@ class Config(BaseSettings):
                 raise ValueError(f"cameras: {camera_id!r} is the name of a best-view service; use another id")
             if ids.count(camera_id) > 1:
                 raise ValueError(f"cameras: two cameras are called {camera_id!r}; ids must be unique")
+        return self
+
+    @model_validator(mode="after")
+    def _zones_and_rules_fit(self) -> Self:
+        check_zones_and_rules(self.zones, self.rules, self.camera_ids)
+        rules = [rule.id for rule in self.rules]
+        for number, webhook in enumerate(self.webhooks):
+            for rule in webhook.rules:
+                if rule not in rules:
+                    known = f"there are {', '.join(rules)}" if rules else "there are none"
+                    raise ValueError(f"webhooks.{number}: rules: there is no rule {rule!r}; {known}")
         return self
 
     @model_validator(mode="after")

@@ -32,6 +32,7 @@ from server.service.operator_assist.operator_assist import OperatorAssist
 from server.service.pulse_follower import PulseFollower
 from server.service.recording.recorder import Recorder
 from server.service.replication.service_replication import ServiceReplication
+from server.service.rules.engine import RuleEngine, SiteEvent
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
@@ -121,7 +122,11 @@ class BestViewPipeline:
         """The last pulse of the last epoch; later frames have no tracks."""
         self.loss_recorder = LossRecorder(self.frame_buffers, self.ingest.states, stride)
         self.stage_timers = StageTimers()
+        self.rules = RuleEngine(config, self.decider.people.letterboxes)
         self.on_decision: list[Callable[[GopChoices], None]] = []
+        self.on_event: list[Callable[[SiteEvent], None]] = []
+        self.on_config: list[Callable[[], None]] = []
+        """Called after a changed configuration has been applied."""
         self._out = out
         self._decision_writer: LiveDecisionWriter | None = None
         self._changed = asyncio.Event()
@@ -259,7 +264,11 @@ class BestViewPipeline:
         # The ground of synthetic cameras is in no file.
         ground = {camera.id: {"ground": camera.ground} for camera in self.config.cameras}
         cameras = [camera.model_copy(update=ground[camera.id]) for camera in config.cameras]
-        self.config = config.model_copy(update={"cameras": cameras})
+        before, self.config = self.config, config.model_copy(update={"cameras": cameras})
+        if any(getattr(config, name) != getattr(before, name) for name in ("zones", "rules", "site")):
+            self.rules.apply(self.config)
+        for callback in self.on_config:
+            callback()
 
     def close(self) -> None:
         """End all streams, and close the bus and the files."""
@@ -316,10 +325,21 @@ class BestViewPipeline:
         self.recorder.put(choices, self.pulses.pulse0, self.state_replication.numbers_since)
         for callback in self.on_decision:
             callback(choices)
+        events = self._evaluate_rules(decision)
         self.splicer.publish_decision(decision)
         self.splicer.forget(self.decider.people.known, decision.merged)
         self.bus.publish_choices(choices)
         if self._decision_writer is not None:
-            self._decision_writer.write_or_skip(decision)
+            self._decision_writer.write_or_skip(decision, events)
         self.loss_recorder.record_gop(decision)
         self.ingest.forget_thumbnails_before(decision.first - self.decider.people.forget_after)
+
+    def _evaluate_rules(self, decision: GopDecision) -> list[SiteEvent]:
+        """Evaluate the rules and publish events; of several services that share a site the first one does."""
+        if self.config.view.share.index:
+            return []
+        events = self.rules.put(decision, self.decider.people.registry.names, self.pulses.pulse0)
+        for event in events:
+            for callback in self.on_event:
+                callback(event)
+        return events

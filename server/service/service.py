@@ -14,6 +14,7 @@ from server.service.facade.operations import OperationsService
 from server.service.facade.people import PeopleService
 from server.service.facade.recordings import RecordingService
 from server.service.facade.rendering import RenderPool
+from server.service.facade.rules import RulesService
 from server.service.facade.streams import StreamService
 from server.service.metrics.service_collector import register_collectors
 from server.service.pipeline import BestViewPipeline
@@ -24,6 +25,7 @@ class BestViewService:
 
     Attributes:
         people: people, their views, and manual corrections.
+        rules: zones and rules, and what they have found.
         cameras: state and diagnostics of the cameras.
         streams: live streams.
         recordings: recorded streams.
@@ -36,6 +38,7 @@ class BestViewService:
     def __init__(self, pipeline: BestViewPipeline) -> None:
         self._pipeline = pipeline
         self.people = PeopleService(pipeline)
+        self.rules = RulesService(pipeline, self.people)
         self.cameras = CameraService(pipeline)
         self.streams = StreamService(pipeline)
         self.recordings = RecordingService(pipeline)

@@ -10,6 +10,7 @@ from camsync import SyncError
 from server.config.running_config import ActiveConfig
 from server.http.app import make_app, serving
 from server.http.app_keys import SiteControl
+from server.integrations.integrations import integrating
 from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.supervisor.exposure_checks import check_bus, check_viewers
@@ -44,8 +45,9 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     try:
         pipeline.open_bus()
         control = SiteControl(running.path, asyncio.Event() if is_supervised() else None)
-        app = make_app(BestViewService(pipeline), running.on_disk, control)
-        async with serving(app, config.http) as port:
+        service = BestViewService(pipeline)
+        app = make_app(service, running.on_disk, control)
+        async with integrating(service), serving(app, config.http) as port:
             scheme = "http" if config.http.tls.key is None else "https"
             log.info("page, streams and API on %s://%s:%d/", scheme, config.http.host, port)
             signal_started()

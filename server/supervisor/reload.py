@@ -31,6 +31,10 @@ _GATEWAY = (
     "rtsp.python",
 )
 """Settings that only the RTSP gateway uses."""
+_LIVE_SECTIONS = ("zones", "rules")
+"""Sections that the best view applies as a whole; they name cameras, so new ones need a restart first."""
+_INTEGRATIONS = ("webhooks", "mqtt")
+_TIME_ZONE = "site.time_zone"
 _BEST_VIEW_SECTIONS = ("view", "http", "access", "record")
 
 
@@ -72,7 +76,8 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     """Plan what a changed configuration means for a running site."""
     keys = changed_keys(running, wanted)
     view = running.view.model_copy(update={name: getattr(wanted.view, name) for name in LIVE_VIEW_SETTINGS})
-    live = _of(keys, _LIVE)
+    sections = (*_LIVE_SECTIONS, *_INTEGRATIONS) if running.camera_ids == wanted.camera_ids else ()
+    live = _of(keys, (*_LIVE, *sections, _TIME_ZONE))
     try:
         running.check_lookahead(view)
     except ValueError:  # the settings that allow a shorter one wait for a restart
@@ -103,6 +108,8 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
             "detect": wanted.detect,
             "rtsp": wanted.rtsp.model_copy(update={"enabled": running.rtsp.enabled}),
             "track": _track(running, wanted, unchanged),
+            **{name: getattr(wanted, name) for name in sections},
+            "site": running.site.model_copy(update={"time_zone": wanted.site.time_zone}),
             "cameras": [_camera(running, wanted, camera, camera_keys) for camera in running.camera_ids],
         }
     )

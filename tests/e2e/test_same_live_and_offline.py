@@ -14,9 +14,18 @@ WRITTEN = (
     "choices-live.csv",
     "choices-smooth.csv",
     "corrections.csv",
+    "events.csv",
     "late.csv",
     *(f"tracks/{camera}.txt" for camera in CAMERAS),
 )
+
+ZONE = {"id": "middle", "area": [[2, 1.5], [6, 1.5], [6, 4.5], [2, 4.5]], "hold_s": 0.1}
+RULES = [
+    {"id": "in", "kind": "entered", "zone": "middle"},
+    {"id": "out", "kind": "left", "zone": "middle"},
+    {"id": "stays", "kind": "stayed", "zone": "middle", "longer_than_s": 1},
+    {"id": "pair", "kind": "close", "closer_than_m": 2, "hold_s": 0.1},
+]
 
 pytestmark = [pytest.mark.live]
 
@@ -43,6 +52,8 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path, 
         track={"cross_view_wait_s": 60, "joint": joint},
         view={"late_after_s": 60},
         zenoh={"lease_s": 60},
+        zones=[ZONE],
+        rules=RULES,
     )
     await rendered(config, recording, tmp_path / "offline")
     async with running(config, "--out", str(tmp_path / "live"), listen=False) as site:
@@ -52,6 +63,8 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path, 
         assert live.read_bytes() == offline.read_bytes(), f"{name} differs\n" + "\n".join(site.lines)
     assert (tmp_path / "live" / "late.csv").read_text() == "frame,camera,reason\n"
     choices = (tmp_path / "live" / "choices.csv").read_text().splitlines()
+    events = (tmp_path / "live" / "events.csv").read_text().splitlines()
+    assert len(events) > 3, "people walk through the middle of the room"
     assert len(choices) > 240, "more than two people per frame were detected"
     assert {line.rsplit(",")[2] for line in choices[1:]} <= set(CAMERAS)
     assert sorted(path.name for path in (tmp_path / "offline" / "best").iterdir()), "a film per person"

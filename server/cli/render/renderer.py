@@ -18,6 +18,7 @@ from server.media.codec import stream_format_for
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.joint_tracking.stage import JointStage
+from server.service.rules.engine import RuleEngine
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 
@@ -37,9 +38,12 @@ class RenderedPeople:
 
 
 class Renderer:
-    """Decides and splices recordings with the classes of the live system, and writes the results."""
+    """Decides and splices recordings with the classes of the live system, and writes the results.
 
-    def __init__(self, config: Config, folder: Path) -> None:
+    ``begins`` is when they begin, unix seconds; None: unknown.
+    """
+
+    def __init__(self, config: Config, folder: Path, begins: float | None = None) -> None:
         cameras = config.camera_ids
         self._config, self._folder = config, folder
         # Undecided frames, and frames by which a camera is ahead.
@@ -58,6 +62,8 @@ class Renderer:
         )
         self._joint = JointStage(config)
         self._recorder = DecisionWriter(folder, cameras, self._decider.people.letterboxes)
+        self._rules = RuleEngine(config, self._decider.people.letterboxes)
+        self._begins = begins
         self._soundtrack = Soundtrack(config)
         audio_buffer = self._soundtrack.audio_buffer
         self._films = FilmWriter(
@@ -106,18 +112,24 @@ class Renderer:
             self._recorder.write_views(decision)
 
     def _write(self, decision: GopDecision) -> None:
-        self._recorder.write(decision)
+        self._recorder.write(decision, self._rules.put(decision, {}, self._begins))
         self._soundtrack.read(decision.first, decision.first + decision.frames)
         self._films.write(decision)
 
 
-def render(config: Config, folder: Path, progress: Callable[[int], None]) -> RenderedPeople:
+def render(
+    config: Config, folder: Path, progress: Callable[[int], None], begins: float | None = None
+) -> RenderedPeople:
     """Render into an existing folder; ``progress`` is called with the frames done in all cameras.
+
+    ``begins`` is when the recordings begin, unix seconds, for rules with a schedule; None: unknown.
 
     Raises:
         UserError: a recording cannot be read.
     """
-    renderer = Renderer(config, folder)
+    if begins is None and (unused := [rule.id for rule in config.rules if rule.has_schedule]):
+        log.warning("rules with a schedule do not apply without --begins: %s", ", ".join(unused))
+    renderer = Renderer(config, folder, begins)
     workers = CameraWorkers(config)
     try:
         workers.start()

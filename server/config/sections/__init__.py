@@ -5,8 +5,10 @@ from server.config.sections.audio import SoundSettings
 from server.config.sections.base import Endpoint, Identifier, PictureSide, Polygon, Port, Section
 from server.config.sections.camera import CameraSettings, TrackSettings
 from server.config.sections.encode import EncodeSettings
+from server.config.sections.integrations import MqttSettings, WebhookSettings
 from server.config.sections.output import HttpSettings, RecordSettings, TlsSettings
 from server.config.sections.rtsp import RtspSettings
+from server.config.sections.rules import RuleSettings, ZoneSettings, check_zones_and_rules
 from server.config.sections.site import ProcessTlsSettings, SiteSettings, SyncSettings, ZenohSettings
 from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShareSettings, ViewSettings
 
@@ -19,12 +21,14 @@ __all__ = [
     "FlagSettings",
     "HttpSettings",
     "Identifier",
+    "MqttSettings",
     "PictureSide",
     "Polygon",
     "Port",
     "ProcessTlsSettings",
     "RecordSettings",
     "RtspSettings",
+    "RuleSettings",
     "Section",
     "ShareSettings",
     "SiteSettings",
@@ -33,5 +37,8 @@ __all__ = [
     "TlsSettings",
     "TrackSettings",
     "ViewSettings",
+    "WebhookSettings",
     "ZenohSettings",
+    "ZoneSettings",
+    "check_zones_and_rules",
 ]

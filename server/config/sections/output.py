@@ -35,6 +35,8 @@ class HttpSettings(Section):
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
+    public_url: Annotated[str, Field(pattern=r"^https?://[^\s/?#]+(/[^\s?#]*)?$")] | None = None
+    """Address at which others reach the page: links of webhooks and MQTT begin with it."""
     viewers_max: PositiveInt = 1000
     """Streams served at once, and as many event listeners; one more gets 503, or another viewer's slot."""
     viewers_per_object: PositiveInt = 1000

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from server.config.sections.base import Endpoint, Endpoints, Identifier, PictureSide, Port, Section
+
+
+def _known_time_zone(name: str) -> str:
+    try:
+        ZoneInfo(name)
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        raise ValueError("is not a time zone that this machine knows, such as Europe/Zurich") from None
+    return name
 
 
 class SiteSettings(Section):
@@ -19,6 +28,8 @@ class SiteSettings(Section):
     height: PictureSide = 360
     niceness: Annotated[int, Field(ge=0, le=19)] = 10
     """Niceness added to camera processes (nice(1)): a busy machine serves streams first."""
+    time_zone: Annotated[str, AfterValidator(_known_time_zone)] | None = None
+    """Of the hours of `rules`, such as Europe/Zurich; None: the machine's."""
 
     @property
     def size(self) -> tuple[int, int]:

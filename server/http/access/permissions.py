@@ -47,6 +47,8 @@ _BY_ROUTE = {
     "/api/events": Permission.ANY_TOKEN,
     "/api/flags": Permission.ANY_TOKEN,
     "/api/past": Permission.ANY_TOKEN,
+    "/api/rules": Permission.SITE,
+    "/api/events/{event}/picture.jpg": Permission.SITE,
     "/metrics": Permission.SITE,
 }
 _BY_PREFIX = {

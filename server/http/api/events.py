@@ -1,4 +1,4 @@
-"""Server-sent events (WHATWG HTML, 9.2): decided GOPs, flags, and changes of people and cameras."""
+"""Server-sent events (WHATWG HTML, 9.2): decided GOPs, flags, rules, changes of people and cameras."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from server.http.api.responses import cameras_info, delays_info, objects_info, s
 from server.http.api.scope_filter import (
     filter_cameras,
     filter_choices,
+    filter_event,
     filter_flag,
     filter_objects,
     filter_site,
@@ -23,6 +24,7 @@ from server.http.api.scope_filter import (
 from server.http.periodic import run_periodically
 from server.messaging.messages import GopChoices
 from server.service.facade.assist import Flag
+from server.service.facade.rules import PicturedEvent
 from server.service.facade.streams import Broadcaster, BytesChunk, DelayMode, Subscriber
 from server.service.service import BestViewService
 
@@ -74,6 +76,7 @@ class Events:
         service.people.subscribe_decisions(partial(self._on_decision, DelayMode.BALANCED))
         service.people.subscribe_other_decisions(self._on_decision)
         service.assist.subscribe_flags(self._on_flag)
+        service.rules.subscribe_events(self._on_rule)
 
     @property
     def viewers(self) -> int:
@@ -171,6 +174,12 @@ class Events:
             chunk = self._flag_event(audience.scope, flag)
             if chunk is not None:
                 scoped.channel.publish_once(chunk)
+
+    def _on_rule(self, found: PicturedEvent) -> None:
+        for audience, scoped in self._by_scope.items():
+            visible = filter_event(found.record, audience.scope, self._service.people.current_number)
+            if visible is not None:
+                scoped.channel.publish_once(BytesChunk(event("rule", visible), random_access=True))
 
     def _on_decision(self, delay: DelayMode, choices: GopChoices) -> None:
         self._recent[delay].append(choices)

@@ -18,6 +18,7 @@ from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, Sit
 from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
 from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT
+from server.service.facade.rules import Rules
 from server.service.facade.streams import DelayMode
 from server.service.facade.view_selection import ViewSelection
 
@@ -30,6 +31,7 @@ _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/objects": Objects,
     "/api/cameras": Cameras,
     "/api/flags": FlagList,
+    "/api/rules": Rules,
     "/api/objects/{object}/choice": ViewSelection,
     "/api/objects/{object}/past": Past,
     "/api/cameras/{camera}/past": Past,
@@ -56,6 +58,7 @@ _MEDIA_TYPES = {
     "/cameras/{camera}/live.jpg": "image/jpeg",
     "/objects/{object}/thumb.jpg": "image/jpeg",
     "/api/events": "text/event-stream",
+    "/api/events/{event}/picture.jpg": "image/jpeg",
     "/api/past": "application/x-ndjson",
     "/healthz": "text/plain",
     "/readyz": "text/plain",
@@ -81,6 +84,7 @@ _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
     "camera": {"type": "string"},
+    "event": {"type": "string", "pattern": "^[0-9a-f-]{1,64}$"},
     "segment": {"type": "integer", "minimum": 0},
     "part": {"type": "integer", "minimum": 0},
     "_HLS_msn": {"type": "integer", "minimum": 0, "description": "The answer waits for this segment."},

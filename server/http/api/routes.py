@@ -78,6 +78,21 @@ async def get_events(request: web.Request) -> web.StreamResponse:
             events.leave(scope, subscriber, delay)
 
 
+@routes.get("/api/rules")
+async def get_rules(request: web.Request) -> web.Response:
+    """List zones and who is in them, rules, and the newest events."""
+    return json_response(request.app[SERVICE].rules.rules())
+
+
+@routes.get("/api/events/{event:[0-9a-f-]{1,64}}/picture.jpg")
+async def get_event_picture(request: web.Request) -> web.Response:
+    """Return a small picture of the first of the people that an event is about."""
+    jpeg = request.app[SERVICE].rules.picture_of(request.match_info["event"])
+    if jpeg is None:
+        return error_response(404, "there is no such event any more, or no picture of it")
+    return web.Response(body=jpeg, content_type="image/jpeg", headers={"Cache-Control": "private"})
+
+
 @routes.get("/api/objects/{object:[0-9]{1,9}}/choice")
 async def get_choice(request: web.Request) -> web.Response:
     """Return which camera shows this person now, or did within the last minute, since when and why."""

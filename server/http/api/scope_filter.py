@@ -11,6 +11,7 @@ from server.http.api.schema import Cameras, Objects, SiteInfo
 from server.http.streams.time_range import RecordedChoices
 from server.messaging.messages import GopChoices
 from server.service.facade.assist import Flag
+from server.service.facade.rules import EventRecord
 
 Resolve = Callable[[int], int]
 """Returns the current number of a person whose number may have been merged."""
@@ -75,6 +76,15 @@ def filter_flag(flag: Flag, scope: Scope, resolve: Resolve) -> Flag | None:
     if scope.camera not in flag.cameras:
         return None
     return msgspec.structs.replace(flag, cameras=[scope.camera])
+
+
+def filter_event(event: EventRecord, scope: Scope, resolve: Resolve) -> EventRecord | None:
+    """Return an event about the person of the scope alone, without its picture; None: it is about others."""
+    if scope.is_all:
+        return event
+    if scope.object is None or [resolve(number) for number in event.objects] != [resolve(scope.object)]:
+        return None
+    return msgspec.structs.replace(event, picture=None)
 
 
 async def filter_decisions(

@@ -26,8 +26,11 @@ from tracking.frame_rate import seconds_up
 
 routes = web.RouteTableDef()
 
+_SECRETS = frozenset({"secret", "password"})
+"""Keys of the items of lists likewise."""
+
 _ENDPOINTS = frozenset({"zenoh.connect", "zenoh.listen"})
-_PASSWORD = re.compile(r"cameras[.][^.]+[.]password")
+_PASSWORD = re.compile(r"(cameras[.][^.]+|mqtt)[.]password")
 """Keys of password files; the file name is hidden, since some enter the password itself there."""
 
 
@@ -123,6 +126,9 @@ def _as_yaml(key: str, value: Any) -> str:
 def _redacted(value: Any) -> Any:
     """Return a value without secrets: only the host of URLs, only the names of FFmpeg options."""
     match value:
+        case BaseModel():
+            named = {name: getattr(value, name) for name in sorted(value.model_fields_set)}
+            return {name: HIDDEN if name in _SECRETS else _redacted(inner) for name, inner in named.items()}
         case Mapping():
             return {redact_to_host(key): HIDDEN for key in value}
         case list() | tuple():

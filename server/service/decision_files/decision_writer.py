@@ -13,6 +13,7 @@ import numpy as np
 from bestview import Merge, Split
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
+from server.service.rules.engine import SiteEvent
 from server.service.view_selection.decider import GopDecision
 from server.service.view_selection.delay_modes import DelayMode, ModeDecision
 from server.system.private_files import make_private_folder, open_private
@@ -21,10 +22,11 @@ from tracking.motchallenge import MotRow, format_row
 CHOICES_HEADER = "frame,object,camera\n"
 CORRECTIONS_HEADER = "frame,correction,object,other,camera\n"
 LATE_HEADER = "frame,camera,reason\n"
+EVENTS_HEADER = "frame,rule,kind,phase,zone,objects,direction\n"
 
 
 class DecisionWriter:
-    """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``corrections.csv``, ``late.csv``.
+    """Writes decisions: ``tracks/<camera>.txt``, ``choices.csv``, ``events.csv`` and so on.
 
     ``choices-live.csv`` and ``choices-smooth.csv`` are the choices for viewers with these delays.
 
@@ -60,17 +62,21 @@ class DecisionWriter:
             mode: folder / f"choices-{mode}.csv" for mode in (DelayMode.LIVE, DelayMode.SMOOTH)
         }
         self._corrections = folder / "corrections.csv"
+        self._events = folder / "events.csv"
         self._late = folder / "late.csv"
         headers = {
             self._choices: CHOICES_HEADER,
             **dict.fromkeys(self._mode_choices.values(), CHOICES_HEADER),
             self._corrections: CORRECTIONS_HEADER,
+            self._events: EVENTS_HEADER,
             self._late: LATE_HEADER,
         }
         self._files = AtomicFiles(dict.fromkeys(self._tracks.values(), "") | headers, private=private)
 
-    def write(self, decision: GopDecision, late: Sequence[str] = ()) -> None:
-        """Write a decision, and rows of ``late.csv``.
+    def write(
+        self, decision: GopDecision, events: Sequence[SiteEvent] = (), late: Sequence[str] = ()
+    ) -> None:
+        """Write a decision, the events that it has led to, and rows of ``late.csv``.
 
         Raises:
             OSError: the disk is full or fails; the files are unchanged.
@@ -89,6 +95,7 @@ class DecisionWriter:
         texts[self._corrections] += (
             f"{decision.first + 1},{_line(correction)}\n" for correction in decision.corrections
         )
+        texts[self._events] += (_event_line(event) for event in events)
         texts[self._late] += late
         self._files.append({path: "".join(rows) for path, rows in texts.items() if rows})
 
@@ -130,6 +137,12 @@ def _line(correction: Merge | Split) -> str:
     if isinstance(correction, Merge):
         return f"merged,{correction.kept},{correction.lost},"
     return f"split,{correction.published_id},{correction.corrected_id},{correction.camera}"
+
+
+def _event_line(event: SiteEvent) -> str:
+    objects = " ".join(map(str, event.objects))
+    words = (event.rule, event.kind, event.phase, event.zone or "", objects, event.direction or "")
+    return f"{event.pulse + 1},{','.join(words)}\n"
 
 
 class AtomicFiles:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from server.media.letterbox import Letterbox
 from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.rules.engine import SiteEvent
 from server.service.view_selection.decider import GopDecision
 from server.service.view_selection.delay_modes import ModeDecision
 
@@ -52,10 +53,10 @@ class LiveDecisionWriter:
         """Add late frames; they are written with the next decision."""
         self._late += (_LateFrame(pulse, camera, reason) for pulse in pulses)
 
-    def write_or_skip(self, decision: GopDecision) -> None:
-        """Write a decision; skip it if writing fails."""
+    def write_or_skip(self, decision: GopDecision, events: Sequence[SiteEvent] = ()) -> None:
+        """Write a decision and the events that it has led to; skip them if writing fails."""
         try:
-            self._writer.write(decision, self._rows())
+            self._writer.write(decision, events, self._rows())
         except OSError as error:
             self._skip(decision, error)
             return

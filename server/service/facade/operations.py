@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import msgspec
@@ -51,6 +52,10 @@ class OperationsService:
 
     def __init__(self, pipeline: BestViewPipeline) -> None:
         self._pipeline = pipeline
+
+    def subscribe_config(self, callback: Callable[[], None]) -> None:
+        """Call back after a changed configuration has been applied."""
+        self._pipeline.on_config.append(callback)
 
     def readiness(self) -> Readiness:
         """Return whether a best view can be served: pulses and frames arrive, and decisions keep up."""

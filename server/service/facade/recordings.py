@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 
+from server.messaging.epochs import utc_time_of_pulse
 from server.service.facade.errors import UnknownCameraError
 from server.service.pipeline import BestViewPipeline
 from server.service.recording.media_files import run_in_reader_thread
@@ -33,9 +35,10 @@ from server.service.time_shift.presence_history import PresenceHistory
 from server.service.time_shift.time_reference import (
     TimeReferenceError,
     parse_time_reference,
-    utc_time_of_pulse,
 )
 from server.service.time_shift.time_shift_stream import PlaybackRange, TimeShiftStream
+
+log = logging.getLogger(__name__)
 
 __all__ = [
     "PlaybackRange",
@@ -53,6 +56,9 @@ class RecordingStatus:
     """Whether streams are recorded to disk."""
 
     enabled: bool
+    """Whether a folder is configured."""
+    is_on: bool
+    """Whether it is written to: recording can be switched off."""
     error: str
     """Why nothing is written at the moment; empty: it is, or recording is off."""
 
@@ -159,7 +165,14 @@ class RecordingService:
     def status(self) -> RecordingStatus:
         """Whether streams are recorded to disk."""
         writer = self._recorder.writer
-        return RecordingStatus(writer is not None, "" if writer is None else writer.problem)
+        is_on = writer is not None and not self._recorder.is_paused
+        return RecordingStatus(writer is not None, is_on, "" if writer is None else writer.problem)
+
+    def switch(self, *, is_on: bool) -> None:
+        """Switch recording to disk off or on; it is on when the service starts."""
+        if self._recorder.is_paused is is_on:
+            self._recorder.is_paused = not is_on
+            log.info("recording is switched %s", "on" if is_on else "off")
 
     def of_person(self, number: int, *, scoped_to_person: bool) -> RecordedStream:
         """Return a person's recorded stream; ``scoped_to_person``: gray where no camera had seen them."""

@@ -52,6 +52,8 @@ class Recorder:
         self._max_late_frames = frames // 2
         self._init_of_parameters: tuple[ParameterSets, InitSegments] | None = None
         """The init segments of these parameters: cached, since every GOP that is played needs them."""
+        self.is_paused = False
+        """Whether nothing is written to the disk, on an operator's command."""
         self.viewers = 0
         """The number of viewers of time shift."""
         record = config.record
@@ -99,7 +101,8 @@ class Recorder:
         self.recent.put(choices)
         if self.writer is None:
             return
-        self._pending.append(choices)
+        if not self.is_paused:
+            self._pending.append(choices)
         while self._pending and self._is_settled(self._pending[0]):
             self._queue_oldest(self.writer)
 

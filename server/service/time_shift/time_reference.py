@@ -42,10 +42,3 @@ def parse_time_reference(text: str, *, now: int, fps: float, pulse0: float | Non
         raise TimeReferenceError("no pulse has been received yet; use seconds ago (-60) or a pulse (p1250)")
     seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp() - pulse0
     return max(0, math.floor(seconds * fps + _TOLERANCE))
-
-
-def utc_time_of_pulse(pulse: int, fps: float, pulse0: float | None) -> str | None:
-    """Return the time of a pulse in UTC (ISO 8601, milliseconds); None: unknown."""
-    if pulse0 is None:
-        return None
-    return datetime.fromtimestamp(pulse0 + pulse / fps, UTC).isoformat(timespec="milliseconds")[:-6] + "Z"

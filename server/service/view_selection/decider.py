@@ -22,6 +22,7 @@ from server.service.view_selection.mode_selection import ModeSelection
 from server.service.view_selection.recent_views import RecentViews
 from server.service.view_selection.undetected_view_inference import UndetectedViewInference
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
+from tracking.types import PictureCondition
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +43,19 @@ class ObjectChoice:
     """Whether no camera has seen the person for a while; the stream stays with the last camera."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PictureState:
+    """One camera's pictures at the end of a GOP.
+
+    Attributes:
+        condition: what is wrong with them.
+        ground: (3, 3) homography from the site's image to the ground; None: there is none.
+    """
+
+    condition: PictureCondition
+    ground: Floats | None
+
+
 @dataclass(frozen=True, slots=True)
 class GopDecision:
     """All people's views for the frames ``first … first + frames - 1``."""
@@ -57,6 +71,8 @@ class GopDecision:
     """Merges and splits since the last decision."""
     reasons: SelectionReasons = field(compare=False, repr=False)
     """The costs behind the choices."""
+    pictures: Mapping[str, PictureState] = field(default_factory=dict, compare=False, repr=False)
+    """By camera, of those that have sent the last frame."""
 
 
 def camera_homographies(config: Config) -> dict[str, Floats | None]:
@@ -223,5 +239,20 @@ class ViewDecider:
         )
         reasons = SelectionReasons(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
         return GopDecision(
-            first, frames, choices, boxes, dict(people.registry.merged), people.take_corrections(), reasons
+            first,
+            frames,
+            choices,
+            boxes,
+            dict(people.registry.merged),
+            people.take_corrections(),
+            reasons,
+            self._pictures(first + frames - 1),
         )
+
+    def _pictures(self, pulse: int) -> dict[str, PictureState]:
+        buffer = self._quality_buffer
+        return {
+            camera: PictureState(buffer.conditions[camera], buffer.ground(camera))
+            for camera in self._cameras
+            if self._has(camera, pulse)
+        }

@@ -15,6 +15,7 @@ from server.messaging.camera_status import PictureMotion
 from server.messaging.picture_motion import moved_homography
 from server.service.identity.camera_window import CameraWindow
 from server.service.ingest.window_history import HistorySpan, WindowHistory
+from tracking.types import PictureCondition
 
 Floats = NDArray[np.float64]
 
@@ -51,14 +52,15 @@ class ViewQualityBuffer:
         self._fps = config.site.fps
         self._homographies, self.letterboxes = homographies, letterboxes
         self._overhead = config.overhead
-        self._clarity = dict.fromkeys(config.camera_ids, 1.0)
+        self.conditions: dict[str, PictureCondition] = dict.fromkeys(config.camera_ids, "clear")
+        """What is wrong with each camera's newest picture."""
         self._motion: dict[str, PictureMotion | None] = dict.fromkeys(config.camera_ids)
         self._histories = {camera: WindowHistory[WindowQuality]() for camera in config.camera_ids}
 
     def put(self, windows: Sequence[CameraWindow]) -> None:
         """Add the windows of an epoch."""
         for window in windows:
-            self._clarity[window.message.camera] = _clarity(window)
+            self.conditions[window.message.camera] = window.message.condition
             self._motion[window.message.camera] = window.message.motion
         for quality in self._qualities(windows):
             first, frames = quality.window.first, len(quality.quality)
@@ -78,7 +80,7 @@ class ViewQualityBuffer:
 
     def clarity(self, camera: str) -> float:
         """Return 1 if a camera's newest picture is clear, else 0."""
-        return self._clarity[camera]
+        return float(self.conditions[camera] == "clear")
 
     def forget_before(self, pulse: int) -> None:
         """Drop the frames before a pulse."""
@@ -128,8 +130,12 @@ class ViewQualityBuffer:
 
     def _ground(self, camera: str) -> Floats | None:
         """Return the homography from the site's image; None for overhead cameras: no one can face them."""
+        return None if camera in self._overhead else self.ground(camera)
+
+    def ground(self, camera: str) -> Floats | None:
+        """Return the homography from the site's image, where the camera looks now; None: there is none."""
         homography = self._homographies[camera]
-        if homography is None or camera in self._overhead:
+        if homography is None or camera not in self.letterboxes:
             return None
         (left, top), scale = (
             self.letterboxes[camera].camera_to_site(np.zeros(2)),

@@ -16,6 +16,7 @@ from pydantic import BaseModel
 from fakes.paths import CONFIGS
 from server.cli.generated_config import DEMO
 from server.config.loader import build_config, load_config
+from server.config.sections import RuleSettings, WebhookSettings, ZoneSettings
 from server.config.site_config import Config
 from synthetic import Scene
 from tracking import solver_names
@@ -79,6 +80,17 @@ def test_every_setting_of_the_reference_is_explained() -> None:
         if not above.lstrip().startswith("# ") and line.strip() not in {"#use: true", "#enabled: true"}
     ]
     assert not bare
+
+
+@pytest.mark.parametrize("item", [ZoneSettings, RuleSettings, WebhookSettings])
+def test_the_reference_has_every_setting_of_a_list(item: type[BaseModel]) -> None:
+    """Lists are empty by default: their items are described in comments."""
+    missing = [
+        name
+        for name in item.model_fields
+        if not re.search(rf"^ *#  ? ?[- ] +{name}: ", REFERENCE, re.MULTILINE)
+    ]
+    assert missing == []
 
 
 def test_the_reference_names_every_option_value() -> None:

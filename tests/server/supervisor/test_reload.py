@@ -62,6 +62,11 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "track.window.birth_max_cost": (ALL_CAMERAS, 0.6),
     "track.backlog_s": (SITE, 3.0),
     "track.joint": (SITE, True),
+    "zones": (LIVE, [{"id": "hall", "area": [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]}]),
+    "webhooks": (LIVE, [{"url": "https://example.org/hook"}]),
+    "mqtt.host": (LIVE, "broker"),
+    "rules": (LIVE, [{"id": "busy", "kind": "crowded", "more_than": 3}]),
+    "site.time_zone": (LIVE, "Europe/Zurich"),
     "site.fps": (SITE, 12.5),
     "encode.crf": (SITE, 30),
     "zenoh.lease_s": (SITE, 2.0),
@@ -80,6 +85,9 @@ def changed_config(keys: set[str]) -> Config:
         "track": {"window": WINDOW},
     }
     for key in keys:
+        if "." not in key:
+            content[key] = CHANGES[key][1]
+            continue
         first, *path, name = key.split(".")
         inner = cameras[path.pop(0)] if first == "cameras" else content.setdefault(first, {})
         for step in path:
@@ -136,6 +144,12 @@ def test_a_changed_list_of_cameras_waits_for_a_restart() -> None:
     wanted = small_config([{"id": "c0", "source": "scene:room", "offset_s": 0.2}, "c1", "c2"])
     reload = plan_reload(running, wanted)
     assert (reload.site, reload.now.cameras) == (("cameras",), running.cameras)
+
+
+def test_zones_of_other_cameras_wait_for_a_restart() -> None:
+    zone = {"id": "door", "camera": "c2", "line": [[0, 0], [9, 0]], "inner": [4, 9]}
+    reload = plan_reload(small_config(), small_config(["c0", "c2"], zones=[zone]))
+    assert (reload.site, reload.now.zones) == (("cameras", "zones"), [])
 
 
 def test_cameras_restart_when_sharpness_gets_a_weight() -> None:

@@ -39,6 +39,7 @@ from server.media.codec import stream_format_for
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.rules.engine import SiteEvent
 from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
@@ -53,7 +54,11 @@ def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
     }
     recorder = DecisionWriter(tmp_path / "out", CAMERAS, fits)
     boxes: list[list[NumberedBox]] = [[(1, *SMALL)], [(1, *SMALL), (2, *LARGE)]]
-    recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes))
+    events = [
+        SiteEvent("busy", "crowded", "began", "till", [1, 2], [None, "Ann"], None, 0, None, 4, A),
+        SiteEvent("in", "crossed", "once", "door", [1], [None], "inward", 1, None, 3, A),
+    ]
+    recorder.write(decision(0, choice(1, A), choice(2, None), frames=2, c0=boxes), events)
     turned_out = (Merge(kept=1, lost=3), Split(published_id=1, corrected_id=2, camera=B))
     recorder.write(
         decision(
@@ -70,6 +75,8 @@ def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
         "tracks/c1.txt": b"6,2,20.00,4.00,16.00,40.00,1.00,-1,-1,-1\n",
         "choices.csv": b"frame,object,camera\n1,1,c0\n2,1,c0\n6,1,c1\n6,2,c0\n",
         "corrections.csv": b"frame,correction,object,other,camera\n6,merged,1,3,\n6,split,1,2,c1\n",
+        "events.csv": b"frame,rule,kind,phase,zone,objects,direction\n"
+        b"1,busy,crowded,began,till,1 2,\n2,in,crossed,once,door,1,inward\n",
         "late.csv": b"frame,camera,reason\n4,c1,tracks late\n5,c1,tracks late\n",
     }
 

@@ -60,6 +60,7 @@ def test_two_views_become_films_tracks_choices_and_plots_with_one_warning_of_len
         "choices-smooth.csv",
         "choices.png",
         "corrections.csv",
+        "events.csv",
         "late.csv",
         "site.json",
         "tracks/c0.txt",

@@ -43,6 +43,8 @@ WHO = {
     "/api/events": ALL,
     "/api/flags": ALL,
     "/api/past": ALL,
+    "/api/rules": WATCHERS,
+    "/api/events/{event}/picture.jpg": WATCHERS,
     "/api/objects/{object}/choice": FAMILY,
     "/api/objects/{object}/past": FAMILY,
     "/api/cameras/{camera}/past": DOOR,
@@ -108,6 +110,7 @@ def fill_path(path: str, number: int = 1, camera: str = A) -> str:
     for name, value in {
         "object": number,
         "camera": camera,
+        "event": "1-2-3",
         "segment": 0,
         "part": 0,
         "file": "main.js",

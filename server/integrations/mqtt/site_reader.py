@@ -1,0 +1,84 @@
+"""Reads a site's state for MQTT from the façade of the service."""
+
+from __future__ import annotations
+
+from server.integrations.mqtt.site_state import CameraState, PersonState, RuleState, SiteState
+from server.service.facade.people import PersonSummary
+from server.service.facade.rendering import PersonView, PictureTimeoutError, RenderPoolFullError
+from server.service.service import BestViewService
+
+_ABSENT_S = 3.0
+"""Seconds unseen after which someone counts as absent: who is hidden for a moment does not flutter."""
+
+
+class SiteReader:
+    """The state of a site. People keep their entries when they leave, until the service ends."""
+
+    def __init__(self, service: BestViewService) -> None:
+        self._service = service
+        self._named: dict[str, PersonState] = {}
+
+    @property
+    def site(self) -> str:
+        """The site's name."""
+        return self._service.config.site.name
+
+    def read(self) -> SiteState:
+        """Return the state now."""
+        service = self._service
+        people, rules = service.people.list_people(), service.rules.rules()
+        recording = service.recordings.status
+        return SiteState(
+            site=self.site,
+            people=sum(self._is_present(person) for person in people),
+            persons=self._persons(people),
+            cameras=[
+                CameraState(camera.camera, camera.state, camera.condition)
+                for camera in service.cameras.list_cameras()
+            ],
+            zones={zone.zone: len(zone.objects) for zone in rules.zones if zone.area is not None},
+            rules=[RuleState(rule.rule, rule.kind, rule.lasting) for rule in rules.rules],
+            recording=recording.is_on if recording.enabled else None,
+        )
+
+    def switch_recording(self, *, is_on: bool) -> None:
+        """Switch recording to disk on or off."""
+        self._service.recordings.switch(is_on=is_on)
+
+    async def picture_of(self, person: PersonState) -> bytes | None:
+        """Return a new picture of a person's best view, JPEG; None: they are absent, or it cannot be had."""
+        if not person.is_present or person.number is None:
+            return None
+        rendering, view = self._service.rendering, PersonView(person.number)
+        try:
+            newest = rendering.newest(view)
+            if newest is None:
+                return None
+            with rendering.using(view) as stream:
+                return (await stream.still("plain", newest)).data
+        except (KeyError, RenderPoolFullError, PictureTimeoutError):
+            return None
+
+    def _persons(self, people: list[PersonSummary]) -> list[PersonState]:
+        """Return all named people; of several with one name the present one, or the one seen last."""
+        now: dict[str, PersonSummary] = {}
+        for person in people:
+            before = now.get(person.name or "")
+            if person.name and (before is None or before.last_seen < person.last_seen):
+                now[person.name] = person
+        current_names = self._service.people.manual_overrides().names.values()
+        for name, person in now.items():
+            is_present = self._is_present(person)
+            zones = tuple(self._service.rules.zones_of(person.number)) if is_present else ()
+            self._named[name] = PersonState(name, person.number, is_present, person.camera, zones)
+        for name in list(self._named):
+            if name not in now:
+                if name in current_names:
+                    self._named[name] = PersonState(name)
+                else:  # renamed, or forgotten
+                    del self._named[name]
+        return sorted(self._named.values(), key=lambda person: person.name)
+
+    def _is_present(self, person: PersonSummary) -> bool:
+        unseen = self._service.decided_end - person.last_seen
+        return bool(person.cameras) or unseen <= _ABSENT_S * self._service.config.site.fps

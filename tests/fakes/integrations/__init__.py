@@ -1,0 +1,1 @@
+"""Other systems that hear a site: an MQTT broker, Home Assistant, receivers of webhooks."""
