@@ -74,6 +74,8 @@ def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
         b"2,2,40.00,8.00,32.00,80.00,1.00,-1,-1,-1\n",
         "tracks/c1.txt": b"6,2,20.00,4.00,16.00,40.00,1.00,-1,-1,-1\n",
         "choices.csv": b"frame,object,camera\n1,1,c0\n2,1,c0\n6,1,c1\n6,2,c0\n",
+        "choices-live.csv": b"frame,object,camera\n",
+        "choices-smooth.csv": b"frame,object,camera\n",
         "corrections.csv": b"frame,correction,object,other,camera\n6,merged,1,3,\n6,split,1,2,c1\n",
         "events.csv": b"frame,rule,kind,phase,zone,objects,direction\n"
         b"1,busy,crowded,began,till,1 2,\n2,in,crossed,once,door,1,inward\n",
