@@ -1,6 +1,7 @@
 """Hypotheses of one frame: groups of detections, at most one per camera, that may be of one person.
 
-Groups are alternatives: those that share a detection exclude each other, and the network program chooses.
+Groups are alternatives: those that share a detection exclude each other, and the network program chooses. A
+group with detections whose feet are wrong (`misplaced_feet`) is another one beside that without them.
 The cost of a place is the negative log likelihood ratio of its detections being of one person to all of them
 being false; it integrates over the unknown place.
 """
@@ -23,6 +24,7 @@ from tracking.ground_plane.gaussians import (
     squared_distances,
 )
 from tracking.ground_plane.measurements import Measurements
+from tracking.ground_plane.misplaced_feet import find_misplaced
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.visibility import detection_probabilities
 
@@ -47,6 +49,7 @@ class Places:
         covariances: (K, 2, 2) m².
         costs: (K,) of the place being a person, against its detections being false.
         conflicts: (K, K) bool, places that share a detection.
+        misplaced: (K, D) bool, the detections of a place whose feet are wrong.
     """
 
     measurements: Measurements
@@ -55,6 +58,11 @@ class Places:
     covariances: Floats
     costs: Floats
     conflicts: NDArray[np.bool_]
+    misplaced: NDArray[np.bool_]
+
+    def locating(self, k: int) -> list[int]:
+        """Return the detections that locate place `k`: those with their feet on it."""
+        return [d for d in self.groups[k] if not self.misplaced[k, d]]
 
     def __len__(self) -> int:
         return len(self.groups)
@@ -96,7 +104,15 @@ def find_places(
     )
     for k, group in enumerate(groups):
         probabilities[k, measurements.camera[list(group)]] = 0.0
-    costs -= np.log1p(-probabilities).sum(axis=1)
+    misses = -np.log1p(-probabilities)
+    costs += misses.sum(axis=1)
+    more = find_misplaced(measurements, members, means, misses, cameras, sizes, settings)
+    extended = np.flatnonzero(more.costs < 0.0)
+    groups += [tuple(np.flatnonzero(members[k] | more.members[k]).tolist()) for k in extended]
+    means, covariances = (np.concatenate([each, each[extended]]) for each in (means, covariances))
+    costs = np.concatenate([costs, (costs + more.costs)[extended]])
+    misplaced = np.concatenate([np.zeros_like(members), more.members[extended]])
+    members = np.concatenate([members, (members | more.members)[extended]])
     costs *= settings.detection_weight(seconds)
     kept = np.flatnonzero(costs < _MAX_COST)
     shared = members[kept].astype(np.float64)
@@ -107,6 +123,7 @@ def find_places(
         covariances[kept],
         costs[kept],
         np.asarray(shared @ shared.T > 0.0),
+        misplaced[kept],
     )
 
 

@@ -70,7 +70,8 @@ class GroundPerson:
                 histogram = (1.0 - _TEMPLATE_UPDATE_RATE) * known + _TEMPLATE_UPDATE_RATE * histogram
             if len(histogram):
                 self._histograms[camera] = histogram
-            self.boxes.update(measurements.boxes[index], sizes[camera])
+            if not places.misplaced[k, index]:
+                self.boxes.update(measurements.boxes[index], sizes[camera])
 
 
 def appearance_costs(people: Sequence[GroundPerson], places: Places, settings: GroundSettings) -> Floats:

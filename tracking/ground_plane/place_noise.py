@@ -37,7 +37,7 @@ class PlaceNoise:
     def update(self, places: Places, chosen: Sequence[int]) -> None:
         """Learn from the chosen places of a final frame that more than one camera sees."""
         for k in chosen:
-            group = list(places.groups[k])
+            group = places.locating(k)
             if len(group) == 1:
                 continue
             measurements = places.measurements

@@ -34,6 +34,9 @@ class GroundSettings:
     turn_rate: float = 0.06  # times per second that somebody starts, stops or turns
     forget_after_s: float = 2.0  # seconds unseen after which somebody has left
     appearance: float = 8.0  # weight of the distance to a person's appearance in a camera
+    misplaced_probability: float = (
+        0.05  # of the feet of a person's box being wrong: hidden, in a shadow, cut off
+    )
     unknown_appearance: float = 0.3  # distance at which an appearance says nothing
 
     def __post_init__(self) -> None:
@@ -41,6 +44,8 @@ class GroundSettings:
             raise ValueError(
                 f"detection_probability is a probability between 0 and 1, not {self.detection_probability}"
             )
+        if self.misplaced_probability >= 1.0:
+            raise ValueError(f"misplaced_probability must be below 1, not {self.misplaced_probability}")
         for field in fields(self):
             if field.name not in _MAY_BE_ANY and not getattr(self, field.name) > 0.0:
                 raise ValueError(f"{field.name} must be above 0, not {getattr(self, field.name)}")
