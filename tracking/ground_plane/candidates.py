@@ -106,7 +106,8 @@ class Candidates:
         offsets = places.means[None, chosen] - self.places[:, None]
         moves = OffsetDensities.of(offsets, places.covariances[None, chosen] + self._spreads()[:, None])
         evidence = np.array([candidate.evidence for candidate in self._candidates])[:, None]
-        return np.where(is_possible(moves), evidence - moves.costs, -np.inf)
+        costs = moves.correlated(self._settings.detection_weight(self._seconds))
+        return np.where(is_possible(moves), evidence - costs, -np.inf)
 
     def _spreads(self) -> Floats:
         """Return the covariances of where they may be in the next frame, (N, 2, 2)."""

@@ -49,6 +49,14 @@ class OffsetDensities:
     distances: Floats
     costs: Floats
 
+    def correlated(self, weight: float) -> Floats:
+        """Return the costs of offsets that err alike from frame to frame, so that each counts for `weight`.
+
+        Only the density does: people are told apart by all of the distance.
+        """
+        distance = 0.5 * self.distances
+        return np.asarray(distance + weight * (self.costs - distance))
+
     @classmethod
     def of(cls, offsets: Floats, covariances: Floats) -> OffsetDensities:
         """Compute them for offsets (..., 2) and covariances (..., 2, 2)."""

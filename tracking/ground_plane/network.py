@@ -58,6 +58,7 @@ def build_ground_network(
     objects, length = len(people) + newcomers, len(frames)
     gone = max(len(places) for places in frames)
     hidden = gone + 1
+    weight = settings.detection_weight(seconds)
     departure = -float(np.log(min(settings.departure_rate * seconds, 1.0)))
     node = np.full((objects, length, hidden + 1), np.inf)
     source = np.full((objects, hidden + 1), np.inf)
@@ -84,7 +85,7 @@ def build_ground_network(
     for m, (before, after) in enumerate(pairwise(frames)):
         steps = _Steps.between(before, after, seconds, settings)
         pair[len(people) :, m, hidden, : len(after)] = arrival_cost
-        pair[len(people) :, m, : len(before), : len(after)] = steps.costs_of_newcomers()
+        pair[len(people) :, m, : len(before), : len(after)] = steps.costs_of_newcomers(weight)
         for n, person in enumerate(people):
             ahead = person.state.predict(person.seconds + m * seconds, settings.acceleration)
             pair[n, m, : len(before), : len(after)] = steps.costs(ahead, seconds, settings)
@@ -143,6 +144,9 @@ class _Steps:
         walked = OffsetDensities.of(self.offsets - seconds * person.velocity, self.spread + uncertain)
         return move_costs(walked, self.turned, settings.turn_probability(seconds))
 
-    def costs_of_newcomers(self) -> Floats:
-        """Return the costs of the steps for somebody whose velocity is not known, (K, L)."""
-        return np.where(is_possible(self.turned), self.turned.costs, np.inf)
+    def costs_of_newcomers(self, weight: float) -> Floats:
+        """Return the costs of the steps for somebody whose velocity is not known, (K, L).
+
+        `weight`: of a frame's detections, as in the costs of places.
+        """
+        return np.where(is_possible(self.turned), self.turned.correlated(weight), np.inf)

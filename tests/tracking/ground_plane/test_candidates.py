@@ -51,6 +51,19 @@ def test_evidence_grows_where_somebody_is_found_again_and_nowhere_else() -> None
     assert len(candidates.places) == 1
 
 
+def test_who_stands_still_far_away_becomes_surer_with_each_detection() -> None:
+    """Places that are not precise, in one camera, must not cost more than the detections there say."""
+    seconds, cameras = SETTINGS.frame_s, CAMERAS[:1]
+    found = detect_walkers(np.array([[HERE]]), VIEWS, FloorNoise())[0]
+    seen = Detections(found["c0"].boxes, np.array([0.7]), found["c0"].histograms)
+    measurements = measure(cameras, [seen], np.array([4.0]), SETTINGS)
+    places = find_places(measurements, [], cameras, [BoxSizes()], SETTINGS, seconds)
+    candidates, gain = Candidates(seconds, SETTINGS), -float(places.costs[0])
+    for detections in range(1, 6):
+        candidates.update(places, [], missed(candidates))
+        assert float(candidates.discounts(places)[0]) > 0.8 * detections * gain - gain
+
+
 def test_two_who_stand_apart_are_two() -> None:
     candidates = Candidates(SECONDS, SETTINGS)
     for _ in range(3):
