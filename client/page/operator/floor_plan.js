@@ -1,10 +1,11 @@
-/** The floor plan: the area that each camera covers, and people's positions and tracks of the last seconds. */
+/** The floor plan: the area that each camera covers, zones, and people's positions and tracks of the last seconds. */
 
 import { shortLabel } from '../people/names.js';
 import { requestOperator } from '../shared/requests.js';
 import { element, make, setText, svg } from '../shared/dom.js';
 import { Repeater } from './section.js';
 import { FloorTracks } from './floor_tracks.js';
+import { FloorZones } from './floor_zones.js';
 
 /** @import {Gop, Site} from '../shared/api_types.js' */
 /** @import {Floor, FloorCamera} from './api_types.js' */
@@ -21,6 +22,7 @@ export class FloorPlan {
   /** @type {FloorCamera[]} */
   #cameras = [];
   #tracks;
+  #zones = new FloorZones();
   #repeater;
   #open = false;
   #drawnFloor = '';
@@ -63,6 +65,7 @@ export class FloorPlan {
     const json = JSON.stringify(floor);
     if (json !== this.#drawnFloor) this.#draw(floor);
     this.#drawnFloor = json;
+    await this.#zones.refresh(this.#size);
     this.#showTracks();
   }
 
@@ -85,7 +88,7 @@ export class FloorPlan {
       const color = this.palette.color(camera);
       return svg('polygon', { points: svgPoints(outline), fill: color, stroke: color, class: 'coverage' });
     });
-    plan.replaceChildren(...areas, this.#people);
+    plan.replaceChildren(...areas, this.#zones.drawing, this.#people);
   }
 
   #showTracks() {

@@ -98,6 +98,27 @@
  * @property {number | null} cut_s cost of the look-ahead with that camera, including the cut
  * @property {number} switch_cost_s seconds of not seeing the person
  * @property {number} lookahead_s
+ *
+ * @typedef {object} Zone
+ * @property {string} zone its id
+ * @property {string | null} camera null: on the floor, in meters
+ * @property {[number, number][] | null} area corners
+ * @property {[number, number][] | null} line
+ * @property {number[]} objects the people in an area now
+ *
+ * @typedef {object} RuleEvent
+ * @property {string} rule its id
+ * @property {string} kind entered, left, crossed, stayed, crowded or close
+ * @property {string} phase once; or began and ended
+ * @property {string | null} zone
+ * @property {number[]} objects people
+ * @property {string | null} time UTC, ISO 8601
+ * @property {string | null} clip address of the best view then
+ *
+ * @typedef {object} Rules /api/rules
+ * @property {number} units_per_meter of the floor plan
+ * @property {Zone[]} zones
+ * @property {RuleEvent[]} events the newest first
  */
 
 export {};

@@ -149,6 +149,27 @@ async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browse
         assert await page.locator("#plan .track").nth(1).get_attribute("points") is not None
 
 
+async def test_the_floor_plan_shows_zones_who_is_in_them_and_events(browser: Browser) -> None:
+    cameras = [{"id": camera, "source": "scene:room", "ground": PLAN} for camera in CAMERAS]
+    zones = [
+        {"id": "hall", "area": [[0, 0], [99, 0], [99, 99], [0, 99]], "hold_s": 0},
+        {"id": "door", "line": [[0, 0], [9, 0]], "inner": [5, 5]},
+    ]
+    rules = [{"id": "came-in", "kind": "entered", "zone": "hall"}]
+    async with open_operator_page(browser, "#floor", cameras=cameras, zones=zones, rules=rules) as (
+        served,
+        page,
+    ):
+        await expect(page.locator("#zone-people li")).to_have_text(["hall: no one"])
+        await expect(page.get_by_role("heading", name="Events")).to_be_hidden()
+        show_people(served)
+        await page.reload()
+        await expect(page.locator("#plan polygon.zone")).to_have_count(1)
+        await expect(page.locator("#plan polyline.zone")).to_have_count(1)
+        await expect(page.locator("#zone-people li")).to_have_text(["hall: 1, 2"])
+        await expect(page.locator("#rule-events li").first).to_contain_text("came-in: entered hall: ")
+
+
 async def test_an_uncalibrated_site_shows_how_to_calibrate(browser: Browser) -> None:
     async with open_operator_page(browser, "#floor") as (served, page):
         show_people(served)
