@@ -7,6 +7,7 @@ import logging
 import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
 
 from aiohttp import web
 
@@ -24,7 +25,7 @@ from server.http.api import openapi, recordings
 from server.http.api import routes as api
 from server.http.api.events import EVENTS, Events
 from server.http.api.shard_redirect import redirect_to_shard
-from server.http.app_keys import CONTROL, ON_DISK, SERVICE, SiteControl
+from server.http.app_keys import CONTROL, ON_DISK, SERVICE, SETUP, SiteControl
 from server.http.connections.connection_limit import FOR_OPERATORS, connection_limit
 from server.http.connections.connection_limiter import ConnectionLimiter, ConnectionLimits
 from server.http.connections.listener import Listener
@@ -43,6 +44,7 @@ from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsSessions
 from server.http.viewers.traffic import TRAFFIC, Traffic
 from server.http.viewers.viewer_limits import EVENT_SLOTS, VIEWER_SLOTS
 from server.service.service import BestViewService
+from server.setup.session import SetupSession
 from server.system.descriptors import descriptor_limit
 from server.system.errors import UserError
 
@@ -89,7 +91,8 @@ def make_app(
         client_max_size=_BODY_MAX_BYTES,
     )
     app[SERVICE], app[ON_DISK], app[FAILURES] = service, on_disk, LogThrottle()
-    app[CONTROL] = control or SiteControl()
+    app[CONTROL] = control = control or SiteControl()
+    app[SETUP] = SetupSession(control.path or Path())
     app[EVENTS], app[TRAFFIC] = Events(service), Traffic()
     app[VIEWER_SLOTS], app[EVENT_SLOTS] = FairShare(), FairShare()
     app[HLS_SESSIONS] = HlsSessions(service.streams.segment_plan.target_s, app[VIEWER_SLOTS])

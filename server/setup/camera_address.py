@@ -18,6 +18,7 @@ _MAX_ADDRESS = 1000
 _MAX_LOGIN = 200
 _HELP = "enter an address such as rtsp://10.0.0.11/stream1, http://10.0.0.14/video.mjpeg or /dev/video0"
 _NAME_BREAKS = re.compile(r"[^A-Za-z0-9_-]+")
+_IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 _SERVICE = re.compile(r"bestview(-\d+)?")
 _MAX_NAME = 32
 
@@ -86,12 +87,25 @@ def address_of(camera: CameraSettings) -> CameraAddress:
     return CameraAddress(camera.source, None, dict(camera.options))
 
 
+def check_name(name: str) -> None:
+    """Check a camera's id.
+
+    Raises:
+        UserError: it is invalid.
+    """
+    if _IDENTIFIER.fullmatch(name) is None or _SERVICE.fullmatch(name):
+        raise UserError(
+            "a name has letters, digits, - and _, at most 32, begins with a letter or digit, "
+            "and is not bestview"
+        )
+
+
 def free_name(wanted: str, taken: set[str]) -> str:
     """Return a camera's id that is not taken, made from any text; ``camera-1`` if it has no letters."""
     name = _NAME_BREAKS.sub("-", wanted).strip("-_")[: _MAX_NAME - 3].strip("-_")
     if name and name not in taken and not _SERVICE.fullmatch(name):
         return name
-    base = name or "camera"
+    base = "camera" if not name or _SERVICE.fullmatch(name) else name
     return next(
         candidate
         for candidate in (f"{base}-{number}" for number in range(1, len(taken) + 2))

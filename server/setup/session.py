@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import re
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
 from server.setup import discovery
-from server.setup.camera_address import CameraAddress, free_name, parse_address
+from server.setup.camera_address import CameraAddress, check_name, free_name, parse_address
 from server.setup.discovery import FoundCamera
 from server.setup.proposal import SiteProposal, propose_site
 from server.setup.site_file import NewCamera, NewSite, write_site
@@ -33,7 +32,6 @@ _TRIALS_AT_ONCE = 2
 _MAX_WAITING = 16
 Request = TypeVar("Request")
 Answer = TypeVar("Answer")
-_IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +48,10 @@ class TriedCamera:
         """What it sends, in a few words."""
         rate = f", {self.trial.fps:g} fps" if self.trial.fps else ""
         return f"{self.trial.codec} {self.trial.width}x{self.trial.height}{rate}"
+
+    def as_new(self, name: str) -> NewCamera:
+        """Return the camera to write, under a name."""
+        return NewCamera(name, self.address, self.sends)
 
 
 @dataclass(slots=True)
@@ -121,13 +123,25 @@ class SetupSession:
             raise UserError(f"{address.shown}: this camera is in the list already")
         if len(self.cameras) >= MAX_CAMERAS:
             raise UserError(f"a site set up here has at most {MAX_CAMERAS} cameras")
+        camera = await self._tried(address, name)
+        taken = {camera.name for camera in self.cameras}
+        camera = replace(camera, name=free_name(name, taken))
+        self.cameras.append(camera)
+        return camera
+
+    async def try_unlisted(self, text: str, user: str, password: str, name: str = "") -> TriedCamera:
+        """Try an address without adding the camera to the list.
+
+        Raises:
+            UserError: it is no address, or no picture arrives.
+        """
+        return await self._tried(parse_address(text, user, password), name)
+
+    async def _tried(self, address: CameraAddress, name: str) -> TriedCamera:
         trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options))
         if trial.error:
             raise UserError(f"{address.shown}: {trial.error}")
-        taken = {camera.name for camera in self.cameras}
-        camera = TriedCamera(next(self._keys), free_name(name, taken), address, trial)
-        self.cameras.append(camera)
-        return camera
+        return TriedCamera(next(self._keys), name, address, trial)
 
     async def _limited(self, ask: Callable[[Request], Awaitable[Answer]], request: Request) -> Answer:
         """Speak to a camera when few others are spoken to.
@@ -151,11 +165,7 @@ class SetupSession:
             UserError: there is none, or the name is invalid or taken.
         """
         camera = self.camera(key)
-        if _IDENTIFIER.fullmatch(name) is None or free_name(name, set()) != name:
-            raise UserError(
-                "a name has letters, digits, - and _, at most 32, begins with a letter or digit, "
-                "and is not bestview"
-            )
+        check_name(name)
         if any(other.name == name and other.key != key for other in self.cameras):
             raise UserError(f"another camera is called {name}")
         self.cameras = [replace(one, name=name) if one is camera else one for one in self.cameras]
@@ -192,6 +202,6 @@ class SetupSession:
         """
         if not self.cameras:
             raise UserError("add a camera first")
-        cameras = [NewCamera(camera.name, camera.address, camera.sends) for camera in self.cameras]
+        cameras = [camera.as_new(camera.name) for camera in self.cameras]
         self.kept = write_site(NewSite(name, chosen, cameras), self.path)
         self.written.set()

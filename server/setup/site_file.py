@@ -81,7 +81,7 @@ def write_site(site: NewSite, path: Path) -> Path | None:
     """
     text = site_text(site, path)
     check_text(text, path)
-    _write_passwords(site.cameras, path)
+    write_passwords(site.cameras, path)
     return replace_file(text, path)
 
 
@@ -131,7 +131,20 @@ def _scalar(text: str) -> str:
     return dump_yaml_inline(text)
 
 
-def _write_passwords(cameras: Sequence[NewCamera], path: Path) -> None:
+def camera_entry(camera: NewCamera, path: Path) -> dict[str, Any]:
+    """Return a camera as an entry of a configuration at a path."""
+    entry: dict[str, Any] = {"id": camera.id, "source": camera.address.source}
+    if camera.address.password is not None:
+        entry["password"] = str(password_file(path, camera.id))
+    return {**entry, "options": dict(camera.address.options)} if camera.address.options else entry
+
+
+def write_passwords(cameras: Sequence[NewCamera], path: Path) -> None:
+    """Write the cameras' passwords into files beside a configuration at a path.
+
+    Raises:
+        UserError: they cannot be written.
+    """
     secret = {camera.id: camera.address.password for camera in cameras if camera.address.password is not None}
     if not secret:
         return
@@ -150,9 +163,3 @@ def _free_path(path: Path) -> Path:
     now = dt.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 — the user's clock
     names = (f"{path.stem}.{now}{more}{path.suffix}" for more in ("", *(f"-{n}" for n in range(2, 1000))))
     return next(free for name in names if not (free := path.with_name(name)).exists())
-
-
-def content_of(text: str) -> dict[str, Any]:
-    """Return the sections of a configuration text."""
-    content = yaml.safe_load(text)
-    return content if isinstance(content, dict) else {}

@@ -32,6 +32,10 @@
  * @property {{text: string, at: number} | null} last_error
  * @property {CameraPicture | null} picture
  *
+ * @typedef {object} SiteCamera in the configuration file
+ * @property {string} camera
+ * @property {string} address without passwords
+ *
  * @typedef {object} RestartStatus /api/operator/restart
  * @property {boolean} possible
  * @property {string} error why the configuration file cannot be used; empty: it can

@@ -14,6 +14,7 @@ import { ZoneEditor } from './zones.js';
 import { PeopleEditor } from './people_editor.js';
 import { CalibrationWalk } from './calibration.js';
 import { Palette } from '../people/palette.js';
+import { CamerasSection, SiteCameras } from './site_cameras.js';
 import { SiteRestart } from './site_restart.js';
 import { SignIn } from '../shared/sign_in.js';
 
@@ -67,13 +68,13 @@ function createSections(site) {
   const people = new PeopleEditor(site, showError);
   const flags = new FlagList(site, showError);
   const downloads = new Downloads(site);
-  sections.set('cameras', new CameraTiles(palette, showError));
+  const restart = new SiteRestart(showError);
+  sections.set('cameras', new CamerasSection(new CameraTiles(palette, showError), new SiteCameras(showError, () => restart.check())));
   sections.set('floor', floor);
   sections.set('people', people);
   sections.set('flags', flags);
   sections.set('downloads', downloads);
   sections.set('zones', new ZoneEditor(site, showError));
-  const restart = new SiteRestart(showError);
   sections.set('calibration', new CalibrationWalk(showError, () => restart.check()));
   sections.set('view-selection', new ViewSelectionForm(showError));
   sections.set('configuration', new ConfigurationTable(showError));

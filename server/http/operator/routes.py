@@ -7,7 +7,15 @@ from aiohttp import web
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
 from server.http.json_responses import json_response
-from server.http.operator import downloads, people, position_corrections, restart, settings, walk
+from server.http.operator import (
+    downloads,
+    people,
+    position_corrections,
+    restart,
+    settings,
+    site_cameras,
+    walk,
+)
 from server.http.operator.schema import CameraDiagnosticsList
 from server.http.static_files import page_file
 
@@ -46,4 +54,5 @@ routes = [
     *downloads.routes,
     *walk.routes,
     *restart.routes,
+    *site_cameras.routes,
 ]

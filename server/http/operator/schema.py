@@ -48,6 +48,20 @@ class RestartStatus(msgspec.Struct, frozen=True):
     """Settings of the file that are not in force."""
 
 
+class SiteCamera(msgspec.Struct, frozen=True):
+    """A camera in the configuration file."""
+
+    camera: str
+    address: str
+    """Without anything that may be secret."""
+
+
+class SiteCameras(msgspec.Struct, frozen=True):
+    """The cameras in the configuration file, which may differ from those in force."""
+
+    cameras: list[SiteCamera]
+
+
 class SelectionSettings(msgspec.Struct, frozen=True):
     """View-selection settings by key, such as switch_cost_s and quality.size."""
 
@@ -101,6 +115,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/position_corrections": CorrectionStatus,
     "/api/operator/config": Settings,
     "/api/operator/restart": RestartStatus,
+    "/api/operator/site_cameras": SiteCameras,
     "/api/operator/view_selection": SelectionSettings,
 }
 """The answer to GET of each path; POST, PUT and DELETE answer with the new state."""

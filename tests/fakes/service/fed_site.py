@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import aiohttp
@@ -11,8 +11,10 @@ import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
 from fakes.timeouts import PATIENCE
+from server.config.running_config import ConfigFileState
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
+from server.http.app_keys import SiteControl
 from server.service.service import BestViewService
 
 A, B = CAMERAS
@@ -34,12 +36,21 @@ class ServedSite:
         return content
 
 
-async def serve_site(*, patience: float = PATIENCE, **changes: Any) -> AsyncIterator[ServedSite]:
+async def serve_site(
+    *,
+    patience: float = PATIENCE,
+    on_disk: Callable[[], ConfigFileState] = lambda: ConfigFileState("", ()),
+    control: SiteControl | None = None,
+    **changes: Any,
+) -> AsyncIterator[ServedSite]:
     service = FedService(small_config(**changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     async with (
         asyncio.timeout(patience),
-        serving(make_app(BestViewService(service)), HttpSettings(port=0, **changes.get("http", {}))) as port,
+        serving(
+            make_app(BestViewService(service), on_disk, control),
+            HttpSettings(port=0, **changes.get("http", {})),
+        ) as port,
         aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session,
     ):
         yield ServedSite(service, session, port)

@@ -7,7 +7,7 @@ import json
 import re
 import time
 from collections.abc import AsyncIterator
-from contextlib import aclosing, asynccontextmanager
+from contextlib import aclosing, asynccontextmanager, closing
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
 from fakes.cli.calibration_walk import SITE, curved_path, errors_on_floor, walk_epochs
 from fakes.http.tokens import token_entry, token_of, write_tokens
+from fakes.media.rtsp_camera import RtspCamera
 from fakes.page.browser import new_page
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
@@ -32,11 +33,15 @@ from fakes.service.scripted_cameras import (
     LARGE,
     SMALL,
     camera_tracks,
+    encoded,
     small_config,
     status,
     tracks,
 )
 from server.cli.calibrate.points_file import read_points
+from server.config.loader import load_config
+from server.config.running_config import ConfigFileState
+from server.http.app_keys import SiteControl
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
 
@@ -131,6 +136,49 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
         await expect(tile.locator(".state")).to_have_text("Gone")
         await expect(tile.locator(".last-error")).to_contain_text("its process disconnected")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
+
+
+async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
+    browser: Browser, tmp_path: Path
+) -> None:
+    path = tmp_path / "site.yaml"
+    before = "cameras: [{id: c0, source: 'scene:room'}]\n"
+    path.write_text(before)
+
+    def on_disk() -> ConfigFileState:
+        return ConfigFileState("", ("cameras",) if path.read_text() != before else ())
+
+    gops = [encoded(0, 40)[at : at + 5] for at in range(0, 40, 5)]
+    control = SiteControl(path, asyncio.Event())
+    with closing(RtspCamera(gops, FPS, login=("viewer", "s3cret"), live=True)) as stream:
+        async with open_operator_page(
+            browser, "#cameras", patience=100, on_disk=on_disk, control=control
+        ) as (_, page):
+            names = page.get_by_label(re.compile("^Name of camera"))
+            await expect(names).to_have_count(1)
+            await page.get_by_label("Add a camera").fill(stream.url)
+            await page.get_by_label("User").fill("viewer")
+            await page.get_by_label("Password").fill("wrong")
+            await page.get_by_label("Name", exact=True).fill("door")
+            await page.get_by_role("button", name="Try and add").click()
+            await expect(page.locator("#error-message")).to_contain_text("401", timeout=20_000)
+            await expect(page.locator("#restart")).to_be_hidden()
+            await page.get_by_label("Password").fill("s3cret")
+            await page.get_by_role("button", name="Try and add").click()
+            await expect(names).to_have_count(2, timeout=20_000)
+            await expect(page.locator("#error-message")).to_be_empty()
+            await expect(page.get_by_label("Password")).to_have_value("")
+            await expect(page.locator("#restart-state")).to_contain_text("not in force: cameras.")
+            await page.get_by_label("Name of camera door").fill("c0")
+            await page.get_by_role("button", name="Rename camera door").click()
+            await expect(page.locator("#error-message")).to_have_text("another camera is called c0")
+            await page.get_by_label("Name of camera door").fill("hall")
+            await page.get_by_role("button", name="Rename camera door").click()
+            await expect(page.get_by_label("Name of camera hall")).to_have_value("hall")
+            assert load_config(path).camera_ids == ("c0", "hall")
+            await page.get_by_role("button", name="Remove camera c0").click()
+            await expect(names).to_have_count(1)
+            assert load_config(path).camera_ids == ("hall",)
 
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:

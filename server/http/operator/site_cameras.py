@@ -1,0 +1,103 @@
+"""``/api/operator/site_cameras``: the cameras in the configuration file; a restart brings them into force."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from aiohttp import web
+
+from server.http.access.permissions import OPERATOR_PATH
+from server.http.app_keys import CONTROL, SETUP
+from server.http.json_responses import error_response, json_response, read_json
+from server.http.operator.schema import SiteCamera, SiteCameras
+from server.setup.site_cameras import add_camera, list_cameras, remove_camera, rename_camera
+from server.system.errors import UserError
+
+routes = web.RouteTableDef()
+
+_PATH = f"{OPERATOR_PATH}/site_cameras"
+_FILE = threading.Lock()
+"""Held while the file is changed."""
+_NO_FILE = "this service has no configuration file"
+_Login = Annotated[str, msgspec.Meta(max_length=200)]
+_Name = Annotated[str, msgspec.Meta(max_length=100)]
+
+
+class CameraToAdd(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A camera to try, and to add if it sends pictures."""
+
+    address: Annotated[str, msgspec.Meta(max_length=1000)]
+    user: _Login = ""
+    password: _Login = ""
+    name: _Name = ""
+
+
+class CameraToRename(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A camera's id, and its new one."""
+
+    camera: _Name
+    name: _Name
+
+
+class CameraToRemove(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A camera's id."""
+
+    camera: _Name
+
+
+@routes.get(_PATH)
+async def get_site_cameras(request: web.Request) -> web.Response:
+    """Return the cameras in the configuration file."""
+    return await _answer(request, lambda _: None)
+
+
+@routes.post(_PATH)
+async def post_site_camera(request: web.Request) -> web.Response:
+    """Try a camera, and add it to the configuration file if it sends pictures."""
+    wanted = await read_json(request, CameraToAdd)
+    path = request.app[CONTROL].path
+    if path is None:
+        return error_response(409, _NO_FILE)
+    try:
+        tried = await request.app[SETUP].try_unlisted(
+            wanted.address, wanted.user, wanted.password, wanted.name
+        )
+    except UserError as error:
+        return error_response(400, str(error))
+    return await _answer(request, lambda path: add_camera(path, tried))
+
+
+@routes.put(_PATH)
+async def put_site_camera(request: web.Request) -> web.Response:
+    """Rename a camera in the configuration file."""
+    wanted = await read_json(request, CameraToRename)
+    return await _answer(request, lambda path: rename_camera(path, wanted.camera, wanted.name))
+
+
+@routes.delete(_PATH)
+async def delete_site_camera(request: web.Request) -> web.Response:
+    """Remove a camera from the configuration file."""
+    wanted = await read_json(request, CameraToRemove)
+    return await _answer(request, lambda path: remove_camera(path, wanted.camera))
+
+
+async def _answer(request: web.Request, change: Callable[[Path], None]) -> web.Response:
+    """Change the file, and return its cameras."""
+    path = request.app[CONTROL].path
+    if path is None:
+        return error_response(409, _NO_FILE)
+
+    def run() -> SiteCameras:
+        with _FILE:
+            change(path)
+        return SiteCameras([SiteCamera(camera.id, camera.address) for camera in list_cameras(path)])
+
+    try:
+        return json_response(await asyncio.to_thread(run))
+    except UserError as error:
+        return error_response(409, str(error))

@@ -1,0 +1,154 @@
+"""The cameras in a configuration file: listed, added, renamed and removed; a restart brings it into force."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from server.config.loader import read_content
+from server.setup.camera_address import check_name, free_name
+from server.setup.session import TriedCamera
+from server.setup.site_file import camera_entry, check_text, password_file, replace_file, write_passwords
+from server.setup.yaml_edit import changed_text
+from server.system.address_redaction import redact_to_host
+from server.system.errors import UserError
+
+_Entry = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ConfiguredCamera:
+    """A camera in the file: its id, and its source without anything that may be secret."""
+
+    id: str
+    address: str
+
+
+def list_cameras(path: Path) -> Sequence[ConfiguredCamera]:
+    """Return the cameras in a configuration file.
+
+    Raises:
+        UserError: it cannot be read, or has no list of cameras.
+    """
+    return [
+        ConfiguredCamera(str(camera.get("id")), redact_to_host(str(camera.get("source"))))
+        for camera in _cameras(path)
+    ]
+
+
+def add_camera(path: Path, tried: TriedCamera) -> None:
+    """Add a camera that was tried, under a free name made from its own.
+
+    No file of a password and no homography of an earlier camera has that name.
+
+    Raises:
+        UserError: the camera is there already, or the files would be invalid or cannot be written.
+    """
+    cameras = _cameras(path)
+    if any(camera.get("source") == tried.address.source for camera in cameras):
+        raise UserError(f"{tried.address.shown}: this camera is in the configuration already")
+    folder = (path.parent / password_file(path, "any")).parent
+    taken = {str(camera.get("id")) for camera in cameras} | {file.name for file in folder.glob("*")}
+    ground = _read_ground(path)
+    if ground is not None:
+        taken |= ground.content["homography"].keys()
+    camera = tried.as_new(free_name(tried.name, taken))
+    text = _checked_text(path, [*cameras, camera_entry(camera, path)])
+    write_passwords([camera], path)
+    replace_file(text, path)
+
+
+def rename_camera(path: Path, camera_id: str, name: str) -> None:
+    """Rename a camera; its homography in the ground file is copied to the new name.
+
+    Raises:
+        UserError: there is no such camera, another setting names it, the name is invalid or taken, or the
+            files cannot be written.
+    """
+    check_name(name)
+    cameras = _cameras_to_change(path, camera_id)
+    if any(str(camera.get("id")) == name for camera in cameras):
+        raise UserError(f"another camera is called {name}")
+    renamed = [{**camera, "id": name} if str(camera.get("id")) == camera_id else camera for camera in cameras]
+    text = _checked_text(path, renamed)
+    _copy_homography(path, camera_id, name)  # first: with both names, either configuration is calibrated
+    replace_file(text, path)
+
+
+def remove_camera(path: Path, camera_id: str) -> None:
+    """Remove a camera; the file of its password stays, since the earlier configuration names it.
+
+    Raises:
+        UserError: there is no such camera, another setting names it, it is the last one, or the file cannot
+            be written.
+    """
+    cameras = _cameras_to_change(path, camera_id)
+    remaining = [camera for camera in cameras if str(camera.get("id")) != camera_id]
+    if not remaining:
+        raise UserError("a site has at least one camera: add another one first")
+    replace_file(_checked_text(path, remaining), path)
+
+
+def _cameras(path: Path) -> list[_Entry]:
+    cameras = read_content(path).get("cameras")
+    if not isinstance(cameras, list) or not all(isinstance(camera, dict) for camera in cameras):
+        raise UserError(f"{path}: cameras: is a list of cameras, each with id and source")
+    return cameras
+
+
+def _cameras_to_change(path: Path, camera_id: str) -> list[_Entry]:
+    """Return all cameras; one of them will get another name or none.
+
+    The check of the configuration finds zones and rules that name it, but takes a sound for a file.
+    """
+    cameras = _cameras(path)
+    if all(str(camera.get("id")) != camera_id for camera in cameras):
+        raise UserError(f"there is no camera {camera_id!a}")
+    sound = read_content(path).get("sound")
+    if isinstance(sound, dict) and sound.get("source") == camera_id:
+        raise UserError(f"{path}: sound.source is camera {camera_id}: change it first")
+    return cameras
+
+
+def _checked_text(path: Path, cameras: list[_Entry]) -> str:
+    text = changed_text(path, "cameras", cameras)
+    check_text(text, path)
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class _Ground:
+    """The file that a configuration names as its ground."""
+
+    file: Path
+    content: dict[str, Any]
+
+
+def _read_ground(path: Path) -> _Ground | None:
+    """Return the ground file of a configuration; None: it names none.
+
+    Raises:
+        UserError: the configuration or the ground file is invalid.
+    """
+    named = read_content(path).get("ground")
+    if not isinstance(named, str):
+        return None
+    check_text(path.read_text(encoding="utf-8"), path)
+    file = path.parent / named
+    return _Ground(file, json.loads(file.read_text(encoding="utf-8")))
+
+
+def _copy_homography(path: Path, camera_id: str, name: str) -> None:
+    """Make a new name's homography in the ground file, if there is one, that of a camera."""
+    ground = _read_ground(path)
+    if ground is None:
+        return
+    matrices = ground.content["homography"]
+    copied = {known: matrix for known, matrix in matrices.items() if known != name}
+    if camera_id in matrices:
+        copied[name] = matrices[camera_id]
+    if copied != matrices:
+        replace_file(json.dumps({**ground.content, "homography": copied}), ground.file)

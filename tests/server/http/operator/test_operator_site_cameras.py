@@ -1,0 +1,142 @@
+"""Operators add, rename and remove cameras in the configuration; nobody else does; no password comes back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator, Iterator
+from contextlib import aclosing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.http.tokens import bearer, serve_with_tokens
+from fakes.media.rtsp_camera import RtspCamera
+from fakes.service.fed_site import ServedSite, serve_site
+from fakes.service.scripted_cameras import FPS, encoded
+from server.http.access.csrf import CSRF_HEADER
+from server.http.app_keys import SiteControl
+
+PATH = "/api/operator/site_cameras"
+LOGIN = ("viewer", "p@ss:/w0rd")
+TEXT = "cameras: [{id: c0, source: 'rtsp://viewer:hidden@10.0.0.1/'}, {id: c1, source: 'scene:room'}]\n"
+BEFORE = [{"camera": "c0", "address": "rtsp://10.0.0.1/..."}, {"camera": "c1", "address": "scene:room"}]
+CHANGES = {CSRF_HEADER: "1"}
+REMOVE = {"camera": "c0"}
+
+
+@pytest.fixture
+def stream() -> Iterator[RtspCamera]:
+    units = encoded(0, 40)
+    camera = RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], FPS, login=LOGIN, live=True)
+    yield camera
+    camera.close()
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "site.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+@pytest.fixture
+async def site(path: Path) -> AsyncIterator[ServedSite]:
+    async with aclosing(serve_site(patience=120, control=SiteControl(path))) as sites:
+        yield await anext(sites)
+
+
+async def send(
+    site: ServedSite, method: str, body: Any, headers: dict[str, str] = CHANGES
+) -> tuple[int, dict[str, Any]]:
+    async with site.session.request(method, PATH, json=body, headers=headers) as answer:
+        return answer.status, json.loads(await answer.text())
+
+
+async def test_a_camera_is_tried_added_renamed_and_removed(site: ServedSite, stream: RtspCamera) -> None:
+    assert await site.get_json(PATH) == {"cameras": BEFORE}
+    wanted = {"address": stream.url, "user": LOGIN[0], "password": LOGIN[1], "name": "Front door"}
+    shown = stream.url.replace("live", "...")
+    assert await send(site, "POST", wanted) == (
+        200,
+        {"cameras": [*BEFORE, {"camera": "Front-door", "address": shown}]},
+    )
+    assert await send(site, "PUT", {"camera": "Front-door", "name": "door"}) == (
+        200,
+        {"cameras": [*BEFORE, {"camera": "door", "address": shown}]},
+    )
+    assert await send(site, "DELETE", {"camera": "door"}) == (200, {"cameras": BEFORE})
+
+
+async def test_a_camera_that_sends_no_pictures_is_not_added(
+    site: ServedSite, stream: RtspCamera, path: Path
+) -> None:
+    status, answer = await send(site, "POST", {"address": stream.url, "user": LOGIN[0], "password": "wr0ng"})
+    assert status == 400
+    assert "401" in answer["error"]
+    assert "wr0ng" not in answer["error"]
+    assert path.read_text() == TEXT
+
+
+@pytest.mark.parametrize(
+    ("method", "body", "status"),
+    [
+        ("POST", {"address": "file:///etc/passwd"}, 400),
+        ("POST", {"address": "/etc/passwd"}, 400),
+        ("POST", {"address": "x" * 1001}, 400),
+        ("POST", {"address": "rtsp://h/", "password": "x" * 201}, 400),
+        ("POST", {"address": "rtsp://h/", "more": 1}, 400),
+        ("POST", {}, 400),
+        ("PUT", {"camera": "c0", "name": "../c0"}, 409),
+        ("PUT", {"camera": "c0", "name": "c1"}, 409),
+        ("PUT", {"camera": "c0", "name": "x" * 101}, 400),
+        ("PUT", {"camera": "c7", "name": "front"}, 409),
+        ("DELETE", {"camera": "c7"}, 409),
+        ("DELETE", {"camera": 1}, 400),
+        ("DELETE", [], 400),
+    ],
+)
+async def test_an_invalid_request_is_one_line_and_changes_nothing(
+    site: ServedSite, path: Path, method: str, body: Any, status: int
+) -> None:
+    code, answer = await send(site, method, body)
+    assert code == status
+    assert len(answer["error"].splitlines()) == 1
+    assert [file.name for file in path.parent.iterdir()] == ["site.yaml"]
+    assert path.read_text() == TEXT
+
+
+async def test_a_change_needs_the_header_that_no_other_site_can_send(site: ServedSite, path: Path) -> None:
+    for method in ("POST", "PUT", "DELETE"):
+        assert (await send(site, method, REMOVE, {}))[0] == 403
+    assert path.read_text() == TEXT
+
+
+async def test_only_operators_see_or_change_the_configured_cameras(path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "tokens"
+    folder.mkdir()
+    async with serve_with_tokens(folder, control=SiteControl(path)) as site:
+        for token in ("desk", "family", "door"):
+            for method in ("GET", "POST", "PUT", "DELETE"):
+                assert (await send(site, method, REMOVE, {**CHANGES, **bearer(token)}))[0] == 403
+        assert (await send(site, "DELETE", REMOVE))[0] == 401
+        assert path.read_text() == TEXT
+        assert await send(site, "DELETE", REMOVE, {**CHANGES, **bearer("lead")}) == (
+            200,
+            {"cameras": BEFORE[1:]},
+        )
+
+
+async def test_a_service_without_a_configuration_file_says_so() -> None:
+    async with aclosing(serve_site(control=SiteControl())) as sites:
+        site = await anext(sites)
+        assert (await site.get(PATH))[0] == 409
+        for method, body in (
+            ("POST", {"address": "rtsp://127.0.0.1/"}),
+            ("PUT", {"camera": "c0", "name": "front"}),
+            ("DELETE", REMOVE),
+        ):
+            assert await send(site, method, body) == (
+                409,
+                {"error": "this service has no configuration file"},
+            )
