@@ -47,6 +47,7 @@ def _answer(request: StreamRequest | ProfilesRequest) -> msgspec.Struct:
         return run_trial(request)
     from server.setup.onvif_profiles import query_profiles  # noqa: PLC0415
 
+    logging.getLogger().setLevel(logging.CRITICAL)  # the library logs addresses
     return query_profiles(request)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from importlib.util import find_spec
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
@@ -46,7 +45,6 @@ def query_profiles(request: ProfilesRequest) -> ProfileList:
 async def _query(request: ProfilesRequest) -> ProfileList:
     from onvif import ONVIFCamera  # noqa: PLC0415 — an extra, and slow to import
 
-    logging.getLogger().setLevel(logging.CRITICAL)  # the library logs addresses
     async with asyncio.timeout(_SECONDS):
         camera = ONVIFCamera(
             request.host, request.port, request.user, request.password, no_cache=True, adjust_time=True

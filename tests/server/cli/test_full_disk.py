@@ -32,7 +32,7 @@ async def served() -> AsyncIterator[ServedSite]:
 
 
 async def recorded(served: ServedSite, out: Path) -> None:
-    await run_watch(f"http://127.0.0.1:{served.port}", 1, out, None, "p0", f"p{FRAMES}")
+    await run_watch([f"http://127.0.0.1:{served.port}"], 1, out, None, "p0", f"p{FRAMES}")
 
 
 async def stream_size(served: ServedSite, folder: Path) -> int:
