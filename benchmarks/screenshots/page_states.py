@@ -8,10 +8,8 @@ without any people is faked by this script: on the demo it is over within a mome
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
-import io
 import os
 import signal
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -19,20 +17,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from PIL import Image
 from playwright.async_api import Browser, Page
 from playwright.async_api import TimeoutError as LateError
 
 from benchmarks.common.browser import check_chromium, chromium
 from benchmarks.common.demo_site import demo_at, open_when_ready
-from benchmarks.common.environment import ROOT, CannotRunError, finish
+from benchmarks.common.environment import CannotRunError, finish
 from benchmarks.common.process_load import running_pids
+from benchmarks.screenshots.webp_files import WIDTHS, options_of, write_webp
 
-WIDTHS = {360: 740, 800: 900, 1600: 900}
-"""Sizes of the window."""
-_WIDEST = 1000
-"""Largest width of a picture in the documents, pixels; wider ones are scaled down."""
-_QUALITY = 55
 _PATIENCE_MS = 6_000
 _TRIES = 12
 _LONG_MS = 120_000
@@ -97,7 +90,7 @@ class ScreenshotSession:
             else:
                 raise RuntimeError(f"{state}: not reached")
             png = await self.page.screenshot()
-            await asyncio.to_thread(_write, png, self.out / str(width) / f"{state}.webp")
+            await asyncio.to_thread(write_webp, png, self.out / str(width) / f"{state}.webp")
 
     async def as_it_is(self) -> None:
         """Prepare nothing."""
@@ -202,23 +195,9 @@ async def _gone(sitting: ScreenshotSession) -> None:
         os.kill(pid, signal.SIGKILL)
 
 
-def _write(png: bytes, path: Path) -> None:
-    image = Image.open(io.BytesIO(png)).convert("RGB")
-    if image.width > _WIDEST:
-        size = (_WIDEST, round(image.height * _WIDEST / image.width))
-        image = image.resize(size, Image.Resampling.LANCZOS)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    image.save(path, "WEBP", quality=_QUALITY, method=6)
-
-
 def main() -> None:
     """Take the screenshots."""
-    options = argparse.ArgumentParser(
-        prog="python -m benchmarks.screenshots.page_states", description=__doc__.splitlines()[0]
-    )
-    options.add_argument(
-        "--out", type=Path, default=ROOT / "docs" / "screenshots", help="folder to write into"
-    )
+    options = options_of("page_states", __doc__)
     options.add_argument("--fps", type=float, default=25.0, help="frame rate; less on a machine that is busy")
     options.add_argument("--page", choices=("viewer", "operator"), help="only this one's")
     chosen = options.parse_args()

@@ -7,21 +7,19 @@ The page and its server are real; the cameras are drawn, so that no network is n
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
-import io
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
-from PIL import Image
 from playwright.async_api import Page
 
 from benchmarks.common.browser import check_chromium, chromium
-from benchmarks.common.environment import ROOT, CannotRunError, finish
+from benchmarks.common.environment import CannotRunError, finish
+from benchmarks.screenshots.webp_files import WIDTHS, options_of, write_webp
 from server.http.setup_app import serve_setup
 from server.setup.camera_address import CameraAddress, free_name, parse_address
 from server.setup.discovery import FoundCamera
@@ -29,13 +27,10 @@ from server.setup.session import SetupSession, TriedCamera
 from server.setup.trial_messages import ProfileList, StreamProfile, StreamTrial
 from synthetic import Scene
 
-WIDTHS = {360: 740, 800: 900, 1600: 900}
 _NAMES = ("door", "hall", "stairs")
 _SIZE = (640, 360)
 _START = 200
 """The scene's frame: people are in view."""
-_WIDEST = 1000
-_QUALITY = 55
 
 
 class DrawnSession(SetupSession):
@@ -91,7 +86,7 @@ async def take(out: Path) -> None:
                     await page.set_viewport_size({"width": width, "height": height})
                     await page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
                     await asyncio.to_thread(
-                        _write, await page.screenshot(full_page=True), out / str(width) / "setup.webp"
+                        write_webp, await page.screenshot(full_page=True), out / str(width) / "setup.webp"
                     )
         finally:
             serving.cancel()
@@ -112,23 +107,9 @@ async def _add_cameras(page: Page) -> None:
     )
 
 
-def _write(png: bytes, path: Path) -> None:
-    image = Image.open(io.BytesIO(png)).convert("RGB")
-    if image.width > _WIDEST:
-        size = (_WIDEST, round(image.height * _WIDEST / image.width))
-        image = image.resize(size, Image.Resampling.LANCZOS)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    image.save(path, "WEBP", quality=_QUALITY, method=6)
-
-
 def main() -> None:
     """Take the screenshots."""
-    options = argparse.ArgumentParser(
-        prog="python -m benchmarks.screenshots.setup_states", description=__doc__.splitlines()[0]
-    )
-    options.add_argument(
-        "--out", type=Path, default=ROOT / "docs" / "screenshots", help="folder to write into"
-    )
+    options = options_of("setup_states", __doc__)
     out = options.parse_args().out
     try:
         check_chromium()

@@ -2,9 +2,9 @@
 
 import { shortLabel } from '../people/names.js';
 import { requestOperator } from '../shared/requests.js';
-import { element, make, setText, svg } from '../shared/dom.js';
+import { element, make, setLines, setText, svg } from '../shared/dom.js';
 import { Repeater } from './section.js';
-import { FloorTracks } from './floor_tracks.js';
+import { FloorTracks, svgPoints } from './floor_tracks.js';
 import { FloorZones } from './floor_zones.js';
 
 /** @import {Gop, Site} from '../shared/api_types.js' */
@@ -100,8 +100,7 @@ export class FloorPlan {
       return `${shortLabel(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
     });
     const list = element('positions');
-    while (list.children.length > lines.length) list.lastChild?.remove();
-    lines.forEach((line, at) => setText(list.children[at] ?? list.appendChild(make('li')), line));
+    setLines(list, lines);
     const heading = element('floor').querySelector('h2') ?? list;
     setText(heading, tracks.length ? 'On the floor now' : 'No one is on the floor now');
   }
@@ -142,9 +141,4 @@ function describe(calibrated, uncalibrated) {
 /** @param {number[]} values */
 function range(values) {
   return [Math.min(...values), Math.max(...values)];
-}
-
-/** @param {[number, number][]} positions */
-function svgPoints(positions) {
-  return positions.map(([x, y]) => `${x},${-y}`).join(' ');
 }

@@ -97,3 +97,11 @@ export class FloorTracks {
       }));
   }
 }
+
+/**
+ * @param {[number, number][]} positions on the floor
+ * @returns {string} the points of a drawing, whose y axis points down
+ */
+export function svgPoints(positions) {
+  return positions.map(([x, y]) => `${x},${-y}`).join(' ');
+}

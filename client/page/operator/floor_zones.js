@@ -2,7 +2,8 @@
 
 import { shortLabel } from '../people/names.js';
 import { getJson } from '../shared/requests.js';
-import { element, make, setText, svg } from '../shared/dom.js';
+import { svgPoints } from './floor_tracks.js';
+import { element, make, setLines, svg } from '../shared/dom.js';
 
 /** @import {RuleEvent, Rules, Zone} from '../shared/api_types.js' */
 
@@ -24,7 +25,7 @@ export class FloorZones {
     const onFloor = zones.filter(({ camera }) => camera === null);
     this.drawing.replaceChildren(...onFloor.flatMap((zone) => draw(zone, scale, size)));
     const areas = zones.filter(({ area }) => area !== null);
-    showLines('zone-people', areas.map(({ zone, objects }) => `${zone}: ${people(objects) || 'no one'}`));
+    setLines(element('zone-people'), areas.map(({ zone, objects }) => `${zone}: ${people(objects) || 'no one'}`));
     const list = element('rule-events');
     list.replaceChildren(...events.slice(0, EVENTS).map(eventLine));
     list.previousElementSibling?.toggleAttribute('hidden', !events.length);
@@ -37,10 +38,10 @@ export class FloorZones {
  * @param {number} size
  */
 function draw({ zone, area, line }, scale, size) {
-  const corners = (area ?? line ?? []).map(([x, y]) => [x * scale, -y * scale]); // SVG's y axis points down
-  const points = corners.map((corner) => corner.join(' ')).join(' ');
+  const corners = (area ?? line ?? []).map(([x, y]) => /** @type {[number, number]} */ ([x * scale, y * scale]));
+  const points = svgPoints(corners);
   const [x, y] = [0, 1].map((axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length);
-  const name = svg('text', { x, y, 'font-size': size * NAME_SIZE, class: 'name' });
+  const name = svg('text', { x, y: -y, 'font-size': size * NAME_SIZE, class: 'name' });
   name.textContent = zone;
   return [svg(area ? 'polygon' : 'polyline', { points, class: 'zone' }), name];
 }
@@ -57,14 +58,4 @@ function eventLine({ time, rule, kind, phase, zone, objects, clip }) {
 /** @param {number[]} objects */
 function people(objects) {
   return objects.map((object) => shortLabel(object)).join(', ');
-}
-
-/**
- * @param {string} id of a list
- * @param {string[]} lines
- */
-function showLines(id, lines) {
-  const list = element(id);
-  while (list.children.length > lines.length) list.lastChild?.remove();
-  lines.forEach((line, at) => setText(list.children[at] ?? list.appendChild(make('li')), line));
 }

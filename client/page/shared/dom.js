@@ -43,3 +43,14 @@ export function svg(name, attributes = {}) {
 export function setText(target, text) {
   if (target.textContent !== text) target.textContent = text;
 }
+
+/**
+ * Set the lines of a list, without touching those that stay.
+ *
+ * @param {Element} list
+ * @param {string[]} lines
+ */
+export function setLines(list, lines) {
+  while (list.children.length > lines.length) list.lastChild?.remove();
+  lines.forEach((line, at) => setText(list.children[at] ?? list.appendChild(make('li')), line));
+}

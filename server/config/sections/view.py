@@ -38,6 +38,13 @@ class ShareSettings(Section):
     """Base URLs of all services, by index; viewers go on there when this one dies. None: `of` services."""
 
     @property
+    def editing_blocked(self) -> str:
+        """Why operators cannot change people's numbers; empty: they can."""
+        if self.services > 1:
+            return "the site has several services (view.share), and their person numbers must stay equal"
+        return ""
+
+    @property
     def services(self) -> int:
         """Number of services."""
         return len(self.servers) or self.of

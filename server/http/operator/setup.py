@@ -19,8 +19,8 @@ from server.system.errors import UserError
 routes = web.RouteTableDef()
 
 _PATH = f"{OPERATOR_PATH}/setup"
-_Login = Annotated[str, msgspec.Meta(max_length=200)]
-_Name = Annotated[str, msgspec.Meta(max_length=100)]
+Login = Annotated[str, msgspec.Meta(max_length=200)]
+Name = Annotated[str, msgspec.Meta(max_length=100)]
 
 
 class SearchedCamera(msgspec.Struct, frozen=True):
@@ -43,10 +43,10 @@ class SearchResult(msgspec.Struct, frozen=True):
 class StreamsQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A found camera whose streams are asked for."""
 
-    host: _Name
+    host: Name
     port: Annotated[int, msgspec.Meta(ge=1, le=65_535)]
-    user: _Login = ""
-    password: _Login = ""
+    user: Login = ""
+    password: Login = ""
 
 
 class OfferedStream(msgspec.Struct, frozen=True):
@@ -73,21 +73,21 @@ class CameraTrial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     stream: int | None = None
     address: Annotated[str, msgspec.Meta(max_length=1000)] = ""
-    user: _Login = ""
-    password: _Login = ""
-    name: _Name = ""
+    user: Login = ""
+    password: Login = ""
+    name: Name = ""
 
 
 class CameraName(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A camera's new name."""
 
-    name: _Name
+    name: Name
 
 
 class SiteChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The site's name, rate and picture size."""
 
-    name: _Name
+    name: Name
     fps: float
     width: int
     height: int

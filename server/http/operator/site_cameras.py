@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -12,42 +11,39 @@ import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
-from server.http.app_keys import CONTROL, SETUP
+from server.http.app_keys import SETUP
 from server.http.json_responses import error_response, json_response, read_json
+from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteCamera, SiteCameras
+from server.http.operator.setup import Login, Name
 from server.setup.site_cameras import add_camera, list_cameras, remove_camera, rename_camera
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
 
 _PATH = f"{OPERATOR_PATH}/site_cameras"
-_FILE = threading.Lock()
-"""Held while the file is changed."""
-_NO_FILE = "this service has no configuration file"
-_Login = Annotated[str, msgspec.Meta(max_length=200)]
-_Name = Annotated[str, msgspec.Meta(max_length=100)]
 
 
 class CameraToAdd(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A camera to try, and to add if it sends pictures."""
 
     address: Annotated[str, msgspec.Meta(max_length=1000)]
-    user: _Login = ""
-    password: _Login = ""
-    name: _Name = ""
+    user: Login = ""
+    password: Login = ""
+    name: Name = ""
 
 
 class CameraToRename(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A camera's id, and its new one."""
 
-    camera: _Name
-    name: _Name
+    camera: Name
+    name: Name
 
 
 class CameraToRemove(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A camera's id."""
 
-    camera: _Name
+    camera: Name
 
 
 @routes.get(_PATH)
@@ -60,9 +56,10 @@ async def get_site_cameras(request: web.Request) -> web.Response:
 async def post_site_camera(request: web.Request) -> web.Response:
     """Try a camera, and add it to the configuration file if it sends pictures."""
     wanted = await read_json(request, CameraToAdd)
-    path = request.app[CONTROL].path
-    if path is None:
-        return error_response(409, _NO_FILE)
+    try:
+        config_path(request)
+    except UserError as error:
+        return error_response(409, str(error))
     try:
         tried = await request.app[SETUP].try_unlisted(
             wanted.address, wanted.user, wanted.password, wanted.name
@@ -88,16 +85,10 @@ async def delete_site_camera(request: web.Request) -> web.Response:
 
 async def _answer(request: web.Request, change: Callable[[Path], None]) -> web.Response:
     """Change the file, and return its cameras."""
-    path = request.app[CONTROL].path
-    if path is None:
-        return error_response(409, _NO_FILE)
-
-    def run() -> SiteCameras:
-        with _FILE:
-            change(path)
-        return SiteCameras([SiteCamera(camera.id, camera.address) for camera in list_cameras(path)])
-
     try:
-        return json_response(await asyncio.to_thread(run))
+        path = config_path(request)
+        await change_config(path, change)
+        listed = await asyncio.to_thread(list_cameras, path)
     except UserError as error:
         return error_response(409, str(error))
+    return json_response(SiteCameras([SiteCamera(camera.id, camera.address) for camera in listed]))

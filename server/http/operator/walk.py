@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
+from functools import partial
 from typing import Annotated, Literal
 
 import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
-from server.http.app_keys import CONTROL, SERVICE
+from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, json_response, read_json
+from server.http.operator.config_file import change_config, config_path
 from server.setup.ground import apply_ground
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
-
-_NO_FILE = "this service has no configuration file"
 
 
 class WalkCommand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -46,11 +45,11 @@ async def post_walk(request: web.Request) -> web.Response:
         case "finish":
             calibration.finish(command.person)
         case "apply":
-            ground, path = calibration.ground_file(), request.app[CONTROL].path
-            if ground is None or path is None:
-                return error_response(409, "there is no calibration result yet" if path else _NO_FILE)
             try:
-                await asyncio.to_thread(apply_ground, path, ground.decode())
+                path, ground = config_path(request), calibration.ground_file()
+                if ground is None:
+                    return error_response(409, "there is no calibration result yet")
+                await change_config(path, partial(apply_ground, ground=ground.decode()))
             except UserError as error:
                 return error_response(409, str(error))
     return json_response(calibration.status())

@@ -191,9 +191,7 @@ class PeopleService:
     @property
     def editing_blocked(self) -> str:
         """Why people cannot be renamed, merged or split here; empty: they can."""
-        if self._pipeline.config.view.share.services > 1:
-            return "the site has several services (view.share), and their person numbers must stay equal"
-        return ""
+        return self._pipeline.config.view.share.editing_blocked
 
     def manual_overrides(self) -> PersonOverrides:
         """Return the operator's names and merges."""
