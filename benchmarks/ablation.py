@@ -53,7 +53,7 @@ ABLATIONS = (
     ),
     Ablation("window of 0.2 seconds", {"window": {"length_s": 0.2, "birth_s": 0.2, "min_frames": 3}}),
     Ablation("no re-identification", {"window": {"reidentify_max_distance": 0.0}}),
-    Ablation("fixed templates", {"window": {"template_memory_s": float("inf")}}),
+    Ablation("fixed templates", {"window": {"template_memory_s": 1e6}}),
     Ablation("the paper's layout term", {"costs": {"layout": PAPER.costs.layout}}),
     Ablation("unknown appearance costs nothing", {"costs": {"unknown_appearance": 0.0}}),
     Ablation("hiding costs c_b alone (CVPR)", {"costs": {"occlusion_adds_change": False}}),

@@ -57,7 +57,7 @@ def _window(frames: int) -> WindowSettings:
         duplicate_overlap=1.0,
         forget_after_s=_FOR_EVER,
         max_objects=_ANY,
-        template_memory_s=float("inf"),
+        template_memory_s=_FOR_EVER,
         gate_heights=_FOR_EVER,
         max_height_ratio=_FOR_EVER,
         max_interpolated_gap_s=0.0,

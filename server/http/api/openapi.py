@@ -78,6 +78,7 @@ _UNAVAILABLE = {
     if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
 _MAY_BE_UNAVAILABLE_FOR_OPERATORS = {"/api/operator/people", "/api/operator/position_corrections"}
+_OF_THE_CONFIGURATION_FILE = {"/api/operator/site_cameras"}
 _FROM_REQUIRED = {"/api/past", *OPERATOR_FILES}
 _RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
@@ -169,7 +170,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     names = re.findall(r"\{(\w+)\}", path)
     if names or path in OPERATOR_RESULTS:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
-    if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | _RECORDED_SPANS or path.endswith("/choice"):
+    if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | DELAY | _RECORDED_SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "Invalid query.", "content": error}
     if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
         responses["400"] = {"description": "Invalid request.", "content": error}
@@ -180,6 +181,11 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         }
         responses["403"] = {"description": "Outside the token's scope.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
+    if path in _OF_THE_CONFIGURATION_FILE:
+        responses["409"] = {
+            "description": "The site has no configuration file, or refuses the change.",
+            "content": error,
+        }
     if path in TIME_SHIFT | OPERATOR_FILES.keys():
         responses["416"] = {"description": "That time is not recorded.", "content": error}
     if path in _UNAVAILABLE | _MAY_BE_UNAVAILABLE_FOR_OPERATORS | _RECORDED_SPANS or "object" in names:

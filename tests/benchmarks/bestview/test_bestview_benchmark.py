@@ -41,6 +41,7 @@ def rows(identity: int, left: float, frames: Sequence[int], top: float = 0.0) ->
 def hall(gt: Rows, min_visible: float = 0.25) -> BenchmarkScene:
     content = {
         "site": {"name": "hall", "fps": 10.0, "width": 100, "height": 100},
+        "encode": {"gop_s": 0.5},
         "cameras": [{"id": camera, "source": "scene:none"} for camera in gt],
     }
     return BenchmarkScene("hall", "two views", content, gt, min_visible)

@@ -94,7 +94,7 @@ def test_epochs_are_consecutive_and_the_last_ends_the_recording(recording: Path)
 def test_an_offset_shifts_boxes_and_frames(recording: Path) -> None:
     # Without a prescan: the shifted recording has a window of frames before its first, the other has none.
     original, shifted = (
-        offline(config_of(recording, offset=offset, detect=LIVE)) for offset in (0, 2 * STRIDE)
+        offline(config_of(recording, offset_s=offset / 25, detect=LIVE)) for offset in (0, 2 * STRIDE)
     )
     boxes = [_boxes(batches) for batches in (original, shifted)]
     assert boxes[1] == {(pulse + 2 * STRIDE, track): box for (pulse, track), box in boxes[0].items()}
@@ -210,7 +210,7 @@ def test_an_unreadable_detections_file_is_refused(
 
 def test_a_recording_that_ends_before_the_first_pulse_is_refused_offline(recording: Path) -> None:
     with pytest.raises(UserError, match="camera c0: its recording has no pictures"):
-        offline(config_of(recording, offset=-1000))
+        offline(config_of(recording, offset_s=-40))
 
 
 def test_sharpness_is_measured_only_if_it_has_a_weight(recording: Path) -> None:

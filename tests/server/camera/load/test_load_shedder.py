@@ -97,7 +97,7 @@ def test_every_level_sheds_more_and_a_recording_is_always_complete(stride: int, 
 
 @pytest.mark.parametrize("fps", [0.5, 1.0, 2.0, FPS])
 def test_a_frame_may_take_its_whole_interval_at_any_rate(fps: float) -> None:
-    load = LoadMonitor(small_config(site={"fps": fps}), "c0", live=True)
+    load = LoadMonitor(small_config(site={"fps": fps}, view={"lookahead_s": 6.0}), "c0", live=True)
     for pulse in range(200):
         load.measure_lag(0.95 / fps, pulse / fps)
         assert load.level == 0
