@@ -80,6 +80,8 @@ BENCHMARKS = (
     Benchmark("streaming", "splicing, viewers and HLS delay, beside ffmpeg and nginx; 6 minutes"),
     Benchmark("codecs", "cost and size of H.264, VP8 and passthrough; 1 minute"),
     Benchmark("faults", "injected faults of processes, sources, messages, disk and clock; 12 minutes"),
+    Benchmark("faults.failover", "failures of a site with two best-view services; 9 minutes"),
+    Benchmark("faults.restart", "restart of the best view, stage by stage; 3 minutes"),
     Benchmark("faults.containers", "injected faults of containers; needs Docker Engine; 10 minutes"),
     Benchmark("overlay", "cost of burnt-in boxes and JPEG; 1 minute"),
     Benchmark("page", "the page on the demo: switching people, memory over a visit; 4 minutes"),

@@ -73,10 +73,7 @@ def _name(pid: int) -> str:
     """Return a process's name: a command of `myview`, "rendering", "browser", or "measuring" (this one)."""
     if pid == os.getpid():
         return "measuring"
-    try:
-        words = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
-    except OSError:
-        return "browser"
+    words = _words(pid)
     if "server.service.rendering.worker" in words:
         return "rendering"
     if "server.cli.main" not in words:
@@ -88,3 +85,18 @@ def _name(pid: int) -> str:
 def running_pids(name: str) -> list[int]:
     """Return the ids of the descendants with this name, such as ``camera c1``."""
     return [pid for pid in sorted(_family(_running())) if _name(pid) == name]
+
+
+def children_of(pid: int, module: str) -> list[int]:
+    """Return the ids of a process's children that run a module of Python."""
+    running = _running()
+    children = [child for child, stat in running.items() if int(stat[_PARENT]) == pid]
+    return [child for child in sorted(children) if module in _words(child)]
+
+
+def _words(pid: int) -> list[str]:
+    """Return a process's command line; empty: it has exited."""
+    try:
+        return (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
+    except OSError:
+        return []

@@ -4,8 +4,9 @@
 
 Exit code 0: healthy; 1: unhealthy, with a one-line reason for the container engine. It runs every few seconds
 beside each process, so it loads little: no configuration, only environment variables of the compose files.
-``MYVIEW_HEALTH_URL`` is the best view's address, ``MYVIEW_HEALTH_CERTIFICATE`` the file of its certificate,
-and ``MYVIEW_HEALTH_TOKEN`` (a file) or ``MYVIEW_TOKEN`` the token.
+``MYVIEW_HEALTH_URL`` is the best view's address, or those of the services that replace each other, separated
+by commas; ``MYVIEW_HEALTH_CERTIFICATE`` the file of its certificate, and ``MYVIEW_HEALTH_TOKEN`` (a file) or
+``MYVIEW_TOKEN`` the token.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from pathlib import Path
 
 _URL = "http://bestview:8080"
 _SYNC_PORT, _RTSP_PORT = "7400", "8554"
-_TIMEOUT_S = 5.0
+_TIMEOUT_S = 4.0
+"""Of each service; the container engine waits 10 s."""
 
 
 class UnhealthyError(Exception):
@@ -54,7 +56,7 @@ def check_service() -> None:
     Raises:
         OSError: it does not.
     """
-    _get("/healthz")
+    _get(_services()[0], "/healthz")
 
 
 def check_gateway() -> None:
@@ -75,13 +77,23 @@ def check_gateway() -> None:
 
 
 def check_camera_frames(camera: str) -> None:
-    """Check whether a camera's frames arrive at the best view.
+    """Check whether a camera's frames arrive at the best view, at one of its services.
 
     Raises:
         UnhealthyError: they do not.
         OSError: the best view is unreachable.
     """
-    known = {camera["camera"]: camera for camera in json.loads(_get("/api/cameras"))["cameras"]}
+    *others, last = _services()
+    for service in others:
+        with contextlib.suppress(UnhealthyError, OSError, http.client.HTTPException):
+            _check_frames_at(service, camera)
+            return
+    _check_frames_at(last, camera)
+
+
+def _check_frames_at(service: str, camera: str) -> None:
+    answer = json.loads(_get(service, "/api/cameras"))
+    known = {camera["camera"]: camera for camera in answer["cameras"]}
     if camera not in known:
         raise UnhealthyError(f"the best view knows no camera {camera}, or the token is for another one")
     if known[camera]["state"] != "live" or not known[camera]["fps"] > 0:
@@ -90,8 +102,11 @@ def check_camera_frames(camera: str) -> None:
         )
 
 
-def _get(path: str) -> bytes:
-    url = os.environ.get("MYVIEW_HEALTH_URL") or _URL
+def _services() -> list[str]:
+    return [url.strip() for url in (os.environ.get("MYVIEW_HEALTH_URL") or _URL).split(",")]
+
+
+def _get(url: str, path: str) -> bytes:
     request = urllib.request.Request(url.rstrip("/") + path)  # noqa: S310 — the address is from the compose files
     token = _token()
     if token:

@@ -17,11 +17,12 @@ from fakes.paths import ROOT
 from server.config.loader import load_config
 from server.config.site_config import Config
 
-PLAIN, SECURE, SERVER, CAMERAS = (
+PLAIN, SECURE, SERVER, CAMERAS, STANDBY = (
     "docker-compose.yml",
     "docker-compose.secure.yml",
     "docker-compose.server.yml",
     "docker-compose.cameras.yml",
+    "docker-compose.standby.yml",
 )
 VARIANTS = [
     (PLAIN,),
@@ -30,6 +31,7 @@ VARIANTS = [
     (PLAIN, SECURE, SERVER),
     (PLAIN, CAMERAS),
     (PLAIN, SECURE, CAMERAS),
+    (PLAIN, STANDBY),
 ]
 SECRETS = "/run/secrets/"
 NEEDS_COMPOSE = pytest.mark.skipif(
@@ -113,7 +115,7 @@ def test_every_service_is_read_only_has_a_health_check_and_limits_its_log() -> N
         assert service["init"] is True, name
 
 
-@pytest.mark.parametrize("file", [PLAIN, SECURE, SERVER, CAMERAS])
+@pytest.mark.parametrize("file", [PLAIN, SECURE, SERVER, CAMERAS, STANDBY])
 def test_no_service_has_extra_privileges(file: str) -> None:
     for name, service in content(file)["services"].items():
         assert not {"privileged", "cap_add", "network_mode", "pid", "ipc", "userns_mode"} & set(service), name
@@ -157,6 +159,20 @@ def test_the_secure_site_trusts_no_network(monkeypatch: pytest.MonkeyPatch) -> N
         assert (config.access.tokens is not None) == (config.http.tls.key is not None) == (name == "bestview")
 
 
+def test_two_services_know_each_other_and_every_process_knows_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, standby = content(PLAIN)["services"], content(STANDBY)["services"]
+    assert set(standby) == {*plain, "bestview-1"}, "a camera that knows one service only dies with it"
+    for name, service in standby.items():
+        base = plain["bestview" if name == "bestview-1" else name]["environment"]
+        config = _config({**base, **service["environment"]}, monkeypatch)
+        assert list(config.zenoh.routers) == ["tcp/bestview:7447", "tcp/bestview-1:7447"]
+        assert config.view.share.services == 2
+        assert config.view.share.index == (name == "bestview-1")
+        services = service["environment"]["MYVIEW_HEALTH_URL"].split(",")
+        own = [f"http://{name}:8080"] if name.startswith("bestview") else []
+        assert services == (own or ["http://bestview:8080", "http://bestview-1:8080"])
+
+
 @pytest.mark.parametrize("file", [SERVER, CAMERAS])
 def test_the_documented_env_file_has_all_required_variables(file: str) -> None:
     """Else Compose commands in another shell would lack them."""
@@ -182,7 +198,7 @@ def _config(environment: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> Con
     with monkeypatch.context() as patch:
         for name, value in environment.items():
             if "__" in name:
-                patch.setenv(name, str(value))
+                patch.setenv(name, re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", str(value)))
         return load_config(ROOT / "configs" / "demo.yaml")
 
 
@@ -217,6 +233,15 @@ def test_pulses_and_bus_are_published_only_for_cameras_on_other_hosts(tmp_path: 
         ("10.0.0.5", 7400),
         ("10.0.0.5", 7447),
     }
+
+
+@NEEDS_COMPOSE
+def test_the_second_service_is_published_at_an_address_of_its_own(tmp_path: Path) -> None:
+    services = composed((PLAIN, STANDBY), tmp_path)["services"]
+    ports = [services[name]["ports"][0]["published"] for name in ("bestview", "bestview-1")]
+    assert ports == ["8080", "8081"]
+    urls = json.loads(services["c0"]["environment"]["MYVIEW_VIEW__SHARE__SERVERS"])
+    assert urls == [f"http://127.0.0.1:{port}/" for port in ports]
 
 
 @NEEDS_COMPOSE

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.common.network_hosts import CannotMakeHostsError, NetworkHosts, network_hosts
 from client import watch
-from fakes.running.network_hosts import CannotMakeHostsError, NetworkHosts, network_hosts
 from fakes.running.several_services import FPS, Watcher, configuration, several_services, watching
 from fakes.timeouts import PATIENCE
 

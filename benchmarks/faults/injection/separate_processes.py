@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,6 +18,7 @@ from benchmarks.faults.site.fault_site import (
     Fault,
     FaultSite,
     Inject,
+    ProcessExit,
     follow_events,
     terminate_process,
 )
@@ -28,23 +29,38 @@ NAMES = ("bestview", "sync", *CAMERAS)
 
 
 class SeparateProcesses:
-    """Processes that are started one by one; ``environments`` adds variables by process name."""
+    """Processes that are started one by one.
+
+    By process name ``environments`` adds variables, and ``prefixes`` the words before the command, such as
+    those that run it in a network namespace.
+    """
 
     def __init__(
-        self, config: Path, log: IO[str], environments: Mapping[str, Mapping[str, str]] | None = None
+        self,
+        config: Path,
+        log: IO[str],
+        environments: Mapping[str, Mapping[str, str]] | None = None,
+        prefixes: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         self._config, self._log, self._environments = config, log, environments or {}
+        self._prefixes = prefixes or {}
         self.processes: dict[str, asyncio.subprocess.Process] = {}
 
     async def start(self, name: str) -> None:
-        """Start a process."""
-        words = ["camera", str(self._config), name] if name in CAMERAS else [name, str(self._config)]
+        """Start a process; ``bestview-1`` is one of several best-view services."""
+        command = name.partition("-")[0]
+        words = ["camera", str(self._config), name] if name in CAMERAS else [command, str(self._config)]
         self.processes[name] = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "server.cli.main", *words),
+            *(*self._prefixes.get(name, ()), sys.executable, "-m", "server.cli.main", *words),
             env={**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **self._environments.get(name, {})},
             stdout=self._log,
             stderr=self._log,
         )
+
+    async def terminate(self) -> list[ProcessExit]:
+        """Terminate all processes."""
+        running = {name: process for name, process in self.processes.items() if process.returncode is None}
+        return await asyncio.gather(*(terminate_process(*process) for process in running.items()))
 
 
 def write_config(
@@ -89,13 +105,7 @@ async def run_separately(
             async with follow_events(fault_site):
                 yield fault_site
         finally:
-            fault_site.exits += await asyncio.gather(
-                *(
-                    terminate_process(name, process)
-                    for name, process in control.processes.items()
-                    if process.returncode is None
-                )
-            )
+            fault_site.exits += await control.terminate()
 
 
 def restart_processes(*processes: str) -> Inject:

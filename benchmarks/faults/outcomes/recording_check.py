@@ -13,6 +13,7 @@ from benchmarks.faults.outcomes.fault_run import FaultOutcome
 from benchmarks.faults.video.stamped_views import FPS, FRAMES, read_stamp
 from benchmarks.faults.viewing.live_pictures import LiveFrameOrder, find_differences
 from benchmarks.faults.viewing.viewers import EventLog
+from client import Gop
 
 _MIN_RESUMED_GOPS = 5
 """GOPs at the end of a fault that must be recorded in any case."""
@@ -61,13 +62,29 @@ def _read(path: Path, live: Collection[str]) -> RecordedFile:
     return RecordedFile(camera, int(path.stem), frames, plays)
 
 
+def recorded_frames(files: Sequence[RecordedFile]) -> dict[str, dict[int, int]]:
+    """Return by camera the recorded frame of each pulse."""
+    recorded: dict[str, dict[int, int]] = {}
+    for file in files:
+        recorded.setdefault(file.camera, {}).update(file.frames)
+    return recorded
+
+
+def unrecorded(shown: Sequence[Gop], recorded: Mapping[str, Mapping[int, int]]) -> list[int]:
+    """Return the first pulses of the GOPs of which a shown camera was not recorded, once for each camera."""
+    return [
+        gop.first
+        for gop in shown
+        for camera in sorted({camera for camera in gop.choices.values() if camera})
+        if not recorded.get(camera, {}).keys() >= set(range(gop.first, gop.first + gop.frames))
+    ]
+
+
 def add_recording_results(
     outcomes: Sequence[FaultOutcome], events: EventLog, files: Sequence[RecordedFile]
 ) -> None:
     """Add to each outcome its lost GOPs, broken files, and mismatches of a network camera."""
-    recorded: dict[str, dict[int, int]] = {}
-    for file in files:
-        recorded.setdefault(file.camera, {}).update(file.frames)
+    recorded = recorded_frames(files)
     for number, outcome in enumerate(outcomes):
         outcome.mismatches = [
             note
@@ -79,12 +96,7 @@ def add_recording_results(
         shown = [gop for _, gop in events.gops[first:end]]
         if not shown:
             continue
-        missing = [
-            gop.first
-            for gop in shown
-            for camera in sorted({camera for camera in gop.choices.values() if camera})
-            if not recorded.get(camera, {}).keys() >= set(range(gop.first, gop.first + gop.frames))
-        ]
+        missing = unrecorded(shown, recorded)
         outcome.lost = len(missing)
         if (
             outcome.fault.stops_recording

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,8 @@ _TOPS, _WIDTHS = np.random.default_rng(1).permuted(np.tile(np.arange(FRAMES), (2
 _DARK, _BRIGHT, _MIDDLE = 40, 215, 128
 _MIN_VISIBLE = 0.3
 """Visible share of a person from which they are detected."""
+_MIN_OVERLAP = 0.5
+"""Intersection over union of a tracked box and a person's from which it shows them."""
 _TIME_BASE = Fraction(1, 90_000)
 
 
@@ -60,11 +62,30 @@ class StampedViews:
     ground: Path | None
     found: Mapping[tuple[str, int, int, int, int], int]
     """The frame in which a box was detected, by camera and left, top, right, bottom in thousandths."""
+    people: Mapping[tuple[str, int], Mapping[int, tuple[float, ...]]] = field(default_factory=dict)
+    """The boxes (left, top, right, bottom) of the scene's people, by camera and frame, then by person."""
 
     def frame_of(self, camera: str, box: Box) -> int | None:
         """Return the frame in which a box was detected; None: it is interpolated."""
         sides = (round(1000 * side) for side in (box.left, box.top, box.right, box.bottom))
         return self.found.get((camera, *sides))  # type: ignore[arg-type]
+
+    def person_of(self, camera: str, pulse: int, box: Box) -> int | None:
+        """Return the person of the scene whom a box shows at a pulse; None: nobody."""
+        sides = (box.left, box.top, box.right, box.bottom)
+        people = self.people.get((camera, pulse % FRAMES), {})
+        overlaps = {person: _overlap(sides, truth) for person, truth in people.items()}
+        best = max(overlaps, key=overlaps.__getitem__, default=None)
+        return best if best is not None and overlaps[best] >= _MIN_OVERLAP else None
+
+
+def _overlap(one: Sequence[float], other: Sequence[float]) -> float:
+    """Return the intersection over union of two boxes: left, top, right, bottom."""
+    width = min(one[2], other[2]) - max(one[0], other[0])
+    height = min(one[3], other[3]) - max(one[1], other[1])
+    shared = max(0.0, width) * max(0.0, height)
+    areas = ((box[2] - box[0]) * (box[3] - box[1]) for box in (one, other))
+    return shared / (sum(areas) - shared)
 
 
 def stamp_picture(image: NDArray[np.uint8], camera: int, frame: int) -> NDArray[np.uint8]:
@@ -96,21 +117,28 @@ def make(folder: Path, pulses: int) -> StampedViews:
     places = _places()
     truths = {place: scene.truth(place) for place in sorted(set(places))}
     cameras, found = [], {}
+    people: dict[tuple[str, int], dict[int, tuple[float, ...]]] = {}
     for number, name in enumerate(CAMERAS):
         drawn = {place: scene.image(number, place) for place in truths}
         pictures = [stamp_picture(drawn[place], number, frame) for frame, place in enumerate(places)]
         write_film(pictures, folder / f"{name}.mp4")
-        boxes = [_boxes(truths[place][number]) for place in places]
+        detected = [_detect(truths[place][number]) for place in places]
+        boxes = [np.array(list(some.values())).reshape(-1, 4) for some in detected]
         _write_detections(boxes, pulses, folder / f"{name}.txt")
         for frame, some in enumerate(boxes):
             found.update(dict.fromkeys(((name, *sides) for sides in _sides(some, frame)), frame))
-        source, detected = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
-        cameras.append({"id": name, "source": source, "at_end": "loop", "detections": detected})
+        for frame, sizes in enumerate(detected):
+            people[name, frame] = {
+                person: (left, top, left + width, top + height)
+                for person, (left, top, width, height) in sizes.items()
+            }
+        source, file = str(folder / f"{name}.mp4"), str(folder / f"{name}.txt")
+        cameras.append({"id": name, "source": source, "at_end": "loop", "detections": file})
     floors = {name: scene.homography(number) for number, name in enumerate(CAMERAS)}
     ground = {name: floor.tolist() for name, floor in floors.items() if floor is not None}
     (folder / "ground.json").write_text(json.dumps({"unit": "m", "homography": ground}), encoding="ascii")
     site = {"name": "faults", "fps": FPS, "width": WIDTH, "height": HEIGHT}
-    return StampedViews(cameras, site, folder / "ground.json", found)
+    return StampedViews(cameras, site, folder / "ground.json", found, people)
 
 
 def shrink_other_detections(views: StampedViews, folder: Path, best: str, pulses: int) -> StampedViews:
@@ -170,12 +198,14 @@ def _places() -> list[int]:
     return [both[frame % len(both)] for frame in range(FRAMES)]
 
 
-def _boxes(truth: Any) -> NDArray[np.float64]:
-    """Return the whole and visible boxes ``(N, 4)``: left, top, width, height in whole pixels."""
-    boxes = np.floor(truth.boxes[truth.visibility >= _MIN_VISIBLE]).reshape(-1, 4)
+def _detect(truth: Any) -> dict[int, tuple[float, ...]]:
+    """Return by person the whole and visible boxes: left, top, width, height in whole pixels."""
+    boxes = np.floor(truth.boxes).reshape(-1, 4)
     inside = (boxes[:, :2] >= 1).all(axis=1) & (boxes[:, 2] < WIDTH - 1) & (boxes[:, 3] < HEIGHT - 1)
-    kept = boxes[inside]
-    return np.hstack([kept[:, :2], kept[:, 2:] - kept[:, :2]])
+    detected = inside & (truth.visibility >= _MIN_VISIBLE)
+    kept = boxes[detected]
+    sizes = np.hstack([kept[:, :2], kept[:, 2:] - kept[:, :2]])
+    return dict(zip(truth.ids[detected].tolist(), map(tuple, sizes.tolist()), strict=True))
 
 
 def _write_detections(boxes: Sequence[NDArray[np.float64]], pulses: int, path: Path) -> None:

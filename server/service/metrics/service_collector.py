@@ -54,6 +54,7 @@ class ServiceCollector(Collector):
         yield from self._queues()
         yield from self._flags()
         yield from self._recording()
+        yield from self._replication()
 
     def _queues(self) -> Iterable[Metric]:
         pipeline, writer = self._pipeline, self._pipeline.recorder.writer
@@ -98,6 +99,17 @@ class ServiceCollector(Collector):
             "myview_unrecorded_gops",
             "GOPs that could not be recorded.",
             value=writer.lost if writer else 0,
+        )
+
+    def _replication(self) -> Iterable[Metric]:
+        replication = self._pipeline.replication
+        yield GaugeMetricFamily(
+            "myview_leads", "The site's other services follow this one.", value=float(replication.leads)
+        )
+        yield CounterMetricFamily(
+            "myview_followed_records",
+            "Records of the leading service whose numbers replaced this one's.",
+            value=replication.followed,
         )
 
 

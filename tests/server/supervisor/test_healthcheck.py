@@ -135,6 +135,18 @@ def test_a_camera_is_healthy_when_its_frames_arrive(
         assert capsys.readouterr().out.count("\n") == 1
 
 
+def test_a_camera_is_healthy_while_one_of_two_services_receives_its_frames(
+    http_service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running, dead = f"http://127.0.0.1:{http_service.server_port}", f"http://127.0.0.1:{free_port()}"
+    for services in (f"{running},{dead}", f"{dead}, {running}"):
+        monkeypatch.setenv("MYVIEW_HEALTH_URL", services)
+        assert main(["camera", "c0"]) == 0
+    assert main(["bestview"]) == 1, "the first one is the service's own"
+    http_service.cameras = [{**LIVE, "state": "gone"}]
+    assert main(["camera", "c0"]) == 1
+
+
 @pytest.mark.usefixtures("http_service")
 def test_no_proxy_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("http_proxy", f"http://127.0.0.1:{free_port()}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 import msgspec
 import pytest
+from prometheus_client import CollectorRegistry
 
 from fakes.service.scripted_cameras import (
     CAMERAS,
@@ -21,6 +22,7 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.messaging.service_record import ServiceRecord, ServiceState
+from server.service.metrics.service_collector import ServiceCollector
 from server.service.replication.service_replication import LEASE_S
 
 A, B = CAMERAS
@@ -179,6 +181,12 @@ async def test_the_service_that_has_decided_every_epoch_for_longest_leads(servic
     assert [services.running[index].replication.leads for index in (0, 1)] == [False, True]
     services.stop(1)
     assert services.running[0].replication.leads
+    metrics = CollectorRegistry()
+    metrics.register(ServiceCollector(services.running[0], {}))
+    assert metrics.get_sample_value("myview_leads") == 1
+    assert (
+        metrics.get_sample_value("myview_followed_records_total") == services.running[0].replication.followed
+    )
 
 
 async def test_a_silent_service_does_not_lead_for_longer_than_its_lease(services: Services) -> None:

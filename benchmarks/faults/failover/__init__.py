@@ -1,0 +1,1 @@
+"""Failover between two best-view services of a site, measured against the promises."""
