@@ -158,16 +158,16 @@ class OnlineTracker:
     def _assign(self, first: int, frames: Sequence[Detections]) -> tuple[npt.NDArray[np.int64], SolveReport]:
         """Solve the window for all objects; return states `(n, F)`, -1 where occluded."""
         states = np.full((len(self._objects), len(frames)), OCCLUDED, dtype=np.int64)
-        allowed = [self._gated_detections(item, first, frames) for item in self._objects]
+        allowed = self._gated_detections(first, frames)
         # An object without any gated detection is occluded throughout and need not enter the program.
-        inside = [n for n, places in enumerate(allowed) if any(place.any() for place in places)]
+        inside = np.flatnonzero(allowed.any(axis=(1, 2))).tolist()
         if not inside:
             report = SolveReport(self._solver.name, 0.0, 0.0, integral=True, conflicts=0, rounds=0)
             return states, report
         templates = [self._objects[n].template(first) for n in inside]
         ids = [template.id for template in templates]
         network = restrict_network(
-            build_network(templates, frames, self._costs, self._center), [allowed[n] for n in inside]
+            build_network(templates, frames, self._costs, self._center), allowed[inside]
         )
         network = self._adjust_costs(network, first, ids)
         solution = self._solver.solve(
@@ -177,15 +177,12 @@ class OnlineTracker:
         states[inside] = solution.states
         return states, solution.report
 
-    def _gated_detections(
-        self, item: TrackedObject, first: int, frames: Sequence[Detections]
-    ) -> list[npt.NDArray[np.bool_]]:
-        """Return which detections of each frame the object can be, `(K_m,)` bool; empty: none at all."""
-        if item.frames_occluded(first - 1) > self._window.reidentify_after:
-            return []
-        return [
-            gate_detections(item, first + m, detections, self._window) for m, detections in enumerate(frames)
-        ]
+    def _gated_detections(self, first: int, frames: Sequence[Detections]) -> npt.NDArray[np.bool_]:
+        """Return which detections of each frame each object can be, `(n, M, K)`."""
+        allowed = gate_detections(self._objects, first, frames, self._window)
+        lost = [item.frames_occluded(first - 1) > self._window.reidentify_after for item in self._objects]
+        allowed[lost] = False
+        return allowed
 
     def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002
         """Return the network to solve for the objects `ids`; subclasses override it to change costs."""

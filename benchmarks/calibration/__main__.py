@@ -44,6 +44,7 @@ _ROOM_S, _ROOM_SIZE, _ROOM_FPS = 60.0, (640, 360), 25.0
 _FRAME_OFFSETS = {"c1": 7, "c2": -4}
 """Frames by which the room's cameras are desynchronized."""
 _AUDITORIUM = ("HC3", "HC4", "IP2", "IP5")
+_AUDITORIUM_FPS = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,9 +177,10 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
     )
     tracks.mkdir()
     for camera in _AUDITORIUM:
-        recording = Recording(camera, source / "det" / f"{camera}.txt.gz", source / "gt" / f"{camera}.txt.gz")
+        detected, truth = (source / kind / f"{camera}.txt.gz" for kind in ("det", "gt"))
+        recording = Recording(camera, detected, truth, _AUDITORIUM_FPS)
         write_rows(tracks / f"{camera}.txt", track(recording))
-    walked = walks_from_tracks([tracks], VideoFormat(size, 30.0))
+    walked = walks_from_tracks([tracks], VideoFormat(size, _AUDITORIUM_FPS))
     found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON_M)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"

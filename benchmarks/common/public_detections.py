@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from benchmarks.common.environment import CannotRunError
-from server.cli.track.command import track_one
+from server.cli.track.command import config_for_video, detect_frames, newly_final_rows
+from server.config.site_config import Config
+from tracking import Detections, OnlineTracker
+from tracking.detectors import MotFileDetector
 from tracking.evaluation import Scores, evaluate
 from tracking.motchallenge import MotRow, read_rows
+
+_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 TrackSettings = Mapping[str, Mapping[str, Any]]
 """Keys of the configuration section `track` that differ from the defaults."""
@@ -21,11 +27,16 @@ TrackSettings = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One camera's detections and ground truth."""
+    """One camera's detections and ground truth.
+
+    Attributes:
+        fps: frames per second, at which it was recorded; a video's file can say otherwise.
+    """
 
     name: str
     detections: Path
     truth: Path
+    fps: float
     video: Path | None = None
 
     def score(self, tracks: list[MotRow]) -> Scores:
@@ -41,11 +52,11 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
     """
     campus, pets, auditorium = data / "mot15" / "TUD-Campus", data / "pets09", data / "auditorium"
     candidates = [
-        Recording("TUD-Campus", campus / "det.txt", campus / "gt.txt"),
-        Recording("pets09", pets / "det" / "view1.txt", pets / "gt" / "view1.txt", pets / "view1.mp4"),
+        Recording("TUD-Campus", campus / "det.txt", campus / "gt.txt", 25.0),
+        Recording("pets09", pets / "det" / "view1.txt", pets / "gt" / "view1.txt", 7.0, pets / "view1.mp4"),
         *(
-            Recording(camera, auditorium / "det" / f"{camera}.txt.gz", auditorium / "gt" / f"{camera}.txt.gz")
-            for camera in ("HC3", "HC4", "IP2", "IP5")
+            Recording(name, auditorium / "det" / f"{name}.txt.gz", auditorium / "gt" / f"{name}.txt.gz", 30.0)
+            for name in ("HC3", "HC4", "IP2", "IP5")
         ),
     ]
     found = [
@@ -59,19 +70,42 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
     return found
 
 
-def track(
+def configured(
     recording: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
-) -> list[MotRow]:
-    """Return MyView's tracks, as `myview track --det` writes them.
-
-    With `pictures`, appearance is computed from the video; without, tracking uses boxes and confidences only.
-    """
+) -> Config:
+    """Return the configuration that `myview track --det` uses, with other settings of the section `track`."""
     with tempfile.TemporaryDirectory() as folder:
-        out, config = Path(folder) / "tracks.txt", Path(folder) / "settings.yaml"
-        config.write_text(
+        path = Path(folder) / "settings.yaml"
+        path.write_text(
             yaml.safe_dump({"track": {key: dict(section) for key, section in (settings or {}).items()}}),
             encoding="utf-8",
         )
-        video = recording.video if pictures else None
-        track_one(video, recording.detections, out, config, None, lambda _: None)
-        return read_rows(out)
+        return config_for_video(recording.video if pictures else None, recording.detections, path)
+
+
+def detections(recording: Recording, config: Config, *, pictures: bool = False) -> Iterator[Detections]:
+    """Yield the detections of all frames, with the histograms of its pictures or without."""
+    if pictures:
+        yield from (frame.detections for frame in detect_frames(config))
+        return
+    detector = MotFileDetector(recording.detections)
+    for number in range(detector.last_frame + 1):
+        yield detector.detect(_NO_PICTURE, number)
+
+
+def track(
+    recording: Recording, settings: TrackSettings | None = None, *, pictures: bool = False
+) -> list[MotRow]:
+    """Return MyView's tracks, as `myview track --det` writes them at the recording's true frame rate.
+
+    With `pictures`, appearance is computed from the video; without, tracking uses boxes and confidences only.
+    """
+    config = configured(recording, settings, pictures=pictures)
+    solver = config.track.create_solver(recording.fps)
+    center = (config.site.width / 2.0, config.site.height / 2.0) if pictures else None
+    tracker = OnlineTracker(config.track.window, config.track.costs, solver, recording.fps, center)
+    rows: list[MotRow] = []
+    for number, seen in enumerate(detections(recording, config, pictures=pictures)):
+        rows += newly_final_rows(tracker.push(number, seen))
+    rows += newly_final_rows(tracker.flush())
+    return rows

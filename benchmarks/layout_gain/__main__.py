@@ -17,49 +17,39 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common.environment import CannotRunError, finish, parser
-from benchmarks.common.public_detections import Recording, find_recordings
+from benchmarks.common.public_detections import Recording, configured, detections, find_recordings
 from benchmarks.common.report import Report
 from benchmarks.layout_gain.companions import CompanionSettings, CompanionTracker
 from benchmarks.layout_gain.true_positions import TruePositionTracker, true_boxes, true_companions
-from server.cli.track.command import config_for_video, detect_frames, newly_final_rows
-from tracking import Detections, OnlineTracker, create_solver
-from tracking.detectors import MotFileDetector
+from server.cli.track.command import newly_final_rows
+from tracking import Detections, OnlineTracker
 from tracking.motchallenge import MotRow, read_rows
-from tracking.solvers import DEFAULT_SOLVER
 
 _DROPPED = 0.03
-_TRUE_FPS = {"pets09": 7.0}
-"""Where a file says another frame rate than it was recorded at."""
 _WEIGHTS = (0.1, 0.3)
-_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
 Tracker = Callable[..., OnlineTracker]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedRecording:
-    """A recording's detections, with histograms if it has pictures, and its frames per second."""
+    """A recording's detections, with histograms if it has pictures."""
 
     recording: Recording
     name: str
     frames: Sequence[Detections]
-    fps: float
 
     @classmethod
     def of(cls, recording: Recording, *, pictures: bool) -> DetectedRecording:
         """Read the detections, with pictures or without."""
-        config = config_for_video(recording.video if pictures else None, recording.detections, None)
-        if pictures:
-            frames = [frame.detections for frame in detect_frames(config)]
-            return cls(recording, f"{recording.name}, pictures", frames, config.site.fps)
-        detector = MotFileDetector(recording.detections)
-        frames = [detector.detect(_NO_PICTURE, number) for number in range(detector.last_frame + 1)]
-        return cls(recording, recording.name, frames, config.site.fps)
+        name = f"{recording.name}, pictures" if pictures else recording.name
+        config = configured(recording, pictures=pictures)
+        return cls(recording, name, list(detections(recording, config, pictures=pictures)))
 
     def ways(self) -> dict[str, Tracker]:
         """Return the trackers by name; the first one is the default."""
         people = true_boxes(read_rows(self.recording.truth))
-        together = true_companions(people, _TRUE_FPS.get(self.recording.name, self.fps))
+        together = true_companions(people, self.recording.fps)
         terms = {f"companions by tracks, {weight:g}": CompanionSettings(weight) for weight in _WEIGHTS}
         return {
             "default": OnlineTracker,
@@ -75,9 +65,8 @@ class DetectedRecording:
 
     def idf1(self, tracker: Tracker, seed: int) -> float:
         """Track with these detections, of which every seed but 0 drops some; return IDF1, per cent."""
-        track = config_for_video(None, self.recording.detections, None).track
-        solver = create_solver(DEFAULT_SOLVER, track.solver_budget(self.fps))
-        online = tracker(track.window, track.costs, solver, self.fps)
+        track, fps = configured(self.recording).track, self.recording.fps
+        online = tracker(track.window, track.costs, track.create_solver(fps), fps)
         rng, rows = np.random.default_rng(seed), list[MotRow]()
         for number, seen in enumerate(self.frames):
             kept = rng.random(len(seen)) >= _DROPPED if seed else np.ones(len(seen), dtype=np.bool_)

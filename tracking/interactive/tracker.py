@@ -222,19 +222,17 @@ class CorrectableTracker(OnlineTracker):
             )
         return states, report
 
-    def _gated_detections(
-        self, item: TrackedObject, first: int, frames: Sequence[Detections]
-    ) -> list[npt.NDArray[np.bool_]]:
-        allowed = super()._gated_detections(item, first, frames)
-        for m, detections in enumerate(frames):
-            correction = self._corrections.get(first + m, {}).get(item.id)
-            if correction is not None:
-                # The gate does not apply to the corrected point.
-                allowed = allowed or [np.zeros(len(frame), dtype=np.bool_) for frame in frames]
-                allowed[m] = allowed[m] | near_correction(correction, detections.boxes)
-            for number, index in self._memory.inserted.get(first + m, {}).items():
-                if allowed and number != item.id:
-                    allowed[m][index] = False
+    def _gated_detections(self, first: int, frames: Sequence[Detections]) -> npt.NDArray[np.bool_]:
+        allowed = super()._gated_detections(first, frames)
+        for n, item in enumerate(self._objects):
+            for m, detections in enumerate(frames):
+                correction = self._corrections.get(first + m, {}).get(item.id)
+                if correction is not None:
+                    # The gate does not apply to the corrected point.
+                    allowed[n, m, : len(detections)] |= near_correction(correction, detections.boxes)
+                for number, index in self._memory.inserted.get(first + m, {}).items():
+                    if number != item.id:
+                        allowed[n, m, index] = False
         return allowed
 
     def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats, iou
-from tracking.lifecycle.gating import restrict_network, within_gate
+from tracking.lifecycle.gating import gate_detections, restrict_network, within_gate
 from tracking.model.network import CostSettings, build_network
-from tracking.model.object_state import Template, mean_histogram
+from tracking.model.object_state import Template, TrackedObject, mean_histogram
 from tracking.solvers.base import OCCLUDED, Solver
 from tracking.types import Detections
 from tracking.window import ResolvedWindowSettings
@@ -116,12 +116,10 @@ class _BirthTest:
 
     def promising(self, frames: Sequence[Detections], last: int, seed: int) -> bool:
         """Return whether enough frames have a detection near the seed; a cheap test before solving."""
-        box = frames[last].boxes[seed]
-        hits = sum(
-            bool(within_gate(box, detections.boxes, abs(last - m), self.window).any())
-            for m, detections in enumerate(frames)
-        )
-        return hits >= _required_frames(self.window)
+        numbers = np.repeat(np.arange(len(frames)), [len(detections) for detections in frames])
+        boxes = np.concatenate([detections.boxes for detections in frames])
+        near = within_gate(frames[last].boxes[seed], boxes, np.abs(last - numbers), self.window)
+        return len(np.unique(numbers[near])) >= _required_frames(self.window)
 
     def run(self, frames: Sequence[Detections], last: int, seed: int) -> npt.NDArray[np.int64] | None:
         """Track backward from the seed, then forward from the end of that track; `None` unless they agree."""
@@ -148,10 +146,8 @@ class _BirthTest:
         box, histogram = frames[0].boxes[seed], frames[0].histograms[seed]
         later = list(frames[1:])
         network = build_network([Template(0, histogram, box)], later, self.costs)
-        allowed = [
-            within_gate(box, detections.boxes, m + 1, self.window) for m, detections in enumerate(later)
-        ]
-        solution = self.solver.solve(restrict_network(network, [allowed]))
+        allowed = gate_detections([TrackedObject(0, histogram, box, 0)], 1, later, self.window)
+        solution = self.solver.solve(restrict_network(network, allowed))
         found[1:] = solution.states[0]
         occluded = np.count_nonzero(found == OCCLUDED)
         # The cost of the visible frames: the path's cost minus that of occluded frames and of the sink.

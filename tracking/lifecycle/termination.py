@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from tracking.boxes import Floats, areas, intersections, iou
 from tracking.model.object_state import TrackedObject
+
+Bools = npt.NDArray[np.bool_]
 
 # Least frames in which both tracks are visible: crossings are shorter.
 _MIN_COMMON_FRAMES = 5
@@ -24,25 +27,27 @@ def duplicate_ids(ids: Sequence[int], boxes: Sequence[Floats], duplicate_overlap
         duplicate_overlap: mean IoU from which two tracks are duplicates; of the intersection over the smaller
             box a slightly larger mean is required.
     """
-    ended: list[int] = []
-    for younger in range(len(ids) - 1, 0, -1):
-        for older in range(younger):
-            if ids[older] not in ended and _is_duplicate(boxes[older], boxes[younger], duplicate_overlap):
-                ended.append(ids[younger])
-                break
-    return sorted(ended)
+    if not ids:
+        return []
+    tracks = np.stack(boxes)
+    visible = ~np.isnan(tracks[:, :, 0])
+    tracks[~visible] = 0.0
+    return [
+        number
+        for n, number in enumerate(ids)
+        if _is_duplicate(tracks[:n], visible[:n], tracks[n], visible[n], duplicate_overlap)
+    ]
 
 
-def _is_duplicate(older: Floats, younger: Floats, overlap: float) -> bool:
-    visible = ~np.isnan(younger[:, 0])
-    both = visible & ~np.isnan(older[:, 0])
-    common = np.count_nonzero(both)
-    if common < max(_MIN_COMMON_FRAMES, _MIN_COMMON_SHARE * np.count_nonzero(visible)):
-        return False
-    first, second = older[both], younger[both]
-    smaller = np.maximum(np.minimum(areas(first), areas(second)), 1.0)
-    inside = float(np.mean(intersections(first, second) / smaller))
-    return float(np.mean(iou(first, second))) >= overlap or inside >= (1.0 + overlap) / 2.0 + 0.1
+def _is_duplicate(older: Floats, seen: Bools, younger: Floats, visible: Bools, overlap: float) -> bool:
+    """Return whether a track `(F, 4)` duplicates one of `older` `(T, F, 4)`; boxes are 0 where hidden."""
+    common = (seen & visible).sum(axis=1)
+    candidates = common >= max(_MIN_COMMON_FRAMES, _MIN_COMMON_SHARE * np.count_nonzero(visible))
+    older, common = older[candidates], common[candidates]
+    smaller = np.maximum(np.minimum(areas(older), areas(younger)), 1.0)
+    inside = (intersections(older, younger) / smaller).sum(axis=1) / common
+    shared = iou(older, younger).sum(axis=1) / common
+    return bool(((shared >= overlap) | (inside >= (1.0 + overlap) / 2.0 + 0.1)).any())
 
 
 _MIN_VISIBLE_FRAMES = 3
