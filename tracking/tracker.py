@@ -179,9 +179,11 @@ class OnlineTracker:
 
     def _gated_detections(self, first: int, frames: Sequence[Detections]) -> npt.NDArray[np.bool_]:
         """Return which detections of each frame each object can be, `(n, M, K)`."""
-        allowed = gate_detections(self._objects, first, frames, self._window)
-        lost = [item.frames_occluded(first - 1) > self._window.reidentify_after for item in self._objects]
-        allowed[lost] = False
+        near = [item.frames_occluded(first - 1) <= self._window.reidentify_after for item in self._objects]
+        kept = np.flatnonzero(near)
+        among = gate_detections([self._objects[n] for n in kept], first, frames, self._window)
+        allowed = np.zeros((len(near), *among.shape[1:]), dtype=np.bool_)
+        allowed[kept] = among
         return allowed
 
     def _adjust_costs(self, network: Network, first: int, ids: list[int]) -> Network:  # noqa: ARG002

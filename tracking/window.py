@@ -40,7 +40,7 @@ class WindowSettings:
     birth_max_iou: float = 0.35  # overlap (IoU) with a track above which a detection starts no new one
     duplicate_overlap: float = 0.8  # mean overlap of two tracks above which they are duplicates
     forget_after_s: float = 60.0  # F: seconds occluded after which an object is dropped, its id retired
-    max_objects: int = 24  # most objects kept; the longest occluded one is dropped first
+    max_objects: int = 100  # most objects kept; the longest occluded one is dropped first
     template_memory_s: float = (
         0.8  # seconds of detections over which an object's template is averaged; inf: all
     )

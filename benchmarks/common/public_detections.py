@@ -30,11 +30,12 @@ class Recording:
     """One camera's detections and ground truth.
 
     Attributes:
+        detections: public ones; None: those of MyView's own detector in the video.
         fps: frames per second, at which it was recorded; a video's file can say otherwise.
     """
 
     name: str
-    detections: Path
+    detections: Path | None
     truth: Path
     fps: float
     video: Path | None = None
@@ -60,13 +61,32 @@ def find_recordings(data: Path, names: list[str] | None = None) -> list[Recordin
         ),
     ]
     found = [
-        recording for recording in candidates if recording.detections.is_file() and recording.truth.is_file()
+        recording
+        for recording in candidates
+        if recording.detections and recording.detections.is_file() and recording.truth.is_file()
     ]
     if names:
         found = [recording for recording in found if recording.name in names]
     if not found:
         missing = ", ".join(names or [recording.name for recording in candidates])
         raise CannotRunError(f"needs detections and ground truth ({missing}) in {data}")
+    return found
+
+
+def find_development_recordings(data: Path) -> list[Recording]:
+    """Return recordings for choosing settings, which no result is reported on.
+
+    Raises:
+        CannotRunError: there are none.
+    """
+    views = [(folder, view) for folder in ("terrace", "terrace2") for view in ("c0", "c1")]
+    found = [
+        Recording(f"{folder} {view}", None, data / folder / "gt" / f"{view}.txt", 25.0, video)
+        for folder, view in views
+        if (video := data / folder / f"{view}.mp4").is_file()
+    ]
+    if not found:
+        raise CannotRunError(f"needs terrace in {data}; --data or MYVIEW_TEST_DATA give the folder")
     return found
 
 
@@ -85,7 +105,7 @@ def configured(
 
 def detections(recording: Recording, config: Config, *, pictures: bool = False) -> Iterator[Detections]:
     """Yield the detections of all frames, with the histograms of its pictures or without."""
-    if pictures:
+    if pictures or recording.detections is None:
         yield from (frame.detections for frame in detect_frames(config))
         return
     detector = MotFileDetector(recording.detections)
@@ -108,4 +128,4 @@ def track(
     for number, seen in enumerate(detections(recording, config, pictures=pictures)):
         rows += newly_final_rows(tracker.push(number, seen))
     rows += newly_final_rows(tracker.flush())
-    return rows
+    return sorted(rows, key=lambda row: (row.frame, row.id))

@@ -35,12 +35,16 @@ from benchmarks.solvers.time_growth import (
     plot_table1,
     table1,
 )
+from benchmarks.solvers.tracked_crowd import track_crowd
 from tracking.solvers import SolverBudget
 
 BUDGETS = (0.07, 0.25, 1.0)
 """Seconds of work; the first is that of a window of the live tracker."""
 
 LIVE = (WindowSize(8, 16, 15), WindowSize(10, 40, 15), WindowSize(20, 40, 15), WindowSize(60, 60, 15))
+
+CROWDS, CROWD_S = (WindowSize(20, 40), WindowSize(60, 60)), 4.0
+"""Crowds that the live tracker tracks, and for how many seconds; a window is 15 frames."""
 
 
 def named(case: WindowCase) -> list[str]:
@@ -103,6 +107,21 @@ def live_row(size: WindowSize, steps: int, *, warm: bool) -> list[str]:
     ]
 
 
+def crowd_row(size: WindowSize, seconds: float, seed: int) -> list[str]:
+    """Return a row: the windows of the live tracker, with everything that they do."""
+    found = track_crowd(size, seconds, seed)
+    times = [np.percentile(1e3 * found.windows, share) for share in (50, 95, 100)]
+    return [
+        f"{size.objects}",
+        f"{size.places}",
+        f"{found.objects.mean():.0f}",
+        *(f"{value:.0f}" for value in times),
+        f"{1e3 * np.percentile(found.solves, 95):.0f}",
+        f"{100 * found.stopped.mean():.0f}",
+        f"{100 * found.gaps.max():.2f}",
+    ]
+
+
 def run(options: argparse.Namespace) -> None:
     """Print the tables and draw the plots."""
     report = Report()
@@ -116,6 +135,11 @@ def run(options: argparse.Namespace) -> None:
         "Live: building and solving the network at every frame, gated; cold, or warm-started; ms",
         ["solver", "n", "K", "M", "median", "p95", "max", "no program, %", "rounds"],
         [live_row(size, options.steps, warm=warm) for size in LIVE for warm in (False, True)],
+    )
+    report.table(
+        "The live tracker in a crowd, HD, default settings and budget: windows and solves, ms",
+        ["n", "K", "tracked", "median", "p95", "max", "solve p95", "stopped, %", "largest gap, %"],
+        [crowd_row(size, CROWD_S, seed) for size in CROWDS for seed in range(options.seeds)],
     )
     report.table(
         "The integer optimum, and the largest gaps of columns' solution and bound, %; M = 20; ms",

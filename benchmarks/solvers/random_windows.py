@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracking.boxes import Floats
 from tracking.model.network import CostSettings, Network, Template, build_network
 from tracking.types import Detections
 
 BINS = 64
 PERSON = np.array([40.0, 100.0])
-CIF, VGA = np.array([352.0, 288.0]), np.array([640.0, 480.0])
+CIF, VGA, HD = np.array([352.0, 288.0]), np.array([640.0, 480.0]), np.array([1920.0, 1080.0])
 SEEN, COVERED = 0.9, 0.4
 """Share of people who are detected, and the distance in sizes of a person within which one covers another."""
 
@@ -41,13 +42,13 @@ def random_window(size: WindowSize, settings: CostSettings, seed: int) -> Networ
 
 
 class Walkers:
-    """Walking people among false positives, some of which resemble one of them."""
+    """Walking people in a picture `(2,)` pixels large, among false positives, some of which resemble one."""
 
-    def __init__(self, size: WindowSize, seed: int) -> None:
-        self._size = size
+    def __init__(self, size: WindowSize, seed: int, picture: Floats = VGA) -> None:
+        self._size, self._picture = size, picture
         self._rng = np.random.default_rng(seed)
         self.looks = self._rng.dirichlet(np.full(BINS, 0.5), size.objects)
-        self.corners = self._rng.uniform(0.0, VGA, (size.objects, 2))
+        self.corners = self._rng.uniform(0.0, picture, (size.objects, 2))
         self._speed = self._rng.normal(0.0, 3.0, (size.objects, 2))
 
     def templates(self) -> list[Template]:
@@ -75,7 +76,7 @@ class Walkers:
         rng, size = self._rng, self._size
         self._speed += rng.normal(0.0, 0.5, self._speed.shape)
         self._speed = np.clip(self._speed, -6.0, 6.0)
-        out = ((self.corners < 0) & (self._speed < 0)) | ((self.corners > VGA) & (self._speed > 0))
+        out = ((self.corners < 0) & (self._speed < 0)) | ((self.corners > self._picture) & (self._speed > 0))
         self._speed[out] *= -1.0
         self.corners += self._speed
         visible = self._visible()
@@ -83,7 +84,7 @@ class Walkers:
         corners = np.vstack(
             [
                 self.corners[visible] + rng.normal(0.0, 2.0, (len(visible), 2)),
-                rng.uniform(0.0, VGA, (stray, 2)),
+                rng.uniform(0.0, self._picture, (stray, 2)),
             ]
         )
         alike = self.looks[rng.integers(size.objects, size=stray)] * 50.0

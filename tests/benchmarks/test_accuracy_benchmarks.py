@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +18,7 @@ from benchmarks.other_trackers import virtual_environment as peer_environment
 from benchmarks.other_trackers.virtual_environment import OtherTrackersUnavailableError
 from server.cli.track.command import track_one
 from server.system.errors import UserError
+from tracking import OnlineTracker
 from tracking.evaluation import Scores
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
@@ -57,6 +60,20 @@ def test_measured_tracks_are_those_that_the_command_writes(recording: Recording,
     track_one(None, recording.detections, out, None, None, lambda _: None)
     assert track(recording) == read_rows(out)
     assert recording.score(track(recording)).idf1 > 0.9
+
+
+def test_a_recording_is_tracked_at_its_true_rate(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rates: list[float] = []
+
+    def noted(*settings: Any) -> OnlineTracker:
+        rates.append(settings[3])
+        return OnlineTracker(*settings)
+
+    monkeypatch.setattr("benchmarks.common.public_detections.OnlineTracker", noted)
+    track(replace(recording, fps=7.0))
+    assert rates == [7.0]
 
 
 @pytest.mark.parametrize("term", ABLATIONS, ids=lambda term: term.name)

@@ -11,6 +11,7 @@ from benchmarks.layout_gain.companions import (
     departure_costs,
     find_companion,
 )
+from benchmarks.layout_gain.ground_layout import GroundLayoutTracker, HeightFit
 from benchmarks.layout_gain.true_positions import TruePositionTracker, true_boxes, true_companions
 from tracking import CostSettings, Detections, OnlineTracker, WindowSettings, create_solver
 from tracking.boxes import Floats
@@ -70,6 +71,26 @@ def test_people_have_companions_in_the_truth_while_they_walk_together() -> None:
     assert set.union(*found.values()) == {1, 2}
 
 
+def test_heights_grow_with_the_distance_below_the_horizon() -> None:
+    """A step of half a height is as long for who is near as for who is far, to the side and ahead."""
+    fit = HeightFit()
+    rows = np.linspace(150.0, 500.0, 60)
+    tall = 0.5 * (rows - 100.0)
+    people = np.stack([300.0 - 0.2 * tall, rows - tall, 300.0 + 0.2 * tall, rows], axis=1)
+    fit.add(people)
+    sideways = people + np.outer(0.5 * tall, [1.0, 0.0, 1.0, 0.0])
+    np.testing.assert_allclose(fit.places(sideways)[:, 0] - fit.places(people)[:, 0], 0.5, atol=1e-9)
+    nearer = people + np.outer(0.01 * tall, [0.0, 1.0, 0.0, 1.0])
+    np.testing.assert_allclose(fit.places(nearer)[:, 1] - fit.places(people)[:, 1], 0.01, rtol=0.01)
+
+
+def test_of_few_people_all_are_as_high() -> None:
+    fit = HeightFit()
+    fit.add(np.stack([person_at(100.0, 300.0), person_at(200.0, 400.0)]))
+    places = fit.places(np.stack([person_at(100.0, 300.0), person_at(200.0, 300.0)]))
+    np.testing.assert_allclose(places, [[1.0, 3.0], [2.0, 3.0]])
+
+
 def test_trackers_of_people_apart_are_the_online_tracker() -> None:
     """Nobody has a companion, and everybody is where the truth says."""
     walks = {1: path(100.0, 1.0, 40), 2: path(900.0, -1.0, 40)}
@@ -78,13 +99,14 @@ def test_trackers_of_people_apart_are_the_online_tracker() -> None:
     trackers = [
         OnlineTracker(*settings),
         CompanionTracker(*settings, companions=SETTINGS),
+        GroundLayoutTracker(*settings, weight=1e-3),
         TruePositionTracker(*settings, people=true_boxes(rows), applies=None),
     ]
     for t in range(40):
         boxes = np.stack([walks[1][t], walks[2][t]])
         results = [one.push(t, Detections(boxes, np.ones(2), np.empty((2, 0)))) for one in trackers]
         ids = [[track.id for track in result.tracks] if result else None for result in results]
-        assert ids[0] == ids[1] == ids[2]
+        assert all(found == ids[0] for found in ids)
 
 
 def test_the_truth_tells_apart_two_who_meet_and_turn_back() -> None:

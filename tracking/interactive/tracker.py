@@ -20,7 +20,6 @@ from tracking.interactive.solved_window import SolvedWindow
 from tracking.interactive.window_memory import WindowMemory, WindowSnapshot
 from tracking.lifecycle.initiation import Birth
 from tracking.model.network import Network
-from tracking.model.object_state import TrackedObject
 from tracking.model.settings import CostSettings
 from tracking.solvers.base import Solver, SolveReport
 from tracking.tracker import OnlineTracker

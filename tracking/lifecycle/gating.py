@@ -27,9 +27,9 @@ def gate_detections(
     frames: Sequence[Detections],
     window: ResolvedWindowSettings,
 ) -> Bools:
-    """Return which detections of each frame of a window each object can be, `(n, M, K)`.
+    """Return which detections of each frame of a window each object can be, `(n, M, K)`; padding is False.
 
-    `first` is the number of the window's first frame. Frames with fewer than K detections are padded by False.
+    `first` is the number of the window's first frame.
     """
     counts = [len(detections) for detections in frames]
     present = np.arange(max(counts)) < np.array(counts)[:, None]

@@ -104,17 +104,18 @@ def transition_costs(motion: MotionCosts | None, places: ObservationArrays, sett
     Q is the number of sets of observations, or n if the motion of any object is known.
     """
     sets, frames, width = places.present.shape
-    costs = np.zeros((sets, max(frames - 1, 0), width + 1, width + 1))
+    steps = max(frames - 1, 0)
     before, after = places.histograms[:, :-1], places.histograms[:, 1:]
-    between = costs[:, :, :width, :width]
-    between += settings.appearance * appearance_distance_matrix(before, after, settings.measure)
+    between = settings.appearance * appearance_distance_matrix(before, after, settings.measure)
     between += _displacement_costs(places.boxes[:, :-1], places.boxes[:, 1:], settings)
+    costs = np.zeros((sets if motion is None else len(motion.moving), steps, width + 1, width + 1))
     costs[:, :, width, :width] = settings.change
     costs[:, :, :width, width] = settings.disappearance
     if motion is None:
+        costs[:, :, :width, :width] = between
         return costs
-    costs = np.broadcast_to(costs, (len(motion.reappearing), *costs.shape[1:])).copy()
-    costs[:, :, :width, :width] += motion.moving[:, 1:, None]
+    # The largest array of a window: it is written once.
+    np.add(between, motion.moving[:, 1:, None], out=costs[:, :, :width, :width])
     costs[:, :, width, :width] += motion.reappearing[:, 1:]
     return costs
 

@@ -68,13 +68,15 @@ class ArcGeneration:
         rows: Sequence[ConflictRow],
         finder: ConflictSeparator,
         meter: BudgetMeter,
+        trellis: Trellis | None = None,
     ) -> None:
+        """Prepare the search; `trellis` is that of the network, if known."""
         self._network = network
         self._meter = meter
         self._priced_points: list[tuple[ArcMasterSolution, _PricedTrellis]] = []
         """The priced point of the best bound, if there is any."""
         self._guessed = np.empty((0, 0))
-        self._trellis = Trellis.of(network)
+        self._trellis = trellis or Trellis.of(network)
         self._finder = finder
         self._master = ArcMaster(network, meter=meter)
         # An object that is always occluded violates no row, so the program is feasible.
@@ -183,7 +185,7 @@ def generate_arcs(
 ) -> RelaxedSolution:
     """Find the optimum of the relaxation, from a guess at the duals; the finder must be unused."""
     starts = path_arcs(np.arange(network.objects), pricing.alone.nodes)
-    search = ArcGeneration(network, starts, [], finder, meter)
+    search = ArcGeneration(network, starts, [], finder, meter, pricing.trellis)
     search.enter_guess(guess_duals(network, pricing, finder, meter))
     return search.run()
 

@@ -131,7 +131,9 @@ class PathGeneration:
         starts = path_arcs(
             np.concatenate([owners, inactive]), np.concatenate([nodes, self._alone.nodes[inactive]])
         )
-        search = ArcGeneration(self._network, starts, self._master.rows, self._finder, self._meter)
+        search = ArcGeneration(
+            self._network, starts, self._master.rows, self._finder, self._meter, self._pricing.trellis
+        )
         found = search.run()
         if found.bound < self._bound:
             prices = conflict_prices(self._network, self._master.rows[: len(self._prices)], self._prices)

@@ -57,7 +57,7 @@ def greedy_paths(network: Network, alone: Paths | None = None) -> GreedyPaths:
     known. An object that cannot be occluded in a frame and has no free place there stays in conflict.
     """
     exclusions = network.exclusions()
-    trellis = Trellis(network.source, network.node.copy(), network.pair, network.sink)
+    trellis = Trellis.of(network).with_node(network.node.copy())
     each, frames = np.indices((network.objects, network.frames))
     alone = best_paths(trellis) if alone is None else alone
     nodes, costs, bound = alone.nodes.copy(), alone.costs.copy(), float(alone.costs.sum())

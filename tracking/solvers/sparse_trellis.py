@@ -4,60 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
 from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
+from tracking.solvers.arc_lists import StepArcs, existing_arcs, group_by_step
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import Paths
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ArcGroups:
-    """The arcs of a step that share a state, one after another, for sums and minima over each group.
-
-    Attributes:
-        starts: (G,) the first arc of each group.
-        states: (G,) the state that the arcs of a group share.
-    """
-
-    starts: Ints
-    states: Ints
-
-    @classmethod
-    def of(cls, sorted_states: Ints) -> ArcGroups:
-        """Group arcs by their states, (E,), ascending."""
-        starts = np.flatnonzero(np.diff(sorted_states, prepend=-1))
-        return cls(starts, sorted_states[starts])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StepArcs:
-    """The arcs between two frames, sorted by target, then origin.
-
-    Attributes:
-        span: where they are in the lists of all arcs.
-        origin, target: (E,) their states.
-        entering: groups by target.
-        order: (E,) sorts them by origin, then target.
-        leaving: groups by origin, in that order.
-    """
-
-    span: slice
-    origin: Ints
-    target: Ints
-    entering: ArcGroups
-    order: Ints
-    leaving: ArcGroups
-
-    @classmethod
-    def of(cls, span: slice, origin: Ints, target: Ints) -> StepArcs:
-        """Group the arcs of a step."""
-        order = np.argsort(origin, kind="stable")
-        return cls(span, origin, target, ArcGroups.of(target), order, ArcGroups.of(origin[order]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +39,8 @@ class SparseTrellis:
     @classmethod
     def of(cls, network: Network) -> SparseTrellis:
         """List the arcs of a network of two frames at least, whose objects may all hide."""
-        exists = np.isfinite(network.pair).any(axis=0)
-        usable = np.asarray(np.isfinite(network.node).any(axis=0))
-        exists &= usable[:-1, :, None] & usable[1:, None]
-        step, target, origin = np.nonzero(np.swapaxes(exists, 1, 2))
-        steps = _steps(network.frames - 1, step, origin, target)
+        step, origin, target = existing_arcs(network.pair, network.node)
+        steps = group_by_step(network.frames - 1, step, origin, target)
         costs = network.pair[:, step, origin, target][network.pair_sets]
         trellis = cls(network.max_places + 1, network.pair_sets, step, origin, target, costs, steps)
         costs += trellis.nodes(network.node)
@@ -100,7 +52,7 @@ class SparseTrellis:
     def select(self, kept: Bools) -> SparseTrellis:
         """Return the trellis of the arcs where `kept` (E,) is true, at least one in each step."""
         step, origin, target = self.step[kept], self.origin[kept], self.target[kept]
-        steps = _steps(len(self.steps), step, origin, target)
+        steps = group_by_step(len(self.steps), step, origin, target)
         return SparseTrellis(self.states, self.sets, step, origin, target, self.costs[:, kept], steps)
 
     def __len__(self) -> int:
@@ -189,9 +141,3 @@ class SparseTrellis:
             through[:, arcs.span] += backward[m + 1][:, arcs.target]
         through -= forward[-1].min(axis=1)[:, None]
         return through
-
-
-def _steps(count: int, step: Ints, origin: Ints, target: Ints) -> tuple[StepArcs, ...]:
-    ends = np.searchsorted(step, np.arange(count + 1))
-    spans = [slice(int(first), int(last)) for first, last in pairwise(ends)]
-    return tuple(StepArcs.of(span, origin[span], target[span]) for span in spans)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,35 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
+from tracking.solvers.arc_lists import StepArcs, existing_arcs, group_by_step
 from tracking.solvers.objective import Ints
+
+_MOST_LISTED, _LEAST_STATES = 0.2, 16
+"""Arcs are listed if no more than this share of the pairs of states has one, and there are so many states."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ListedArcs:
+    """The arcs that any object has: steps, and their costs (Q, E), infinite where an object lacks one."""
+
+    steps: tuple[StepArcs, ...]
+    costs: Floats
+
+    @classmethod
+    def of(cls, network: Network) -> _ListedArcs | None:
+        """List the arcs of a network if they are few."""
+        steps, states = network.frames - 1, network.max_places + 1
+        if not steps or states < _LEAST_STATES:
+            return None
+        step, origin, target = existing_arcs(network.pair, network.node)
+        if len(step) > _MOST_LISTED * steps * states**2:
+            return None
+        costs = network.pair[:, step, origin, target]
+        return cls(group_by_step(steps, step, origin, target), costs)
+
+    def select(self, chosen: NDArray[np.int64]) -> _ListedArcs:
+        """Return the arcs of some of the objects."""
+        return self if len(self.costs) == 1 else _ListedArcs(self.steps, self.costs[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,26 +47,48 @@ class Trellis:
 
     Attributes:
         source, node, pair, sink: as in `Network`; `node` is (n, M, S), `pair` (P, M - 1, S, S).
+        chosen: (n,) the sets of `pair` of these objects; None: all in order, or the only one.
+        listed: the arcs in lists, if they are few.
     """
 
     source: Floats
     node: Floats
     pair: Floats
     sink: Floats
+    chosen: NDArray[np.int64] | None = None
+    listed: _ListedArcs | None = None
 
     @classmethod
     def of(cls, network: Network) -> Trellis:
         """Return the trellis of a network without prices."""
-        return cls(network.source, network.node, network.pair, network.sink)
+        listed = _ListedArcs.of(network)
+        return cls(network.source, network.node, network.pair, network.sink, listed=listed)
 
-    def select(self, chosen: NDArray[np.int64]) -> Trellis:
+    def select(self, objects: NDArray[np.int64]) -> Trellis:
         """Return the trellis of some of the objects."""
-        pair = self.pair if len(self.pair) == 1 else self.pair[chosen]
-        return Trellis(self.source[chosen], self.node[chosen], pair, self.sink[chosen])
+        return Trellis(
+            self.source[objects],
+            self.node[objects],
+            self.pair,
+            self.sink[objects],
+            None if len(self.pair) == 1 else objects if self.chosen is None else self.chosen[objects],
+            self.listed.select(objects) if self.listed else None,
+        )
 
     def with_node(self, node: Floats) -> Trellis:
         """Return the trellis with other node costs."""
-        return Trellis(self.source, node, self.pair, self.sink)
+        return replace(self, node=node)
+
+    @property
+    def sets(self) -> NDArray[np.int64]:
+        """The index into `pair` of each object, (n,)."""
+        if len(self.pair) == 1:
+            return np.zeros(len(self.node), dtype=np.int64)
+        return np.arange(len(self.node)) if self.chosen is None else self.chosen
+
+    def step_pairs(self, step: int) -> Floats:
+        """Return the costs of the arcs of a step, (n or 1, S, S)."""
+        return self.pair[:, step] if self.chosen is None else self.pair[self.chosen, step]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,9 +120,17 @@ def forward(trellis: Trellis, known: Floats | None = None) -> Floats:
         best[: len(known)], first = known, len(known)
     else:
         best[0] = trellis.source + trellis.node[:, 0]
+    if trellis.listed:
+        for m, arcs in enumerate(trellis.listed.steps[first - 1 :], first):
+            through = best[m - 1][:, arcs.origin]
+            through += trellis.listed.costs[:, arcs.span]
+            best[m] = np.inf
+            best[m][:, arcs.entering.states] = np.minimum.reduceat(through, arcs.entering.starts, axis=1)
+            best[m] += trellis.node[:, m]
+        return best
     costs = np.empty((objects, states, states))
     for m in range(first, frames):
-        np.add(best[m - 1][:, :, None], trellis.pair[:, m - 1], out=costs)
+        np.add(best[m - 1][:, :, None], trellis.step_pairs(m - 1), out=costs)
         np.minimum.reduce(costs, axis=1, out=best[m])
         best[m] += trellis.node[:, m]
     return best
@@ -83,10 +141,19 @@ def backward(trellis: Trellis) -> Floats:
     objects, frames, states = trellis.node.shape
     best = np.empty((frames, objects, states))
     best[-1] = trellis.sink
+    if trellis.listed:
+        for m in range(frames - 2, -1, -1):
+            arcs = trellis.listed.steps[m]
+            through = (best[m + 1] + trellis.node[:, m + 1])[:, arcs.target]
+            through += trellis.listed.costs[:, arcs.span]
+            through, leaving = through[:, arcs.order], arcs.leaving
+            best[m] = np.inf
+            best[m][:, leaving.states] = np.minimum.reduceat(through, leaving.starts, axis=1)
+        return best
     costs = np.empty((objects, states, states))
     for m in range(frames - 2, -1, -1):
         ahead = best[m + 1] + trellis.node[:, m + 1]
-        np.add(trellis.pair[:, m], ahead[:, None], out=costs)
+        np.add(trellis.step_pairs(m), ahead[:, None], out=costs)
         np.minimum.reduce(costs, axis=2, out=best[m])
     return best
 
@@ -94,8 +161,7 @@ def backward(trellis: Trellis) -> Floats:
 def trace_back(trellis: Trellis, best: Floats) -> Paths:
     """Trace the result of `forward` back from the sink; ties go to the lowest state."""
     objects, frames, _ = trellis.node.shape
-    each = np.arange(objects)
-    sets = each if len(trellis.pair) == objects else np.zeros(objects, dtype=np.int64)
+    each, sets = np.arange(objects), trellis.sets
     nodes = np.empty((objects, frames), dtype=np.int64)
     ends = best[-1] + trellis.sink
     nodes[:, -1] = ends.argmin(axis=1)
@@ -171,13 +237,11 @@ class PrunedStates:
         packed[~self.filled] = empty
         return packed
 
-    def pairs(self, values: Floats) -> Floats:
-        """Return values of arcs, (n or 1, M - 1, S, S) to (n, M - 1, W, W)."""
-        objects, frames = self.index.shape[:2]
-        sets = np.arange(objects) if len(values) == objects else np.zeros(objects, dtype=np.int64)
-        step = np.arange(frames - 1)[:, None, None]
+    def pairs(self, trellis: Trellis) -> Floats:
+        """Return the costs of the arcs of a trellis, (n, M - 1, W, W)."""
+        step = np.arange(self.index.shape[1] - 1)[:, None, None]
         origin, target = self.index[:, :-1, :, None], self.index[:, 1:, None, :]
-        return np.asarray(values[sets[:, None, None, None], step, origin, target])
+        return np.asarray(trellis.pair[trellis.sets[:, None, None, None], step, origin, target])
 
     def trellis(self, trellis: Trellis) -> Trellis:
         """Return the trellis of the kept states."""
@@ -185,7 +249,7 @@ class PrunedStates:
         return Trellis(
             trellis.source[each, self.index[:, 0]],
             self.states(trellis.node, np.inf),
-            self.pairs(trellis.pair),
+            self.pairs(trellis),
             trellis.sink[each, self.index[:, -1]],
         )
 

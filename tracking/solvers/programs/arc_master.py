@@ -253,7 +253,7 @@ def find_improving_arcs(
     forward_costs, backward_costs = (
         np.swapaxes(passed, 0, 1) for passed in (passes.forward, passes.backward)
     )
-    costs = packed.pairs(trellis.pair)
+    costs = packed.pairs(trellis)
     costs += packed.states(forward_costs, np.inf)[:, :-1, :, None]
     costs += packed.states(backward_costs + trellis.node, np.inf)[:, 1:, None, :]
     n, m, i, j = np.nonzero(costs < limits[:, None, None, None])
