@@ -40,6 +40,17 @@ class Recording:
     fps: float
     video: Path | None = None
 
+    @property
+    def public_detections(self) -> Path:
+        """The file of its public detections.
+
+        Raises:
+            ValueError: it has none.
+        """
+        if self.detections is None:
+            raise ValueError(f"{self.name} has no public detections")
+        return self.detections
+
     def score(self, tracks: list[MotRow]) -> Scores:
         """Score tracks of this recording."""
         return evaluate(read_rows(self.truth), tracks)
@@ -108,7 +119,7 @@ def detections(recording: Recording, config: Config, *, pictures: bool = False) 
     if pictures or recording.detections is None:
         yield from (frame.detections for frame in detect_frames(config))
         return
-    detector = MotFileDetector(recording.detections)
+    detector = MotFileDetector(recording.public_detections)
     for number in range(detector.last_frame + 1):
         yield detector.detect(_NO_PICTURE, number)
 

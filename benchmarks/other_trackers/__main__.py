@@ -68,7 +68,7 @@ def tracks_of(
         yield PICTURES, track(sequence, pictures=True)
     if peers is not None:
         yield from _peers_tracks(sequence, peers, report)
-    yield CEILING, oracle_association(read_rows(sequence.detections), read_rows(sequence.truth))
+    yield CEILING, oracle_association(read_rows(sequence.public_detections), read_rows(sequence.truth))
 
 
 def _peers_tracks(
@@ -76,7 +76,7 @@ def _peers_tracks(
 ) -> Iterator[tuple[str, list[MotRow]]]:
     for peer in PEERS:
         try:
-            yield peer.name, peers.track(peer, sequence.detections)
+            yield peer.name, peers.track(peer, sequence.public_detections)
         except OtherTrackersUnavailableError as problem:
             report.line(f"{sequence.name}: without {peer.name}: {problem}")
 
