@@ -20,6 +20,8 @@ from benchmarks.latency.shown_frames import ShownFrames
 from benchmarks.latency.stage_delays import STAGES, split
 from benchmarks.render import __main__ as render
 from benchmarks.screenshots.__main__ import small_png
+from benchmarks.solvers.random_windows import WindowSize
+from benchmarks.solvers.tracked_crowd import track_crowd
 from server.messaging.messages import CameraTracks, FrameHeader, GopChoices
 
 FPS, GOP, LOOKAHEAD, STRIDE = 25.0, 10, 20, 5
@@ -203,3 +205,11 @@ def test_a_benchmark_without_its_recordings_is_skipped(
     assert ended.value.code == SKIPPED
     assert "render: skipped: needs the recordings" in capsys.readouterr().out
     assert not (tmp_path / "out").exists()
+
+
+def test_everybody_of_a_small_crowd_is_tracked_within_the_budget() -> None:
+    found = track_crowd(WindowSize(4, 6), 1.0, 0)
+    assert len(found.windows) == 5
+    assert found.objects.max() == 4
+    assert found.gaps.max() < 1e-9
+    assert not found.stopped.any()
