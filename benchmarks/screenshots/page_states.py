@@ -50,7 +50,7 @@ _LEFT = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
   return objects.filter((it) => !it.visible && it.thumbnail).map((it) => it.object);
 }"""
-_SECTIONS = ("cameras", "floor", "known", "zones", "calibration", "view-selection")
+_SECTIONS = ("cameras", "floor", "known", "zones", "ignored-areas", "calibration", "view-selection")
 """Sections of the operator's page."""
 _MEASURED_MS = 8_000
 """Milliseconds until a section has its pictures and measurements."""

@@ -27,8 +27,8 @@ _MAX_DEPTH = 200
 _QUOTED = re.compile(r" '[^'<>]{2,}'")
 """A quoted name from the file in a library's message; not ``'<block end>'`` and ``']'``."""
 
-_WIDTH = 1000
-"""Line width of written YAML."""
+_WIDTH = 10_000
+"""Line width of YAML written for one line."""
 
 
 class _Loader(SafeLoader):
@@ -100,8 +100,8 @@ def _describe(error: yaml.YAMLError) -> str:
 
 
 def dump_yaml_inline(value: Any) -> str:
-    """Dump a value in flow style, for one line after its key."""
-    written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH)
+    """Dump a value in flow style, for one line after its key, mappings in their own order."""
+    written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH, sort_keys=False)
     return written.removesuffix("\n...\n").strip()
 
 

@@ -23,10 +23,13 @@ class SiteControl:
     Attributes:
         path: the configuration file; None: it is not known.
         restart: set to start all processes again; None: nothing supervises them.
+        reload: applies what the configuration file says now, as far as that needs no restart, soon after it
+            returns; None: it is not known how.
     """
 
     path: Path | None = None
     restart: asyncio.Event | None = None
+    reload: Callable[[], None] | None = None
 
 
 CONTROL = web.AppKey("control", SiteControl)

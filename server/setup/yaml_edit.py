@@ -1,16 +1,18 @@
-"""Change of one section of a configuration's text; comments in the rest stay."""
+"""Change of sections of a configuration's text; comments in the rest stay."""
 
 from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from server.config.loader import read_content
-from server.config.yaml_file import dump_yaml
+from server.config.yaml_file import dump_yaml, dump_yaml_inline
 
 _INSIDE = re.compile(r"[ \t-]|$")
 """The start of a line that belongs to the section above: indented, or an entry of a list; or empty."""
@@ -25,25 +27,127 @@ def changed_text(path: Path, section: str, value: Any) -> str:
     Raises:
         UserError: the file cannot be read, or is not valid YAML.
     """
+    wanted = {**read_content(path), section: value}
+    text = path.read_text(encoding="utf-8")
+    return _checked(_replaced(text, section, dump_yaml({section: value})), wanted)
+
+
+def changed_lists_text(path: Path, lists: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """Return the text of a configuration file with other entries in some lists, each entry with an id.
+
+    Entries that stay the same keep their text, those that change the comments above them; a changed one is
+    one line in flow style. Otherwise as :func:`changed_text`.
+
+    Raises:
+        UserError: the file cannot be read, or is not valid YAML.
+    """
     content = read_content(path)
-    wanted = {**content, section: value}
-    text = _replaced(path.read_text(encoding="utf-8"), section, dump_yaml({section: value}))
+    text = path.read_text(encoding="utf-8")
+    for section, entries in lists.items():
+        if entries != (content.get(section) or []):
+            text = _replaced(text, section, _list_text(text, section, content.get(section) or [], entries))
+    return _checked(text, {**content, **{section: list(entries) for section, entries in lists.items()}})
+
+
+def _checked(text: str, wanted: Mapping[str, Any]) -> str:
+    """Return a text if it means what is wanted, else another one that does."""
     with contextlib.suppress(yaml.YAMLError):
-        if yaml.safe_load(text) == wanted:
+        if _without_empty(yaml.safe_load(text)) == _without_empty(wanted):
             return text
-    return f"# The earlier file, beside this one, has the comments.\n{dump_yaml(wanted)}"
+    return f"# The earlier file, beside this one, has the comments.\n{dump_yaml(dict(wanted))}"
+
+
+def _without_empty(content: Any) -> Any:
+    """Return a configuration without its empty lists: a section that is empty may as well be absent."""
+    return (
+        {name: value for name, value in content.items() if value != []}
+        if isinstance(content, Mapping)
+        else content
+    )
 
 
 def _replaced(text: str, section: str, lines: str) -> str:
     """Return a text with new lines for a section; they are appended if it has none."""
     old = text.splitlines(keepends=True)
-    starts = [number for number, line in enumerate(old) if re.match(rf"{section}[ \t]*:", line)]
+    span = _span(old, section)
+    if span is None:
+        return f"{text.rstrip()}\n\n{lines}"
+    return "".join([*old[: span.start], lines, *old[span.stop :]]) if span else ""
+
+
+def _span(lines: Sequence[str], section: str) -> range | None:
+    """Return the lines of a section without comments after it; None: there is none; empty: there are two."""
+    starts = [number for number, line in enumerate(lines) if re.match(rf"{section}[ \t]*:", line)]
     if len(starts) != 1:
-        return f"{text.rstrip()}\n\n{lines}" if not starts else ""
-    first = end = starts[0]
-    for number in range(first + 1, len(old)):
-        if not old[number].startswith("#") and not _INSIDE.match(old[number]):
+        return range(0) if starts else None
+    end = starts[0]
+    for number in range(starts[0] + 1, len(lines)):
+        if not lines[number].startswith("#") and not _INSIDE.match(lines[number]):
             break
-        if old[number].strip() and not old[number].lstrip().startswith("#"):
+        if _is_content(lines[number]):
             end = number
-    return "".join([*old[:first], lines, *old[end + 1 :]])
+    return range(starts[0], end + 1)
+
+
+def _is_content(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+@dataclass(frozen=True, slots=True)
+class _EntryText:
+    """An entry of a list in block style: the comments above it, and its own lines."""
+
+    above: str
+    lines: str
+    content: Mapping[str, Any]
+
+
+def _list_text(
+    text: str, section: str, old: Sequence[Mapping[str, Any]], entries: Sequence[Mapping[str, Any]]
+) -> str:
+    """Return the lines of a section with new entries."""
+    if not entries:
+        return f"{section}: []\n"
+    lines = text.splitlines(keepends=True)
+    span = _span(lines, section) or range(0)
+    known = _entry_texts(text, section, lines, span, old)
+    names = {entry.get("id") for entry in entries}
+    written = {each.content.get("id"): each for each in known}
+    replaced = [
+        each for each in known if each.content.get("id") not in names
+    ]  # a renamed one keeps its comments
+    first = known[0].lines if known else "  -"
+    indent = first[: len(first) - len(first.lstrip(" "))]
+    head = lines[span.start] if known else f"{section}:\n"
+    parts = [head]
+    for entry in entries:
+        found = written.get(entry.get("id"))
+        if found is None and len(old) == len(entries) and replaced:
+            found = replaced.pop(0)
+        above = "" if found is None else found.above
+        same = found is not None and found.content == entry
+        parts.append(above + (found.lines if found and same else f"{indent}- {dump_yaml_inline(entry)}\n"))
+    return "".join(parts)
+
+
+def _entry_texts(
+    text: str, section: str, lines: Sequence[str], span: range, old: Sequence[Mapping[str, Any]]
+) -> list[_EntryText]:
+    """Return the entries of a section in block style; none if it is in another one."""
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    pairs = root.value if isinstance(root, yaml.MappingNode) else []
+    node = next((value for key, value in pairs if key.value == section), None)
+    if not isinstance(node, yaml.SequenceNode) or node.flow_style or len(node.value) != len(old):
+        return []
+    starts = [item.start_mark.line for item in node.value]
+    begins = []
+    for start in starts:
+        begin = start
+        while begin - 1 > span.start and not _is_content(lines[begin - 1]):
+            begin -= 1
+        begins.append(begin)
+    ends = [*begins[1:], span.stop]
+    return [
+        _EntryText("".join(lines[begin:start]), "".join(lines[start:end]), content)
+        for begin, start, end, content in zip(begins, starts, ends, old, strict=True)
+    ]

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import signal
+from collections.abc import Callable
 from pathlib import Path
 
 from camsync import SyncError
-from server.config.running_config import ActiveConfig
+from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
 from server.http.app import make_app, serving
 from server.http.app_keys import SiteControl
 from server.integrations.integrations import integrating
@@ -41,10 +44,11 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     check_viewers(config)
     check_bus(config)
     pipeline = BestViewPipeline(add_synthetic_homographies(config), out)
+    reload = reloader()
     reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
         pipeline.open_bus()
-        control = SiteControl(running.path, asyncio.Event() if is_supervised() else None)
+        control = SiteControl(running.path, asyncio.Event() if is_supervised() else None, reload)
         service = BestViewService(pipeline)
         app = make_app(service, running.on_disk, control)
         async with integrating(service), serving(app, config.http) as port:
@@ -57,6 +61,23 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     finally:
         reload_task.cancel()
         pipeline.close()
+
+
+def reloader() -> Callable[[], None]:
+    """Return a function that reloads the site's configuration file, as SIGHUP does.
+
+    Under `myview up` that is for the supervisor to do, which keeps the configuration in force for processes
+    that it starts again. If it has died, nothing happens: this process is about to end.
+    """
+    own, parent = os.getpid(), os.getppid()
+    if ACTIVE_CONFIG_VARIABLE not in os.environ:
+        return lambda: os.kill(own, signal.SIGHUP)
+
+    def reload() -> None:
+        if os.getppid() == parent:
+            os.kill(parent, signal.SIGHUP)
+
+    return reload
 
 
 async def _run_until_restart(pipeline: BestViewPipeline, restart: asyncio.Event | None) -> None:

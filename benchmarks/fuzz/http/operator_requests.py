@@ -30,10 +30,25 @@ _REQUESTS: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/walk", {"action": "apply"}),
     ("DELETE", "/api/operator/walk", None),
     ("POST", "/api/operator/restart", {}),
+    (
+        "PUT",
+        "/api/operator/zones",
+        {
+            "zone": "door",
+            "camera": "c0",
+            "line": [[1, 2], [8.5, 2]],
+            "inner": [4, 9],
+            "rules": [{"rule": "in", "kind": "crossed", "direction": "inward"}],
+            "replaces": "door",
+        },
+    ),
+    ("PUT", "/api/operator/zones", {"zone": "till", "area": [[0, 0], [9, 0], [9, 9]], "rules": []}),
+    ("DELETE", "/api/operator/zones", {"zone": "till"}),
     ("POST", "/api/session", {"token": "secret"}),
     ("GET", "/api/operator/people", None),
     ("GET", "/api/operator/walk", None),
     ("GET", "/api/operator/view_selection", None),
+    ("GET", "/api/operator/zones", None),
 )
 """Without finishing a walk, which starts a process; other tests cover it."""
 

@@ -20,6 +20,7 @@ from benchmarks.fuzz.engine.fed_site import FedService, TracksMaker, feed_epoch,
 from benchmarks.fuzz.engine.target import Target
 from server.http.api.openapi import describe
 from server.http.app import make_app, serving
+from server.http.app_keys import SiteControl
 from server.service.service import BestViewService
 
 _HEALTH_EVERY = 100
@@ -27,6 +28,8 @@ EPOCHS = 6
 _WAIT_S = 10.0
 """Seconds to wait for a response, by the time-skipping clock."""
 _MAX_BYTES = 65_536
+_FILE = "cameras: [{id: c0, source: 'scene:room'}, {id: c1, source: 'scene:room'}]\n"
+"""The configuration file that operators' requests change."""
 _HEALTH = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
 
 
@@ -50,14 +53,17 @@ class ServedSite:
         self.loop.run_until_complete(self._serve(dict(sections or {}), make_tracks))
 
     async def _serve(self, sections: dict[str, Any], make_tracks: TracksMaker) -> None:
-        config = site(record={"folder": str(Path(self._folder.name) / "kept")}, **sections)
+        folder = Path(self._folder.name)
+        config = site(record={"folder": str(folder / "kept")}, **sections)
+        path = folder / "site.yaml"
+        path.write_text(_FILE, encoding="utf-8")
         self.service, rng = FedService(config), Random(1)
         self.service.recorder.open()
         self._stack.callback(self.service.close)
         self.service.pulses.pulse0 = 1_700_000_000.0
         for epoch in range(EPOCHS):
             feed_epoch(self.service, rng, epoch, EPOCHS, make_tracks)
-        self.app = make_app(BestViewService(self.service))
+        self.app = make_app(BestViewService(self.service), control=SiteControl(path))
         self._before(self.app)
         self.port = await self._stack.enter_async_context(
             serving(self.app, config.http.model_copy(update={"port": 0}))

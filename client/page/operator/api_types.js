@@ -74,6 +74,28 @@
  * @property {string} insufficient what the walk did not cover, if the result is uncertain
  * @property {string} configuration YAML; empty: there is no ground file
  *
+ * @typedef {object} ZoneRule
+ * @property {string} rule its id
+ * @property {string} kind entered, left, crossed, stayed, crowded or close
+ * @property {string | null} direction of crossed: inward or outward; null: both
+ * @property {number | null} longer_than_s of stayed
+ * @property {number | null} more_than of crowded: people
+ * @property {number | null} closer_than_m of close
+ *
+ * @typedef {object} SiteZone a zone in the configuration file
+ * @property {string} zone its id
+ * @property {string | null} camera null: on the floor, in meters or the ground's unit; else in pixels of its picture
+ * @property {[number, number][] | null} area corners
+ * @property {[number, number][] | null} line its two ends
+ * @property {[number, number] | null} inner a point on the inner side of a line
+ * @property {ZoneRule[]} rules
+ *
+ * @typedef {object} SiteZones /api/operator/zones
+ * @property {string} unavailable why they cannot be changed; empty: they can
+ * @property {boolean} in_force
+ * @property {string} unit of coordinates on the floor
+ * @property {SiteZone[]} zones
+ *
  * @typedef {object} Setting an entry of /api/operator/config
  * @property {string} key
  * @property {string} value in YAML

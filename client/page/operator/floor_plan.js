@@ -4,7 +4,8 @@ import { shortLabel } from '../people/names.js';
 import { requestOperator } from '../shared/requests.js';
 import { element, make, setLines, setText, svg } from '../shared/dom.js';
 import { Repeater } from './section.js';
-import { FloorTracks, svgPoints } from './floor_tracks.js';
+import { describeCalibration, drawCoverage, drawTrack } from './floor_drawing.js';
+import { FloorTracks } from './floor_tracks.js';
 import { FloorZones } from './floor_zones.js';
 
 /** @import {Gop, Site} from '../shared/api_types.js' */
@@ -14,8 +15,6 @@ import { FloorZones } from './floor_zones.js';
 /** @import {Palette} from '../people/palette.js' */
 
 const INTERVAL_MS = 5000; // the covered areas change when a camera starts
-const MARGIN = 0.05; // share of the plan's size
-const DOT = 0.012; // likewise
 
 /** @implements {Section} */
 export class FloorPlan {
@@ -39,7 +38,7 @@ export class FloorPlan {
     this.#tracks = new FloorTracks(site);
     this.#repeater = new Repeater(() => this.#refresh(), INTERVAL_MS, showError);
     // Tracks are collected before the section is opened.
-    void requestOperator('floor').then((floor) => (this.#cameras = floor.cameras), () => undefined);
+    void this.load().catch(() => undefined);
   }
 
   open() {
@@ -52,6 +51,19 @@ export class FloorPlan {
     this.#repeater.stop();
   }
 
+  /** @returns {FloorTrack[]} people's tracks of the last seconds */
+  get tracks() {
+    return this.#tracks.tracks;
+  }
+
+  /** @returns {Promise<Floor>} what the cameras cover now */
+  async load() {
+    /** @type {Floor} */
+    const floor = await requestOperator('floor');
+    this.#cameras = floor.cameras;
+    return floor;
+  }
+
   /** @param {Gop} gop */
   add(gop) {
     this.#tracks.add(gop, this.#cameras);
@@ -59,9 +71,7 @@ export class FloorPlan {
   }
 
   async #refresh() {
-    /** @type {Floor} */
-    const floor = await requestOperator('floor');
-    this.#cameras = floor.cameras;
+    const floor = await this.load();
     const json = JSON.stringify(floor);
     if (json !== this.#drawnFloor) this.#draw(floor);
     this.#drawnFloor = json;
@@ -70,31 +80,23 @@ export class FloorPlan {
   }
 
   /** @param {Floor} floor */
-  #draw({ cameras, uncalibrated }) {
-    const outlines = cameras.map(({ outline }) => outline).filter((outline) => outline.length > 0);
-    element('plan').toggleAttribute('hidden', !outlines.length);
-    setText(element('floor-message'), describe(outlines.length, uncalibrated));
-    element('floor-cameras').replaceChildren(...cameras.map(({ camera }) => make('li', {}, this.#chip(camera))));
-    if (!outlines.length) return;
-    const corners = outlines.flat();
-    const [left, right] = range(corners.map(([x]) => x));
-    const [low, high] = range(corners.map(([, y]) => -y)); // the y axis of SVG points down
-    this.#size = Math.max(right - left, high - low);
-    const margin = this.#size * MARGIN;
-    const box = [left - margin, low - margin, right - left + 2 * margin, high - low + 2 * margin];
+  #draw(floor) {
+    const coverage = drawCoverage(floor, this.palette);
     const plan = element('plan');
-    plan.setAttribute('viewBox', box.join(' '));
-    const areas = cameras.map(({ camera, outline }) => {
-      const color = this.palette.color(camera);
-      return svg('polygon', { points: svgPoints(outline), fill: color, stroke: color, class: 'coverage' });
-    });
-    plan.replaceChildren(...areas, this.#zones.drawing, this.#people);
+    plan.toggleAttribute('hidden', !coverage);
+    const calibrated = floor.cameras.filter(({ outline }) => outline.length > 0).length;
+    setText(element('floor-message'), describeCalibration(calibrated, floor.uncalibrated));
+    element('floor-cameras').replaceChildren(...floor.cameras.map(({ camera }) => make('li', {}, this.#chip(camera))));
+    if (!coverage) return;
+    this.#size = coverage.size;
+    plan.setAttribute('viewBox', coverage.viewBox);
+    plan.replaceChildren(...coverage.areas, this.#zones.drawing, this.#people);
   }
 
   #showTracks() {
     const tracks = this.#tracks.tracks;
     const size = this.#size;
-    this.#people.replaceChildren(...tracks.flatMap((track) => this.#drawTrack(track, size)));
+    this.#people.replaceChildren(...tracks.flatMap((track) => drawTrack(track, size)));
     const lines = tracks.map(({ object, positions, cameras }) => {
       const [x, y] = positions[positions.length - 1];
       return `${shortLabel(object)} at ${x.toFixed(2)}, ${y.toFixed(2)}, seen by ${cameras.join(', ')}`;
@@ -105,40 +107,10 @@ export class FloorPlan {
     setText(heading, tracks.length ? 'On the floor now' : 'No one is on the floor now');
   }
 
-  /**
-   * @param {FloorTrack} track
-   * @param {number} size of the plan
-   */
-  #drawTrack({ object, positions }, size) {
-    const [x, y] = positions[positions.length - 1];
-    const name = svg('text', { x, y: -y - size * DOT * 1.6, 'font-size': size * 0.035, class: 'name' });
-    name.textContent = shortLabel(object);
-    return [
-      svg('polyline', { points: svgPoints(positions), class: 'track' }),
-      svg('circle', { cx: x, cy: -y, r: size * DOT, class: 'dot' }),
-      name,
-    ];
-  }
-
   /** @param {string} camera */
   #chip(camera) {
     const chip = make('span', { className: 'chip', textContent: camera });
     chip.style.setProperty('--camera', this.palette.color(camera));
     return chip;
   }
-}
-
-/**
- * @param {number} calibrated number of calibrated cameras
- * @param {string[]} uncalibrated
- */
-function describe(calibrated, uncalibrated) {
-  if (calibrated) return uncalibrated.length ? `Not calibrated: ${uncalibrated.join(', ')}.` : '';
-  if (!uncalibrated.length) return 'No camera has reported yet.';
-  return 'No camera is calibrated: mark the floor under Zones, or calibrate by a walk.';
-}
-
-/** @param {number[]} values */
-function range(values) {
-  return [Math.min(...values), Math.max(...values)];
 }

@@ -78,7 +78,7 @@ _UNAVAILABLE = {
     if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
 _MAY_BE_UNAVAILABLE_FOR_OPERATORS = {"/api/operator/people", "/api/operator/position_corrections"}
-_OF_THE_CONFIGURATION_FILE = {"/api/operator/site_cameras"}
+_OF_THE_CONFIGURATION_FILE = {"/api/operator/site_cameras", "/api/operator/zones"}
 _FROM_REQUIRED = {"/api/past", *OPERATOR_FILES}
 _RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}

@@ -15,6 +15,7 @@ from server.http.operator import (
     settings,
     site_cameras,
     walk,
+    zones,
 )
 from server.http.operator.schema import CameraDiagnosticsList
 from server.http.static_files import page_file
@@ -55,4 +56,5 @@ routes = [
     *walk.routes,
     *restart.routes,
     *site_cameras.routes,
+    *zones.routes,
 ]

@@ -62,6 +62,49 @@ class SiteCameras(msgspec.Struct, frozen=True):
     cameras: list[SiteCamera]
 
 
+class ZoneRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A rule on a zone, without what restricts it to times and people."""
+
+    rule: str
+    """Its id."""
+    kind: str
+    """entered, left, crossed, stayed, crowded or close."""
+    direction: str | None = None
+    """For crossed: inward or outward; null: both."""
+    longer_than_s: float | None = None
+    """For stayed."""
+    more_than: int | None = None
+    """For crowded: the number of people."""
+    closer_than_m: float | None = None
+    """For close."""
+
+
+class SiteZone(msgspec.Struct, frozen=True):
+    """A zone in the configuration file: an area or a line."""
+
+    zone: str
+    """Its id."""
+    camera: str | None = None
+    """Null: coordinates are meters, or the ground's unit, on the floor; else pixels of its own picture."""
+    area: list[tuple[float, float]] | None = None
+    line: list[tuple[float, float]] | None = None
+    inner: tuple[float, float] | None = None
+    """A point on the inner side of a line."""
+    rules: list[ZoneRule] = []
+
+
+class SiteZones(msgspec.Struct, frozen=True):
+    """The zones in the configuration file with their rules."""
+
+    unavailable: str
+    """Why they cannot be changed here, and those in force are listed; empty: they can."""
+    in_force: bool
+    """Whether the service applies these zones and rules."""
+    unit: str
+    """Of coordinates on the floor: m, or the ground's own; empty: unknown."""
+    zones: list[SiteZone]
+
+
 class SelectionSettings(msgspec.Struct, frozen=True):
     """View-selection settings by key, such as switch_cost_s and quality.size."""
 
@@ -117,6 +160,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/restart": RestartStatus,
     "/api/operator/site_cameras": SiteCameras,
     "/api/operator/view_selection": SelectionSettings,
+    "/api/operator/zones": SiteZones,
 }
 """The answer to GET of each path; POST, PUT and DELETE answer with the new state."""
 

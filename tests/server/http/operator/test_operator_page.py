@@ -7,26 +7,25 @@ import json
 import re
 import time
 from collections.abc import AsyncIterator
-from contextlib import aclosing, asynccontextmanager, closing
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import pytest_asyncio
 import yaml
-from playwright.async_api import Browser, Page, Route, expect
+from playwright.async_api import Browser, Route, expect
 
 from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
 from fakes.cli.calibration_walk import SITE, curved_path, errors_on_floor, walk_epochs
 from fakes.http.tokens import token_entry, token_of, write_tokens
 from fakes.media.rtsp_camera import RtspCamera
-from fakes.page.browser import new_page
+from fakes.page.operator_page import PLAN, check_button_sizes, open_operator_page, serious_faults
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import A, B, ServedSite, serve_site, show_people
+from fakes.service.fed_site import A, B, show_people
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -46,9 +45,7 @@ from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
 
 SECTIONS = ["cameras", "floor", "people", "flags", "downloads"]
-SECTIONS += ["zones", "calibration", "view-selection", "configuration"]
-PLAN = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0]]
-"""Of a camera that looks straight down: ten pixels are one unit of the floor."""
+SECTIONS += ["zones", "ignored-areas", "calibration", "view-selection", "configuration"]
 
 
 pytestmark = [
@@ -61,27 +58,6 @@ pytestmark = [
 async def browser() -> AsyncIterator[Browser]:
     async with chromium() as running:
         yield running
-
-
-@asynccontextmanager
-async def open_operator_page(
-    browser: Browser, place: str = "", axe: str = "", *, patience: float = 60, **changes: Any
-) -> AsyncIterator[tuple[ServedSite, Page]]:
-    """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
-    complaints: list[str] = []
-    async with aclosing(serve_site(patience=patience, **changes)) as sites:
-        served = await anext(sites)
-        page = await new_page(browser, viewport={"width": 1000, "height": 800})
-        await page.add_init_script(axe)  # without the site's content policy
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on(
-            "console",
-            lambda message: complaints.append(message.text) if "Content Security" in message.text else None,
-        )
-        await page.goto(f"http://127.0.0.1:{served.port}/operator{place}")
-        yield served, page
-        await page.close()
-    assert complaints == []
 
 
 async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_path: Path) -> None:
@@ -330,7 +306,7 @@ async def test_a_late_picture_of_another_camera_does_not_replace_the_selected_on
 
         await page.route("**/live.jpg", answer)
         async with page.expect_request(f"**/{A}/live.jpg"):
-            await page.locator("#sections").get_by_role("link", name="Zones").click()
+            await page.locator("#sections").get_by_role("link", name="Ignored areas").click()
         await page.get_by_label("Camera", exact=True).select_option(B)
         image = page.locator("#mark-image")
         await expect(image).to_have_attribute("src", re.compile("^blob:"))
@@ -346,7 +322,7 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
     browser: Browser,
 ) -> None:
     cameras = [A, {"id": B, "source": "scene:room", "ignore": [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]}]
-    async with open_operator_page(browser, "#zones", cameras=cameras) as (served, page):
+    async with open_operator_page(browser, "#ignored-areas", cameras=cameras) as (served, page):
         show_people(served)
         pressed = asyncio.Event()
 
@@ -359,7 +335,7 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
         await page.get_by_label("Camera", exact=True).select_option(B)
         await page.get_by_role("button", name="Next area").click()
         pressed.set()
-        await expect(page.get_by_label("Zones as YAML")).to_have_value(
+        await expect(page.get_by_label("Marks as YAML")).to_have_value(
             f"cameras:\n  - id: {B}\n    ignore: [[[0, 0], [9, 0], [9, 9]]]\n"
         )
 
@@ -367,10 +343,10 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
 async def test_ignored_areas_become_configuration_lines(browser: Browser) -> None:
     existing_areas = [[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]]
     cameras = [{"id": A, "source": "scene:room", "ignore": existing_areas}, B]
-    async with open_operator_page(browser, "#zones", cameras=cameras) as (served, page):
+    async with open_operator_page(browser, "#ignored-areas", cameras=cameras) as (served, page):
         show_people(served)
         await page.reload()
-        stage, lines = page.locator("#mark-stage"), page.get_by_label("Zones as YAML")
+        stage, lines = page.locator("#mark-stage"), page.get_by_label("Marks as YAML")
         await expect(page.locator("#mark-drawing .area")).to_have_count(
             2
         )  # the configured one and the one being drawn
@@ -396,7 +372,7 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
 
 
 async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, tmp_path: Path) -> None:
-    async with open_operator_page(browser, "#zones") as (served, page):
+    async with open_operator_page(browser, "#ignored-areas") as (served, page):
         show_people(served)
         await page.reload()
         await page.get_by_label("Camera", exact=True).select_option(B)
@@ -511,22 +487,6 @@ async def test_no_width_overflows_and_axe_finds_no_serious_violation(browser: Br
                     assert await serious_faults(page) == []
     if not axe:
         pytest.skip("axe-core is not there: make node_modules/.installed")
-
-
-async def check_button_sizes(page: Page) -> None:
-    for button in await page.locator("button:visible, select:visible, nav a").all():
-        box = await button.bounding_box()
-        assert box is not None
-        assert min(box["width"], box["height"]) >= 44, await button.text_content()
-
-
-async def serious_faults(page: Page) -> list[Any]:
-    found = await page.evaluate("axe.run()")
-    return [
-        (violation["id"], [node["html"] for node in violation["nodes"]])
-        for violation in found["violations"]
-        if violation["impact"] in {"serious", "critical"}
-    ]
 
 
 async def test_sections_are_reached_by_keyboard_and_stored_in_the_url(browser: Browser) -> None:

@@ -1,6 +1,6 @@
-/** Zones and floor points as configuration and files, in pixels of the camera's own picture. */
+/** Ignored areas and floor points as configuration and files, in pixels of the camera's own picture. */
 
-/** @import {CameraPicture} from './api_types.js' */
+/** @import {CameraPicture} from '../api_types.js' */
 
 /** @typedef {[number, number]} Point x and y, pixels */
 /** @typedef {{image: Point, floor: [string, string]}} PointPair a point in the camera's picture, and its entered position on the floor */

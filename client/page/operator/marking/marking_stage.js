@@ -3,10 +3,10 @@
  * Points are in pixels of the site's picture.
  */
 
-import { svg } from '../shared/dom.js';
+import { svg } from '../../shared/dom.js';
 
-/** @import {Site} from '../shared/api_types.js' */
-/** @import {Point} from './zone_export.js' */
+/** @import {Site} from '../../shared/api_types.js' */
+/** @import {Point} from './mark_export.js' */
 
 const STEP = 1; // pixels that an arrow key moves the cross
 const LARGE_STEP = 10; // with shift

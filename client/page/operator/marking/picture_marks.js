@@ -1,19 +1,19 @@
-/** The zone editor: areas of a camera's picture to ignore, and points with known positions on the floor. */
+/** Marks in a camera's picture: areas to ignore, and points with known positions on the floor. */
 
-import { ignoredAreasYaml, missingPoints, pointsFile, toCameraPixels, toSitePixels } from './zone_export.js';
-import { requestOperator } from '../shared/requests.js';
-import { element, make, setText } from '../shared/dom.js';
+import { ignoredAreasYaml, missingPoints, pointsFile, toCameraPixels, toSitePixels } from './mark_export.js';
+import { requestOperator } from '../../shared/requests.js';
+import { element, make, setText } from '../../shared/dom.js';
 import { MarkingStage } from './marking_stage.js';
-import { loadStill } from './camera_stills.js';
-import { copy } from '../shared/tools.js';
+import { loadStill } from '../camera_stills.js';
+import { copy } from '../../shared/tools.js';
 
-/** @import {Site} from '../shared/api_types.js' */
-/** @import {CameraDiagnostics, CameraPicture, Setting} from './api_types.js' */
-/** @import {Point, PointPair} from './zone_export.js' */
-/** @import {Section, ShowError} from './section.js' */
+/** @import {Site} from '../../shared/api_types.js' */
+/** @import {CameraDiagnostics, CameraPicture, Setting} from '../api_types.js' */
+/** @import {Point, PointPair} from './mark_export.js' */
+/** @import {Section, ShowError} from '../section.js' */
 
 /** @implements {Section} */
-export class ZoneEditor {
+export class PictureMarks {
   /** @type {Map<string, CameraPicture | null>} by camera */
   #pictures = new Map();
   /** @type {Map<string, Point[][]>} areas to ignore, by camera; the last one is being drawn */

@@ -1,11 +1,11 @@
-/** Zones and floor points as configuration and files in the camera's pixels. */
+/** Ignored areas and floor points as configuration and files in the camera's pixels. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import {
   ignoredAreasYaml, missingPoints, pointsFile, toCameraPixels, toSitePixels,
-} from '../../../../client/page/operator/zone_export.js';
+} from '../../../../client/page/operator/marking/mark_export.js';
 
 const PICTURE = { width: 1280, height: 960, scale: 0.375, left: 80, top: 0 };
 
@@ -23,7 +23,7 @@ test('areas with too few corners are left out', () => {
 });
 
 test('complete pairs are in the file, and missing ones are reported', () => {
-  /** @type {import('../../../../client/page/operator/zone_export.js').PointPair[]} */
+  /** @type {import('../../../../client/page/operator/marking/mark_export.js').PointPair[]} */
   const pairs = [1, 2, 3].map((at) => ({ image: [at, 0], floor: [String(at), '-0.5'] }));
   const incomplete = { image: /** @type {[number, number]} */ ([9, 9]), floor: /** @type {[string, string]} */ (['1', ' ']) };
   const file = JSON.parse(pointsFile(new Map([['c0', [...pairs, incomplete]], ['c1', [incomplete]]]), 'm'));
