@@ -34,7 +34,7 @@ MIN_IOU = 0.5
 MAX_GAP = 20
 """Frames of a gap that is interpolated."""
 DETECTED_ONLY = {"undetected_weight": 0.0}
-JOINT = {"joint": True}
+PER_CAMERA = {"joint": False}
 APPEARANCE_ONLY = {"identity": {"maximum_travel_evidence": 0.0}}
 TRUE, TRUE_LARGEST = "true boxes", "true boxes, largest"
 MYVIEW, CALIBRATED, UNCALIBRATED = "MyView", "MyView, calibrated", "no homographies"
@@ -106,7 +106,7 @@ def run_methods(
         self_calibrated: the scene with homographies from its cameras' tracks.
     """
     frames = truth.boxes.shape[1]
-    config = scene.config()
+    config = scene.config(track=PER_CAMERA)
 
     def select(rows: Rows) -> Rendering:
         return Rendering(_as_lists(rows), decide_with_true_ids(config, rows, frames).choices)
@@ -145,24 +145,21 @@ def run_methods(
         if searched is None:
             continue
         calibrated_scene, found = searched.scene, searched.detections
-        messages = (
-            messages if calibrated_scene is scene else track_scene(calibrated_scene.config(), found.frames)
-        )
-        without_peers = track_scene(uncalibrated, found.frames)
-        result = decide(calibrated_scene.config(), messages)
+        jointly, per_camera = calibrated_scene.config(), calibrated_scene.config(track=PER_CAMERA)
+        joint_messages = track_scene(jointly, found.frames)
+        result = decide(jointly, joint_messages)
         yield MethodResult(name, result)
         yield MethodResult(
-            f"{name}, detected only", decide(calibrated_scene.config(view=DETECTED_ONLY), messages)
+            f"{name}, detected only", decide(calibrated_scene.config(view=DETECTED_ONLY), joint_messages)
         )
-        yield MethodResult(f"{name}, no peer evidence", decide(calibrated_scene.config(), without_peers))
-        tracked_jointly = calibrated_scene.config(track=JOINT)
-        yield MethodResult(
-            f"{name}, joint", decide(tracked_jointly, track_scene(tracked_jointly, found.frames))
-        )
+        if calibrated_scene is not scene:
+            messages = track_scene(per_camera, found.frames)
+        without_peers = track_scene(uncalibrated, found.frames)
+        yield MethodResult(f"{name}, per camera", decide(per_camera, messages))
+        yield MethodResult("  no peer evidence", decide(per_camera, without_peers))
         if scene.disjoint:
-            yield MethodResult(
-                f"{name}, appearance only", decide(calibrated_scene.config(view=APPEARANCE_ONLY), messages)
-            )
+            by_appearance = calibrated_scene.config(view=APPEARANCE_ONLY)
+            yield MethodResult(f"{name}, appearance only", decide(by_appearance, joint_messages))
         yield MethodResult(f"{name}, final ids", select(result.tracks))
         yield MethodResult(f"{name}, largest", select_largest(result.tracks))
         ground = calibrated_scene.homographies

@@ -48,7 +48,7 @@ def run_ways(
     scene: BenchmarkScene, detections: SceneDetections, ways: list[str], solver: str
 ) -> Iterator[WayScore]:
     """Run the selected ways on a scene."""
-    config = scene.config()
+    config = scene.config(track={"joint": False})
     length = max(len(found.detections) for found in detections.frames.values())
     homographies = scene.homographies
     cameras = {

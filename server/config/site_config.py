@@ -174,14 +174,6 @@ class Config(BaseSettings):
         return self
 
     @model_validator(mode="after")
-    def _operators_correct_single_cameras(self) -> Self:
-        if self.track.joint and self.track.assist.enabled:
-            raise ValueError(
-                "track.joint: an operator corrects the tracks of single cameras; leave out track.assist"
-            )
-        return self
-
-    @model_validator(mode="after")
     def _streams_can_be_of_this_codec(self) -> Self:
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:
@@ -205,14 +197,14 @@ class Config(BaseSettings):
         Where people are tracked jointly, detections are joined there instead.
         """
         calibrated = self._calibrated
-        if not self.track.cross_view.enabled or self.track.joint or camera_id not in calibrated:
+        if not self.track.cross_view.enabled or self.track.is_joint or camera_id not in calibrated:
             return ()
         return tuple(peer for peer in calibrated if peer != camera_id)
 
     @property
     def joint_cameras(self) -> Sequence[str]:
-        """The cameras whose people are tracked jointly on the common ground; none with fewer than two."""
-        calibrated = self._calibrated if self.track.joint else ()
+        """The cameras whose people are tracked jointly where they overlap; none with fewer than two."""
+        calibrated = self._calibrated if self.track.is_joint else ()
         return calibrated if len(calibrated) > 1 else ()
 
     @property

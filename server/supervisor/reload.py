@@ -35,6 +35,8 @@ _LIVE_SECTIONS = ("zones", "rules")
 """Sections that the best view applies as a whole; they name cameras, so new ones need a restart first."""
 _INTEGRATIONS = ("webhooks", "mqtt")
 _TIME_ZONE = "site.time_zone"
+_BY_JOINT = ("tracker", "assist")
+"""Of these, settings that may change whether people are tracked jointly, and then need one, too."""
 _BEST_VIEW_SECTIONS = ("view", "http", "access", "record")
 
 
@@ -123,11 +125,17 @@ def _of(keys: Sequence[str], sections: Sequence[str]) -> tuple[str, ...]:
 
 
 def _deferred_track_settings(running: Config, wanted: Config, keys: Sequence[str]) -> tuple[str, ...]:
-    """Return settings of `track` that need a restart: they change when windows end or frames are final."""
+    """Return settings of `track` that need a restart.
+
+    They change when windows end, when frames are final, or whether people are tracked jointly.
+    """
     fps = running.site.fps
     changed = running.track.model_copy(update={name: getattr(wanted.track, name) for name in _BY_LAG})
     late = _BY_LAG if changed.final_lag(fps) != running.track.final_lag(fps) else ()
-    return (*late, "window") if any(key in _EPOCHS for key in keys) else late
+    joint_cameras = running.model_copy(update={"track": wanted.track}).joint_cameras
+    joint = _BY_JOINT if joint_cameras != running.joint_cameras else ()
+    window = ("window",) if any(key in _EPOCHS for key in keys) else ()
+    return tuple(dict.fromkeys((*late, *joint, *window)))
 
 
 def _track(running: Config, wanted: Config, unchanged: Sequence[str]) -> TrackSettings:

@@ -24,7 +24,7 @@ def add_joint_homographies(config: Config) -> Config:
     Raises:
         UserError: there is no such scene.
     """
-    return add_synthetic_homographies(config) if config.track.joint else config
+    return add_synthetic_homographies(config) if config.track.is_joint else config
 
 
 def _calibrated(camera: CameraSettings, site: SiteSettings) -> CameraSettings:

@@ -70,8 +70,9 @@ class TrackSettings(Section):
 
     tracker: str = DEFAULT_TRACKER
     """MyView's own tracker, or a baseline."""
-    joint: bool = False
-    """Track people on the common ground of calibrated cameras in all of them at once."""
+    joint: bool = True
+    """Track people on the common ground of overlapping calibrated cameras in all of them at once; not where
+    operators correct tracks, or a baseline tracks people: both know single cameras only."""
     solver: str = DEFAULT_SOLVER
     solver_share: PositiveFloat | None = 0.35
     """Work of a solve at most, as a share of the stride on an ordinary machine; None: no limit."""
@@ -91,6 +92,11 @@ class TrackSettings(Section):
     """How a camera uses the detections of others that see the same ground."""
     cross_view_wait_s: NonNegativeFloat = 0.3
     """Seconds after its capture that a frame waits for the other cameras' detections."""
+
+    @property
+    def is_joint(self) -> bool:
+        """Whether people are tracked on the common ground of calibrated cameras that overlap."""
+        return self.joint and self.tracker == DEFAULT_TRACKER and not self.assist.enabled
 
     def final_lag(self, fps: float) -> int:
         """Return the frames that follow a final frame at most when a window ends."""

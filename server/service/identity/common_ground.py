@@ -26,23 +26,29 @@ Floats = NDArray[np.float64]
 class CommonGround:
     """The cameras that are tracked jointly: their tracks on the ground, and which of their own those are.
 
-    ``local_numbers`` names the tracks on the ground.
+    ``cameras`` may be, where they overlap, and are taken to be until an epoch says. ``local_numbers`` names
+    the tracks on the ground.
     """
 
     def __init__(self, cameras: Sequence[str], local_numbers: LocalNumbers) -> None:
-        self.cameras = tuple(cameras)
+        self._has_map = bool(cameras)
+        self.cameras = frozenset(cameras)
         self._local_numbers = local_numbers
         self._own_tracks = OwnTracks()
 
     def homographies(self, of_cameras: Mapping[str, Floats | None]) -> dict[str, Floats | None]:
         """Return the homographies of all cameras, and of the map if any are tracked jointly."""
-        return {**of_cameras, **({GROUND: np.eye(3)} if self.cameras else {})}
+        return {**of_cameras, **({GROUND: np.eye(3)} if self._has_map else {})}
 
-    def link(self, joint: JointEpoch, windows: Iterable[CameraWindow]) -> dict[TrackName, TrackKey]:
+    def link(
+        self, joint: JointEpoch, reported: Collection[str], windows: Iterable[CameraWindow]
+    ) -> dict[TrackName, TrackKey]:
         """Learn which of the cameras' own tracks show whom; return what is new.
 
-        ``windows`` of these cameras have the tracks on the ground.
+        ``reported`` are all cameras of the epoch; ``windows`` of those tracked jointly have the tracks on the
+        ground.
         """
+        self.cameras = self.cameras - set(reported) | joint.own.keys()
         return self._own_tracks.update(joint.own, windows)
 
     def updates(self, joint: JointTracks, messages: Iterable[CameraTracks]) -> list[TrackUpdate]:
@@ -71,7 +77,7 @@ class CommonGround:
             each
             for correction in corrections
             for each in (
-                [replace(correction, camera=camera) for camera in self.cameras]
+                [replace(correction, camera=camera) for camera in sorted(self.cameras)]
                 if isinstance(correction, Split) and correction.camera == GROUND
                 else [correction]
             )

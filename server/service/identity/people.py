@@ -45,7 +45,7 @@ class PersonTracker:
     ``homographies`` map each camera's image to the ground; None where there is none. ``share`` is
     this service's shard; identities are computed for all people, identically in every service. Tracks are
     final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
-    cameras that look straight down, ``joint_cameras`` those whose people are tracked jointly on the ground;
+    cameras that look straight down, ``joint_cameras`` those that are tracked jointly where they overlap;
     ``fps`` are the site's frames a second.
     """
 
@@ -280,7 +280,7 @@ class PersonTracker:
 
     def _recall(self, own: Sequence[CameraWindow], joint: Sequence[CameraWindow], epoch: Epoch) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
-        linked = {} if epoch.joint is None else self._ground.link(epoch.joint, joint)
+        linked = {} if epoch.joint is None else self._ground.link(epoch.joint, epoch.tracks, joint)
         if not self._expected:
             return
         origin = self._reader.local_numbers.origin

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import msgspec
@@ -78,18 +78,21 @@ def merge_joint_tracks(message: CameraTracks, joint: JointTracks) -> CameraTrack
     )
 
 
-def with_joint_tracks(epoch: Epoch, cameras: Sequence[str], joint: JointTracks | None) -> Epoch:
-    """Return an epoch with joint tracks in the messages of their cameras; None: without any tracks there."""
-    own = {camera: message for camera, message in epoch.tracks.items() if camera in cameras}
-    merged = {
+def with_joint_tracks(epoch: Epoch, joint: JointTracks) -> Epoch:
+    """Return an epoch with joint tracks in the messages of their cameras."""
+    own = {camera: message for camera, message in epoch.tracks.items() if camera in joint.cameras}
+    merged = {camera: merge_joint_tracks(message, joint) for camera, message in own.items()}
+    return replace(epoch, tracks=epoch.tracks | merged, joint=JointEpoch(joint, own))
+
+
+def without_tracks(epoch: Epoch, cameras: Collection[str]) -> Epoch:
+    """Return an epoch in which these cameras, which are tracked jointly, show nobody."""
+    empty = {
         camera: msgspec.structs.replace(message, tracks=[], observations=[])
-        if joint is None
-        else merge_joint_tracks(message, joint)
-        for camera, message in own.items()
+        for camera, message in epoch.tracks.items()
+        if camera in cameras
     }
-    return replace(
-        epoch, tracks=epoch.tracks | merged, joint=None if joint is None else JointEpoch(joint, own)
-    )
+    return replace(epoch, tracks=epoch.tracks | empty)
 
 
 def _first_frames(track: TrackMessage, frames: int, last: int) -> TrackMessage:

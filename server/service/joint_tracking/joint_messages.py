@@ -71,5 +71,5 @@ class JointTracks(msgspec.Struct, frozen=True, kw_only=True):
     """In ground units; 0: nobody was seen yet."""
     paths: list[GroundPath]
     cameras: dict[str, list[TrackMessage]]
-    """The boxes in each camera, in pixels of the site's image; ids as in `paths`."""
+    """The boxes in each camera that overlaps another, in pixels of the site's image; ids as in `paths`."""
     solve: SolverReport | None

@@ -13,7 +13,13 @@ from server.messaging.track_conversion import solver_report
 from server.service.joint_tracking.camera_track_builder import CameraTrackBuilder
 from server.service.joint_tracking.joint_messages import GroundPath, JointSetup, JointTask, JointTracks
 from tracking import Detections, SolverBudget, create_solver
-from tracking.ground_plane import GroundCamera, GroundFrame, GroundPlaneTracker, GroundSettings
+from tracking.ground_plane import (
+    GroundCamera,
+    GroundFrame,
+    GroundPlaneTracker,
+    GroundSettings,
+    overlapping_cameras,
+)
 
 
 class JointTracker:
@@ -22,7 +28,10 @@ class JointTracker:
     def __init__(self, setup: JointSetup) -> None:
         self._run, self._site_size = setup.run, setup.site_size
         self._homographies = {camera: np.array(rows) for camera, rows in setup.homographies.items()}
-        self._sizes: dict[str, tuple[int, int]] = {}
+        self._calibrations: dict[str, GroundCamera] = {}
+        """Of the cameras that have reported."""
+        self._joint: frozenset[str] = frozenset()
+        """Those of them that overlap."""
         self._tracker = GroundPlaneTracker(
             # A camera's own size follows with its first observations.
             {
@@ -43,7 +52,7 @@ class JointTracker:
     def step(self, task: JointTask) -> JointTracks:
         """Track people in the frames of an epoch."""
         self._take(task)
-        all_ended = bool(task.cameras) and all(camera in self._ended for camera in self._sizes)
+        all_ended = bool(task.cameras) and all(camera in self._ended for camera in self._calibrations)
         last = max(part.last for part in task.cameras.values()) if all_ended else task.last
         final, ahead = self._track_to(last, all_ended=all_ended)
         cameras = {
@@ -55,6 +64,7 @@ class JointTracker:
                 part.motion,
             )
             for camera, part in task.cameras.items()
+            if camera in self._joint
         }
         for found in self._detections.values():
             for pulse in [pulse for pulse in found if pulse <= self._final_to]:
@@ -73,13 +83,18 @@ class JointTracker:
     def _take(self, task: JointTask) -> None:
         """Store the observations of an epoch."""
         for camera, part in task.cameras.items():
-            if self._sizes.get(camera) != part.size:
-                self._sizes[camera] = part.size
-                calibration = GroundCamera(self._homographies[camera], *map(float, part.size))
+            width, height = part.size
+            known = self._calibrations.get(camera)
+            if known is None or (known.width, known.height) != (width, height):
+                calibration = GroundCamera(self._homographies[camera], width, height)
+                self._calibrations[camera] = calibration
                 self._tracker.set_camera(camera, calibration)
-            for frame in part.frames:
-                self._detections[camera][frame.pulse] = unpack_observations(frame)
+                self._joint = overlapping_cameras(self._calibrations)
             (self._ended.add if part.ended else self._ended.discard)(camera)
+        for camera, part in task.cameras.items():
+            if camera in self._joint:
+                for frame in part.frames:
+                    self._detections[camera][frame.pulse] = unpack_observations(frame)
 
     def _track_to(self, last: int, *, all_ended: bool) -> tuple[list[GroundFrame], list[GroundFrame]]:
         """Track up to frame `last`; return the frames that have become final, and those after them."""

@@ -19,4 +19,4 @@ class JointStage:
         """Return the epoch with joint tracks; unchanged where no cameras are tracked jointly."""
         if self._tracker is None:
             return epoch
-        return with_joint_tracks(epoch, self._cameras, self._tracker.step(joint_task(epoch, self._cameras)))
+        return with_joint_tracks(epoch, self._tracker.step(joint_task(epoch, self._cameras)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Collection
 from itertools import count
 
 import msgspec
@@ -12,7 +13,7 @@ from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.joint_tracking.epochs import joint_setup, joint_task, with_joint_tracks
+from server.service.joint_tracking.epochs import joint_setup, joint_task, with_joint_tracks, without_tracks
 from server.service.joint_tracking.joint_messages import JointSetup, JointTracks
 from server.system.worker.process import WorkerDiedError, WorkerProcess
 
@@ -33,10 +34,9 @@ class JointWorker:
     def __init__(self, config: Config) -> None:
         self._cameras = config.joint_cameras
         self._setup = joint_setup(config) if self._cameras else None
-        if self._cameras:
-            log.info("cameras %s are tracked jointly on their common ground", ", ".join(self._cameras))
-        elif config.track.joint:
-            log.warning("track.joint: fewer than two upright cameras are calibrated: each is tracked alone")
+        self._joint = set(self._cameras)
+        """The cameras that overlap, as far as is known: all, until the process says."""
+        self._logged: set[str] = set()
         self._runs = count()
         self._worker: WorkerProcess[JointTracks] | None = None
         self._failures = LogThrottle()
@@ -48,15 +48,26 @@ class JointWorker:
         """Return the epoch with joint tracks; unchanged where no cameras are tracked jointly."""
         if self._setup is None:
             return epoch
-        joint = None
         if self._worker is not None or asyncio.get_running_loop().time() >= self._retry_at:
+            task = joint_task(epoch, self._cameras)
             try:
                 worker = await self._running(self._setup)
-                joint = await worker.ask(joint_task(epoch, self._cameras))
+                joint = await worker.ask(task)
                 self._backoff.reset()
             except WorkerDiedError as error:
                 await self._replace(error)
-        return with_joint_tracks(epoch, self._cameras, joint)
+            else:
+                self._joint = self._joint - task.cameras.keys() | joint.cameras.keys()
+                self._log_joint_cameras(joint.cameras)
+                return with_joint_tracks(epoch, joint)
+        return without_tracks(epoch, self._joint)
+
+    def _log_joint_cameras(self, cameras: Collection[str]) -> None:
+        """Log which cameras are tracked jointly, when more are."""
+        if not self._logged.issuperset(cameras):
+            self._logged |= set(cameras)
+            names = [camera for camera in self._cameras if camera in self._logged]
+            log.info("cameras %s are tracked jointly on their common ground", ", ".join(names))
 
     async def _replace(self, error: WorkerDiedError) -> None:
         """End the process; the next one starts at once, and later if that fails, too."""

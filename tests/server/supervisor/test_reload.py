@@ -61,7 +61,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "track.costs.occlusion": (ALL_CAMERAS, 0.9),
     "track.window.birth_max_cost": (ALL_CAMERAS, 0.6),
     "track.backlog_s": (SITE, 3.0),
-    "track.joint": (SITE, True),
+    "track.joint": (SITE, False),
     "zones": (LIVE, [{"id": "hall", "area": [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]}]),
     "webhooks": (LIVE, [{"url": "https://example.org/hook"}]),
     "mqtt.host": (LIVE, "broker"),

@@ -116,6 +116,24 @@ def test_sites_that_do_not_track_jointly_are_left_alone() -> None:
     assert SIZE == (640, 480)
 
 
+def test_a_camera_that_looks_elsewhere_keeps_its_own_tracks() -> None:
+    elsewhere = np.array([[1.0, 0.0, 100.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    cameras = [
+        {
+            "id": name,
+            "source": "scene:room",
+            "ground": ((elsewhere if name == "c2" else np.eye(3)) @ view.camera.homography).tolist(),
+        }
+        for name, view in VIEWS.items()
+    ]
+    stage = JointStage(joint_config(cameras=cameras))
+    for epoch in list(walked_epochs(walk_past()))[:-1]:
+        found = stage.step(epoch)
+        assert found.tracks["c2"] is epoch.tracks["c2"]
+        assert [found.is_joint(name) for name in VIEWS] == [True, True, False]
+    assert {len(message.tracks) for message in found.tracks.values()} == {2}
+
+
 def test_windows_that_do_not_overlap_are_tracked_too() -> None:
     window = {"length_s": 0.6, "stride_s": 0.6, "birth_s": 0.6, "min_frames": 3}
     stage = JointStage(joint_config(track={"joint": True, "window": window}))
