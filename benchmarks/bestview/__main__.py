@@ -19,12 +19,12 @@ Detectors prescan recordings, as MyView does; with `--as-live` they learn the ba
 *MyView* tracks people on the floor in all cameras at once; *per camera* in each alone (`track.joint`).
 
 *Detected only* excludes views of people that the camera does not detect, although other cameras locate them.
-*No peer evidence* is per camera, without detections from other cameras. *Calibrated* has the homographies that `myview
-calibrate` computes from the cameras' tracks. *Largest* selects in each frame the camera with the largest box.
-*Nearest feet* associates whole tracks of MyView's single-camera tracker (or ByteTrack's, on the same boxes)
-by the median distance of foot points, and selects the largest box. *Occupancy map* detects people on the
-ground from all cameras' foreground and links them by min-cost flow; MyView's program selects its views. The
-sweeps use true boxes.
+*No peer evidence* is per camera, without detections from other cameras. *Calibrated* has the homographies
+that `myview calibrate` computes from the cameras' tracks. *Largest* selects in each frame the camera with the
+largest box. *Nearest feet* associates whole tracks of MyView's single-camera tracker (or ByteTrack's, on the
+same boxes) by the median distance of foot points, and selects the largest box. *Occupancy map* detects people
+on the ground from all cameras' foreground and links them by min-cost flow; MyView's program selects its views.
+The sweeps use true boxes.
 """
 
 from __future__ import annotations

@@ -87,6 +87,23 @@ class DetectedScene:
     detections: SceneDetections
 
 
+@dataclass(frozen=True, slots=True)
+class _Selection:
+    """Views of a scene's people, selected from boxes with any ids."""
+
+    scene: BenchmarkScene
+    frames: int
+
+    def best(self, rows: Rows) -> Rendering:
+        """Return MyView's views."""
+        config = self.scene.config(track=PER_CAMERA)
+        return Rendering(_as_lists(rows), decide_with_true_ids(config, rows, self.frames).choices)
+
+    def largest(self, rows: Rows) -> Rendering:
+        """Return in each frame the camera with the largest box."""
+        return Rendering(_as_lists(rows), largest(rows, self.scene.sizes, self.frames))
+
+
 def run_methods(
     scene: BenchmarkScene,
     truth: SceneTruth,
@@ -105,76 +122,79 @@ def run_methods(
         peers: the environment of the other tracker.
         self_calibrated: the scene with homographies from its cameras' tracks.
     """
-    frames = truth.boxes.shape[1]
-    config = scene.config(track=PER_CAMERA)
-
-    def select(rows: Rows) -> Rendering:
-        return Rendering(_as_lists(rows), decide_with_true_ids(config, rows, frames).choices)
-
-    def select_largest(rows: Rows) -> Rendering:
-        return Rendering(_as_lists(rows), largest(rows, scene.sizes, frames))
-
+    selection = _Selection(scene, truth.boxes.shape[1])
     true_rows = visible_rows(scene, truth)
-    yield MethodResult(TRUE, select(true_rows), ground_truth=True)
-    yield MethodResult(TRUE_LARGEST, select_largest(true_rows), ground_truth=True)
+    yield MethodResult(TRUE, selection.best(true_rows), ground_truth=True)
+    yield MethodResult(TRUE_LARGEST, selection.largest(true_rows), ground_truth=True)
+    yield from _own_tracks(selection, detections)
+    yield from _uncalibrated(selection, uncalibrated_detections)
+    if scene.calibrated:
+        yield from _calibrated(selection, DetectedScene(scene, detections), MYVIEW, "", peers)
+    if self_calibrated is not None:
+        yield from _calibrated(selection, self_calibrated, CALIBRATED, ", calibr.", peers)
+
+
+def _own_tracks(selection: _Selection, detections: SceneDetections) -> Iterator[MethodResult]:
+    """Each camera's own tracks, with true ids or with none."""
+    scene = selection.scene
+    config = scene.config(track=PER_CAMERA)
     messages = track_scene(config, detections.frames)
     own_rows = own_tracks(messages)
     true_ids = boxes_by_truth(own_rows, scene.gt)
-    yield MethodResult("own boxes, true ids", select(true_ids))
-    yield MethodResult("  with gaps interpolated", select(interpolated_gaps(true_ids, MAX_GAP)))
-    yield MethodResult(
-        "own tracklets, true ids", select(tracks_by_truth(own_tracklets(config, messages), scene.gt))
-    )
-    yield MethodResult("own tracks, true ids", select(tracks_by_truth(own_rows, scene.gt)))
-    yield MethodResult("own tracks, not associated", select_largest(unassociated_tracks(own_rows)))
-    uncalibrated = scene.config(ground=False)
-    uncalibrated_messages = track_scene(uncalibrated, uncalibrated_detections.frames)
-    uncalibrated_result = decide(uncalibrated, uncalibrated_messages)
-    yield MethodResult(UNCALIBRATED, uncalibrated_result)
+    tracklets = tracks_by_truth(own_tracklets(config, messages), scene.gt)
+    yield MethodResult("own boxes, true ids", selection.best(true_ids))
+    yield MethodResult("  with gaps interpolated", selection.best(interpolated_gaps(true_ids, MAX_GAP)))
+    yield MethodResult("own tracklets, true ids", selection.best(tracklets))
+    yield MethodResult("own tracks, true ids", selection.best(tracks_by_truth(own_rows, scene.gt)))
+    yield MethodResult("own tracks, not associated", selection.largest(unassociated_tracks(own_rows)))
+
+
+def _uncalibrated(selection: _Selection, detections: SceneDetections) -> Iterator[MethodResult]:
+    """MyView without homographies."""
+    scene = selection.scene
+    config = scene.config(ground=False)
+    messages = track_scene(config, detections.frames)
+    result = decide(config, messages)
+    yield MethodResult(UNCALIBRATED, result)
     if scene.disjoint:
-        yield MethodResult(
-            "  appearance only",
-            decide(scene.config(ground=False, view=APPEARANCE_ONLY), uncalibrated_messages),
-        )
+        by_appearance = scene.config(ground=False, view=APPEARANCE_ONLY)
+        yield MethodResult("  appearance only", decide(by_appearance, messages))
     if not scene.calibrated:
-        yield MethodResult(f"{UNCALIBRATED}, largest", select_largest(uncalibrated_result.tracks))
-    for name, searched in (
-        (MYVIEW, DetectedScene(scene, detections) if scene.calibrated else None),
-        (CALIBRATED, self_calibrated),
-    ):
-        if searched is None:
-            continue
-        calibrated_scene, found = searched.scene, searched.detections
-        jointly, per_camera = calibrated_scene.config(), calibrated_scene.config(track=PER_CAMERA)
-        joint_messages = track_scene(jointly, found.frames)
-        result = decide(jointly, joint_messages)
-        yield MethodResult(name, result)
-        yield MethodResult(
-            f"{name}, detected only", decide(calibrated_scene.config(view=DETECTED_ONLY), joint_messages)
+        yield MethodResult(f"{UNCALIBRATED}, largest", selection.largest(result.tracks))
+
+
+def _calibrated(
+    selection: _Selection,
+    detected: DetectedScene,
+    name: str,
+    suffix: str,
+    peers: OtherTrackerEnvironment | None,
+) -> Iterator[MethodResult]:
+    """MyView and the other ways to associate, with homographies."""
+    scene, found = detected.scene, detected.detections
+    jointly, per_camera = scene.config(), scene.config(track=PER_CAMERA)
+    messages = track_scene(jointly, found.frames)
+    result = decide(jointly, messages)
+    yield MethodResult(name, result)
+    yield MethodResult(f"{name}, detected only", decide(scene.config(view=DETECTED_ONLY), messages))
+    without_peers = track_scene(selection.scene.config(ground=False), found.frames)
+    yield MethodResult(f"{name}, per camera", decide(per_camera, track_scene(per_camera, found.frames)))
+    yield MethodResult("  no peer evidence", decide(per_camera, without_peers))
+    if scene.disjoint:
+        by_appearance = scene.config(view=APPEARANCE_ONLY)
+        yield MethodResult(f"{name}, appearance only", decide(by_appearance, messages))
+    yield MethodResult(f"{name}, final ids", selection.best(result.tracks))
+    yield MethodResult(f"{name}, largest", selection.largest(result.tracks))
+    nearest = f"nearest feet{suffix}"
+    feet = by_nearest_feet(own_tracks(without_peers), scene.homographies)
+    yield MethodResult(nearest, selection.largest(feet))
+    if scene.detections is None and not scene.disjoint:
+        yield from (
+            MethodResult(f"{MAP}{suffix}", selection.best(rows)) for rows in _occupancy_tracks(scene, found)
         )
-        if calibrated_scene is not scene:
-            messages = track_scene(per_camera, found.frames)
-        without_peers = track_scene(uncalibrated, found.frames)
-        yield MethodResult(f"{name}, per camera", decide(per_camera, messages))
-        yield MethodResult("  no peer evidence", decide(per_camera, without_peers))
-        if scene.disjoint:
-            by_appearance = calibrated_scene.config(view=APPEARANCE_ONLY)
-            yield MethodResult(f"{name}, appearance only", decide(by_appearance, joint_messages))
-        yield MethodResult(f"{name}, final ids", select(result.tracks))
-        yield MethodResult(f"{name}, largest", select_largest(result.tracks))
-        ground = calibrated_scene.homographies
-        name_of_nearest = "nearest feet" if calibrated_scene is scene else "nearest feet, calibr."
-        yield MethodResult(
-            name_of_nearest, select_largest(by_nearest_feet(own_tracks(without_peers), ground))
-        )
-        if scene.detections is None and not scene.disjoint:
-            title = MAP if calibrated_scene is scene else f"{MAP}, calibr."
-            yield from (
-                MethodResult(title, select(rows)) for rows in _occupancy_tracks(calibrated_scene, found)
-            )
-        if peers is not None:
-            other_tracks = by_nearest_feet(_peer_tracks(peers, found.boxes), ground)
-            yield MethodResult(f"{PEER}, {name_of_nearest}", select_largest(other_tracks))
+    if peers is not None:
+        other_tracks = by_nearest_feet(_peer_tracks(peers, found.boxes), scene.homographies)
+        yield MethodResult(f"{PEER}, {nearest}", selection.largest(other_tracks))
 
 
 def _occupancy_tracks(calibrated_scene: BenchmarkScene, found: SceneDetections) -> Iterator[Rows]:
