@@ -23,8 +23,8 @@ Detectors prescan recordings, as MyView does; with `--as-live` they learn the ba
 that `myview calibrate` computes from the cameras' tracks. *Largest* selects in each frame the camera with the
 largest box. *Nearest feet* associates whole tracks of MyView's single-camera tracker (or ByteTrack's, on the
 same boxes) by the median distance of foot points, and selects the largest box. *Occupancy map* detects people
-on the ground from all cameras' foreground and links them by min-cost flow; MyView's program selects its views.
-The sweeps use true boxes.
+on the ground from all cameras' foreground and links them by min-cost flow; MyView's program selects its
+views. The sweeps use true boxes.
 """
 
 from __future__ import annotations
