@@ -15,6 +15,7 @@ from server.config.site_config import Config
 from server.media.codec import stream_format_for
 from server.messaging.inbox import Message
 from server.messaging.messages import GopChoices
+from server.service.buffer_lengths import BufferLengths
 from server.service.bus_connection import BusConnection
 from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
@@ -42,8 +43,6 @@ from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
-_MAX_AHEAD_S = 60.0
-"""Seconds that a camera's pulses may be ahead of this service's, which may have been suspended."""
 _INBOX_TURNS = 10
 """How often the inboxes are served between two epochs, at most."""
 _FIRST_PULSE_S = 3.0
@@ -57,32 +56,21 @@ class BestViewPipeline:
         self.config = config
         self.pulses = PulseFollower(config)
         cameras = config.camera_ids
-        fps, stride = config.site.fps, config.window.stride
-        grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
-        # Frames must still be buffered when the last camera that is waited for has reported.
-        smooth = round(config.view.smooth_lookahead_s * fps) + config.gop
-        frames = max(
-            round(config.view.buffer_s * fps),
-            backlog + 4 * (config.lookahead + grace + stride),
-            backlog + 2 * (grace + stride) + smooth,
-        )
-        self.max_lookahead = (frames - backlog) // 2 - grace - stride
-        """The longest look-ahead, in frames, that can be set at run time: half of what the buffers allow."""
+        fps, stride, lengths = config.site.fps, config.window.stride, BufferLengths.of(config)
+        self.max_lookahead = lengths.max_lookahead
         self.stream_format = stream_format_for(
             config.encode.codec, config.site.size, per_camera_parameters=config.encode.parameters == "own"
         )
         self.frame_buffers = {
-            camera: FrameBuffer(config.site.fps, frames, self.stream_format) for camera in cameras
+            camera: FrameBuffer(fps, lengths.frames, self.stream_format) for camera in cameras
         }
-        max_ahead = round(_MAX_AHEAD_S * fps)
-        self.aligner = EpochAligner(cameras, stride, grace, backlog, max_ahead + grace + backlog)
+        latest = lengths.max_ahead + lengths.grace + lengths.backlog
+        self.aligner = EpochAligner(cameras, stride, lengths.grace, lengths.backlog, latest)
         audio_format = config.sound.format
         self.audio_buffer = (
-            None
-            if audio_format is None
-            else AudioBuffer(audio_format, config.site.fps, frames / config.site.fps)
+            None if audio_format is None else AudioBuffer(audio_format, fps, lengths.frames / fps)
         )
-        self._backlog_monitor = BacklogMonitor(frames - config.lookahead - config.gop)
+        self._backlog_monitor = BacklogMonitor(lengths.frames - config.lookahead - config.gop)
         self.skipped_epochs = 0
         """Epochs that were not decided because decisions had fallen too far behind."""
         self._skip_log = LogThrottle()
@@ -97,14 +85,14 @@ class BestViewPipeline:
             self.audio_buffer,
             audio_sender=config.audio_sender,
             current_pulse=lambda: self.pulses.newest,
-            max_ahead=max_ahead,
+            max_ahead=lengths.max_ahead,
             on_ended=self.bus.confirm_end,
         )
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
         self._joint = JointWorker(config)
-        self.decision_state = DecisionState(config.site.fps)
+        self.decision_state = DecisionState(fps)
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
         )
@@ -117,7 +105,9 @@ class BestViewPipeline:
         )
         self.replication = ServiceReplication(config, self.decider.people, self.state_replication, self.bus)
         self.walk_session = WalkSession(config)
-        self.recorder = Recorder(config, self.frame_buffers, self.stream_format, frames, self.audio_buffer)
+        self.recorder = Recorder(
+            config, self.frame_buffers, self.stream_format, lengths.frames, self.audio_buffer
+        )
         self._last_decided = -1
         """The last pulse of the last epoch; later frames have no tracks."""
         self.loss_recorder = LossRecorder(self.frame_buffers, self.ingest.states, stride)
