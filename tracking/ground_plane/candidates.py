@@ -46,9 +46,8 @@ class Candidate:
 class Candidates:
     """The candidates after the last final frame; frames are `seconds` apart."""
 
-    def __init__(self, seconds: float, settings: GroundSettings) -> None:
+    def __init__(self, seconds: float) -> None:
         self._seconds = seconds
-        self._settings = settings
         self._candidates: list[Candidate] = []
 
     @property
@@ -56,21 +55,21 @@ class Candidates:
         """Where they were seen last, (N, 2)."""
         return np.array([candidate.place for candidate in self._candidates]).reshape(-1, 2)
 
-    def discounts(self, places: Places) -> Floats:
+    def discounts(self, places: Places, settings: GroundSettings) -> Floats:
         """Return by how much less an arrival costs at each of K places of the next frame, (K,)."""
         if not self._candidates or not len(places):
             return np.zeros(len(places))
-        return np.asarray(np.maximum(self._continued(places, range(len(places))).max(axis=0), 0.0))
+        return np.asarray(np.maximum(self._continued(places, range(len(places)), settings).max(axis=0), 0.0))
 
-    def update(self, places: Places, chosen: Sequence[int], missed: Floats) -> None:
+    def update(self, places: Places, chosen: Sequence[int], missed: Floats, settings: GroundSettings) -> None:
         """Add a final frame, in which people were found at the `chosen` places.
 
         `missed`: (N,) costs of each candidate being seen by no camera in this frame.
         """
         free = _free_places(places, chosen)
-        found = self._found(places, chosen)
+        found = self._found(places, chosen, settings)
         begun = -places.costs[free]
-        continued = self._continued(places, free) + begun
+        continued = self._continued(places, free, settings) + begun
         continued[sorted(found)] = -np.inf
         rows, columns = assign_pairs(continued, 0.0)
         evidence, kept = begun.copy(), list[Candidate]()
@@ -95,7 +94,7 @@ class Candidates:
         """Forget all."""
         self._candidates = []
 
-    def _continued(self, places: Places, indices: Sequence[int]) -> Floats:
+    def _continued(self, places: Places, indices: Sequence[int], settings: GroundSettings) -> Floats:
         """Return the evidence of each candidate before it moved to each of these places, (N, K).
 
         It is -inf where a place is too far.
@@ -104,26 +103,30 @@ class Candidates:
             return np.zeros((len(self._candidates), len(indices)))
         chosen = list(indices)
         offsets = places.means[None, chosen] - self.places[:, None]
-        moves = OffsetDensities.of(offsets, places.covariances[None, chosen] + self._spreads()[:, None])
+        moves = OffsetDensities.of(
+            offsets, places.covariances[None, chosen] + self._spreads(settings)[:, None]
+        )
         evidence = np.array([candidate.evidence for candidate in self._candidates])[:, None]
-        costs = moves.correlated(self._settings.detection_weight(self._seconds))
+        costs = moves.correlated(settings.detection_weight(self._seconds))
         return np.where(is_possible(moves), evidence - costs, -np.inf)
 
-    def _spreads(self) -> Floats:
+    def _spreads(self, settings: GroundSettings) -> Floats:
         """Return the covariances of where they may be in the next frame, (N, 2, 2)."""
         walked = [
-            (self._settings.speed * (candidate.unseen + self._seconds)) ** 2 for candidate in self._candidates
+            (settings.speed * (candidate.unseen + self._seconds)) ** 2 for candidate in self._candidates
         ]
         covariances = np.array([candidate.covariance for candidate in self._candidates])
         return np.asarray(covariances + np.array(walked)[:, None, None] * np.eye(2))
 
-    def _found(self, places: Places, chosen: Sequence[int]) -> set[int]:
+    def _found(self, places: Places, chosen: Sequence[int], settings: GroundSettings) -> set[int]:
         """Return the candidates who are among the people found."""
         if not self._candidates or not len(chosen):
             return set()
         people = list(chosen)
         offsets = places.means[None, people] - self.places[:, None]
-        distances = squared_distances(offsets, places.covariances[None, people] + self._spreads()[:, None])
+        distances = squared_distances(
+            offsets, places.covariances[None, people] + self._spreads(settings)[:, None]
+        )
         return set(np.flatnonzero((distances < _GATE).any(axis=1)).tolist())
 
 

@@ -18,6 +18,7 @@ from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.candidates import Candidates
 from tracking.ground_plane.hypotheses import find_places
 from tracking.ground_plane.measurements import PERSON_M, estimate_units_per_metre, measure
+from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.network import build_ground_network
 from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.place_noise import PlaceNoise
@@ -53,7 +54,7 @@ class KeyframeTracker:
         """
         self._names = tuple(cameras)
         self._given = tuple(cameras.values())
-        self._settings = settings
+        self._motion = MotionScale(settings)
         self._solver = solver
         self._seconds = 1.0 / fps
         self._lag = frames_in(settings.lag_s, fps)
@@ -63,7 +64,7 @@ class KeyframeTracker:
         self._sizes = [BoxSizes() for _ in cameras]
         self._noise = PlaceNoise(len(cameras))
         self._first_detected: int | None = None
-        self._candidates = Candidates(self._seconds, settings)
+        self._candidates = Candidates(self._seconds)
         self._people: list[GroundPerson] = []
         self._next_id = 1
         self._window: deque[WindowFrame] = deque()
@@ -117,6 +118,11 @@ class KeyframeTracker:
         return () if units is None else tuple(camera.scaled(units) for camera in self._given)
 
     @property
+    def _settings(self) -> GroundSettings:
+        """The settings, with what has been learned about how people move."""
+        return self._motion.settings
+
+    @property
     def person_height(self) -> float | None:
         """How tall people are, in the unit of the plane; None before the first detections."""
         return None if self._units_per_metre is None else PERSON_M * self._units_per_metre
@@ -140,7 +146,7 @@ class KeyframeTracker:
                 places = frame.places
                 place, covariance = places.means[row[m]], places.covariances[row[m]]
             elif (row[m:] >= 0).any():
-                ahead = person.ahead(frame.number)
+                ahead = person.ahead(frame.number, self._settings)
                 place, covariance = ahead.place, ahead.place_covariance
             else:
                 continue
@@ -168,7 +174,7 @@ class KeyframeTracker:
         if self._is_beginning(self._window[0].number):
             rate = self._settings.people_density
         arrival_cost = -float(np.log(rate))
-        first = arrival_cost - np.minimum(self._candidates.discounts(frames[0]), arrival_cost)
+        first = arrival_cost - np.minimum(self._candidates.discounts(frames[0], self._settings), arrival_cost)
         newcomers = _NEWCOMERS
         while True:
             network = build_ground_network(
@@ -199,7 +205,7 @@ class KeyframeTracker:
             if n < len(self._people):
                 person = self._people[n]
                 if state >= 0:
-                    person.move(frame.number, frame.places, state)
+                    self._move(person, frame, state)
                 elif state == _GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
                     continue
             elif state >= 0:
@@ -212,17 +218,23 @@ class KeyframeTracker:
             if state >= 0:
                 person.learn(frame.places, state, self._sizes)
             if state >= 0 or (row[1:] >= 0).any():
-                ahead = person.ahead(frame.number)
+                ahead = person.ahead(frame.number, self._settings)
                 tracks.append(self._track(person, frame, state, ahead.place, ahead.place_covariance))
         chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
         self._noise.update(frame.places, chosen)
         missed = missed_costs(
             self._candidates.places, frame.places.measurements, self._cameras, self._sizes, self._settings
         )
-        self._candidates.update(frame.places, chosen, self._settings.detection_weight(self._seconds) * missed)
+        missed *= self._settings.detection_weight(self._seconds)
+        self._candidates.update(frame.places, chosen, missed, self._settings)
         self._people = people
         self._states = self._states[rows + arriving, 1:]
         return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)
+
+    def _move(self, person: GroundPerson, frame: WindowFrame, state: int) -> None:
+        places, seconds = frame.places, person.seconds_unseen(frame.number)
+        self._motion.update(person.state, seconds, places.means[state], places.covariances[state])
+        person.move(frame.number, places, state, self._settings)
 
     def _arrive(self, frame: WindowFrame, state: int) -> GroundPerson:
         number, self._next_id = self._next_id, self._next_id + 1

@@ -54,7 +54,7 @@ def _shows_people(camera: GroundCamera, points: Floats) -> NDArray[np.bool_]:
 
 def _is_floor(camera: GroundCamera, points: Floats) -> NDArray[np.bool_]:
     """Return which image points (K, 2) are below the horizon: those beyond are behind the camera."""
-    return np.isfinite(camera.to_image(camera.to_ground(points))).all(axis=1)
+    return np.asarray(np.isfinite(camera.to_image(camera.to_ground(points))).all(axis=1))
 
 
 def _sideways(camera: GroundCamera, points: Floats) -> Floats:

@@ -19,7 +19,7 @@ _UNKNOWN = np.zeros(0)
 
 
 class GroundPerson:
-    """The state of a person after the last final frame.
+    """The state of a person after the last final frame. `settings` have how people move.
 
     Attributes:
         id: from 1, never reused.
@@ -28,7 +28,7 @@ class GroundPerson:
         boxes: their size.
     """
 
-    __slots__ = ("_histograms", "_seconds", "_settings", "boxes", "id", "seen", "state")
+    __slots__ = ("_histograms", "_seconds", "boxes", "id", "seen", "state")
 
     def __init__(
         self, number: int, frame: int, places: Places, k: int, seconds: float, settings: GroundSettings
@@ -38,22 +38,22 @@ class GroundPerson:
         self.seen = frame
         self.state = MotionState.at(places.means[k], places.covariances[k], settings.speed)
         self.boxes = PersonBoxes()
-        self._seconds, self._settings = seconds, settings
+        self._seconds = seconds
         self._histograms: dict[int, Floats] = {}
 
-    def ahead(self, frame: int) -> MotionState:
+    def ahead(self, frame: int, settings: GroundSettings) -> MotionState:
         """Return the predicted state in a frame after the last one seen."""
-        return self.state.predict(self.seconds_unseen(frame), self._settings.acceleration)
+        return self.state.predict(self.seconds_unseen(frame), settings.acceleration)
 
     def seconds_unseen(self, frame: int) -> float:
         """Return the seconds from the frame in which they were seen last to another."""
         return self._seconds * (frame - self.seen)
 
-    def move(self, frame: int, places: Places, k: int) -> None:
+    def move(self, frame: int, places: Places, k: int, settings: GroundSettings) -> None:
         """Move to place `k` of a frame."""
         seconds = self.seconds_unseen(frame)
         mean, covariance = places.means[k], places.covariances[k]
-        self.state = follow(self.state, seconds, mean, covariance, self._settings)
+        self.state = follow(self.state, seconds, mean, covariance, settings)
         self.seen = frame
 
     def template(self, camera: int) -> Floats:

@@ -79,7 +79,7 @@ def known_people(
     hidden = [
         weight
         * missed_costs(
-            np.array([person.ahead(frame.number).place for person in people]),
+            np.array([person.ahead(frame.number, settings).place for person in people]),
             frame.places.measurements,
             cameras,
             sizes,

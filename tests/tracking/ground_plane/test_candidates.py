@@ -32,7 +32,7 @@ def nearest(places: Places, place: tuple[float, float]) -> int:
 
 
 def discount(candidates: Candidates, place: tuple[float, float]) -> float:
-    return float(candidates.discounts(places_of(place))[0])
+    return float(candidates.discounts(places_of(place), SETTINGS)[0])
 
 
 def missed(candidates: Candidates, cost: float = 0.0) -> Floats:
@@ -40,11 +40,11 @@ def missed(candidates: Candidates, cost: float = 0.0) -> Floats:
 
 
 def test_evidence_grows_where_somebody_is_found_again_and_nowhere_else() -> None:
-    candidates = Candidates(SECONDS, SETTINGS)
+    candidates = Candidates(SECONDS)
     assert discount(candidates, HERE) == 0.0
     discounts = []
     for place in (HERE, NEARBY, HERE):
-        candidates.update(places_of(place), [], missed(candidates))
+        candidates.update(places_of(place), [], missed(candidates), SETTINGS)
         discounts.append(discount(candidates, HERE))
     assert 0.0 < discounts[0] < discounts[1] < discounts[2]
     assert discount(candidates, FAR) == 0.0
@@ -58,46 +58,46 @@ def test_who_stands_still_far_away_becomes_surer_with_each_detection() -> None:
     seen = Detections(found["c0"].boxes, np.array([0.7]), found["c0"].histograms)
     measurements = measure(cameras, [seen], np.array([4.0]), SETTINGS)
     places = find_places(measurements, [], cameras, [BoxSizes()], SETTINGS, seconds)
-    candidates, gain = Candidates(seconds, SETTINGS), -float(places.costs[0])
+    candidates, gain = Candidates(seconds), -float(places.costs[0])
     for detections in range(1, 6):
-        candidates.update(places, [], missed(candidates))
-        assert float(candidates.discounts(places)[0]) > 0.8 * detections * gain - gain
+        candidates.update(places, [], missed(candidates), SETTINGS)
+        assert float(candidates.discounts(places, SETTINGS)[0]) > 0.8 * detections * gain - gain
 
 
 def test_two_who_stand_apart_are_two() -> None:
-    candidates = Candidates(SECONDS, SETTINGS)
+    candidates = Candidates(SECONDS)
     for _ in range(3):
-        candidates.update(places_of(HERE, FAR), [], missed(candidates))
+        candidates.update(places_of(HERE, FAR), [], missed(candidates), SETTINGS)
     assert len(candidates.places) == 2
     assert discount(candidates, HERE) > 0.0
     assert discount(candidates, FAR) > 0.0
 
 
 def test_who_is_missed_loses_evidence_and_is_dropped() -> None:
-    candidates = Candidates(SECONDS, SETTINGS)
+    candidates = Candidates(SECONDS)
     for _ in range(3):
-        candidates.update(places_of(HERE), [], missed(candidates))
+        candidates.update(places_of(HERE), [], missed(candidates), SETTINGS)
     before = discount(candidates, HERE)
-    candidates.update(places_of(FAR), [], missed(candidates, 0.5))
+    candidates.update(places_of(FAR), [], missed(candidates, 0.5), SETTINGS)
     assert 0.0 < discount(candidates, HERE) < before - 0.4
-    candidates.update(places_of(FAR), [], missed(candidates, 1e3))
+    candidates.update(places_of(FAR), [], missed(candidates, 1e3), SETTINGS)
     assert discount(candidates, HERE) == 0.0
 
 
 def test_nobody_is_a_candidate_for_ever_who_is_not_seen() -> None:
-    candidates = Candidates(SECONDS, SETTINGS)
-    candidates.update(places_of(HERE), [], missed(candidates))
+    candidates = Candidates(SECONDS)
+    candidates.update(places_of(HERE), [], missed(candidates), SETTINGS)
     for _ in range(6):
-        candidates.update(places_of(FAR), [nearest(places_of(FAR), FAR)], missed(candidates))
+        candidates.update(places_of(FAR), [nearest(places_of(FAR), FAR)], missed(candidates), SETTINGS)
     assert len(candidates.places) == 0
 
 
 def test_whom_the_program_has_found_is_no_candidate() -> None:
-    candidates = Candidates(SECONDS, SETTINGS)
+    candidates = Candidates(SECONDS)
     for _ in range(3):
-        candidates.update(places_of(HERE), [], missed(candidates))
+        candidates.update(places_of(HERE), [], missed(candidates), SETTINGS)
     found = places_of(HERE, FAR)
-    candidates.update(found, [nearest(found, HERE)], missed(candidates))
+    candidates.update(found, [nearest(found, HERE)], missed(candidates), SETTINGS)
     assert discount(candidates, HERE) == 0.0
     assert discount(candidates, FAR) > 0.0
 
