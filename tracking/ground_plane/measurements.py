@@ -16,8 +16,9 @@ from tracking.types import Detections
 
 PERSON_M = 1.7
 """Height of a person in metres, from which the unit of a ground plane follows."""
-_MAX_LOG_ODDS = 3.0
-"""Scores are not certain: log odds for which they count at most."""
+_MIN_LOG_ODDS, _MAX_LOG_ODDS = -4.0, 3.0
+"""Scores are not certain: log odds for which they count at least and at most. A detector that suppresses boxes
+beside a better one gives them a score of 0, though many are of people."""
 _NOT_COVERED, _COVERED = 0.3, 0.95
 """Shares of a box within a better one up to which its score holds, and from which it loses all it can.
 
@@ -93,7 +94,7 @@ def _measure_camera(
     covariances = factor**2 * (covariances + settings.calibration_noise**2 * np.eye(2))
     per_pixel = settings.false_per_frame / (camera.width * camera.height)
     scores = np.clip(found.scores, 1e-6, 1.0 - 1e-6)
-    odds = np.minimum(np.log(scores / (1.0 - scores)), _MAX_LOG_ODDS)
+    odds = np.clip(np.log(scores / (1.0 - scores)), _MIN_LOG_ODDS, _MAX_LOG_ODDS)
     odds -= settings.covered_log_odds * covered_by_better(found.boxes, odds)
     log_clutter = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - odds
     return camera.to_ground(points), covariances, log_clutter

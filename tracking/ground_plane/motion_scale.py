@@ -20,8 +20,8 @@ _MEMORY = 3000.0
 """Moves that the factor is learned from: a minute of six people."""
 _MAX_COST = 12.0
 """A move costs at most this, so that people who are mixed up do no harm."""
-_PRIOR = 1.0
-"""Log likelihood ratio by which one factor must be better than the next smaller one."""
+_PRIOR = 6.0
+"""Log likelihood ratio by which another factor must be better than 1."""
 
 
 class MotionScale:
@@ -46,5 +46,5 @@ class MotionScale:
             for settings in self._candidates
         ]
         self._costs += np.minimum(costs, _MAX_COST) - self._costs / _MEMORY
-        penalties = _PRIOR * np.arange(len(_FACTORS))
+        penalties = np.where(_FACTORS > 1.0, _PRIOR, 0.0)
         self.settings = self._candidates[int(np.argmin(self._costs + penalties))]
