@@ -17,8 +17,8 @@ from tracking.types import Detections
 PERSON_M = 1.7
 """Height of a person in metres, from which the unit of a ground plane follows."""
 _MIN_LOG_ODDS, _MAX_LOG_ODDS = -4.0, 3.0
-"""Scores are not certain: log odds for which they count at least and at most. A detector that suppresses boxes
-beside a better one gives them a score of 0, though many are of people."""
+"""Scores are not certain: log odds for which they count at least and at most. Detectors that suppress boxes
+beside a better one give them a score of 0, though many are of people."""
 _NOT_COVERED, _COVERED = 0.3, 0.95
 """Shares of a box within a better one up to which its score holds, and from which it loses all it can.
 
