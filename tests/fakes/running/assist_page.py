@@ -37,6 +37,7 @@ async def assisted_site(
         **DEMO,
         "cameras": list(cameras),
         "site": {"name": "demo", "fps": FPS, "width": 320, "height": 180, "niceness": 1},
+        "encode": {"gop_s": GOP / FPS},
         "sync": {"port": free_port(), "start_timeout_s": 60},
         "zenoh": {"connect": bus, "listen": bus},
         "http": {"port": free_port()},
