@@ -12,8 +12,8 @@ from tracking import Detections
 from tracking.boxes import Floats
 from tracking.ground_plane import GroundCamera, GroundSettings
 from tracking.ground_plane.camera import BoxSizes
-from tracking.ground_plane.hypotheses import Places, find_places
-from tracking.ground_plane.measurements import measure
+from tracking.ground_plane.places.hypotheses import Places, find_places
+from tracking.ground_plane.places.measurements import measure
 from tracking.motchallenge import MotRow
 
 _GATE_M = 1.5

@@ -20,7 +20,7 @@ from tracking.ground_plane import (
     GroundSettings,
     track_ground_plane,
 )
-from tracking.ground_plane.measurements import estimate_units_per_metre
+from tracking.ground_plane.places.measurements import estimate_units_per_metre
 from tracking.motchallenge import MotRow
 
 MIN_IOU = 0.5

@@ -16,8 +16,8 @@ import numpy as np
 from tracking.assignment import assign_pairs
 from tracking.boxes import Floats
 from tracking.ground_plane.gaussians import OffsetDensities, squared_distances
-from tracking.ground_plane.hypotheses import Places
 from tracking.ground_plane.motion import is_possible
+from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.settings import GroundSettings
 
 _GATE = 9.2

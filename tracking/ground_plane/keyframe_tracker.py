@@ -16,12 +16,12 @@ from tracking.boxes import Floats
 from tracking.frame_rate import frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.candidates import Candidates
-from tracking.ground_plane.hypotheses import find_places
-from tracking.ground_plane.measurements import PERSON_M, estimate_units_per_metre, measure
 from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.network import build_ground_network
 from tracking.ground_plane.person import GroundPerson
-from tracking.ground_plane.place_noise import PlaceNoise
+from tracking.ground_plane.places.hypotheses import find_places
+from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_metre, measure
+from tracking.ground_plane.places.place_noise import PlaceNoise
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
 from tracking.ground_plane.window import WindowFrame, known_people, missed_costs, predict_places

@@ -15,8 +15,8 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.ground_plane.gaussians import OffsetDensities
-from tracking.ground_plane.hypotheses import Places
 from tracking.ground_plane.motion import MotionState, is_possible, move_costs, reach_costs
+from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.settings import GroundSettings
 from tracking.model.network import Network
 

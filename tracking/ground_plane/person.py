@@ -9,8 +9,8 @@ import numpy as np
 from tracking.appearance import appearance_distance_matrix
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes
-from tracking.ground_plane.hypotheses import Places
 from tracking.ground_plane.motion import MotionState, follow
+from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.predicted_boxes import PersonBoxes
 from tracking.ground_plane.settings import GroundSettings
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes, GroundCamera, feet
-from tracking.ground_plane.visibility import in_picture
+from tracking.ground_plane.places.visibility import in_picture
 
 _BOXES_KEPT = 60
 

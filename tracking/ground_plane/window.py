@@ -9,13 +9,13 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
-from tracking.ground_plane.hypotheses import Places
-from tracking.ground_plane.measurements import Measurements
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.network import KnownPerson
 from tracking.ground_plane.person import GroundPerson, appearance_costs
+from tracking.ground_plane.places.hypotheses import Places
+from tracking.ground_plane.places.measurements import Measurements
+from tracking.ground_plane.places.visibility import detection_probabilities
 from tracking.ground_plane.settings import GroundSettings
-from tracking.ground_plane.visibility import detection_probabilities
 
 _MAX_DETECTION_PROBABILITY = 0.97
 

@@ -11,8 +11,8 @@ from tracking.boxes import Floats
 from tracking.ground_plane import GroundPlaneTracker, GroundSettings, track_ground_plane
 from tracking.ground_plane.camera import BoxSizes
 from tracking.ground_plane.candidates import Candidates
-from tracking.ground_plane.hypotheses import Places, find_places
-from tracking.ground_plane.measurements import measure
+from tracking.ground_plane.places.hypotheses import Places, find_places
+from tracking.ground_plane.places.measurements import measure
 
 VIEWS = floor_views()
 CAMERAS = [view.camera for view in VIEWS.values()]

@@ -11,7 +11,7 @@ from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
 from tracking.boxes import heights
 from tracking.ground_plane import GroundCamera
 from tracking.ground_plane.camera import BoxSizes, feet
-from tracking.ground_plane.measurements import estimate_units_per_metre
+from tracking.ground_plane.places.measurements import estimate_units_per_metre
 
 VIEWS = floor_views()
 CAMERA = VIEWS["c0"].camera

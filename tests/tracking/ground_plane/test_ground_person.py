@@ -15,9 +15,9 @@ from tracking.appearance import appearance_distance_matrix
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.camera import BoxSizes
 from tracking.ground_plane.gaussians import OffsetDensities
-from tracking.ground_plane.hypotheses import Places, find_places
-from tracking.ground_plane.measurements import measure
 from tracking.ground_plane.person import GroundPerson, appearance_costs
+from tracking.ground_plane.places.hypotheses import Places, find_places
+from tracking.ground_plane.places.measurements import measure
 
 VIEWS = floor_views()
 CAMERAS = [view.camera for view in VIEWS.values()]

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.boxes import Floats
 from tracking.ground_plane.gaussians import squared_distances
-from tracking.ground_plane.hypotheses import Places
+from tracking.ground_plane.places.hypotheses import Places
 
 _MEMORY = 400.0
 """Detections that a camera's noise is learned from."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats, heights
 from tracking.ground_plane.camera import BoxSizes, GroundCamera, feet
 from tracking.ground_plane.gaussians import LOG_2PI, determinants
-from tracking.ground_plane.measurements import Measurements
+from tracking.ground_plane.places.measurements import Measurements
 from tracking.ground_plane.settings import GroundSettings
 
 _TOP_NOISE, _SIDE_NOISE, _FOOT_NOISE = 0.07, 0.05, 0.15

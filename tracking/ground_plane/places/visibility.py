@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracking.boxes import Floats, areas, heights, intersections
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
-from tracking.ground_plane.measurements import Measurements
+from tracking.ground_plane.places.measurements import Measurements
 
 _FREE_SHARE, _HIDDEN_SHARE = 0.3, 0.9
 """Shares of a box that others hide, up to which nothing and from which nearly everything is lost."""

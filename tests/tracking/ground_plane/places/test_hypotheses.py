@@ -11,10 +11,10 @@ from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.camera import BoxSizes
 from tracking.ground_plane.gaussians import fuse, negative_log_densities
-from tracking.ground_plane.hypotheses import agglomerate, find_places, group_cost
-from tracking.ground_plane.measurements import Measurements, covered_by_better, measure
-from tracking.ground_plane.place_noise import PlaceNoise
-from tracking.ground_plane.visibility import detection_probabilities
+from tracking.ground_plane.places.hypotheses import agglomerate, find_places, group_cost
+from tracking.ground_plane.places.measurements import Measurements, covered_by_better, measure
+from tracking.ground_plane.places.place_noise import PlaceNoise
+from tracking.ground_plane.places.visibility import detection_probabilities
 
 VIEWS = floor_views()
 CAMERAS = [view.camera for view in VIEWS.values()]

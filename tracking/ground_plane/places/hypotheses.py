@@ -23,10 +23,10 @@ from tracking.ground_plane.gaussians import (
     negative_log_densities,
     squared_distances,
 )
-from tracking.ground_plane.measurements import Measurements
-from tracking.ground_plane.misplaced_feet import find_misplaced
+from tracking.ground_plane.places.measurements import Measurements
+from tracking.ground_plane.places.misplaced_feet import find_misplaced
+from tracking.ground_plane.places.visibility import detection_probabilities
 from tracking.ground_plane.settings import GroundSettings
-from tracking.ground_plane.visibility import detection_probabilities
 
 _MIN_MERGE_GAIN = -4.0
 """Log likelihood ratio below which two groups are certainly of two people."""

@@ -12,8 +12,8 @@ from tracking import Detections
 from tracking.boxes import Floats, heights
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.camera import BoxSizes
-from tracking.ground_plane.hypotheses import Places, find_places
-from tracking.ground_plane.measurements import measure
+from tracking.ground_plane.places.hypotheses import Places, find_places
+from tracking.ground_plane.places.measurements import measure
 
 VIEWS = floor_views()
 CAMERAS = [view.camera for view in VIEWS.values()]
