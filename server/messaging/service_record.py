@@ -38,8 +38,8 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
     """Its index."""
     pulse: Pulse
     unbroken_since: Pulse
-    """Since then the service has decided every epoch. The service with the lowest leads; of equal ones, that
-    with the lowest index. One that was stopped, or cut off from all cameras, therefore follows the others."""
+    """Since then the service has decided every epoch, and was not cut off from all cameras. The one with the
+    lowest leads; of equal ones, that with the lowest index. One that was stopped follows the others."""
     cameras: Annotated[dict[str, CameraIdentitySnapshot], msgspec.Meta(max_length=_CAMERAS_MAX)]
     """What each camera tracks."""
 

@@ -148,6 +148,7 @@ class BestViewPipeline:
         """
         if self._out is not None:  # once all ports are open: a failed start leaves no files
             self._decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
+        await self._joint.start()
         await self.replication.take_over()
         self.recorder.open()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)

@@ -44,6 +44,14 @@ class JointWorker:
         self._retry_at = 0.0
         """When to start a process at the earliest, by the loop's clock."""
 
+    async def start(self) -> None:
+        """Start the process, so that it loads its libraries before the first epoch is there."""
+        if self._setup is not None:
+            try:
+                await self._running(self._setup)
+            except WorkerDiedError as error:
+                await self._replace(error)
+
     async def step(self, epoch: Epoch) -> Epoch:
         """Return the epoch with joint tracks; unchanged where no cameras are tracked jointly."""
         if self._setup is None:

@@ -39,6 +39,9 @@ _CONNECT_S = 1.0
 """How long a service that starts waits for the others' sessions; those that are down do not come."""
 _STATE_S = 2.0
 """How long it waits for their states."""
+_CUT_OFF_S = 1.0
+"""Seconds without any camera's tracks after which a service counts as cut off from them: on a busy machine
+they are sometimes late in one service and not in another."""
 _OWN_RECORDS = 30
 """Own records kept, to be compared with the others' of the same pulse."""
 _NUMBERS_AHEAD_MAX = 10_000
@@ -77,6 +80,9 @@ class ServiceReplication:
         """By pulse."""
         self._unbroken_since: int | None = None
         self._newest_epoch = -1
+        self._cut_off_after = max(1, round(_CUT_OFF_S * config.site.fps / config.window.stride))
+        self._empty_epochs = 0
+        """The last epochs, as far as they have no tracks."""
         self._last_found = Disagreements()
         self._leader = self._index
         self.followed = 0
@@ -133,7 +139,8 @@ class ServiceReplication:
         """Publish a record where one is due, and follow the leading service, after an epoch was decided."""
         if self._services == 1:
             return
-        is_broken = epoch.number != self._newest_epoch + 1 or not epoch.tracks
+        self._empty_epochs = 0 if epoch.tracks else self._empty_epochs + 1
+        is_broken = epoch.number != self._newest_epoch + 1 or self._empty_epochs >= self._cut_off_after
         if self._unbroken_since is None or is_broken:
             self._unbroken_since = epoch.last
         self._newest_epoch = epoch.number

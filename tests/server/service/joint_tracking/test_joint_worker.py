@@ -29,6 +29,21 @@ async def test_the_process_gives_the_same_tracks(monkeypatch: pytest.MonkeyPatch
         await worker.close()
 
 
+async def test_the_process_is_started_before_the_first_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_module, "_ANSWER_S", PATIENCE)
+    monkeypatch.setattr(process_module, "START_S", PATIENCE)
+    worker = JointWorker(joint_config())
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await worker.start()
+            pid = worker.pid
+            assert pid is not None
+            assert (await worker.step(next(iter(walked_epochs(walk_past()))))).joint is not None
+            assert worker.pid == pid
+    finally:
+        await worker.close()
+
+
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 async def test_a_process_that_dies_or_hangs_is_replaced(
     how: signal.Signals, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture

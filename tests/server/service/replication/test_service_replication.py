@@ -10,6 +10,7 @@ from prometheus_client import CollectorRegistry
 
 from fakes.service.scripted_cameras import (
     CAMERAS,
+    FPS,
     LARGE,
     SMALL,
     STRIDE,
@@ -22,6 +23,7 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.messaging.service_record import ServiceRecord, ServiceState
+from server.service.ingest.epoch_aligner import Epoch
 from server.service.metrics.service_collector import ServiceCollector
 from server.service.replication.service_replication import LEASE_S
 
@@ -187,6 +189,25 @@ async def test_the_service_that_has_decided_every_epoch_for_longest_leads(servic
     assert (
         metrics.get_sample_value("myview_followed_records_total") == services.running[0].replication.followed
     )
+
+
+async def test_a_service_that_is_cut_off_from_the_cameras_does_not_lead_but_one_whose_tracks_are_late_does(
+    services: Services,
+) -> None:
+    a_second = round(FPS / STRIDE)
+    services.start(0)
+    services.feed(range(10), {A: {1: SMALL}})
+    services.start(1, takes_over_from=0)
+    services.feed(range(10, 20), {A: {1: SMALL}})
+    for epoch in range(20, 20 + 2 * a_second):
+        services.feed(range(epoch, epoch + 1), {A: {1: SMALL}}, 1)
+        tracks_of = {} if epoch < 19 + a_second else {A: camera_tracks(A, epoch, {1: SMALL})}
+        services.running[0].replication.step(Epoch(epoch, end_of_epoch(epoch, STRIDE), tracks_of))
+        assert services.running[0].replication.leads, epoch
+    for epoch in range(20 + 2 * a_second, 20 + 4 * a_second):
+        services.feed(range(epoch, epoch + 1), {A: {1: SMALL}}, 1)
+        services.running[0].replication.step(Epoch(epoch, end_of_epoch(epoch, STRIDE), {}))
+    assert [services.running[index].replication.leads for index in (0, 1)] == [False, True]
 
 
 async def test_a_silent_service_does_not_lead_for_longer_than_its_lease(services: Services) -> None:
