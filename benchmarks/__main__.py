@@ -81,6 +81,7 @@ BENCHMARKS = (
     Benchmark("codecs", "cost and size of H.264, VP8 and passthrough; 1 minute"),
     Benchmark("faults", "injected faults of processes, sources, messages, disk and clock; 12 minutes"),
     Benchmark("faults.failover", "failures of a site with two best-view services; 9 minutes"),
+    Benchmark("faults.failover.swarm", "killed containers of a Swarm stack; needs Docker Engine; 6 minutes"),
     Benchmark("faults.restart", "restart of the best view, stage by stage; 3 minutes"),
     Benchmark("faults.containers", "injected faults of containers; needs Docker Engine; 10 minutes"),
     Benchmark("overlay", "cost of burnt-in boxes and JPEG; 1 minute"),

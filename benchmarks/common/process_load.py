@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def read_processor_usage() -> ProcessorUsage:
     used: dict[str, float] = {}
     for pid in sorted(family):
         name = _name(pid)
-        used[name] = used.get(name, 0.0) + (int(running[pid][_USER]) + int(running[pid][_SYSTEM])) / _TICKS
+        used[name] = used.get(name, 0.0) + _seconds(running[pid])
     numbers = [int(word) for word in (_PROC / "stat").read_text().split("\n", 1)[0].split()[1:]]
     all_used = sum(number for field, number in enumerate(numbers[:_FIELDS]) if field not in _IDLE) / _TICKS
     used[OTHER] = all_used - sum(used.values())
@@ -85,6 +85,16 @@ def _name(pid: int) -> str:
 def running_pids(name: str) -> list[int]:
     """Return the ids of the descendants with this name, such as ``camera c1``."""
     return [pid for pid in sorted(_family(_running())) if _name(pid) == name]
+
+
+def processor_seconds(pid: int) -> float:
+    """Return the processor seconds that a process has used; 0: it has exited."""
+    stat = _stat(_PROC / str(pid))
+    return _seconds(stat) if stat else 0.0
+
+
+def _seconds(stat: Sequence[str]) -> float:
+    return (int(stat[_USER]) + int(stat[_SYSTEM])) / _TICKS
 
 
 def children_of(pid: int, module: str) -> list[int]:

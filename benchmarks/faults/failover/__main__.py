@@ -33,11 +33,10 @@ from playwright.async_api import Browser
 from benchmarks.common.browser import chromium, chromium_path
 from benchmarks.common.environment import CannotRunError, parser
 from benchmarks.common.report import Report
-from benchmarks.faults.failover.failover_run import FailoverOutcome, run
+from benchmarks.faults.failover.failover_run import FailoverOutcome, check_recordings, run
 from benchmarks.faults.failover.failover_table import describe
 from benchmarks.faults.failover.failures import FAILURES, Failure
-from benchmarks.faults.failover.two_services import TwoServices, run_two_services
-from benchmarks.faults.outcomes import recording_check
+from benchmarks.faults.failover.two_services import run_two_services
 from benchmarks.faults.video.stamped_views import StampedViews, make
 from client import ClientError
 
@@ -85,23 +84,8 @@ async def _run_group(
         for failure in failures:
             outcomes.append(await run(failure, site, views, browser))
             print(f"{failure.name}: done", file=sys.stderr, flush=True)
-    await asyncio.to_thread(_check_recordings, outcomes, site)
+    await asyncio.to_thread(check_recordings, outcomes, site)
     return outcomes
-
-
-def _check_recordings(outcomes: Sequence[FailoverOutcome], site: TwoServices) -> None:
-    """Add to each outcome the GOPs that a service has lost, and the files that do not play."""
-    for index, service in enumerate(site.services):
-        files = recording_check.read(service.recorded)
-        recorded = recording_check.recorded_frames(files)
-        for outcome in (outcome for outcome in outcomes if outcome.gops):
-            begin, end = outcome.gops[index]
-            shown = [gop for _, gop in service.events.gops[begin:end]]
-            lost = len(set(recording_check.unrecorded(shown, recorded)))
-            outcome.lost = max(lost, outcome.lost or 0)
-            if shown:
-                span = range(shown[0].first, shown[-1].first + shown[-1].frames)
-                outcome.broken_files += sum(not file.plays for file in files if file.first in span)
 
 
 def _last_lines(log: Path) -> str:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from playwright.async_api import Browser
 
 from benchmarks.faults.failover.failures import FOLLOWER, MOVED_S, Failure, process_of
-from benchmarks.faults.failover.two_services import TwoServices
+from benchmarks.faults.failover.two_services import SiteOfServices
 from benchmarks.faults.failover.viewers import ClientViewer, HlsPlayer, PageViewer, PlainPlayer, SiteViewer
+from benchmarks.faults.outcomes import recording_check
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews
 from benchmarks.faults.viewing.picture_check import GOP_S
 from client import Gop
@@ -76,7 +77,7 @@ class FailoverOutcome:
 
 
 async def run(
-    failure: Failure, site: TwoServices, views: StampedViews, browser: Browser | None
+    failure: Failure, site: SiteOfServices, views: StampedViews, browser: Browser | None
 ) -> FailoverOutcome:
     """Let viewers watch, make the process fail, and check what they received."""
     outcome = FailoverOutcome(failure)
@@ -129,7 +130,7 @@ async def run(
 
 
 def _viewers(
-    site: TwoServices, failing: int, number: int, views: StampedViews, browser: Browser | None
+    site: SiteOfServices, failing: int, number: int, views: StampedViews, browser: Browser | None
 ) -> tuple[list[SiteViewer], list[SiteViewer]]:
     """Return the viewers of the failing service, and those of the other."""
     url, other = site.services[failing].url, site.services[1 - failing].url
@@ -178,7 +179,7 @@ def changed_numbers(seen: Sequence[Iterable[Gop]], views: StampedViews) -> int:
     return sum(sum(count >= _MIN_GOPS for count in numbers.values()) > 1 for numbers in gops.values())
 
 
-async def _until_services_agree(site: TwoServices, views: StampedViews) -> None:
+async def _until_services_agree(site: SiteOfServices, views: StampedViews) -> None:
     """Wait until both services have decided a GOP with the same numbers.
 
     Raises:
@@ -197,3 +198,18 @@ async def _until_services_agree(site: TwoServices, views: StampedViews) -> None:
                 return
         await asyncio.sleep(_POLL_S)
     raise RuntimeError(f"the services have different numbers for {_AGREE_S:g} s")
+
+
+def check_recordings(outcomes: Sequence[FailoverOutcome], site: SiteOfServices) -> None:
+    """Add to each outcome the GOPs that a service has lost, and the files that do not play."""
+    for index, service in enumerate(site.services):
+        files = recording_check.read(service.recorded)
+        recorded = recording_check.recorded_frames(files)
+        for outcome in (outcome for outcome in outcomes if outcome.gops):
+            begin, end = outcome.gops[index]
+            shown = [gop for _, gop in service.events.gops[begin:end]]
+            lost = len(set(recording_check.unrecorded(shown, recorded)))
+            outcome.lost = max(lost, outcome.lost or 0)
+            if shown:
+                span = range(shown[0].first, shown[-1].first + shown[-1].frames)
+                outcome.broken_files += sum(not file.plays for file in files if file.first in span)

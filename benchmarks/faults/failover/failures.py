@@ -8,8 +8,9 @@ import os
 import signal
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from typing import Any
 
-from benchmarks.faults.failover.two_services import JOINT, SERVICES, TwoServices
+from benchmarks.faults.failover.two_services import JOINT, SERVICES, SiteOfServices, TwoServices
 from benchmarks.faults.site.fault_site import LEASE_S
 
 _RESTART_S = 1.0
@@ -24,7 +25,7 @@ MOVED_S = 2.0
 SILENT_S = LEASE_S + 1.0
 """Promised time where a camera falls silent, which counts as gone after the lease."""
 
-How = Callable[[TwoServices, str, int], Awaitable[None]]
+How = Callable[[Any, str, int], Awaitable[None]]
 """Makes a process fail, by name and id, and returns when it is over."""
 
 
@@ -86,7 +87,7 @@ async def _cut_off(site: TwoServices, name: str, pid: int) -> None:
         site.hosts.cut(name, is_cut=False)
 
 
-async def process_of(failure: Failure, site: TwoServices, leader: int, shown: str) -> tuple[str, int]:
+async def process_of(failure: Failure, site: SiteOfServices, leader: int, shown: str) -> tuple[str, int]:
     """Return the name and the id of the process that is to fail.
 
     Raises:

@@ -7,8 +7,9 @@ import contextlib
 import os
 import re
 import shutil
+import time
 from collections.abc import AsyncIterator, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,44 +28,79 @@ NAMES = (*SERVICES, "sync", *CAMERAS)
 JOINT = "joint tracker"
 _JOINT_MODULE = "server.service.joint_tracking"
 _LEADS = re.compile(r"^myview_leads 1\.0$", re.MULTILINE)
-_ANSWER_S = 1.0
+_ANSWER_S, _LEADS_S, _POLL_S = 5.0, 10.0, 0.2
 _BUS_PORT, _HTTP_PORT, _SYNC_PORT = 7447, 8080, 7400
 
 
 @dataclass(slots=True)
-class TwoServices:
-    """The running site.
+class SiteOfServices:
+    """A running site with two services.
 
     Attributes:
-        processes: by name, of NAMES.
         services: the services' sites as their viewers see them: addresses and events.
-        front: the one address of both services; empty: there is no HAProxy here.
-        hosts: of the processes; None: all run on this machine, and none can be cut off.
+        front: the one address of both services; empty: there is none.
     """
 
-    processes: SeparateProcesses
     services: tuple[FaultSite, ...]
     front: str
-    hosts: NetworkHosts | None
-    log: Path
-    failures: list[str] = field(default_factory=list)
+
+    def pid(self, name: str) -> int:
+        """Return a process's id; 0 where a container has it.
+
+        Raises:
+            RuntimeError: it does not run.
+        """
+        raise NotImplementedError
+
+    def joint_tracker(self, service: str) -> int:
+        """Return the id of a service's process that tracks jointly.
+
+        Raises:
+            RuntimeError: there is none.
+        """
+        raise NotImplementedError
 
     async def leader(self) -> int:
         """Return the index of the leading service, by the services' metrics.
 
         Raises:
-            RuntimeError: not exactly one leads.
+            RuntimeError: not exactly one leads for some time.
         """
         timeout = aiohttp.ClientTimeout(total=_ANSWER_S)
+        deadline = time.monotonic() + _LEADS_S
         async with aiohttp.ClientSession(timeout=timeout, raise_for_status=True) as session:
-            texts = [await _text(session, f"{site.url}metrics") for site in self.services]
-        leading = [index for index, text in enumerate(texts) if _LEADS.search(text)]
-        if len(leading) != 1:
-            raise RuntimeError(f"services that lead: {leading}")
-        return leading[0]
+            while True:
+                texts = [await _text(session, f"{site.url}metrics") for site in self.services]
+                leading = [index for index, text in enumerate(texts) if _LEADS.search(text)]
+                if len(leading) == 1:
+                    return leading[0]
+                if time.monotonic() > deadline:
+                    raise RuntimeError(f"services that lead: {leading}")
+                await asyncio.sleep(_POLL_S)
+
+    async def settle(self) -> None:
+        """Wait until both services are healthy.
+
+        Raises:
+            RuntimeError: they do not become so in time.
+        """
+        await asyncio.gather(*(site.settle() for site in self.services))
+
+
+@dataclass(slots=True)
+class TwoServices(SiteOfServices):
+    """A site whose processes this one has started.
+
+    Attributes:
+        processes: by name, of NAMES.
+        hosts: of the processes; None: all run on this machine, and none can be cut off.
+    """
+
+    processes: SeparateProcesses
+    hosts: NetworkHosts | None
 
     def pid(self, name: str) -> int:
-        """Return the process's id.
+        """Return a process's id.
 
         Raises:
             RuntimeError: it does not run.
@@ -84,14 +120,6 @@ class TwoServices:
         if not found:
             raise RuntimeError(f"{service} has no process that tracks jointly")
         return found[0]
-
-    async def settle(self) -> None:
-        """Wait until both services are healthy, and one leads.
-
-        Raises:
-            RuntimeError: they do not become so in time.
-        """
-        await asyncio.gather(*(site.settle() for site in self.services))
 
 
 async def _text(session: aiohttp.ClientSession, url: str) -> str:
@@ -158,7 +186,7 @@ async def run_two_services(views: StampedViews, folder: Path, *, cut_off: bool) 
             FaultSite(url, folder, 0, recorded=folder / f"kept-{index}") for index, url in enumerate(urls)
         ]
         async with follow_events(sites[0]), follow_events(sites[1]):
-            yield TwoServices(processes, tuple(sites), front, hosts, folder / "site.log")
+            yield TwoServices(tuple(sites), front, processes, hosts)
 
 
 @contextlib.asynccontextmanager
