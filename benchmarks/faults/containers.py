@@ -63,7 +63,7 @@ async def with_containers(views: StampedViews, folder: Path) -> AsyncIterator[Fa
     films.chmod(0o755)  # the containers' user is another one
     kept.mkdir()
     kept.chmod(0o777)
-    (folder / "site.yaml").write_text(yaml.safe_dump(_site(views)), encoding="utf-8")
+    (folder / "site.yaml").write_text(yaml.safe_dump(films_site(views)), encoding="utf-8")
     mounted = [f"{films}:{_FILMS}:ro", f"{folder / 'site.yaml'}:/site/faults.yaml:ro"]
     services: dict[str, Any] = {name: {"volumes": mounted} for name in ("sync", "bestview", *CAMERAS)}
     services["bestview"] = {"volumes": [*mounted, f"{kept}:{_KEPT}"]}
@@ -78,7 +78,7 @@ async def with_containers(views: StampedViews, folder: Path) -> AsyncIterator[Fa
             yield fault_site
 
 
-def _site(views: StampedViews) -> dict[str, Any]:
+def films_site(views: StampedViews) -> dict[str, Any]:
     """Return the configuration, with the paths of the films inside the containers."""
     cameras = [
         {**camera, **{key: f"{_FILMS}/{Path(camera[key]).name}" for key in ("source", "detections")}}
