@@ -3,10 +3,10 @@
     python -m benchmarks.faults.failover --out out/bench
     python -m benchmarks.faults.failover --failure "kill leading service"
 
-The site is that of :mod:`benchmarks.faults`, tracked jointly, with two services behind HAProxy
-(`configs/haproxy.cfg`). To be cut off, every process runs on a host of its own: a network namespace, which
-needs root and iproute2. A killed process is started again after a second; others return after four (frozen)
-or six (cut off). Columns:
+The site is that of :mod:`benchmarks.faults`, tracked jointly if that is what fails, with two services behind
+HAProxy (`configs/haproxy.cfg`). To be cut off, every process runs on a host of its own: a network namespace,
+which needs root and iproute2. A killed process is started again after a second; others return after four
+(frozen) or six (cut off). Columns:
 
 * *others*: the longest time without new video, seconds, for viewers of the service that does not fail, none
   of whose streams may break; in brackets the same of all viewers before the failure;
@@ -62,12 +62,13 @@ async def measure(
     views = await asyncio.to_thread(make, folder, _PULSES)
     outcomes: list[FailoverOutcome] = []
     async with _browser() if page else contextlib.nullcontext() as browser:
-        for cuts_off, group in itertools.groupby(failures, key=lambda failure: failure.cuts_off):
+        kinds = itertools.groupby(failures, key=lambda failure: (failure.cuts_off, failure.is_joint))
+        for number, (_, group) in enumerate(kinds):
             some = list(group)
-            own = folder / f"{cuts_off=}"
+            own = folder / f"site-{number}"
             await asyncio.to_thread(own.mkdir)
             try:
-                outcomes += await _run_group(some, own, views, browser, cuts_off=cuts_off)
+                outcomes += await _run_group(some, own, views, browser)
             except CannotRunError as error:
                 report.line(f"cut off: skipped: {error}")
             except (ClientError, RuntimeError) as error:
@@ -77,10 +78,11 @@ async def measure(
 
 
 async def _run_group(
-    failures: Sequence[Failure], folder: Path, views: StampedViews, browser: Browser | None, *, cuts_off: bool
+    failures: Sequence[Failure], folder: Path, views: StampedViews, browser: Browser | None
 ) -> list[FailoverOutcome]:
     outcomes = []
-    async with run_two_services(views, folder, cut_off=cuts_off) as site:
+    kind = failures[0]
+    async with run_two_services(views, folder, cut_off=kind.cuts_off, joint=kind.is_joint) as site:
         for failure in failures:
             outcomes.append(await run(failure, site, views, browser))
             print(f"{failure.name}: done", file=sys.stderr, flush=True)

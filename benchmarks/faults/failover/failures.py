@@ -53,6 +53,11 @@ class Failure:
         return f"{self.how} {self.target}"
 
     @property
+    def is_joint(self) -> bool:
+        """Whether the site tracks jointly."""
+        return self.target == JOINT
+
+    @property
     def fails_service(self) -> bool:
         """Whether a best-view service fails."""
         return self.target in {LEADER, FOLLOWER}
@@ -101,11 +106,12 @@ async def process_of(failure: Failure, site: SiteOfServices, leader: int, shown:
 
 
 FAILURES = (
-    *(Failure("kill", target, _kill) for target in (LEADER, FOLLOWER, "sync", CAMERA, JOINT)),
+    *(Failure("kill", target, _kill) for target in (LEADER, FOLLOWER, "sync", CAMERA)),
     *(Failure("freeze", target, _freeze) for target in (LEADER, FOLLOWER, "sync")),
     Failure("freeze", CAMERA, _freeze, noticed_s=SILENT_S),
-    Failure("freeze", JOINT, _freeze, noticed_s=SILENT_S),
     *(Failure("cut off", target, _cut_off, cuts_off=True) for target in (LEADER, FOLLOWER, "sync")),
     Failure("cut off", CAMERA, _cut_off, cuts_off=True, noticed_s=SILENT_S),
+    Failure("kill", JOINT, _kill),
+    Failure("freeze", JOINT, _freeze, noticed_s=SILENT_S),
 )
-"""Those of one kind of site, of processes with or without hosts, follow each other."""
+"""Those of one kind of site follow each other."""

@@ -138,7 +138,9 @@ def _hosts(*, cut_off: bool) -> Iterator[NetworkHosts | None]:
 
 
 @contextlib.asynccontextmanager
-async def run_two_services(views: StampedViews, folder: Path, *, cut_off: bool) -> AsyncIterator[TwoServices]:
+async def run_two_services(
+    views: StampedViews, folder: Path, *, cut_off: bool, joint: bool
+) -> AsyncIterator[TwoServices]:
     """Run the site; terminate it at the end.
 
     Raises:
@@ -158,7 +160,7 @@ async def run_two_services(views: StampedViews, folder: Path, *, cut_off: bool) 
         settings: dict[str, dict[str, Any]] = {
             "zenoh": {"connect": routers, "listen": routers[0]},
             "view": {"share": {"servers": urls}},
-            "track": {"joint": True},
+            "track": {"joint": joint},
             "access": {"open_to_all": True, "trusted_network": True},
         }
         if hosts is not None:
