@@ -14,7 +14,8 @@ from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.predicted_boxes import PersonBoxes
 from tracking.ground_plane.settings import GroundSettings
 
-_TEMPLATE_UPDATE_RATE = 0.05
+_TEMPLATE_MEMORY_S = 2.4
+"""Seconds of detections that a person's histogram is the mean of."""
 _UNKNOWN = np.zeros(0)
 
 
@@ -28,7 +29,7 @@ class GroundPerson:
         boxes: their size.
     """
 
-    __slots__ = ("_histograms", "_seconds", "boxes", "id", "seen", "state")
+    __slots__ = ("_histograms", "_seconds", "_update_rate", "boxes", "id", "seen", "state")
 
     def __init__(
         self, number: int, frame: int, places: Places, k: int, seconds: float, settings: GroundSettings
@@ -39,6 +40,7 @@ class GroundPerson:
         self.state = MotionState.at(places.means[k], places.covariances[k], settings.speed)
         self.boxes = PersonBoxes()
         self._seconds = seconds
+        self._update_rate = min(seconds / _TEMPLATE_MEMORY_S, 1.0)
         self._histograms: dict[int, Floats] = {}
 
     def ahead(self, frame: int, settings: GroundSettings) -> MotionState:
@@ -67,7 +69,7 @@ class GroundPerson:
             camera, histogram = int(measurements.camera[index]), measurements.histograms[index]
             known = self._histograms.get(camera)
             if known is not None and len(known) == len(histogram):
-                histogram = (1.0 - _TEMPLATE_UPDATE_RATE) * known + _TEMPLATE_UPDATE_RATE * histogram
+                histogram = known + self._update_rate * (histogram - known)
             if len(histogram):
                 self._histograms[camera] = histogram
             if not places.misplaced[k, index]:

@@ -6,6 +6,12 @@ from dataclasses import dataclass, fields
 
 from tracking.frame_rate import frames_in
 
+_RECENT_S = 3.0
+"""Seconds whose boxes are used to predict risks."""
+_SIZE_S = 2.0
+"""Seconds before and after that determine the size of an object."""
+_START_SHIFT_S = 0.2
+"""Seconds by which a track that starts again may start earlier or later."""
 _MAX_S = 1000.0
 """Limit of seconds back or ahead: message size and prediction time grow with them."""
 
@@ -50,6 +56,9 @@ class InteractiveSettings:
             memory_frames=frames_in(self.memory_s, fps),
             horizon_frames=frames_in(self.horizon_s, fps),
             hidden_frames=frames_in(self.hidden_s, fps),
+            recent_frames=frames_in(_RECENT_S, fps),
+            size_frames=frames_in(_SIZE_S, fps),
+            start_shift=frames_in(_START_SHIFT_S, fps),
         )
 
 
@@ -60,3 +69,6 @@ class ResolvedInteractiveSettings(InteractiveSettings):
     memory_frames: int
     horizon_frames: int
     hidden_frames: int
+    recent_frames: int
+    size_frames: int
+    start_shift: int

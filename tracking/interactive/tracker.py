@@ -29,9 +29,6 @@ from tracking.window import WindowResult, WindowSettings, merge_results
 _MIN_DISAGREEMENT_SHARE = 0.25
 """Share of a correction's weight from which windows are solved again."""
 
-_RECENT_FRAMES = 75
-"""Number of recent frames whose boxes are used for risk prediction."""
-
 
 class CorrectableTracker(OnlineTracker):
     """An `OnlineTracker` that predicts identity failures and applies an operator's corrections.
@@ -51,7 +48,7 @@ class CorrectableTracker(OnlineTracker):
         super().__init__(window, costs, solver, fps, center)
         self._settings = assist.resolve(fps)
         self._risk_predictor = RiskPredictor(self._settings, self._costs)
-        self._memory = WindowMemory(self._settings.memory_frames)
+        self._memory = WindowMemory(self._settings)
         self._corrections: dict[int, dict[int, PositionCorrection]] = {}
         """By frame and object: a later correction replaces an earlier one."""
         self._contradicted_frames: list[int] = []
@@ -70,7 +67,7 @@ class CorrectableTracker(OnlineTracker):
         result = super().push(frame, detections, image)
         if gap > self._window.forget_after:
             # The memory does not span such a gap: frames before it can no longer be corrected.
-            self._memory = WindowMemory(self._settings.memory_frames)
+            self._memory = WindowMemory(self._settings)
             self._memory.add_detections(frame, detections)
         oldest = frame - self._settings.memory_frames
         self._corrections = {
@@ -193,7 +190,7 @@ class CorrectableTracker(OnlineTracker):
             self._solved,
             final_to=final_to,
             recent_boxes=self._memory.boxes_of(
-                self._solved.known_ids, end, max(_RECENT_FRAMES, end - first + 1)
+                self._solved.known_ids, end, max(self._settings.recent_frames, end - first + 1)
             ),
         )
         return replace(result, risk_events=self._risk_predictor.predict(solved))

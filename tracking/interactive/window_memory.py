@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tracking.boxes import BOX_SIDES, Floats, iou
 from tracking.interactive.corrections import PositionCorrection, normalized_squared_distance
 from tracking.interactive.hypothesis_insertion import box_around, has_hypothesis, insert_hypothesis
-from tracking.interactive.settings import InteractiveSettings
+from tracking.interactive.settings import InteractiveSettings, ResolvedInteractiveSettings
 from tracking.model.object_state import TrackedObject
 from tracking.solvers.base import OCCLUDED
 from tracking.solvers.warm_start import WindowWarmStart
@@ -20,12 +20,6 @@ from tracking.types import Detections
 
 _MIN_SAME_IOU = 0.5
 """Overlap (IoU) from which a new track is the one that started there before its window was undone."""
-
-_SIZE_FRAMES = 50
-"""Frames before and after that determine the size of an object."""
-
-_MAX_START_SHIFT = 5
-"""Frames by which such a track may start earlier or later."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +57,7 @@ class InitiatedTrack:
 
 
 class WindowMemory:
-    """The data to re-solve the windows of the last `frames` frames.
+    """The data to re-solve the windows of the last `memory_frames` frames of the settings.
 
     Attributes:
         detections: the detections by frame; missing frames had none.
@@ -72,8 +66,8 @@ class WindowMemory:
         snapshots: the windows, oldest first.
     """
 
-    def __init__(self, frames: int) -> None:
-        self._frames = frames
+    def __init__(self, settings: ResolvedInteractiveSettings) -> None:
+        self._settings = settings
         self._initiated: list[InitiatedTrack] = []
         self._undone: list[InitiatedTrack] = []
         """Tracks of undone windows: a track that starts there again gets the same id."""
@@ -85,7 +79,7 @@ class WindowMemory:
     def add_detections(self, frame: int, detections: Detections) -> None:
         """Add the detections of a frame, and drop frames older than the memory."""
         self.detections[frame] = detections
-        oldest = frame - self._frames
+        oldest = frame - self._settings.memory_frames
         # A window that begins before the memory needs its detections, too.
         while self.snapshots and self.snapshots[0].end < oldest:
             self.snapshots.popleft()
@@ -93,8 +87,9 @@ class WindowMemory:
         self.detections = {n: found for n, found in self.detections.items() if n >= oldest}
         self.assignments = {n: assigned for n, assigned in self.assignments.items() if n >= oldest}
         self.inserted = {n: indices for n, indices in self.inserted.items() if n >= oldest}
-        self._initiated = [track for track in self._initiated if track.frame >= oldest - _MAX_START_SHIFT]
-        self._undone = [track for track in self._undone if track.frame >= oldest - _MAX_START_SHIFT]
+        oldest -= self._settings.start_shift
+        self._initiated = [track for track in self._initiated if track.frame >= oldest]
+        self._undone = [track for track in self._undone if track.frame >= oldest]
 
     def ensure_hypothesis(self, correction: PositionCorrection, histogram: Floats) -> None:
         """Ensure that a corrected object has a fitting observation: insert a hypothesis, or move it."""
@@ -115,9 +110,10 @@ class WindowMemory:
 
     def _size(self, number: int, frame: int) -> Floats | None:
         """Return the median size of an object around a frame, `(2,)` pixels (width, height)."""
+        around = self._settings.size_frames
         sides = [
             self.detections[n].boxes[self.assignments[n][number]]
-            for n in range(frame - _SIZE_FRAMES, frame + _SIZE_FRAMES + 1)
+            for n in range(frame - around, frame + around + 1)
             if number in self.assignments.get(n, {})
             and number not in self.inserted.get(n, {})
             and n in self.detections
@@ -187,6 +183,6 @@ class WindowMemory:
 
     def _undone_track(self, frame: int, box: Floats) -> InitiatedTrack | None:
         """Return the track that started there in an undone window."""
-        near = [track for track in self._undone if abs(track.frame - frame) <= _MAX_START_SHIFT]
+        near = [track for track in self._undone if abs(track.frame - frame) <= self._settings.start_shift]
         found = max(near, key=lambda it: (float(iou(it.box, box)), -it.id), default=None)
         return found if found is not None and float(iou(found.box, box)) >= _MIN_SAME_IOU else None

@@ -34,7 +34,7 @@ class AffinityFusion:
         self, settings: ResolvedIdentitySettings, calibrated: Mapping[str, bool], walking_speed: float
     ) -> None:
         self._settings, self._calibrated, self._walking_speed = settings, calibrated, walking_speed
-        self._scales = DistanceScales(settings.appearance_frames)
+        self._scales = DistanceScales(settings.appearance_frames, max(settings.crowd_frames, 1))
         self._weights = AppearanceWeights(
             settings.appearance_evidence, settings.maximum_appearance_evidence, settings.appearance_frames
         )

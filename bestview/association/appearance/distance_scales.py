@@ -14,8 +14,6 @@ from bestview.association.tracklet import Tracklet
 
 Floats = NDArray[np.float64]
 
-_CONTINUOUS_GAP = 3
-"""Gap in frames within which a continued track shows how much one person's appearance varies."""
 _HISTORY_LIMIT = 500
 """Stored distances of each kind and camera."""
 
@@ -25,10 +23,11 @@ class DistanceScales:
 
     Args:
         minimum_frames: that a histogram needs to be used.
+        continuous_gap: frames within which a continued track shows how much one person's appearance varies.
     """
 
-    def __init__(self, minimum_frames: int) -> None:
-        self._minimum_frames = minimum_frames
+    def __init__(self, minimum_frames: int, continuous_gap: int) -> None:
+        self._minimum_frames, self._continuous_gap = minimum_frames, continuous_gap
         self._same_person: dict[str, Floats] = {}
         self._different_people: dict[str, Floats] = {}
 
@@ -96,7 +95,7 @@ class DistanceScales:
             if (
                 tracklet.predecessor is not None
                 and id(tracklet.predecessor) in place
-                and tracklet.frames_since_predecessor <= _CONTINUOUS_GAP
+                and tracklet.frames_since_predecessor <= self._continuous_gap
             ):
                 same_person.append(float(distance[i, place[id(tracklet.predecessor)]]))
         first, second = np.triu_indices(len(rows), 1)

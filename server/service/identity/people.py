@@ -32,11 +32,12 @@ from server.service.identity.track_parts import (
 from server.service.identity.undetected_frames import UndetectedFrames
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import WindowHistory
+from tracking.frame_rate import frames_in
 
 ALL = ShareSettings()
 """A single service for all people."""
-_RECENT_FRAMES = 100
-"""Recent frames in which a camera must have run detection to count; at least those of an epoch."""
+_RECENT_S = 4.0
+"""Seconds in which a camera must have run detection to count; at least those of an epoch."""
 
 
 class PersonTracker:
@@ -70,7 +71,7 @@ class PersonTracker:
         """All people, those of other shards included."""
         self._share = share
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
-        self._lag = lag
+        self._lag, self._recent = lag, frames_in(_RECENT_S, fps)
         self._id_switch_repair = IdSwitchRepair(self._registry, self._reader)
         self.undetected = UndetectedFrames()
         """Frames without detection, by camera."""
@@ -97,7 +98,7 @@ class PersonTracker:
         tracks = [track for window in own for track in window.fresh_tracks()]
         if epoch.joint is not None:
             tracks += self._ground.updates(epoch.joint.tracks, [window.message for window in joint])
-        since = max(self._newest + 1, epoch.last + 1 - _RECENT_FRAMES)  # epochs may have been skipped
+        since = max(self._newest + 1, epoch.last + 1 - self._recent)  # epochs may have been skipped
         image_sizes = self.undetected.detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         self._newest = epoch.last
         update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, image_sizes))

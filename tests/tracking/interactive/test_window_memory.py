@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.interactive.settings import InteractiveSettings
 from tracking.interactive.window_memory import WindowMemory, WindowSnapshot
 
 PLACE, ELSEWHERE = np.array([10.0, 10.0, 40.0, 90.0]), np.array([200.0, 10.0, 230.0, 90.0])
@@ -15,7 +16,7 @@ def _window(end: int) -> WindowSnapshot:
 
 def _two_tracks_at_one_place() -> WindowMemory:
     """Start one track in each of two windows, as if the first had ended at once."""
-    memory = WindowMemory(100)
+    memory = WindowMemory(InteractiveSettings(memory_s=4.0).resolve(25.0))
     memory.record_window(_window(19))
     assert memory.assign_id(12, PLACE, new_id=1) == 1
     memory.record_window(_window(24))
