@@ -24,7 +24,7 @@ def interpolate_gaps(boxes: Floats, last: tuple[int, Floats] | None, max_gap: in
     if last is not None:
         visible.insert(0, last)
     for (before, start), (after, end) in pairwise(visible):
-        if after - before - 1 <= max_gap:
+        if 0 < after - before - 1 <= max_gap:
             gap = np.arange(max(before + 1, 0), after)
             share = ((gap - before) / (after - before))[:, None]
             filled[gap] = (1.0 - share) * start + share * end

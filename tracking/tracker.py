@@ -275,14 +275,14 @@ class OnlineTracker:
         for m, detections in enumerate(frames[: final_to - first + 1]):
             column = states[:, m]
             assigned = detections.boxes[column[column != OCCLUDED]]
+            overlaps = iou(assigned[:, None], assigned[None])
+            isolated = iter((np.count_nonzero(overlaps > _MAX_OVERLAP, axis=1) <= 1).tolist())
             for item, state in zip(self._objects, column, strict=True):
                 item.present = bool(state != OCCLUDED)
                 if item.present:
-                    overlaps = iou(detections.boxes[state], assigned)
-                    is_isolated = bool(np.count_nonzero(overlaps > _MAX_OVERLAP) <= 1)
                     box, histogram = detections.boxes[state], detections.histograms[state]
                     item.update(
-                        Sighting(first + m, box, histogram, is_isolated), self._window.template_update_rate
+                        Sighting(first + m, box, histogram, next(isolated)), self._window.template_update_rate
                     )
         forget_after = self._window.forget_after
         self._objects = [item for item in self._objects if item.frames_occluded(final_to) <= forget_after]

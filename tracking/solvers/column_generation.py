@@ -31,7 +31,6 @@ from tracking.solvers.programs.path_master import PathMaster, PathMasterSolution
 from tracking.solvers.relaxation import (
     OPTIMALITY_TOLERANCE,
     RelaxedSolution,
-    add_conflict_prices,
     try_warm_start,
 )
 from tracking.solvers.solution_builder import empty_solution, solution_from_relaxation
@@ -179,9 +178,10 @@ class PathGeneration:
 
     def _add_detours(self, objects: Ints) -> None:
         """Add for each of the objects the best path that avoids all rows."""
-        node = self._network.node.copy()
-        for row in self._master.rows:
-            node[:, row.frame][row.members] = np.inf
+        in_rows = self._master.members.add_prices(
+            np.zeros_like(self._network.node), np.ones(len(self._master.rows))
+        )
+        node = np.where(in_rows > 0.0, np.inf, self._network.node)
         self._master.add_paths(objects, self._pricing.best_paths(node, objects))
 
     def _add_improving_paths(self) -> bool:
@@ -197,7 +197,7 @@ class PathGeneration:
         found: list[Ints] = []
         gaps: list[float] = []
         for step in range(_SUBGRADIENT_STEPS):
-            priced = add_conflict_prices(self._network, self._master.rows, prices)
+            priced = self._master.members.add_prices(self._network.node, prices)
             paths = self._pricing.best_paths(priced, active)
             self._meter.add_step()
             self._meter.add_passes(len(active), *self._network.node.shape[1:])
@@ -211,8 +211,7 @@ class PathGeneration:
             found.append(paths.nodes)
             if step >= _MIN_STEPS and gaps[-1] > _MAX_GAP_RATIO**step * gaps[0]:
                 break
-            loads = [row.members[active, paths.nodes[:, row.frame]].sum() for row in self._master.rows]
-            slope = np.array(loads) - 1.0
+            slope = self._master.members.of_paths(active, paths.nodes).sum(axis=0) - 1.0
             slope[(slope < 0.0) & (prices == 0.0)] = 0.0
             if not slope.any():
                 break

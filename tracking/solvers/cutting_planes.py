@@ -36,6 +36,36 @@ class _ConflictComponent:
     rows: Floats
 
 
+class RowMembers:
+    """The members of conflict rows in one array: which paths are in which rows, what nodes pay."""
+
+    def __init__(self, network: Network) -> None:
+        objects, states = network.objects, network.max_places + 1
+        self._alike = network.shared and network.conflict_rows == "clique"
+        """Whether rows are the same for each object."""
+        self._frames = np.empty(0, dtype=np.int64)
+        self._members = np.empty((0, 1 if self._alike else objects, states), dtype=np.bool_)
+
+    def add(self, rows: Sequence[ConflictRow]) -> None:
+        """Add rows."""
+        if rows:
+            members = [row.members[:1] if self._alike else row.members for row in rows]
+            self._members = np.concatenate([self._members, np.array(members)])
+            self._frames = np.concatenate([self._frames, [row.frame for row in rows]])
+
+    def of_paths(self, owners: Ints, nodes: Ints) -> Bools:
+        """Return which rows the paths `nodes` (P, M) of `owners` (P,) are in, (P, R)."""
+        owner = np.zeros_like(owners) if self._alike else owners
+        return np.asarray(self._members[np.arange(len(self._frames)), owner[:, None], nodes[:, self._frames]])
+
+    def add_prices(self, node: Floats, prices: Floats) -> Floats:
+        """Return node costs `node` (n, M, S) with prices (R,) of the first R rows."""
+        sheet = np.zeros((self._members.shape[1], *node.shape[1:]))
+        for row in np.flatnonzero(prices > 0.0).tolist():
+            sheet[:, self._frames[row]] += prices[row] * self._members[row]
+        return node + sheet
+
+
 def conflict_prices(
     network: Network, rows: Sequence[ConflictRow], prices: Floats
 ) -> tuple[ConflictPrice, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.model.network import Network
 from tracking.solvers.budget import Limit
-from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, conflict_prices
+from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, RowMembers, conflict_prices
 from tracking.solvers.heuristics.rounding import is_integral
 from tracking.solvers.objective import Ints, conflict_count, path_costs
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis, best_paths
@@ -98,11 +98,9 @@ def try_warm_start(
 
 def add_conflict_prices(network: Network, rows: list[ConflictRow], prices: Floats) -> Floats:
     """Return node costs (n, M, S) with the prices of conflict rows."""
-    node = network.node.copy()
-    for price, row in zip(prices, rows, strict=True):
-        if price > 0.0:
-            node[:, row.frame][row.members] += price
-    return node
+    members = RowMembers(network)
+    members.add(rows)
+    return members.add_prices(network.node, prices)
 
 
 def follow_warm_start(network: Network, trellis: Trellis, warm_start: WarmStart, nodes: Ints) -> Ints:

@@ -13,8 +13,9 @@ from tracking.model.network import Network
 from tracking.solvers.arc_lists import StepArcs, existing_arcs, group_by_step
 from tracking.solvers.objective import Ints
 
-_MOST_LISTED, _LEAST_STATES = 0.2, 16
-"""Arcs are listed if no more than this share of the pairs of states has one, and there are so many states."""
+_MOST_LISTED, _LEAST_OBJECTS, _LEAST_STATES = 0.2, 6, 16
+"""Arcs are listed if no more than this share of the pairs of states has one, and there are so many objects
+and states: lists of few arcs are no faster than all pairs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +29,7 @@ class _ListedArcs:
     def of(cls, network: Network) -> _ListedArcs | None:
         """List the arcs of a network if they are few."""
         steps, states = network.frames - 1, network.max_places + 1
-        if not steps or states < _LEAST_STATES:
+        if not steps or states < _LEAST_STATES or network.objects < _LEAST_OBJECTS:
             return None
         step, origin, target = existing_arcs(network.pair, network.node)
         if len(step) > _MOST_LISTED * steps * states**2:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,11 +11,13 @@ from hypothesis import strategies as st
 
 from fakes.tracking.random_networks import Case, cases, network_of
 from tracking.model.network import Network
+from tracking.solvers import viterbi
+from tracking.solvers.cutting_planes import ConflictRow, RowMembers
 from tracking.solvers.heuristics.local_search import MovementChanges
 from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import path_costs
 from tracking.solvers.sparse_trellis import SparseTrellis
-from tracking.solvers.viterbi import MinMarginals, Trellis, best_paths
+from tracking.solvers.viterbi import MinMarginals, Trellis, backward, best_paths, forward
 
 many = settings(deadline=None, max_examples=100)
 
@@ -37,6 +41,53 @@ def test_passes_over_lists_equal_those_over_all_pairs_of_states(case: Case) -> N
     found, expected = trellis.best_paths(trellis.costs), best_paths(Trellis.of(network))
     np.testing.assert_allclose(found.costs, expected.costs)
     np.testing.assert_allclose(path_costs(network, found.nodes), expected.costs)
+
+
+@many
+@given(case=cases(objects=4, frames=5, places=5), barred=st.floats(0.0, 1.0))
+def test_a_trellis_with_lists_has_the_same_passes_and_paths_to_the_last_bit(
+    case: Case, barred: float
+) -> None:
+    """Whatever arcs are missing, even all of a step, and for some of the objects and other nodes, too."""
+    network, rng = network_of(case), np.random.default_rng(case.seed)
+    network = replace(network, pair=np.where(rng.random(network.pair.shape) < barred, np.inf, network.pair))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(viterbi, "_MOST_LISTED", 1.0)
+        patch.setattr(viterbi, "_LEAST_OBJECTS", 1)
+        patch.setattr(viterbi, "_LEAST_STATES", 1)
+        listed = Trellis.of(network)
+    assert (listed.listed is not None) == (network.frames > 1)
+    some = np.flatnonzero(rng.random(network.objects) < 0.7)
+    for one in (listed, listed.select(some), listed.with_node(network.node + rng.random(network.node.shape))):
+        plain = replace(one, listed=None)
+        np.testing.assert_array_equal(forward(one), forward(plain))
+        through = forward(plain) + backward(plain)
+        np.testing.assert_array_equal(forward(one) + backward(one), through)
+        np.testing.assert_array_equal(best_paths(one).nodes, best_paths(plain).nodes)
+        np.testing.assert_array_equal(forward(one, forward(plain)[:2]), forward(plain))
+
+
+@many
+@given(case=cases(objects=4, frames=3, places=5), seed=st.integers(0, 2**32 - 1))
+def test_members_of_rows_are_those_of_each_row(case: Case, seed: int) -> None:
+    network, rng = network_of(case), np.random.default_rng(seed)
+    rows = [
+        ConflictRow(frame, np.pad(row, ((0, 0), (0, 1))))
+        for frame in range(network.frames)
+        for row in network.rows(frame)
+    ]
+    members = RowMembers(network)
+    members.add(rows[:2])
+    members.add(rows[2:])
+    owners = rng.integers(0, network.objects, 6)
+    nodes = rng.integers(0, network.max_places + 1, (6, network.frames))
+    inside = [row.members[owners, nodes[:, row.frame]] for row in rows]
+    np.testing.assert_array_equal(members.of_paths(owners, nodes), np.reshape(inside, (len(rows), 6)).T)
+    prices = rng.random(len(rows)) * rng.integers(0, 2, len(rows))
+    priced = network.node.copy()
+    for row, price in zip(rows, prices, strict=True):
+        priced[:, row.frame][row.members] += price
+    np.testing.assert_allclose(members.add_prices(network.node, prices), priced)
 
 
 @many

@@ -11,7 +11,7 @@ from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.budget import BudgetMeter
-from tracking.solvers.cutting_planes import ConflictRow
+from tracking.solvers.cutting_planes import ConflictRow, RowMembers
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.linear_program import create_highs, run_highs
 from tracking.solvers.viterbi import Paths
@@ -46,6 +46,7 @@ class PathMaster:
         self._object_rows: dict[int, int] = {}
         self._conflict_rows: list[int] = []
         self.rows: list[ConflictRow] = []
+        self.members = RowMembers(network)
 
     def add_objects(self, objects: Sequence[int]) -> None:
         """Add these objects to the program; they need paths before the next `solve`."""
@@ -86,11 +87,11 @@ class PathMaster:
     def _entries(self, owners: Ints, nodes: Ints) -> Bools:
         """Return which rows each path is in, (paths, object rows then conflict rows)."""
         own = owners[:, None] == np.array(list(self._object_rows), dtype=np.int64)
-        through = [row.members[owners, nodes[:, row.frame]] for row in self.rows]
-        return np.column_stack([own, *through])
+        return np.hstack([own, self.members.of_paths(owners, nodes)])
 
     def add_rows(self, rows: Sequence[ConflictRow]) -> None:
         """Add conflict rows."""
+        self.members.add(rows)
         for row in rows:
             through = np.flatnonzero(row.members[self._owners, self._paths[:, row.frame]])
             self._conflict_rows.append(len(self._object_rows) + len(self.rows))
