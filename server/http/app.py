@@ -36,8 +36,9 @@ from server.http.hls import routes as hls
 from server.http.metrics import http_collector
 from server.http.metrics.http_collector import register_metrics
 from server.http.operator import routes as operator
-from server.http.streams import jpeg, video
+from server.http.streams import jpeg, video, whep
 from server.http.streams.request_validation import check_container, validate_query
+from server.http.streams.whep_sessions import WHEP_SESSIONS, WhepSessions
 from server.http.tls import Certificate
 from server.http.viewers.fair_share import FairShare
 from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsSessions
@@ -62,6 +63,7 @@ _ROUTES = (
     video,
     hls,
     jpeg,
+    whep,
     openapi,
     static_files,
     operator,
@@ -96,6 +98,7 @@ def make_app(
     app[EVENTS], app[TRAFFIC] = Events(service), Traffic()
     app[VIEWER_SLOTS], app[EVENT_SLOTS] = FairShare(), FairShare()
     app[HLS_SESSIONS] = HlsSessions(service.streams.segment_plan.target_s, app[VIEWER_SLOTS])
+    app[WHEP_SESSIONS] = WhepSessions()
     app[openapi.DESCRIPTION] = openapi.ApiDescription(app)
     config = service.config
     authenticator = Authenticator(
@@ -189,5 +192,6 @@ async def _background_tasks(app: web.Application) -> AsyncIterator[None]:
 async def _end_streams(app: web.Application) -> None:
     app[EVENTS].close()
     app[SERVICE].streams.close()
+    await app[WHEP_SESSIONS].close()
     await app[SERVICE].rendering.close()
     await app[SERVICE].calibration.close()

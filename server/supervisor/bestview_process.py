@@ -1,4 +1,4 @@
-"""The best-view service's process; no codec is loaded in it."""
+"""The best-view service's process; no codec is loaded in it, except by WebRTC."""
 
 from __future__ import annotations
 

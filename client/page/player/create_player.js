@@ -1,8 +1,9 @@
-/** Creates the kind of player that the browser supports. */
+/** Creates the kind of player that the browser supports, or that the page's address asks for. */
 
 import { HlsPlayer } from './hls_player.js';
 import { MediaSourceClass } from './media/media_source.js';
 import { MsePlayer } from './mse_player.js';
+import { wantsWebRtc, WebRtcPlayer } from './webrtc_player.js';
 
 /** @import {PlayerListener} from './mse_player.js' */
 
@@ -17,8 +18,9 @@ import { MsePlayer } from './mse_player.js';
 /**
  * @param {HTMLVideoElement} video
  * @param {PlayerListener} listener
- * @returns {MsePlayer | HlsPlayer}
+ * @returns {MsePlayer | HlsPlayer | WebRtcPlayer}
  */
 export function createPlayer(video, listener) {
+  if (wantsWebRtc()) return new WebRtcPlayer(video, listener);
   return MediaSourceClass ? new MsePlayer(video, listener) : new HlsPlayer(video, listener);
 }

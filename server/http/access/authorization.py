@@ -8,9 +8,10 @@ expires.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
 
 from aiohttp import web
 
@@ -41,6 +42,8 @@ class _OpenRequest:
     permission: Permission
     credential: Credential
     grant: Grant
+    end: Callable[[], None] | None = None
+    """Ends what goes on after its answer; None: the answer is broken off."""
 
 
 class AccessControl:
@@ -52,6 +55,7 @@ class AccessControl:
     def __init__(self, authenticator: Authenticator, resolve: Callable[[int], int]) -> None:
         self.authenticator, self._resolve = authenticator, resolve
         self._open_requests: dict[int, _OpenRequest] = {}
+        self._followed: dict[object, _OpenRequest] = {}
         self._file_reader = ThreadPoolExecutor(1, "tokens")
 
     @property
@@ -108,6 +112,27 @@ class AccessControl:
         finally:
             del self._open_requests[id(request)]
 
+    def follow(self, request: web.Request) -> Callable[[Callable[[], None]], AbstractContextManager[None]]:
+        """Return a context manager for what goes on after the answer to a request that is being answered.
+
+        It is given a function, which is called when the request would not be permitted any more.
+        """
+        opened = self._open_requests.get(id(request))
+
+        @contextmanager
+        def following(end: Callable[[], None]) -> Iterator[None]:
+            if opened is None:
+                yield
+                return
+            key = object()
+            self._followed[key] = replace(opened, end=end)
+            try:
+                yield
+            finally:
+                del self._followed[key]
+
+        return following
+
     async def run(self) -> None:
         """Reload the token file when it changes, and end answers that are no longer permitted."""
         if not self.needs_token:
@@ -121,7 +146,7 @@ class AccessControl:
 
     def end_expired(self) -> None:
         """Break off all answers whose token or session is revoked or expired."""
-        for opened in list(self._open_requests.values()):
+        for opened in [*self._open_requests.values(), *self._followed.values()]:
             current = self.authenticator.grant_of(opened.credential)
             if (
                 isinstance(current, Grant)
@@ -129,7 +154,9 @@ class AccessControl:
                 and (opened.permission not in _BOUND_TO_GRANT or current == opened.grant)
             ):
                 continue
-            if opened.request.transport is not None:
+            if opened.end is not None:
+                opened.end()
+            elif opened.request.transport is not None:
                 opened.request.transport.abort()
 
     async def _end(self) -> None:

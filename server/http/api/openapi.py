@@ -57,6 +57,10 @@ _MEDIA_TYPES = {
     "/objects/{object}/best.jpg": "image/jpeg",
     "/cameras/{camera}/live.jpg": "image/jpeg",
     "/objects/{object}/thumb.jpg": "image/jpeg",
+    "/objects/{object}/whep": "application/sdp",
+    "/cameras/{camera}/whep": "application/sdp",
+    "/objects/{object}/whep/{session}": "application/sdp",
+    "/cameras/{camera}/whep/{session}": "application/sdp",
     "/api/events": "text/event-stream",
     "/api/events/{event}/picture.jpg": "image/jpeg",
     "/api/past": "application/x-ndjson",
@@ -87,6 +91,7 @@ _SCHEMAS: dict[str, Any] = {
     "camera": {"type": "string"},
     "event": {"type": "string", "pattern": "^[0-9a-f-]{1,64}$"},
     "segment": {"type": "integer", "minimum": 0},
+    "session": {"type": "string", "pattern": "^[A-Za-z0-9_-]{22}$"},
     "part": {"type": "integer", "minimum": 0},
     "_HLS_msn": {"type": "integer", "minimum": 0, "description": "The answer waits for this segment."},
     "_HLS_part": {
@@ -166,7 +171,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     else:
         content = {_MEDIA_TYPES[path]: {}}
     error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
-    responses: dict[str, Any] = {"200": {"description": "OK", "content": content}}
+    responses: dict[str, Any] = _success(path, content, error)
     names = re.findall(r"\{(\w+)\}", path)
     if names or path in OPERATOR_RESULTS:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
@@ -212,6 +217,19 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
 
 
+def _success(path: str, content: Any, error: Any) -> dict[str, Any]:
+    """Return the response to a valid request, and WHEP's errors."""
+    if not path.endswith("/whep"):
+        return {"200": {"description": "OK", "content": content}}
+    return {
+        "201": {"description": "The SDP answer; Location is the session's address.", "content": content},
+        "400": {"description": "The SDP offer is invalid, or has no H.264.", "content": error},
+        "415": {"description": "Not application/sdp.", "content": error},
+        "501": {"description": "The extra webrtc is not installed.", "content": error},
+        "503": {"description": "Temporarily unavailable; try again later."},
+    }
+
+
 @routes.get("/api/openapi.json")
 async def get_openapi(request: web.Request) -> web.Response:
     """Return the OpenAPI document."""
@@ -222,9 +240,10 @@ async def get_openapi(request: web.Request) -> web.Response:
 async def get_readable(request: web.Request) -> web.Response:
     """Return a readable page about the API."""
     rows = "".join(
-        f"<tr><td><code>GET {html.escape(path)}</code></td>"
-        f"<td>{html.escape(item['get']['summary'])}</td></tr>"
+        f"<tr><td><code>{method.upper()} {html.escape(path)}</code></td>"
+        f"<td>{html.escape(operation['summary'])}</td></tr>"
         for path, item in request.app[DESCRIPTION].document["paths"].items()
+        for method, operation in [next(iter(item.items()))]
     )
     page = (
         "<!doctype html><html lang=en><meta charset=utf-8><title>MyView: the API</title>"

@@ -45,6 +45,7 @@ DELAY = {
     "/objects/{object}/hls/init.mp4",
     "/objects/{object}/hls/{segment}.m4s",
     "/objects/{object}/hls/{segment}.{part}.m4s",
+    "/objects/{object}/whep",
     "/api/events",
 }
 """Routes that support delay=, a choice of how much is known of what follows."""
