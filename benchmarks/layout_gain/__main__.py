@@ -5,9 +5,9 @@
 `true positions` tells the program where everybody is: a layout term can know no more. `of companions` tells
 it only of people who keep their relative position for a second. Three forms do not know the truth: the
 paper's, between all pairs, in pixels; the same in heights of people on the ground; and, in heights and
-seconds, capped, one only between those who walked together (`companions`). Their weights are chosen on other
-recordings (`--development`). Each seed but the first drops 3 % of the detections: a single swap changes IDF1
-by several points.
+seconds, capped, one only between those who walked together (`companions`). `--development` compares their
+weights on other recordings, where one is to be chosen. Each seed but the first drops 3 % of the detections: a
+single swap changes IDF1 by several points.
 """
 
 from __future__ import annotations
@@ -37,9 +37,8 @@ from tracking.boxes import Floats
 from tracking.motchallenge import MotRow, read_rows
 
 _DROPPED = 0.03
-_PIXEL_WEIGHTS, _HEIGHT_WEIGHTS, _COMPANION_WEIGHTS = (1e-5, 5e-5, 5e-4), (1e-3, 1e-2, 5e-2), (0.1, 0.3, 1.0)
-"""Weights of the three forms that `--development` compares."""
-_CHOSEN_PIXEL_WEIGHTS, _CHOSEN_HEIGHT_WEIGHTS, _CHOSEN_COMPANION_WEIGHTS = (1e-5,), (1e-3,), (0.1, 0.3)
+_PIXEL_WEIGHTS, _HEIGHT_WEIGHTS, _COMPANION_WEIGHTS = (1e-4, 5e-4), (1e-2, 5e-2), (0.1, 0.3)
+"""Weights of the three forms: per pixel, per height, and of a place where no companion expects somebody."""
 
 Tracker = Callable[..., OnlineTracker]
 
@@ -65,7 +64,7 @@ class DetectedRecording:
         together = true_companions(people, self.recording.fps)
         return {
             "default": OnlineTracker,
-            **forms(_CHOSEN_PIXEL_WEIGHTS, _CHOSEN_HEIGHT_WEIGHTS, _CHOSEN_COMPANION_WEIGHTS),
+            **forms(),
             "true positions of companions": lambda *args: TruePositionTracker(
                 *args, people=people, applies=together
             ),
@@ -87,30 +86,28 @@ class DetectedRecording:
         return 100.0 * self.recording.score(rows).idf1
 
 
-def forms(
-    pixels: Sequence[float], ground: Sequence[float], companions: Sequence[float]
-) -> dict[str, Tracker]:
-    """Return the trackers with each form of the layout term at some weights, by name."""
+def forms() -> dict[str, Tracker]:
+    """Return the trackers with each form of the layout term at each weight, by name."""
 
     def paper(weight: float) -> Tracker:
         return lambda window, costs, *more: OnlineTracker(window, replace(costs, layout=weight), *more)
 
     return {
-        **{f"the paper's, {weight:g} a pixel": paper(weight) for weight in pixels},
+        **{f"the paper's, {weight:g} a pixel": paper(weight) for weight in _PIXEL_WEIGHTS},
         **{
             f"on the ground, {weight:g} a height": partial(GroundLayoutTracker, weight=weight)
-            for weight in ground
+            for weight in _HEIGHT_WEIGHTS
         },
         **{
             f"companions, {weight:g}": partial(CompanionTracker, companions=CompanionSettings(weight))
-            for weight in companions
+            for weight in _COMPANION_WEIGHTS
         },
     }
 
 
 def development(recordings: Sequence[Recording], seeds: int, out: Path) -> None:
     """Compare the weights of each form on recordings that are for nothing else."""
-    ways = {"default": OnlineTracker, **forms(_PIXEL_WEIGHTS, _HEIGHT_WEIGHTS, _COMPANION_WEIGHTS)}
+    ways = {"default": OnlineTracker, **forms()}
     inputs = [DetectedRecording.of(recording, pictures=True) for recording in recordings]
     found = {item.name: measured(item, ways, seeds) for item in inputs}
     save(found, seeds, out / "layout_gain-development.txt")
