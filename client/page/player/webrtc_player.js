@@ -98,7 +98,7 @@ export class WebRtcPlayer {
       this.play();
     });
     connection.addEventListener('connectionstatechange', () => {
-      if (connection === this.#connection && connection.connectionState === 'failed') void this.#retry();
+      if (connection === this.#connection && ['disconnected', 'failed'].includes(connection.connectionState)) void this.#retry();
     });
     try {
       await connection.setLocalDescription();

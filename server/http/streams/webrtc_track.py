@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncIterator
 from fractions import Fraction
 from typing import Any
@@ -18,6 +19,8 @@ from aiortc.mediastreams import MediaStreamError
 
 from server.system.errors import UserError
 
+for _library in ("aioice", "aiortc"):
+    logging.getLogger(_library).setLevel(logging.WARNING)  # they log every check of viewers' addresses
 _TIME_BASE = Fraction(1, 90_000)
 
 
@@ -55,9 +58,13 @@ async def answer_offer(offer: str, track: EncodedTrack) -> tuple[RTCPeerConnecti
         UserError: the offer is invalid, or has no H.264.
     """
     connection = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    # Before the offer is read: its codecs are matched then, and the first one that fits is sent.
+    video = connection.addTransceiver(track, "sendonly")
+    known = RTCRtpSender.getCapabilities("video").codecs
+    video.setCodecPreferences([codec for codec in known if codec.name == "H264"])
     try:
         await connection.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-        _send(track, connection)
+        _check_media(connection)
         await connection.setLocalDescription(await connection.createAnswer())
     except UserError:
         await connection.close()
@@ -65,27 +72,24 @@ async def answer_offer(offer: str, track: EncodedTrack) -> tuple[RTCPeerConnecti
     except Exception as error:  # aiortc raises anything for what it cannot read
         await connection.close()
         reason = " ".join(str(error).split())[:_SHOWN]
-        raise UserError(f"the SDP offer is invalid: {reason or type(error).__name__}") from error
+        raise UserError(
+            f"the SDP offer is invalid, or has no H.264 to receive: {reason or type(error).__name__}"
+        ) from error
     except BaseException:
         await connection.close()
         raise
     return connection, connection.localDescription.sdp
 
 
-def _send(track: EncodedTrack, connection: RTCPeerConnection) -> None:
-    """Send a track as the one video that an offer wants to receive.
+def _check_media(connection: RTCPeerConnection) -> None:
+    """Check that an offer has one video, and perhaps sound.
 
     Raises:
-        UserError: it wants none, or another codec.
+        UserError: it has something else.
     """
-    media = connection.getTransceivers()
-    videos = [each for each in media if each.kind == "video"]
-    offered = [codec for each in videos for codec in each._codecs if codec.name == "H264"]  # noqa: SLF001
-    if len(videos) != 1 or len(media) > _MEDIA_MAX or not offered:
+    kinds = [each.kind for each in connection.getTransceivers()]
+    if kinds.count("video") != 1 or len(kinds) > _MEDIA_MAX or connection.getTransceivers()[0].mid is None:
         raise UserError("the SDP offer has no H.264 video to receive, or more than one")
-    known = RTCRtpSender.getCapabilities("video").codecs
-    videos[0].setCodecPreferences([codec for codec in known if codec.name == "H264"])
-    connection.addTrack(track)
 
 
 _MEDIA_MAX = 2

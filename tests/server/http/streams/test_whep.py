@@ -58,12 +58,12 @@ class Viewer:
         return source_of(frame.to_ndarray(format="yuv420p"))
 
 
-async def offer(codec: str = "H264") -> RTCPeerConnection:
-    """Return a connection that offers to receive a video."""
+async def offer(*codecs: str) -> RTCPeerConnection:
+    """Return a connection that offers to receive a video, in the order of preference of some codecs."""
     connection = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     video = connection.addTransceiver("video", direction="recvonly")
     known = RTCRtpReceiver.getCapabilities("video").codecs
-    video.setCodecPreferences([each for each in known if each.name == codec])
+    video.setCodecPreferences([each for codec in codecs for each in known if each.name == codec])
     await connection.setLocalDescription(await connection.createOffer())
     return connection
 
@@ -80,7 +80,7 @@ async def post(
 async def watching(
     site: ServedSite, path: str, headers: dict[str, str] | None = None
 ) -> AsyncIterator[Viewer]:
-    connection = await offer()
+    connection = await offer("VP8", "H264")  # as browsers do
     tracks = asyncio.Queue[Any]()
     connection.on("track", tracks.put_nowait)
     status, session, answer = await post(site, path, connection.localDescription.sdp, headers)
@@ -162,7 +162,7 @@ async def test_an_offer_without_h264_is_refused(site_with_people: ServedSite) ->
 async def test_offers_with_any_change_are_answered_or_refused_in_one_line(
     site_with_people: ServedSite,
 ) -> None:
-    connection = await offer()
+    connection = await offer("H264")
     text = connection.localDescription.sdp
     await connection.close()
     rng = np.random.default_rng(1)
@@ -196,7 +196,7 @@ async def test_viewers_are_limited_as_those_of_other_streams() -> None:
     async for site in serve_site(http={"viewers_per_object": 1}):
         show_people(site)
         async with watching(site, "/objects/1/whep"):
-            connection = await offer()
+            connection = await offer("H264")
             code, _, answer = await post(site, "/objects/1/whep", connection.localDescription.sdp)
             await connection.close()
             assert (code, "http.viewers_per_object" in answer) == (503, True)
