@@ -5,6 +5,8 @@
 
 It needs nothing but Python. Limits and restart policy are moved to where Swarm looks for them, networks span
 machines, and what Swarm does not know is left out. Processes start in any order and wait for each other.
+Ports are those of the machine that a service runs on, and names lead to containers without Swarm's balancer,
+which would hide viewers' addresses and break connections that last.
 docs/how-to/scale.md, "Several services".
 """
 
@@ -59,6 +61,7 @@ def _service(name: str, service: Section) -> Section:
     if "pids" in limits:
         limits["pids"] = int(service["pids_limit"])
     kept["deploy"] = {
+        "endpoint_mode": "dnsrr",
         "resources": {"limits": limits},
         "restart_policy": {"condition": _CONDITIONS[service.get("restart", "no")], "delay": _DELAY},
     }
@@ -85,10 +88,10 @@ def _memory(tmpfs: str) -> Section:
 def _port(name: str, port: Section) -> Section:
     if port.get("host_ip", "0.0.0.0") != "0.0.0.0":  # noqa: S104 — compared, not listened on
         raise CannotConvertError(
-            f"{name}: Swarm publishes a port on every address of every machine, not on {port['host_ip']} "
-            "alone; where that is wanted, set MYVIEW_PUBLISH=8080 and MYVIEW_PUBLISH_1=8081"
+            f"{name}: Swarm publishes a port on every address of a machine, not on {port['host_ip']} alone; "
+            "where that is wanted, set MYVIEW_PUBLISH=8080 and MYVIEW_PUBLISH_1=8081"
         )
-    return {"target": port["target"], "published": int(port["published"]), "mode": "ingress"}
+    return {"target": port["target"], "published": int(port["published"]), "mode": "host"}
 
 
 def main() -> int:

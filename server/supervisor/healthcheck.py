@@ -18,6 +18,7 @@ import os
 import socket
 import ssl
 import sys
+import urllib.parse
 import urllib.request
 from collections.abc import Sequence
 from pathlib import Path
@@ -51,12 +52,15 @@ def check_pulse_server() -> None:
 
 
 def check_service() -> None:
-    """Check whether the best-view service answers.
+    """Check whether the best-view service in this container answers.
 
     Raises:
         OSError: it does not.
     """
-    _get(_services()[0], "/healthz")
+    service = urllib.parse.urlsplit(_services()[0])
+    # Not by its name, which Swarm resolves only once the service is healthy.
+    port = service.port or (443 if service.scheme == "https" else 80)
+    _get(f"{service.scheme}://127.0.0.1:{port}", "/healthz")
 
 
 def check_gateway() -> None:

@@ -169,8 +169,7 @@ def test_two_services_know_each_other_and_every_process_knows_both(monkeypatch: 
         assert config.view.share.services == 2
         assert config.view.share.index == (name == "bestview-1")
         services = service["environment"]["MYVIEW_HEALTH_URL"].split(",")
-        own = [f"http://{name}:8080"] if name.startswith("bestview") else []
-        assert services == (own or ["http://bestview:8080", "http://bestview-1:8080"])
+        assert services == ["http://bestview:8080", "http://bestview-1:8080"]
 
 
 @pytest.mark.parametrize("file", [SERVER, CAMERAS])

@@ -54,6 +54,7 @@ def test_limits_and_restarts_are_where_swarm_looks_for_them() -> None:
     stack = json.loads(convert(PROJECT).stdout)
     (service,) = stack["services"].values()
     assert service["deploy"] == {
+        "endpoint_mode": "dnsrr",
         "resources": {"limits": {"cpus": "2", "memory": "2147483648", "pids": 512}},
         "restart_policy": {"condition": "any", "delay": "1s"},
     }
@@ -61,6 +62,7 @@ def test_limits_and_restarts_are_where_swarm_looks_for_them() -> None:
         {"type": "bind", "source": "/a", "target": "/b", "read_only": True},
         {"type": "tmpfs", "target": "/memory", "tmpfs": {"size": 256 << 20}},
     ]
+    assert service["ports"] == [{"target": 8080, "published": 8080, "mode": "host"}]
     assert not {"build", "depends_on", "restart", "mem_limit", "tmpfs"} & set(service)
     assert stack["networks"] == {
         "site": {"driver": "overlay", "internal": True},

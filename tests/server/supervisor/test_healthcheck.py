@@ -142,7 +142,10 @@ def test_a_camera_is_healthy_while_one_of_two_services_receives_its_frames(
     for services in (f"{running},{dead}", f"{dead}, {running}"):
         monkeypatch.setenv("MYVIEW_HEALTH_URL", services)
         assert main(["camera", "c0"]) == 0
-    assert main(["bestview"]) == 1, "the first one is the service's own"
+    assert main(["bestview"]) == 1, "its own port is that of the first one"
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"http://no-name.invalid:{http_service.server_port}")
+    assert main(["bestview"]) == 0, "its name is not resolved"
+    monkeypatch.setenv("MYVIEW_HEALTH_URL", f"{dead},{running}")
     http_service.cameras = [{**LIVE, "state": "gone"}]
     assert main(["camera", "c0"]) == 1
 
