@@ -23,6 +23,8 @@ _LIMITS = {"cpus": "cpus", "mem_limit": "memory", "pids_limit": "pids"}
 """Where a service's limits are found, and what Swarm calls them."""
 _COMPOSE_ONLY = ("cpu_shares", "memswap_limit", "restart", "tmpfs", *_LIMITS)
 _CONDITIONS = {"unless-stopped": "any", "always": "any", "on-failure": "on-failure", "no": "none"}
+_UNHEALTHY_AFTER = 6
+"""Failed health checks after which Swarm ends a container."""
 _DELAY = "1s"
 """Before a container is started again."""
 
@@ -67,9 +69,22 @@ def _service(name: str, service: Section) -> Section:
     }
     kept["networks"] = list(service["networks"])
     kept["volumes"] = [*map(_mount, service.get("volumes", ())), *map(_memory, service.get("tmpfs", ()))]
+    if "healthcheck" in service:
+        kept["healthcheck"] = _health(service)
     if "ports" in service:
         kept["ports"] = [_port(name, port) for port in service["ports"]]
     return kept
+
+
+def _health(service: Section) -> Section:
+    """Swarm ends what is unhealthy, which Compose only reports.
+
+    A camera is unhealthy without its source or best view. To end it would help neither, and lose the numbers
+    of people, which cameras keep while the best view is away. Others may be slow on a busy machine.
+    """
+    if service["command"][0] == "camera":
+        return {"disable": True}
+    return {**service["healthcheck"], "timeout": "30s", "retries": _UNHEALTHY_AFTER}
 
 
 def _mount(volume: Section) -> Section:

@@ -70,6 +70,16 @@ def test_limits_and_restarts_are_where_swarm_looks_for_them() -> None:
     }
 
 
+def test_a_camera_is_not_ended_while_its_source_or_the_best_view_is_away() -> None:
+    health = {"test": ["CMD", "check"], "interval": "5s", "timeout": "10s", "retries": 3}
+    service = {**PROJECT["services"]["bestview"], "healthcheck": health}
+    camera = {**service, "command": ["camera", "configs/demo.yaml", "c0"]}
+    done = convert({**PROJECT, "services": {"bestview": service, "c0": camera}})
+    checks = {name: made["healthcheck"] for name, made in json.loads(done.stdout)["services"].items()}
+    assert checks["c0"] == {"disable": True}
+    assert checks["bestview"] == {**health, "timeout": "30s", "retries": 6}
+
+
 def test_a_port_of_this_machine_alone_is_not_published_to_all() -> None:
     service = {**PROJECT["services"]["bestview"]}
     service["ports"] = [{**service["ports"][0], "host_ip": "127.0.0.1"}]

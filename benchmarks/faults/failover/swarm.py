@@ -39,7 +39,7 @@ FILES = ("docker-compose.yml", "docker-compose.standby.yml")
 SERVICES = ("bestview", "bestview-1")
 _FILMS, _KEPT = "/site/films", "/site/kept"
 _PULSES = 20_000
-_COMMAND_S, _BUILD_S = 120.0, 900.0
+_COMMAND_S, _BUILD_S, _START_S = 120.0, 900.0, 300.0
 
 
 class SwarmError(RuntimeError):
@@ -172,7 +172,7 @@ async def run_stack(views: StampedViews, folder: Path) -> AsyncIterator[SwarmSit
         sites = [
             FaultSite(url, folder, 0, recorded=folder / f"kept-{index}") for index, url in enumerate(urls)
         ]
-        async with follow_events(sites[0]), follow_events(sites[1]):
+        async with follow_events(sites[0], _START_S), follow_events(sites[1], _START_S):
             yield SwarmSite(tuple(sites), "", docker, stack)
 
 

@@ -29,6 +29,7 @@ JOINT = "joint tracker"
 _JOINT_MODULE = "server.service.joint_tracking"
 _LEADS = re.compile(r"^myview_leads 1\.0$", re.MULTILINE)
 _ANSWER_S, _LEADS_S, _POLL_S = 5.0, 10.0, 0.2
+_START_S = 180.0
 _BUS_PORT, _HTTP_PORT, _SYNC_PORT = 7447, 8080, 7400
 
 
@@ -187,7 +188,7 @@ async def run_two_services(
         sites = [
             FaultSite(url, folder, 0, recorded=folder / f"kept-{index}") for index, url in enumerate(urls)
         ]
-        async with follow_events(sites[0]), follow_events(sites[1]):
+        async with follow_events(sites[0], _START_S), follow_events(sites[1], _START_S):
             yield TwoServices(tuple(sites), front, processes, hosts)
 
 

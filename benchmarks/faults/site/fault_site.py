@@ -93,13 +93,13 @@ class FaultSite:
         cameras = [self.events.shown(viewer.number) for viewer in self.viewers]
         return sorted(CAMERAS, key=lambda name: (-cameras.count(name), name))
 
-    async def settle(self) -> None:
+    async def settle(self, seconds: float = _SETTLE_S) -> None:
         """Wait until the site is healthy: all cameras live, and decisions arriving that show people.
 
         Raises:
             RuntimeError: the site does not become healthy in time.
         """
-        deadline = time.monotonic() + _SETTLE_S
+        deadline = time.monotonic() + seconds
         healthy_since = None
         while time.monotonic() < deadline:
             now = time.monotonic()
@@ -111,7 +111,7 @@ class FaultSite:
                 return
             await asyncio.sleep(_POLL_S)
         states = {name: self.events.state(name) for name in CAMERAS}
-        raise RuntimeError(f"the site did not recover within {_SETTLE_S:g} s: {states}")
+        raise RuntimeError(f"the site did not recover within {seconds:g} s: {states}")
 
     def _is_healthy(self, now: float) -> bool:
         if not self.events.gops or any(self.events.state(name) != "live" for name in CAMERAS):
@@ -144,14 +144,14 @@ class FaultSite:
 
 
 @contextlib.asynccontextmanager
-async def follow_events(fault_site: FaultSite) -> AsyncIterator[FaultSite]:
-    """Follow the events of a site, and wait until it is healthy."""
+async def follow_events(fault_site: FaultSite, start_s: float = _SETTLE_S) -> AsyncIterator[FaultSite]:
+    """Follow the events of a site, and wait until it is healthy, so many seconds at most."""
     tasks = [
         asyncio.create_task(fault_site.events.listen(fault_site.url)),
         asyncio.create_task(fault_site.watch_server()),
     ]
     try:
-        await fault_site.settle()
+        await fault_site.settle(start_s)
         yield fault_site
     finally:
         for task in tasks:
