@@ -3,9 +3,10 @@
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.ground_plane --data ../shared/data --out out/bench
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.ground_plane --scene "wildtrack strong" --seeds 3
 
-All ways get the same detections, and none is tuned to a scene. *Joint program* is `tracking.ground_plane`.
-*Per camera, joined* is what the service does: a tracker per camera, and identities across cameras from their
-tracks. *Per camera alone* has ids of its own in every camera: its mean is what a camera knows by itself.
+All ways get the same detections, and none is tuned to a scene. *Joint program* is `tracking.ground_plane`;
+*in the service* with identities after it. *Per camera, joined* is what the service does where views do not
+overlap: a tracker per camera, and identities across cameras from their tracks. *Per camera alone* has ids of
+its own in every camera: its mean is what a camera knows by itself.
 *Frame by frame* finds places from all cameras in each frame as the joint program does, and links them by the
 Hungarian method with constant velocity. Scores are means over the seeds, with half of their range; *ms* is
 processor time per frame of all cameras together.
