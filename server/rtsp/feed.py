@@ -2,13 +2,12 @@
 
 A feed goes on through everything that passes: a restart of the service, a camera's death, other parameter
 sets. It ends when the service refuses the stream for good (a revoked token), when the stream is gone for a
-minute (a forgotten person), or when nobody watches.
+minute (a forgotten person), or when its client leaves.
 """
 
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
 import threading
 import time
@@ -16,9 +15,9 @@ from collections.abc import Callable, Iterator
 
 import gi
 
-for _name in ("Gst", "GstApp", "GstRtspServer"):
+for _name in ("Gst", "GstApp"):
     gi.require_version(_name, "1.0")
-from gi.repository import Gst, GstApp, GstRtspServer  # noqa: E402
+from gi.repository import Gst, GstApp  # noqa: E402
 
 from server.rtsp.mp4_reader import (  # noqa: E402
     Head,
@@ -41,9 +40,6 @@ log = logging.getLogger(__name__)
 
 _ABANDON_S = 60.0
 """How long the service may be away, or not know the stream, until its clients are sent away."""
-_UNUSED_S = 15.0
-"""How long a feed waits for the media that takes it."""
-_FIRST_SAMPLE_S = 5.0
 _RETRY_S = 0.5
 _REFUSED_FOR_GOOD = {401, 403}
 _QUEUE_BYTES = 4_000_000
@@ -53,17 +49,11 @@ _LEAST_STEP_S = 0.001
 """Between two samples of a track: times must ascend."""
 
 
-_Status = GstRtspServer.RTSPMediaStatus
-_DEAD = {_Status.UNPREPARING, _Status.ERROR}
-_numbers = itertools.count()
-
-
 class Feed:
-    """One stream of the service for one RTSP media and all its clients.
+    """One stream of the service, for the one media of one client.
 
     Attributes:
         address: the stream.
-        number: of this feed and its media, never used again.
         tracks: its tracks, when it was opened.
     """
 
@@ -75,42 +65,28 @@ class Feed:
             ServiceAwayError: it does not answer, or sends nothing.
         """
         self._service, self.address, self._on_end = service, address, on_end
-        self.number = next(_numbers)
-        self._media: GstRtspServer.RTSPMedia | None = None
         self._stream = service.open(address.path, address.token)
         self._parts = _parts(self._stream)
-        self._early: list[Sample] = []
         self.tracks = self._first_head().tracks
         self._sources: dict[str, GstApp.AppSrc] = {}
         """By codec, once a media has taken the feed."""
         self._last_due_s: dict[str, float] = {}
-        self._pipeline: Gst.Element | None = None
+        self._clock = StreamClock(_SLACK_S if address.is_paced else 0.0)
         self._stopped = threading.Event()
-        self._taken = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=address.path, daemon=True)
-        self._thread.start()
 
     def connect(self, media: Gst.Element) -> None:
-        """Push into the sources of a media's element from now on: its first, or another after that."""
-        self._clock = StreamClock(_SLACK_S if self.address.is_paced else 0.0)
-        self._last_due_s.clear()
+        """Push into the sources of a media's element from now on; once."""
         for track in self.tracks:
             source = media.get_by_name(source_name(track))
             source.set_property("caps", caps_of(track))
             source.set_property("max-bytes", _QUEUE_BYTES)
             self._sources[track.codec] = source
-        self._pipeline = media
-        self._taken.set()
+        threading.Thread(target=self._run, args=(media,), name=self.address.path, daemon=True).start()
 
-    def media_key(self) -> str:
-        """Return the key of its media; another one if that is being taken down, as its last client leaves."""
-        if self._media is not None and self._media.get_status() in _DEAD:
-            self._media, self.number = None, next(_numbers)
-        return str(self.number)
-
-    def set_media(self, media: GstRtspServer.RTSPMedia) -> None:
-        """Set the media that has taken it."""
-        self._media = media
+    @property
+    def is_connected(self) -> bool:
+        """Whether a media has taken it."""
+        return bool(self._sources)
 
     @property
     def has_ended(self) -> bool:
@@ -120,7 +96,6 @@ class Feed:
     def stop(self) -> None:
         """End it, from any thread."""
         self._stopped.set()
-        self._taken.set()
         self._stream.close()
 
     def _first_head(self) -> Head:
@@ -131,10 +106,9 @@ class Feed:
         self._stream.close()
         raise ServiceAwayError("the service's stream has no head")
 
-    def _run(self) -> None:
+    def _run(self, media: Gst.Element) -> None:
         try:
-            if self._taken.wait(_UNUSED_S):
-                self._push_all()
+            self._push_all(media)
         finally:
             self._stopped.set()
             self._stream.close()
@@ -142,11 +116,11 @@ class Feed:
                 source.end_of_stream()
             self._on_end(self)
 
-    def _push_all(self) -> None:
+    def _push_all(self, media: Gst.Element) -> None:
         while not self._stopped.is_set():
             try:
                 for part in self._parts:
-                    self._push(part)
+                    self._push(part, media)
             except (ServiceAwayError, Mp4Error) as error:
                 log.debug("%s: %s", self.address.path, error)
             if self._stopped.is_set() or not self._reopen():
@@ -175,17 +149,17 @@ class Feed:
             log.info("%s ends: %s", self.address.path, reason)
         return False
 
-    def _push(self, part: Head | Sample) -> None:
+    def _push(self, part: Head | Sample, media: Gst.Element) -> None:
         if isinstance(part, Head):
             for track in part.tracks:
                 if (source := self._sources.get(track.codec)) is not None:
                     source.set_property("caps", caps_of(track))
             return
         source = self._sources.get(part.track.codec)
-        if source is None or self._pipeline is None:
+        if source is None:
             return
         is_keyframe = part.track.is_video and part.is_key
-        running = self._pipeline.get_current_running_time()
+        running = media.get_current_running_time()
         running_s = 0.0 if running == Gst.CLOCK_TIME_NONE else running / Gst.SECOND  # it does not play yet
         due_s = self._clock.due(part.time_s, running_s, is_key=is_keyframe)
         due_s = max(due_s, self._last_due_s.get(part.track.codec, 0.0) + _LEAST_STEP_S)

@@ -1,7 +1,7 @@
 """The RTSP server: GStreamer's, whose media are made of feeds as clients ask for them.
 
-Access is decided by the service alone: a client's token opens the stream there, or does not. Clients that ask
-for the same stream with the same token share one feed.
+Access is decided by the service alone: a client's token opens the stream there, or does not. Nothing is
+shared: each client has a feed and a media of its own, so that none depends on how another comes and leaves.
 """
 
 from __future__ import annotations
@@ -61,24 +61,20 @@ class GatewaySettings:
 
 
 class _Factory(GstRtspServer.RTSPMediaFactory):  # type: ignore[misc]
-    """Makes the media of the feed that the request being answered has opened."""
+    """Makes the media of the client whose request is being answered."""
 
     def __init__(self, gateway: Gateway) -> None:
         super().__init__()
         self._gateway = gateway
-        self.set_shared(True)
-        self.set_stop_on_disconnect(True)
         protocols = GstRtsp.RTSPLowerTrans.TCP
         if gateway.settings.udp:
             protocols |= GstRtsp.RTSPLowerTrans.UDP
         self.set_protocols(protocols)
 
-    def do_gen_key(self, _: Any) -> str:
-        # By feed: the media of one that has just ended may still be there.
-        return self._gateway.feed_of_request().media_key()
-
-    def do_create_element(self, _: Any) -> Gst.Element:
-        feed = self._gateway.feed_of_request()
+    def do_create_element(self, _: Any) -> Gst.Element | None:
+        feed = self._gateway.feed_for_media()
+        if feed is None:
+            return None  # 503
         parts = (
             f"appsrc name={source_name(track)} is-live=true format=time leaky-type=downstream"
             f" ! {_PAYLOADERS[track.codec]} name=pay{number} pt={96 + number}"
@@ -87,9 +83,6 @@ class _Factory(GstRtspServer.RTSPMediaFactory):  # type: ignore[misc]
         element = Gst.parse_launch(f"( {' '.join(parts)} )")
         feed.connect(element)
         return element
-
-    def do_configure(self, media: Any) -> None:
-        self._gateway.feed_of_request().set_media(media)
 
 
 class _Access(GstRtspServer.RTSPAuth):  # type: ignore[misc]
@@ -117,26 +110,28 @@ class _Access(GstRtspServer.RTSPAuth):  # type: ignore[misc]
                 return True
 
 
-@dataclass(frozen=True, slots=True)
-class _Request:
-    """How a request is answered, and the feed that it has opened."""
+@dataclass(slots=True)
+class _Connection:
+    """A client's connection: how its last request is answered, and its stream."""
 
-    status: Any
+    ip: str
+    status: Any = _Status.OK
     feed: Feed | None = None
+    is_closed: bool = False
 
 
 class Gateway:
-    """The server, its feeds, and who has opened them."""
+    """The server and its clients."""
 
     def __init__(self, settings: GatewaySettings) -> None:
         self.settings = settings
-        self._requests: dict[int, _Request] = {}
-        """The request that each thread is answering; Python forgets what is local to GLib's threads."""
+        self._answered: dict[int, _Connection] = {}
+        """Whose request each thread is answering; Python forgets what is local to GLib's threads."""
         self._lock = threading.RLock()
-        self._feeds: dict[StreamAddress, Feed] = {}
-        self._mounts: dict[str, set[StreamAddress]] = {}
-        self._opened: dict[Any, set[StreamAddress]] = {}
-        """By client, what it has opened."""
+        self._connections: dict[Any, _Connection] = {}
+        """By client."""
+        self._mounts: set[str] = set()
+        """Streams that were watched once: the server has a place for each."""
         self._wrong_tokens = WrongTokenRateLimit(time.monotonic)
         self._valid: dict[tuple[str, bytes], None] = {}
         """Addresses and digests of tokens that were right, the oldest first."""
@@ -148,6 +143,7 @@ class Gateway:
         if settings.certificate is not None:
             access.set_tls_certificate(Gio.TlsCertificate.new_from_files(settings.certificate, settings.key))
         self._server.set_auth(access)
+        self._factory = _Factory(self)
         self._threads = GstRtspServer.RTSPThreadPool()
         self._threads.set_max_threads(_THREADS)
         self._server.set_thread_pool(self._threads)
@@ -168,46 +164,60 @@ class Gateway:
     def may_connect(self) -> bool:
         """Return whether there is a place for another connection."""
         with self._lock:
-            return len(self._opened) < self.settings.clients_max + _IDLE_CONNECTIONS
+            return len(self._connections) < self.settings.clients_max + _IDLE_CONNECTIONS
 
-    def feed_of_request(self) -> Feed:
-        """Return the feed of the request that this thread is answering."""
-        feed = self._requests[threading.get_ident()].feed
-        assert feed is not None  # noqa: S101 — refused requests come no further
+    def feed_for_media(self) -> Feed | None:
+        """Return a feed for a new media of the client that this thread is answering; None: it has none.
+
+        A client that has torn down its media and asks again gets another feed.
+        """
+        connection = self._answered[threading.get_ident()]
+        feed = connection.feed
+        if feed is not None and feed.is_connected:
+            connection.status = self._open_feed(connection, feed.address)
+            feed = connection.feed if connection.status == _Status.OK else None
         return feed
 
     def open_for(self, context: Any) -> Any:
         """Open the stream of a request; return an RTSP status, which is kept for :meth:`_answer`, too."""
-        self._requests[threading.get_ident()] = request = self._open(context)
-        return request.status
+        connection = self._connections.get(context.client, _Connection("", is_closed=True))
+        self._answered[threading.get_ident()] = connection
+        connection.status = self._open(context, connection)
+        return connection.status
 
-    def _open(self, context: Any) -> _Request:
-        uri, client = context.uri, context.client
+    def _open(self, context: Any, connection: _Connection) -> Any:
+        uri = context.uri
         _, authorization = context.request.get_header(GstRtsp.RTSPHeaderField.AUTHORIZATION, 0)
         mount = mount_of(uri.abspath)
         address = None if uri.query else stream_address(mount, authorization)
         if address is None:
-            return _Request(_Status.NOT_FOUND)
+            return _Status.NOT_FOUND
+        feed = connection.feed
+        if feed is not None and feed.address == address and not feed.has_ended:
+            return _Status.OK
+        status = self._open_feed(connection, address)
         with self._lock:
-            opened = self._opened.setdefault(client, set())
-            watching = sum(
-                bool(addresses) for other, addresses in self._opened.items() if other is not client
-            )
-            if not opened and watching >= self.settings.clients_max:
-                return _Request(_Status.SERVICE_UNAVAILABLE)
-            feed = self._feeds.get(address)
-            if feed is not None and not feed.has_ended:
-                return _Request(_Status.OK, self._mount(feed, mount, client))
-        opened_feed = self._open_feed(address, context.conn.get_ip())
-        if isinstance(opened_feed, Feed):
-            return _Request(_Status.OK, self._mount(opened_feed, mount, client))
-        return _Request(opened_feed)
+            if status == _Status.OK and mount not in self._mounts:
+                self._server.get_mount_points().add_factory(mount, self._factory)
+                self._mounts.add(mount)
+        return status
 
-    def _open_feed(self, address: StreamAddress, ip: str) -> Feed | Any:
-        """Open a feed, or return the RTSP status of why not; an address that sends wrong tokens has to wait.
+    def _has_place(self, connection: _Connection) -> bool:
+        watching = sum(one.feed is not None for one in self._connections.values())
+        return not connection.is_closed and (
+            connection.feed is not None or watching < self.settings.clients_max
+        )
 
-        Tokens that were right do not: one wrong setting must not stop the others of that address.
+    def _open_feed(self, connection: _Connection, address: StreamAddress) -> Any:
+        """Open a feed instead of the client's former one; return an RTSP status.
+
+        An address that sends wrong tokens has to wait. Tokens that were right do not: one wrong setting must
+        not stop the others of that address.
         """
+        with self._lock:
+            if not self._has_place(connection):
+                return _Status.SERVICE_UNAVAILABLE
+        ip = connection.ip
         seen = ip, hashlib.sha256((address.token or "").encode()).digest()
         if address.token is not None and seen not in self._valid and self._wrong_tokens.wait(ip) > 0:
             return _Status.SERVICE_UNAVAILABLE
@@ -224,53 +234,35 @@ class Gateway:
         self._valid[seen] = None
         if len(self._valid) > _VALID_KEPT:
             self._valid.pop(next(iter(self._valid)))
-        return feed
-
-    def _mount(self, feed: Feed, mount: str, client: Any) -> Feed:
-        """Add a feed to the server; return the one that another thread has added meanwhile."""
         with self._lock:
-            current = self._feeds.get(feed.address)
-            if current is not None and current is not feed and not current.has_ended:
-                feed.stop()
-                feed = current
-            self._feeds[feed.address] = feed
-            if mount not in self._mounts:
-                self._server.get_mount_points().add_factory(mount, _Factory(self))
-            self._mounts.setdefault(mount, set()).add(feed.address)
-            if client in self._opened:
-                self._opened[client].add(feed.address)
-        return feed
+            unused = feed  # the place may be another's by now
+            if self._has_place(connection):
+                unused, connection.feed = connection.feed, feed
+        if unused is not None:
+            unused.stop()
+        return _Status.SERVICE_UNAVAILABLE if unused is feed else _Status.OK
 
     def _answer(self, _: Any, __: Any) -> Any:
-        return self._requests[threading.get_ident()].status
+        return self._answered[threading.get_ident()].status
 
     def _on_client(self, _: Any, client: Any) -> None:
         with self._lock:
-            self._opened.setdefault(client, set())
+            self._connections[client] = _Connection(client.get_connection().get_ip())
         client.connect("pre-describe-request", self._answer)
         client.connect("pre-setup-request", self._answer)
         client.connect("closed", self._on_closed)
 
     def _on_closed(self, client: Any) -> None:
         with self._lock:
-            left = self._opened.pop(client, set())
-            watched = {address for opened in self._opened.values() for address in opened}
-            unwatched = [self._feeds[address] for address in left - watched if address in self._feeds]
-        for feed in unwatched:
-            feed.stop()
+            connection = self._connections.pop(client)
+            connection.is_closed = True
+        if connection.feed is not None:
+            connection.feed.stop()
 
     def _on_end(self, feed: Feed) -> None:
-        """Forget a feed; end the connections of its clients, which no longer get anything."""
+        """End the connection of a feed's client, which no longer gets anything."""
         with self._lock:
-            if self._feeds.get(feed.address) is not feed:
-                return
-            del self._feeds[feed.address]
-            for mount, addresses in list(self._mounts.items()):
-                addresses.discard(feed.address)
-                if not addresses:
-                    del self._mounts[mount]
-                    self._server.get_mount_points().remove_factory(mount)
-            clients = [client for client, opened in self._opened.items() if feed.address in opened]
+            clients = [client for client, one in self._connections.items() if one.feed is feed]
         GLib.timeout_add(_CLOSE_AFTER_MS, _close, clients)
 
     def _clean_up(self) -> bool:

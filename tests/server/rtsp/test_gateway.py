@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Iterator
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import av
@@ -33,18 +36,20 @@ from server.messaging.epochs import end_of_epoch
 
 pytestmark = needs_gstreamer
 
-EPOCHS = 400
+PICTURES = 100 * STRIDE
+"""Each camera's, all different; then they come again."""
 
 
 @asynccontextmanager
 async def live(served: ServedSite) -> AsyncIterator[None]:
-    """Let a site run in real time; its person is larger in the other camera every other GOP."""
+    """Let a site run in real time or slower; its person is larger in the other camera every other GOP."""
     served.service.connect_cameras(*CAMERAS)
 
     async def run() -> None:
-        for epoch in range(EPOCHS):
+        for epoch in count():
             for seed, camera in enumerate(CAMERAS):
-                for unit in encoded(seed, EPOCHS * STRIDE)[epoch * STRIDE : (epoch + 1) * STRIDE]:
+                for pulse in range(epoch * STRIDE, (epoch + 1) * STRIDE):
+                    unit = replace(encoded(seed, PICTURES)[pulse % PICTURES], pulse=pulse)
                     served.service.ingest.video(video(camera, unit))
                 size = LARGE if (epoch + seed) % 2 else SMALL
                 served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: size})))
@@ -63,17 +68,22 @@ async def live(served: ServedSite) -> AsyncIterator[None]:
 
 
 def own_pictures(camera: int) -> dict[bytes, int]:
-    """Return the pulse of each of a camera's pictures, by its decoded pixels."""
+    """Return the number of each of a camera's pictures, by its decoded pixels."""
     decoder = av.CodecContext.create("h264", "r")
-    units = encoded(camera, EPOCHS * STRIDE)
+    units = encoded(camera, PICTURES)
     frames = [frame for unit in units for frame in decoder.decode(av.Packet(unit.data))]
     frames += decoder.decode(None)
-    return {pixels(frame): pulse for pulse, frame in enumerate(frames)}
+    return {pixels(frame): number for number, frame in enumerate(frames)}
 
 
 def pixels(frame: av.VideoFrame) -> bytes:
     array: NDArray[np.uint8] = frame.to_ndarray(format="yuv420p")
     return array.tobytes()
+
+
+def steps(numbers: Sequence[int]) -> list[int]:
+    """Return by how many pictures each is later than the one before; what goes back steps far."""
+    return [int(step) for step in np.diff(numbers) % PICTURES]
 
 
 def watch(url: str, transport: str = "tcp") -> Iterator[av.VideoFrame]:
@@ -86,6 +96,33 @@ async def frames_of(url: str, count: int, transport: str = "tcp") -> list[av.Vid
         return [frame for frame, _ in zip(watch(url, transport), range(count), strict=False)]
 
     return await asyncio.to_thread(run)
+
+
+@asynccontextmanager
+async def watching(url: str) -> AsyncIterator[list[av.VideoFrame]]:
+    """Watch a stream; yield the frames, which become more."""
+    frames: list[av.VideoFrame] = []
+    leaving = threading.Event()
+
+    def run() -> None:
+        for frame in watch(url):
+            frames.append(frame)
+            if leaving.is_set():
+                return
+
+    task = asyncio.create_task(asyncio.to_thread(run))
+    try:
+        await until(lambda: bool(frames) or task.done())
+        yield frames
+    finally:
+        leaving.set()
+        await task
+
+
+async def more(frames: list[av.VideoFrame], number: int) -> None:
+    """Wait for so many more."""
+    before = len(frames)
+    await until(lambda: len(frames) >= before + number)
 
 
 @pytest.fixture
@@ -104,9 +141,12 @@ async def gateway(site: ServedSite) -> AsyncIterator[RunningGateway]:
 async def test_a_camera_has_its_own_pictures_in_order(gateway: RunningGateway, transport: str) -> None:
     own = await asyncio.to_thread(own_pictures, 0)
     frames = await frames_of(gateway.url("/cameras/c0", token_of("door")), 20, transport)
-    pulses = [own[pixels(frame)] for frame in frames]
-    assert pulses == list(range(pulses[0], pulses[0] + 20))
-    assert frames[0].width, frames[0].height
+    shown = [own[pixels(frame)] for frame in frames if pixels(frame) in own]
+    if transport == "tcp":
+        assert steps(shown) == [1] * 19
+    else:  # a machine that is too busy may lose packets, and what is predicted from them
+        assert shown
+        assert all(0 < step < PICTURES / 2 for step in steps(shown))
 
 
 async def test_a_best_view_goes_on_through_cuts_with_the_cameras_own_pictures(
@@ -118,11 +158,12 @@ async def test_a_best_view_goes_on_through_cuts_with_the_cameras_own_pictures(
         next((camera, one[pixels(frame)]) for camera, one in enumerate(own) if pixels(frame) in one)
         for frame in frames
     ]
-    pulses = [pulse for _, pulse in shown]
-    assert pulses == list(range(pulses[0], pulses[0] + 40))
+    assert steps([number for _, number in shown]) == [1] * 39
     assert {camera for camera, _ in shown} == {0, 1}
     times = [frame.time for frame in frames if frame.time is not None]
-    assert np.diff(times) == pytest.approx(1 / FPS, abs=0.005), "evenly, though whole GOPs come at once"
+    assert np.median(np.diff(times)) == pytest.approx(1 / FPS, abs=0.005), (
+        "evenly, though whole GOPs come at once"
+    )
 
 
 @pytest.mark.parametrize(
@@ -177,46 +218,67 @@ async def test_a_revoked_token_ends_its_streams(
     assert (await gateway.describe("/cameras/c0", basic("any", token_of("door"))))[0] == 401
 
 
-@pytest.mark.slow  # one run in six a client gets fewer pictures: not understood yet
-async def test_clients_beyond_the_most_are_refused_until_one_leaves(
-    site: ServedSite, gateway: RunningGateway
-) -> None:
-    watching = [
-        asyncio.create_task(frames_of(gateway.url(f"/cameras/{camera}", token_of("desk")), 50))
-        for camera in CAMERAS
-    ]
-    desk = basic("any", token_of("desk"))
+async def test_clients_beyond_the_most_are_refused_until_one_leaves(gateway: RunningGateway) -> None:
+    desk = token_of("desk")
 
     async def status() -> int:
-        return (await gateway.describe("/cameras/c0", desk))[0]
+        return (await gateway.describe("/cameras/c0", basic("any", desk)))[0]
 
-    # Who asks before both watch takes the place of one.
-    await until(lambda: site.service.splicer.viewers == 2)
-    while await status() != 503:
-        assert not all(task.done() for task in watching)
-    assert [len(frames) for frames in await asyncio.gather(*watching)] == [50, 50]
-    while await status() != 200:  # noqa: ASYNC110 — the gateway notices when a connection closes
-        await asyncio.sleep(0.05)
+    async with watching(gateway.url("/cameras/c0", desk)) as staying:
+        async with watching(gateway.url("/cameras/c0", desk)):
+            assert await status() == 503
+        while await status() != 200:  # noqa: ASYNC110 — the gateway notices when a connection closes
+            await asyncio.sleep(0.05)
+        await more(staying, 2 * FPS)
 
 
 @pytest.mark.parametrize("path", ["/cameras/c0", "/objects/1"])
-async def test_clients_that_come_as_others_leave_get_pictures(gateway: RunningGateway, path: str) -> None:
-    for _ in range(12):
-        assert len(await frames_of(gateway.url(path, token_of("desk")), 3)) == 3
+async def test_clients_that_come_as_others_leave_get_pictures(site: ServedSite, path: str) -> None:
+    async with run_gateway(site.port, clients_max=12) as gateway:
+
+        async def one_after_another() -> None:
+            for _ in range(4):
+                assert len(await frames_of(gateway.url(path, token_of("desk")), 3)) == 3
+
+        await asyncio.gather(*(one_after_another() for _ in range(3)))
+
+
+async def test_a_client_that_has_torn_down_its_stream_gets_it_again(gateway: RunningGateway) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", gateway.port)
+    address = f"rtsp://127.0.0.1:{gateway.port}/cameras/c0"
+    login = f"Authorization: {basic('any', token_of('door'))}"
+
+    async def answer(request: str, *lines: str) -> str:
+        writer.write("\r\n".join([f"{request} RTSP/1.0", "CSeq: 1", login, *lines, "", ""]).encode())
+        head = (await reader.readuntil(b"\r\n\r\n")).decode()
+        assert head.startswith("RTSP/1.0 200"), head
+        for line in head.splitlines():
+            if line.startswith("Content-Length:"):
+                await reader.readexactly(int(line.split()[1]))
+        return head
+
+    for _ in range(2):
+        await answer(f"DESCRIBE {address}")
+        head = await answer(f"SETUP {address}/stream=0", "Transport: RTP/AVP/TCP;unicast;interleaved=0-1")
+        session = next(line.partition(";")[0] for line in head.splitlines() if line.startswith("Session:"))
+        await answer(f"TEARDOWN {address}", session)
+    writer.close()
 
 
 async def test_a_client_goes_on_when_the_connection_to_the_service_breaks(site: ServedSite) -> None:
     own = await asyncio.to_thread(own_pictures, 1)
-    async with broken_connections(site.port) as (port, break_all), run_gateway(port) as gateway:
-        watching = asyncio.create_task(frames_of(gateway.url("/cameras/c1", token_of("desk")), 100))
-        for _ in range(2):
-            await until(lambda: site.service.splicer.viewers == 1)
-            break_all()
-            await until(lambda: site.service.splicer.viewers == 0)
-        frames = await watching
-    pulses = [own[pixels(frame)] for frame in frames if pixels(frame) in own]
-    assert len(pulses) >= 90, "all but those with a picture missing before them"
-    assert pulses == sorted(pulses)
+    async with (
+        breakable_connections(site.port) as connections,
+        run_gateway(connections.port) as gateway,
+        watching(gateway.url("/cameras/c1", token_of("desk"))) as frames,
+    ):
+        for number in (2, 3):
+            connections.break_all()
+            await until(lambda number=number: connections.opened >= number)  # type: ignore[misc]
+            await more(frames, FPS)
+    shown = [own[pixels(frame)] for frame in frames if pixels(frame) in own]
+    assert len(shown) > len(frames) / 2, "all but those with a picture missing before them"
+    assert all(0 < step < PICTURES / 2 for step in steps(shown))
 
 
 async def test_without_a_service_streams_are_unavailable() -> None:
@@ -224,33 +286,43 @@ async def test_without_a_service_streams_are_unavailable() -> None:
         assert (await gateway.describe("/cameras/c0"))[0] == 503
 
 
-@asynccontextmanager
-async def broken_connections(port: int) -> AsyncIterator[tuple[int, Callable[[], None]]]:
-    """Pass connections on to a port; yield the port of this, and what breaks all connections."""
-    writers: set[asyncio.StreamWriter] = set()
+class BreakableConnections:
+    """Passes connections on to a port."""
 
-    async def copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        writers.add(writer)
+    def __init__(self, onward: int) -> None:
+        self.port, self.opened = 0, 0
+        self._onward = onward
+        self._writers: set[asyncio.StreamWriter] = set()
+
+    async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.opened += 1
+        beyond, onward = await asyncio.open_connection("127.0.0.1", self._onward)
+        await asyncio.gather(self._copy(reader, onward), self._copy(beyond, writer))
+
+    async def _copy(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._writers.add(writer)
         with contextlib.suppress(OSError):
             while data := await reader.read(65_536):
                 writer.write(data)
                 await writer.drain()
         writer.close()
 
-    async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        beyond, onward = await asyncio.open_connection("127.0.0.1", port)
-        await asyncio.gather(copy(reader, onward), copy(beyond, writer))
-
-    def break_all() -> None:
-        for writer in writers:
+    def break_all(self) -> None:
+        for writer in self._writers:
             writer.transport.abort()
-        writers.clear()
+        self._writers.clear()
 
-    server = await asyncio.start_server(accept, "127.0.0.1", 0)
+
+@asynccontextmanager
+async def breakable_connections(port: int) -> AsyncIterator[BreakableConnections]:
+    """Pass connections on to a port until all are broken."""
+    connections = BreakableConnections(port)
+    server = await asyncio.start_server(connections.accept, "127.0.0.1", 0)
+    connections.port = server.sockets[0].getsockname()[1]
     try:
-        yield server.sockets[0].getsockname()[1], break_all
+        yield connections
     finally:
-        break_all()
+        connections.break_all()
         server.close()
 
 
