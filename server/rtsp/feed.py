@@ -159,9 +159,7 @@ class Feed:
         if source is None:
             return
         is_keyframe = part.track.is_video and part.is_key
-        running = media.get_current_running_time()
-        running_s = 0.0 if running == Gst.CLOCK_TIME_NONE else running / Gst.SECOND  # it does not play yet
-        due_s = self._clock.due(part.time_s, running_s, is_key=is_keyframe)
+        due_s = self._clock.due(part.time_s, _running_s(media), is_key=is_keyframe)
         due_s = max(due_s, self._last_due_s.get(part.track.codec, 0.0) + _LEAST_STEP_S)
         self._last_due_s[part.track.codec] = due_s
         data = with_parameter_sets(part.data, part.track.configuration) if is_keyframe else part.data
@@ -171,6 +169,16 @@ class Feed:
         if not part.is_key:
             buffer.set_flags(Gst.BufferFlags.DELTA_UNIT)
         source.push_buffer(buffer)
+
+
+def _running_s(media: Gst.Element) -> float:
+    """Return a media's running time; 0 before it plays.
+
+    Not by `get_current_running_time`: between the clock and its base time, which a media gets one after the
+    other, that is the clock's own time, hours ahead; samples that are due then would hold back all others.
+    """
+    base, clock = media.get_base_time(), media.get_clock()
+    return float(clock.get_time() - base) / Gst.SECOND if base and clock is not None else 0.0
 
 
 def _parts(stream: ServiceStream) -> Iterator[Head | Sample]:

@@ -235,12 +235,13 @@ class Gateway:
         if len(self._valid) > _VALID_KEPT:
             self._valid.pop(next(iter(self._valid)))
         with self._lock:
-            unused = feed  # the place may be another's by now
-            if self._has_place(connection):
-                unused, connection.feed = connection.feed, feed
+            has_place = self._has_place(connection)  # it may be another's by now
+            unused = connection.feed if has_place else feed
+            if has_place:
+                connection.feed = feed
         if unused is not None:
             unused.stop()
-        return _Status.SERVICE_UNAVAILABLE if unused is feed else _Status.OK
+        return _Status.OK if has_place else _Status.SERVICE_UNAVAILABLE
 
     def _answer(self, _: Any, __: Any) -> Any:
         return self._answered[threading.get_ident()].status
