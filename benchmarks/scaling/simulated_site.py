@@ -124,6 +124,7 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         "site": {"name": "hall", "fps": fps, "width": WIDTH, "height": HEIGHT},
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": routers, "listen": routers[0]},
+        "track": {"joint": False},  # simulated cameras send tracks alone
         # The configured rate is the measured one, not the viewers': timeouts are counted in frames.
         "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
         "cameras": [

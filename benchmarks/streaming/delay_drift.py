@@ -11,7 +11,7 @@ import msgspec
 from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE
 from server.camera.encoder import AccessUnit
-from server.config.sections import CameraSettings
+from server.config.sections import CameraSettings, TrackSettings
 from server.config.site_config import Config
 from server.media.containers.fmp4 import ticks
 from server.messaging.inbox import Message
@@ -85,7 +85,8 @@ async def drift(films: Sequence[Sequence[AccessUnit]], pulses: int) -> DelayDrif
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
-    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
+    track = TrackSettings(joint=False)  # simulated cameras send tracks alone
+    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras, track=track))
     source, decided = PacedCameras(service, films, hall), list[GopChoices]()
     service.on_decision.append(decided.append)
     viewer = service.splicer.decided_cameras[hall.ids[0]].subscribe().chunks()

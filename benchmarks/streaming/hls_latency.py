@@ -14,7 +14,7 @@ from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.streaming.delay_drift import PacedCameras
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, GOP, SITE
 from server.camera.encoder import AccessUnit
-from server.config.sections import CameraSettings, HttpSettings
+from server.config.sections import CameraSettings, HttpSettings, TrackSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving
 from server.messaging.messages import GopChoices
@@ -78,7 +78,8 @@ async def hls_delays(films: Sequence[Sequence[AccessUnit]], seconds: float) -> t
         CameraSettings(id=name, source=f"rtsp://{name}/", ground=ground.tolist())
         for name, ground in zip(hall.ids, hall.grounds, strict=True)
     ]
-    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras))
+    track = TrackSettings(joint=False)  # simulated cameras send tracks alone
+    service = BestViewPipeline(Config(site=SITE, encode=ENCODE, cameras=cameras, track=track))
     source, decided, clock = (
         PacedCameras(service, films, hall),
         dict[int, float](),

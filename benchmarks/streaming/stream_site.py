@@ -106,6 +106,7 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
         "encode": {"gop_s": ENCODE.gop_s},
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": address, "listen": address},
+        "track": {"joint": False},  # simulated cameras send tracks alone
         "http": {"port": http, "viewers_max": _NO_LIMIT, "viewers_per_object": _NO_LIMIT},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}

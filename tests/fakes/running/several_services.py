@@ -35,6 +35,7 @@ def configuration(folder: Path, services: int = 2, hosts: Sequence[str] = (), **
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
         "sync": {"port": free_port(), "start_timeout_s": 3.0},
         "zenoh": {"connect": routers, "listen": routers[0]},
+        "track": {"joint": False},  # simulated cameras send tracks alone
         "view": {"share": {"servers": [f"http://{host}:{free_port()}/" for host in hosts]}},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
