@@ -34,7 +34,9 @@ def _config(kind: str, **camera: object) -> Config:
         {"id": name, "source": "scene:overhead", "kind": kind, "ground": np.eye(3).tolist(), **camera}
         for name in ("c0", "c1")
     ]
-    return build_config({"site": site, "cameras": cameras}, where="site.yaml", folder=Path())
+    return build_config(
+        {"site": site, "cameras": cameras, "track": {"joint": False}}, where="site.yaml", folder=Path()
+    )
 
 
 _LEARNED, _SEARCHED = range(0, 80, 8), range(0, 60, 3)

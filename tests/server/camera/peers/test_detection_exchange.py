@@ -67,7 +67,12 @@ def config_of(
         "cameras": cameras,
         "detect": {} if ahead else {"prescan_s": 0, "median": {"bootstrap_s": 1.0}},
         "ground": "ground.json",
-        "track": {"backlog_s": PATIENCE, "cross_view": {"enabled": use}, "cross_view_wait_s": wait},
+        "track": {
+            "backlog_s": PATIENCE,
+            "cross_view": {"enabled": use},
+            "cross_view_wait_s": wait,
+            "joint": False,
+        },
         "view": {"late_after_s": PATIENCE},
     }
     return build_config(content, where="hall", folder=recording)
