@@ -21,6 +21,7 @@ from fakes.timeouts import PATIENCE, PATIENCE_MS
 pytestmark = [
     pytest.mark.live,
     pytest.mark.asyncio,
+    pytest.mark.slow,  # beside other sites an accepted correction was not applied once
     needs_chromium,
 ]
 ALIKE = "crossing"
