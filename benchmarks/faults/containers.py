@@ -28,11 +28,11 @@ from benchmarks.faults.outcomes.measurement import measure
 from benchmarks.faults.outcomes.promise_table import describe
 from benchmarks.faults.site.compose_site import (
     PLAIN,
-    ComposeError,
     ComposeSite,
     missing_requirement,
     run_compose_site,
 )
+from benchmarks.faults.site.docker_command import DockerError
 from benchmarks.faults.site.fault_site import (
     LEASE_S,
     SETTINGS,
@@ -108,7 +108,7 @@ def kill_container(*names: str) -> Inject:
     async def inject(fault_site: FaultSite) -> None:
         for name in names:
             site, _, container = _target(fault_site, name)
-            with contextlib.suppress(ComposeError):  # the shell that sends the signal dies, too
+            with contextlib.suppress(DockerError):  # the shell that sends the signal dies, too
                 await site.docker("exec", container, "sh", "-c", "kill -KILL -1")
 
     return inject

@@ -12,7 +12,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import subprocess
 import sys
 import tempfile
 import uuid
@@ -31,6 +30,7 @@ from benchmarks.faults.failover.failover_table import describe
 from benchmarks.faults.failover.failures import CAMERA, FOLLOWER, LEADER, Failure
 from benchmarks.faults.failover.two_services import SiteOfServices
 from benchmarks.faults.site.compose_site import missing_requirement
+from benchmarks.faults.site.docker_command import COMMAND_S, run_command
 from benchmarks.faults.site.fault_site import FaultSite, follow_events
 from benchmarks.faults.video.stamped_views import CAMERAS, StampedViews, make
 from server.cli.generated_config import free_port
@@ -39,11 +39,7 @@ FILES = ("docker-compose.yml", "docker-compose.standby.yml")
 SERVICES = ("bestview", "bestview-1")
 _FILMS, _KEPT = "/site/films", "/site/kept"
 _PULSES = 20_000
-_COMMAND_S, _BUILD_S, _START_S = 120.0, 900.0, 300.0
-
-
-class SwarmError(RuntimeError):
-    """A command of Docker failed; the text is its output."""
+_BUILD_S, _START_S = 900.0, 300.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,28 +48,13 @@ class Docker:
 
     environment: Mapping[str, str]
 
-    def run(self, *words: str, text: str = "", seconds: float = _COMMAND_S) -> str:
+    def run(self, *words: str, text: str = "", seconds: float = COMMAND_S) -> str:
         """Run a command with a text as its input; return its output.
 
         Raises:
-            SwarmError: it fails or does not end.
+            DockerError: it fails or does not end.
         """
-        try:
-            done = subprocess.run(
-                words,
-                cwd=ROOT,
-                env=dict(self.environment),
-                input=text,
-                capture_output=True,
-                text=True,
-                timeout=seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise SwarmError(f"{' '.join(words)}: has not ended after {seconds:g} s") from None
-        if done.returncode:
-            raise SwarmError(f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
-        return done.stdout.strip()
+        return run_command(words, self.environment, text=text, seconds=seconds)
 
 
 @dataclass(slots=True)

@@ -15,17 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common.environment import ROOT, CannotRunError
+from benchmarks.faults.site.docker_command import COMMAND_S, DockerError, run_command
 from server.cli.generated_config import free_port
 
 PLAIN = (ROOT / "docker-compose.yml",)
 _BUILD_S = 900.0
 """Seconds: a build without cache downloads some 250 MB."""
 _UP_S = 300.0
-_COMMAND_S = 120.0
-
-
-class ComposeError(RuntimeError):
-    """A Docker command failed; the text is its output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,31 +32,15 @@ class ComposeSite:
     files: tuple[Path, ...]
     environment: Mapping[str, str]
 
-    def run(self, *words: str, seconds: float = _COMMAND_S, check: bool = True) -> str:
+    def run(self, *words: str, seconds: float = COMMAND_S, check: bool = True) -> str:
         """Run a command; return its output.
 
         Raises:
-            ComposeError: the command fails or times out.
+            DockerError: the command fails or times out.
         """
-        try:
-            done = subprocess.run(
-                words,
-                cwd=ROOT,
-                env=dict(self.environment),
-                capture_output=True,
-                text=True,
-                timeout=seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise ComposeError(f"{' '.join(words)}: has not ended after {seconds:g} s") from None
-        if check and done.returncode:
-            raise ComposeError(
-                f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
-            )
-        return done.stdout.strip()
+        return run_command(words, self.environment, seconds=seconds, check=check)
 
-    def compose(self, *words: str, seconds: float = _COMMAND_S, check: bool = True) -> str:
+    def compose(self, *words: str, seconds: float = COMMAND_S, check: bool = True) -> str:
         """Run ``docker compose`` for this project."""
         named = [word for file in self.files for word in ("--file", str(file))]
         return self.run("docker", "compose", *named, *words, seconds=seconds, check=check)
@@ -73,13 +53,13 @@ class ComposeSite:
         """Start all services, and wait until they are healthy.
 
         Raises:
-            ComposeError: a service does not become healthy; the text has the logs.
+            DockerError: a service does not become healthy; the text has the logs.
         """
         words = ("up", "--detach", "--no-build", "--wait", "--wait-timeout", f"{_UP_S:.0f}")
         try:
-            self.compose(*words, seconds=_UP_S + _COMMAND_S)
-        except ComposeError as error:
-            raise ComposeError(f"{error}\n{self.compose('logs', check=False)}") from None
+            self.compose(*words, seconds=_UP_S + COMMAND_S)
+        except DockerError as error:
+            raise DockerError(f"{error}\n{self.compose('logs', check=False)}") from None
 
     def containers(self) -> dict[str, dict[str, Any]]:
         """Return `docker inspect` of every container by service, stopped ones included."""
@@ -128,7 +108,7 @@ def run_compose_site(files: Sequence[Path] = PLAIN, **variables: str) -> Iterato
 
     Raises:
         CannotRunError: there is no Docker Engine.
-        ComposeError: the site does not start.
+        DockerError: the site does not start.
     """
     missing = missing_requirement()
     if missing is not None:
