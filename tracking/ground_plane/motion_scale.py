@@ -22,6 +22,7 @@ _MAX_COST = 12.0
 """A move costs at most this, so that people who are mixed up do no harm."""
 _PRIOR = 6.0
 """Log likelihood ratio by which another factor must be better than 1."""
+_PENALTIES = np.where(_FACTORS > 1.0, _PRIOR, 0.0)
 
 
 class MotionScale:
@@ -46,5 +47,4 @@ class MotionScale:
             for settings in self._candidates
         ]
         self._costs += np.minimum(costs, _MAX_COST) - self._costs / _MEMORY
-        penalties = np.where(_FACTORS > 1.0, _PRIOR, 0.0)
-        self.settings = self._candidates[int(np.argmin(self._costs + penalties))]
+        self.settings = self._candidates[int(np.argmin(self._costs + _PENALTIES))]

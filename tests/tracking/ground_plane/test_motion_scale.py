@@ -27,10 +27,10 @@ def walk(acceleration: float, seed: int, moves: int = 400) -> Floats:
     return np.array(places)
 
 
-def learned(places: Floats) -> MotionScale:
-    """Return what is learned from following somebody as the tracker does."""
-    scale = MotionScale(ASSUMED)
-    state = MotionState.at(places[0], COVARIANCE, ASSUMED.speed)
+def learned(places: Floats, scale: MotionScale | None = None) -> MotionScale:
+    """Return what is learned, after what a scale knows, from following somebody as the tracker does."""
+    scale = scale or MotionScale(ASSUMED)
+    state = MotionState.at(places[0], COVARIANCE, scale.settings.speed)
     for place in places[1:]:
         scale.update(state, SECONDS, place, COVARIANCE)
         state = follow(state, SECONDS, place, COVARIANCE, scale.settings)
@@ -56,11 +56,7 @@ def test_speed_and_acceleration_grow_together_and_nothing_else_does() -> None:
 def test_a_court_that_becomes_a_hall_is_learned_anew() -> None:
     scale = learned(walk(6.0, 1))
     for seed in range(20):
-        places = walk(0.5, seed)
-        state = MotionState.at(places[0], COVARIANCE, scale.settings.speed)
-        for place in places[1:]:
-            scale.update(state, SECONDS, place, COVARIANCE)
-            state = follow(state, SECONDS, place, COVARIANCE, scale.settings)
+        learned(walk(0.5, seed), scale)
     assert factor(scale) == 1.0
 
 
