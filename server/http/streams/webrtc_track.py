@@ -22,6 +22,10 @@ from server.system.errors import UserError
 for _library in ("aioice", "aiortc"):
     logging.getLogger(_library).setLevel(logging.WARNING)  # they log every check of viewers' addresses
 _TIME_BASE = Fraction(1, 90_000)
+_MEDIA_MAX = 2
+"""Media in an offer: video, and sound, which is not sent."""
+_SHOWN = 200
+"""Characters of a library's message that an error repeats."""
 
 
 class EncodedTrack(MediaStreamTrack):
@@ -90,9 +94,3 @@ def _check_media(connection: RTCPeerConnection) -> None:
     kinds = [each.kind for each in connection.getTransceivers()]
     if kinds.count("video") != 1 or len(kinds) > _MEDIA_MAX or connection.getTransceivers()[0].mid is None:
         raise UserError("the SDP offer has no H.264 video to receive, or more than one")
-
-
-_MEDIA_MAX = 2
-"""Media in an offer: video, and sound, which is not sent."""
-_SHOWN = 200
-"""Characters of a library's message that an error repeats."""
