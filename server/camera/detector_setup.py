@@ -12,7 +12,7 @@ import numpy as np
 
 from bestview import camera_height, horizon_row
 from server.camera.detector_choice import choose_detector, describe_detector
-from server.camera.sources import FrameSource, Recording
+from server.camera.sources import FrameSource, ImageFolder, Recording
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
 from server.config.sections.detect import DetectSettings
@@ -88,7 +88,7 @@ def make_prescanned_detector(
     """
     detector, settings = make_detector(config, camera, letterbox), config.detect
     log.info("camera %s: people are detected by: %s", camera.id, describe_detector(detector))
-    if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording):
+    if isinstance(detector, LetterboxedDetections) and isinstance(source, Recording | ImageFolder):
         detector.number_frames_by(source.pulse_by_frame_count)
     if isinstance(detector, BackgroundDetector | FusedDetector):
         indices = settings.prescan_frames(config.site.fps)

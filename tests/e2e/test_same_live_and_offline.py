@@ -49,6 +49,7 @@ async def test_live_equals_offline_to_the_byte(recording: Path, tmp_path: Path, 
     config = configuration(
         tmp_path,
         recording,
+        detects=True,
         track={"cross_view_wait_s": 60, "joint": joint},
         view={"late_after_s": 60},
         zenoh={"lease_s": 60},

@@ -66,6 +66,11 @@ class ImageFolder:
             self._newest = self._fitted(image, self._files[index])
         return self._newest
 
+    def pulse_by_frame_count(self, pulse: int) -> int:
+        """Return the pulse at which this pulse's image is first shown."""
+        index = pulse - self._offset
+        return pulse if index < 0 else self._offset + index % len(self._files)
+
     def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Read some of the images; one that cannot be read is left out."""
         files = [self._files[index] for index in indices if index < len(self._files)]

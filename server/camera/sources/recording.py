@@ -106,11 +106,11 @@ class Recording:
                 raise
             position = self._position(index)
             picture = self._forward(position)
-        self._record_number(pulse, position)
+        self._record_number(pulse, index, position)
         return self._shown(picture)
 
     def pulse_by_frame_count(self, pulse: int) -> int:
-        """Return the pulse that this pulse's frame would have if frames were counted, one per pulse."""
+        """Return the pulse of this pulse's frame if frames were counted, one per pulse, and not repeated."""
         return pulse + self._number_offsets.get(pulse, 0)
 
     def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
@@ -177,8 +177,8 @@ class Recording:
         if self._length is None and self._newest is not None:
             self._length = frame_count(self._seconds, self.fps, self._site_fps)
 
-    def _record_number(self, pulse: int, position: int) -> None:
-        offset = self._number - position if self._at <= position else 0
+    def _record_number(self, pulse: int, index: int, position: int) -> None:
+        offset = position - index + (self._number - position if self._at <= position else 0)
         if offset:
             self._number_offsets[pulse] = offset
             if len(self._number_offsets) > _MAX_NUMBERS:

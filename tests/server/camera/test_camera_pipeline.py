@@ -193,6 +193,17 @@ def test_detections_of_a_file_are_tracked_in_the_sites_pixels(recording: Path) -
         assert np.isclose(rows[rows[:, 0] == pulse + 1, 2:6], original).all(axis=1).any()
 
 
+def test_the_detections_of_a_looped_recording_repeat_with_it(recording: Path) -> None:
+    config = config_of(recording, detections="gt/c0.txt", at_end="loop")
+    pipeline = CameraPipeline(config, "c0")
+    rounds = [
+        [pipeline.detect(pulse, pipeline.take(pulse)).detections.boxes.tolist() for pulse in pulses]
+        for pulses in (range(FRAMES), range(FRAMES, 2 * FRAMES))
+    ]
+    assert any(rounds[0]), "there are people"
+    assert rounds[0] == rounds[1]
+
+
 @pytest.mark.parametrize(
     ("content", "reason"), [(None, "No such file"), ("1,2,x\n", "det.txt"), (b"\xff\xfe\x00", "det.txt")]
 )
