@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
-from contextlib import aclosing
+from contextlib import aclosing, suppress
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser
+from playwright.async_api import Browser, Error, Page
 
 from benchmarks.common.browser import chromium
 from fakes.page.browser import new_page
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import A, B, serve_site, show_people
+from fakes.service.fed_site import A, B, ServedSite, serve_site, show_people
 from fakes.service.scripted_cameras import LARGE, SMALL, WIDTH
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
@@ -22,6 +22,15 @@ pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 async def browser() -> AsyncIterator[Browser]:
     async with chromium() as running:
         yield running
+
+
+async def feed_until_shown(served: ServedSite, page: Page) -> None:
+    """Send GOPs until the page shows one, as cameras do: what is sent before it listens is lost."""
+    shown = f"video.videoWidth === {WIDTH}"
+    while not await page.evaluate(shown):
+        served.service.feed(1, {A: {1: LARGE}, B: {1: SMALL}})
+        with suppress(Error):
+            await page.wait_for_function(shown, timeout=500)
 
 
 async def test_a_person_and_a_held_camera_are_played_by_webrtc(browser: Browser) -> None:
@@ -34,8 +43,7 @@ async def test_a_person_and_a_held_camera_are_played_by_webrtc(browser: Browser)
             async with page.expect_response(f"**/{path}/whep") as begun:
                 await page.goto(address + more)
             assert (await begun.value).status == 201
-            await page.wait_for_function(f"video.videoWidth === {WIDTH}")
-        served.service.feed(3, {A: {1: LARGE}, B: {1: SMALL}})
+            await feed_until_shown(served, page)
         async with page.expect_request(lambda request: request.method == "DELETE") as ended:
             await page.get_by_role("button", name="Automatic").click()
         assert f"/cameras/{A}/whep/" in (await ended.value).url
