@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -48,6 +48,8 @@ class TrackUpdate:
         boxes: (M, 4) left, top, right, bottom in pixels per frame; NaN rows where hidden.
         appearance: mean histograms of frames in which no other person is in the box.
         picture_height: of the camera, pixels; feet at the lower edge are cut off.
+        detected: by camera, (M,) the frames in which it detects somebody whom several track together; None:
+            a track of one camera, which detects them wherever there is a box.
     """
 
     camera: str
@@ -56,6 +58,7 @@ class TrackUpdate:
     boxes: NDArray[np.float64]
     appearance: tuple[AppearanceHistogram, ...] = ()
     picture_height: float = float("inf")
+    detected: Mapping[str, NDArray[np.bool_]] | None = None
 
     @property
     def key(self) -> TrackKey:
@@ -82,6 +85,7 @@ class TrackObservations:
         ground_point: (T, W, 2) ground units, NaN where hidden or without homography.
         ground_covariance: (T, W, 2, 2) of `ground_point`, ground units squared, NaN likewise.
         person_heights: (T, W) estimated person heights in ground units, NaN likewise.
+        detected: by row and camera, (W,) the frames in which it detects somebody whom several track together.
     """
 
     keys: tuple[TrackKey, ...]
@@ -90,6 +94,18 @@ class TrackObservations:
     ground_point: NDArray[np.float64]
     ground_covariance: NDArray[np.float64]
     person_heights: NDArray[np.float64]
+    detected: Mapping[int, Mapping[str, NDArray[np.bool_]]] = field(default_factory=dict)
+
+    def count_detections(self, row: int, start: int, stop: int) -> dict[str, int]:
+        """Count the detections of a track in the columns from `start` to `stop`, in all of which it is seen.
+
+        Returns:
+            By camera; those without any are left out.
+        """
+        if row not in self.detected:
+            return {self.keys[row].camera: stop - start}
+        counts = {camera: int(found[start:stop].sum()) for camera, found in self.detected[row].items()}
+        return {camera: count for camera, count in counts.items() if count}
 
     @property
     def visible(self) -> NDArray[np.bool_]:
@@ -149,8 +165,13 @@ def align_tracks(
     first = min((track.first_frame for track in ordered), default=0)
     width = max((track.first_frame + len(track.boxes) for track in ordered), default=0) - first
     boxes = np.full((len(keys), width, 4), np.nan)
+    detected: dict[int, dict[str, NDArray[np.bool_]]] = {}
     for i, track in enumerate(ordered):
-        boxes[i, track.first_frame - first :][: len(track.boxes)] = track.boxes
+        begin, count = track.first_frame - first, len(track.boxes)
+        boxes[i, begin:][:count] = track.boxes
+        if track.detected is not None:
+            around = begin, width - begin - count
+            detected[i] = {camera: np.pad(frames, around) for camera, frames in track.detected.items()}
     ground = np.full((len(keys), width, 2), np.nan)
     spread = np.full((len(keys), width, 2, 2), np.nan)
     heights = np.full((len(keys), width), np.nan)
@@ -166,7 +187,7 @@ def align_tracks(
         ground[rows] = to_ground(homography, foot_points(whole))
         spread[rows] = foot_covariance(homography, whole, foot_error.sideways, foot_error.upwards)
         heights[rows] = person_heights(homography, whole)
-    return TrackObservations(keys, first, boxes, ground, spread, heights)
+    return TrackObservations(keys, first, boxes, ground, spread, heights, detected)
 
 
 def _check(track: TrackUpdate, homographies: Mapping[str, NDArray[np.float64] | None]) -> None:
@@ -175,6 +196,9 @@ def _check(track: TrackUpdate, homographies: Mapping[str, NDArray[np.float64] | 
         raise ValueError(f"{name}: the camera is unknown")
     if track.boxes.ndim != 2 or track.boxes.shape[1] != 4:  # noqa: PLR2004 — left, top, right, bottom
         raise ValueError(f"{name}: boxes have shape {track.boxes.shape}, not (M, 4)")
+    for camera, found in (track.detected or {}).items():
+        if found.shape != (len(track.boxes),):
+            raise ValueError(f"{name}: detections by {camera} are not of its {len(track.boxes)} frames")
     for appearance in track.appearance:
         if appearance.histogram.ndim != 1:
             raise ValueError(f"{name}: a histogram has shape {appearance.histogram.shape}, not (B,)")

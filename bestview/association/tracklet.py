@@ -56,7 +56,7 @@ class Tracklet:
         end: last observation.
         predecessor: the tracklet of the same track before this one.
         crowd_frames_before: frames of crowd between the two.
-        frame_count: observations.
+        detections: by camera, the frames in which it detects the person.
         uncrowded_frames: observations outside crowds.
         crowd_frames_at_end: how many of the newest observations in a row are in a crowd.
         appearance: mean histograms of frames in which no other person is in the box.
@@ -72,7 +72,7 @@ class Tracklet:
     end: TrackletEndpoint
     predecessor: Tracklet | None = None
     crowd_frames_before: int = 0
-    frame_count: int = 0
+    detections: dict[str, int] = field(default_factory=dict)
     uncrowded_frames: int = 0
     crowd_frames_at_end: int = 0
     appearance: PersonAppearance = field(default_factory=PersonAppearance)
@@ -92,9 +92,10 @@ class Tracklet:
         """The person id published for most frames, 0 before the first; of equals the lowest."""
         return max(sorted(self.published_frames), key=self.published_frames.__getitem__, default=0)
 
-    def add_frames(self, frames: range, *, crowded: bool) -> None:
-        """Count observations in consecutive frames, all in a crowd or none."""
-        self.frame_count += len(frames)
+    def add_frames(self, frames: range, detections: Mapping[str, int], *, crowded: bool) -> None:
+        """Count observations in consecutive frames, all in a crowd or none; `detections` by camera."""
+        for camera, count in detections.items():
+            self.detections[camera] = self.detections.get(camera, 0) + count
         self.uncrowded_frames += 0 if crowded else len(frames)
         self.crowd_frames_at_end = self.crowd_frames_at_end + len(frames) if crowded else 0
         if not self.settled_id:

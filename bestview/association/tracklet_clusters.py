@@ -31,11 +31,9 @@ class TrackletCluster:
     person_id: int = 0
 
     @property
-    def frame_count(self) -> int:
-        """Observations in all cameras; those of a track that several cameras see count for each."""
-        return sum(
-            tracklet.frame_count * max(len(tracklet.appearance.by_camera), 1) for tracklet in self.tracklets
-        )
+    def detection_count(self) -> int:
+        """Detections by all cameras."""
+        return sum(sum(tracklet.detections.values()) for tracklet in self.tracklets)
 
     @property
     def first_frame(self) -> int:
@@ -55,9 +53,8 @@ class TrackletCluster:
     @cached_property
     def cameras_so_far(self) -> set[str]:
         """Cameras that see the person, or have seen them before."""
-        # A track that several cameras see is named after none of them.
         return set[str]().union(
-            *(tracklet.appearance.by_camera or {tracklet.key.camera} for tracklet in self.tracklets),
+            *(tracklet.detections for tracklet in self.tracklets),
             *(person.appearance.by_camera for person in self.people),
         )
 

@@ -83,7 +83,11 @@ class TrackletSplitter:
                 tracklet = self._start_tracklet(key, _endpoint(observations, run.track, run.start), tracklet)
                 if key in self._recalled_ids:
                     tracklet.reassign_id(self._recalled_ids.pop(key))
-            tracklet.add_frames(range(frame, observations.first_frame + run.stop), crowded=run.crowded)
+            tracklet.add_frames(
+                range(frame, observations.first_frame + run.stop),
+                observations.count_detections(run.track, run.start, run.stop),
+                crowded=run.crowded,
+            )
             tracklet.end = _endpoint(observations, run.track, run.stop - 1)
             rows[run.track, run.start : run.stop] = self._row.get(tracklet.key, -1)
             settled_ids[run.track, run.start : run.stop] = tracklet.settled_id

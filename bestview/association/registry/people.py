@@ -118,14 +118,14 @@ class PersonStore:
         """Return whether a cluster was seen recently, and often enough to be a person."""
         settings = self._settings
         if (
-            new.frame_count < settings.confirmation_frames
+            new.detection_count < settings.confirmation_frames
             or new.last_frame < frame - settings.gap_frames - settings.clustering_interval
         ):
             return False
         unconfirmed_misses = (
             max(0, count_missing_cameras(new) - len(new.cameras_so_far) + 1) if settings.ghost_penalty else 0
         )
-        return new.frame_count >= settings.confirmation_frames * (
+        return new.detection_count >= settings.confirmation_frames * (
             1.0 + settings.ghost_penalty * unconfirmed_misses
         )
 

@@ -112,6 +112,7 @@ def ground_updates(
             first_frame=joint.first,
             boxes=_boxes(path.places, joint.person_height),
             appearance=tuple(looks.get(path.id, ())),
+            detected={camera: np.array(frames) for camera, frames in path.detected.items()},
         )
         for path in joint.paths
     ]

@@ -57,6 +57,8 @@ class GroundPath(msgspec.Struct, frozen=True, kw_only=True):
     id: int
     places: list[tuple[float, float] | None]
     """In ground units, one per frame; None: not there."""
+    detected: dict[str, list[bool]]
+    """By camera, one per frame: whether it detects them; cameras that never do are left out."""
 
 
 class JointTracks(msgspec.Struct, frozen=True, kw_only=True):

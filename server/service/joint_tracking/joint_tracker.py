@@ -136,9 +136,14 @@ def _without_gap(frames: list[GroundFrame]) -> list[GroundFrame]:
 
 def _paths(frames: list[GroundFrame]) -> list[GroundPath]:
     """Return the paths of everybody in final frames, by id."""
-    places: dict[int, list[tuple[float, float] | None]] = {}
+    paths: dict[int, GroundPath] = {}
     for at, frame in enumerate(frames):
         for track in frame.tracks:
+            empty = GroundPath(id=track.id, places=[None] * len(frames), detected={})
+            path = paths.setdefault(track.id, empty)
             x, y = track.place.tolist()
-            places.setdefault(track.id, [None] * len(frames))[at] = (x, y)
-    return [GroundPath(id=number, places=path) for number, path in sorted(places.items())]
+            path.places[at] = (x, y)
+            for camera, box in track.boxes.items():
+                if box.detection is not None:
+                    path.detected.setdefault(camera, [False] * len(frames))[at] = True
+    return [path for _, path in sorted(paths.items())]

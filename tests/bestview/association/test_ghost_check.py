@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings
+from bestview import IdentityRegistry, IdentitySettings, TrackUpdate
 from bestview.association.ghost_check import fully_detectable
 from fakes.bestview.identity_scenes import (
     CALIBRATED,
@@ -48,6 +48,23 @@ def test_each_camera_that_misses_a_person_requires_more_frames() -> None:
 
 def test_a_second_camera_that_sees_the_person_compensates_one_that_does_not() -> None:
     assert created_at(in_two_cameras(1, (0, 0)), PICTURES) == [15], "two cameras compensate the third"
+
+
+@pytest.mark.parametrize(
+    ("cameras", "frame"),
+    [(("south",), (1 + 2 * 4) * 25), (("south", "west"), 15), (("south", "west", "north"), 10)],
+)
+def test_somebody_whom_cameras_track_together_is_confirmed_by_those_that_detect_them(
+    cameras: tuple[str, ...], frame: int
+) -> None:
+    # On a map: without looks, as of somebody in a crowd.
+    registry = IdentityRegistry(SETTINGS, {**CALIBRATED, "map": np.eye(3)})
+    box, found = np.tile([0.0, -TALL, 0.0, 0.0], (STRIDE, 1)), np.ones(STRIDE, dtype=np.bool_)
+    for first in range(0, 300, STRIDE):
+        track = TrackUpdate("map", 1, first, box, detected=dict.fromkeys(cameras, found))
+        if registry.update([track], first + STRIDE - 1, PICTURES).created:
+            break
+    assert first + STRIDE == frame
 
 
 def test_cameras_whose_view_does_not_cover_the_place_are_not_missing() -> None:

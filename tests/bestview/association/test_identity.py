@@ -27,7 +27,6 @@ from fakes.bestview.identity_scenes import (
     STRIDE,
     VIEWS,
     StraightTrack,
-    coat,
     collect_updates,
     in_two_cameras,
     numbers,
@@ -58,17 +57,6 @@ def test_ids_are_published_only_once_confirmed_and_created_once() -> None:
     # Two cameras see 10 frames together in every update.
     assert [update.created for update in seen] == [(), (), (1,)] + [()] * 9
     assert [len(numbers(update)) for update in seen[:4]] == [0, 0, 2, 2]
-
-
-@pytest.mark.parametrize(("cameras", "frames"), [(("south",), 25), (("south", "west"), 15)])
-def test_a_track_that_several_cameras_see_is_confirmed_sooner(cameras: tuple[str, ...], frames: int) -> None:
-    seen = registry(confirmation_s=1.0, clustering_interval_s=0.2)
-    stays = StraightTrack("south", 1, 0, 99, (0, 0))
-    for last in range(STRIDE - 1, frames, STRIDE):
-        first = last - STRIDE + 1
-        looks = tuple(AppearanceHistogram(first, last, coat(1), camera) for camera in cameras)
-        update = seen.update([replace(stays.track(first, last), appearance=looks)], last)
-        assert bool(update.created) == (last == frames - 1)
 
 
 @OPEN_TRACKLET_LIMITS
@@ -337,6 +325,7 @@ def test_invalid_arguments_are_refused_in_one_line() -> None:
 
     refused("camera is unknown", replace(track, camera="cellar"))
     refused("shape", replace(track, boxes=np.zeros((15, 3))))
+    refused("frames", replace(track, detected={"west": np.ones(3, dtype=np.bool_)}))
     refused("histogram", replace(track, appearance=(AppearanceHistogram(0, 3, np.zeros((2, 2))),)))
     refused("of frames 3 to 20", replace(track, appearance=(AppearanceHistogram(3, 20, np.zeros(2)),)))
     refused("occurs twice", track, track)

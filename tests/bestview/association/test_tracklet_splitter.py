@@ -142,5 +142,5 @@ def test_tracklets_do_not_depend_on_how_frames_are_grouped_into_updates(data: st
     for local in (1, 2):
         assert spans(parts, local) == spans(whole, local)
         assert sum(
-            tracklet.frame_count for tracklet in whole.active if tracklet.key.local_id == local
+            sum(tracklet.detections.values()) for tracklet in whole.active if tracklet.key.local_id == local
         ) == sum(map(bool, boxes[local]))
