@@ -111,6 +111,10 @@ class WindowReader:
         self._final |= {window.message.camera: window.message.final_to for window in windows}
         return windows
 
+    def final_to(self, camera: str) -> int:
+        """Return the last frame that the camera's windows have made final; -1: none."""
+        return self._final.get(camera, -1)
+
     def read_late(self, epoch: Epoch) -> Iterator[CameraWindow]:
         """Yield the revisions of the past that arrived too late for their epoch.
 
@@ -133,7 +137,7 @@ class WindowReader:
         local_ids = np.array([key.local_id for key in keys], dtype=np.int64)
         fresh = message.first
         if message.revised_from is not None:
-            fresh = max(fresh, min(self._final.get(message.camera, -1), message.final_to) + 1)
+            fresh = max(fresh, min(self.final_to(message.camera), message.final_to) + 1)
         return CameraWindow(message, keys, local_ids, letterbox, boxes.reshape(len(keys), frames, 4), fresh)
 
     def with_current_keys(self, window: CameraWindow) -> CameraWindow:

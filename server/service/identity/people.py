@@ -36,6 +36,8 @@ from tracking.frame_rate import frames_in
 
 ALL = ShareSettings()
 """A single service for all people."""
+_COMPARED_S = 1.0
+"""Seconds of each camera's final tracks that are kept, to find the identity switches of its next revision."""
 _RECENT_S = 4.0
 """Seconds in which a camera must have run detection to count; at least those of an epoch."""
 
@@ -71,7 +73,7 @@ class PersonTracker:
         """All people, those of other shards included."""
         self._share = share
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
-        self._lag, self._recent = lag, frames_in(_RECENT_S, fps)
+        self._lag, self._recent, self._compared = lag, frames_in(_RECENT_S, fps), frames_in(_COMPARED_S, fps)
         self._id_switch_repair = IdSwitchRepair(self._registry, self._reader)
         self.undetected = UndetectedFrames()
         """Frames without detection, by camera."""
@@ -259,14 +261,15 @@ class PersonTracker:
     def forget_before(self, pulse: int) -> None:
         """Forget the boxes and person numbers before a pulse; record the tracks published until then."""
         if self.published.frames:
-            spans = [span for history in self._histories.values() for span in history.over(0, pulse - 1)]
+            began, histories = self._needed_from, self._histories.values()
+            spans = [span for history in histories for span in history.over(began, pulse - 1)]
             for span in sorted(spans, key=lambda span: span.last):
                 self.published.record(span, self.numbers(span.window.keys, span.last, 1)[:, 0])
         self._needed_from = max(self._needed_from, pulse)
         self.undetected.forget_before(pulse)
         self._id_switch_repair.keep_only(self._parts, self._needed_from)
-        for history in self._histories.values():
-            history.forget_before(pulse)
+        for camera, history in self._histories.items():
+            history.forget_before(min(pulse, self._reader.final_to(camera) + 1 - self._compared))
 
     def _store(self, window: CameraWindow) -> CameraWindow:
         """Store a window, after repairing identity switches where it revises the past."""

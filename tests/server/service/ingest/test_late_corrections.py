@@ -38,3 +38,22 @@ def test_tracks_exchange_their_keys_once_however_many_late_revisions_report_it(l
     newest = {"c0": camera_tracks("c0", now, {1: RIGHT, 2: LEFT})}
     for window in people.update(Epoch(now, end_of_epoch(now, STRIDE), newest, late_revisions=revisions)):
         assert window.keys == (right, left), "keys stay on their sides"
+
+
+@pytest.mark.parametrize("decided_without", [1, 4, 20])
+def test_a_camera_that_was_gone_while_it_corrected_its_tracks_still_exchanges_their_keys(
+    decided_without: int,
+) -> None:
+    """Solving a long past again takes long on a busy machine; views are decided without the camera."""
+    people = PersonTracker(IdentitySettings(), ["c0"], {"c0": None}, (WIDTH, HEIGHT), 0)
+    for epoch in range(4):
+        [revision] = people.update(epoch_of(epoch, camera_tracks("c0", epoch, {1: LEFT, 2: RIGHT})))
+    left, right = revision.keys
+    now = 4 + decided_without
+    for epoch in range(4, now):
+        people.update(epoch_of(epoch))
+        people.forget_before(end_of_epoch(epoch, STRIDE) + 1)
+    newest = {"c0": camera_tracks("c0", now, {1: RIGHT, 2: LEFT})}
+    last = end_of_epoch(now, STRIDE)
+    for window in people.update(Epoch(now, last, newest, late_revisions=(late_revision(4),))):
+        assert window.keys == (right, left), "keys stay on their sides"
