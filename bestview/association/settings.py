@@ -73,6 +73,8 @@ class IdentitySettings:
     maximum_cross_camera_evidence: float = 8.0
     # Seconds, summed over all cameras, for which a person must be seen to get an id.
     confirmation_s: float = 1.0
+    # The same where cameras track together, and have weighed already whether somebody is there.
+    joint_confirmation_s: float = 0.4
     # Additional multiples of them for each calibrated camera that should see the person and does not, unless
     # a second one sees them: shadows and ghosts of the background are seen by one camera.
     ghost_penalty: float = 4.0
@@ -146,6 +148,7 @@ class IdentitySettings:
             gap_decay_frames=self.gap_decay_s * fps,
             reappearance_frames=frames(self.reappearance_s),
             confirmation_frames=frames(self.confirmation_s),
+            joint_confirmation_frames=frames(self.joint_confirmation_s),
             clustering_interval=clustering_interval,
             publish_after=publish_after,
             settle_after=frames(self.settle_after_s, publish_after + 2 * clustering_interval),
@@ -170,6 +173,7 @@ class ResolvedIdentitySettings(IdentitySettings):
     gap_decay_frames: float
     reappearance_frames: int
     confirmation_frames: int
+    joint_confirmation_frames: int
     clustering_interval: int
     publish_after: int
     settle_after: int

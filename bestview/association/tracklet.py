@@ -57,6 +57,7 @@ class Tracklet:
         predecessor: the tracklet of the same track before this one.
         crowd_frames_before: frames of crowd between the two.
         detections: by camera, the frames in which it detects the person.
+        is_joint: several cameras track the person together.
         uncrowded_frames: observations outside crowds.
         crowd_frames_at_end: how many of the newest observations in a row are in a crowd.
         appearance: mean histograms of frames in which no other person is in the box.
@@ -73,6 +74,7 @@ class Tracklet:
     predecessor: Tracklet | None = None
     crowd_frames_before: int = 0
     detections: dict[str, int] = field(default_factory=dict)
+    is_joint: bool = False
     uncrowded_frames: int = 0
     crowd_frames_at_end: int = 0
     appearance: PersonAppearance = field(default_factory=PersonAppearance)

@@ -36,6 +36,11 @@ class TrackletCluster:
         return sum(sum(tracklet.detections.values()) for tracklet in self.tracklets)
 
     @property
+    def is_joint(self) -> bool:
+        """Whether several cameras track the person together."""
+        return any(tracklet.is_joint for tracklet in self.tracklets)
+
+    @property
     def first_frame(self) -> int:
         """First frame of the active tracklets, of which there must be some."""
         return min(tracklet.start.frame for tracklet in self.tracklets)

@@ -73,14 +73,17 @@ class TrackletSplitter:
         for run in observation_runs(observations.visible, crowded, frame_by_frame=frame_by_frame):
             key = observations.keys[run.track]
             tracklet, frame = self._current.get(key), observations.first_frame + run.start
+            is_joint = run.track in observations.detected
             if key in self._pending_splits:
                 person_id, predecessor = self._pending_splits.pop(key)
                 tracklet = self._start_tracklet(
-                    key, _endpoint(observations, run.track, run.start), predecessor
+                    key, _endpoint(observations, run.track, run.start), predecessor, is_joint=is_joint
                 )
                 tracklet.continue_as(person_id, predecessor)
             elif tracklet is None or self._starts_new_tracklet(tracklet, frame, crowded=run.crowded):
-                tracklet = self._start_tracklet(key, _endpoint(observations, run.track, run.start), tracklet)
+                tracklet = self._start_tracklet(
+                    key, _endpoint(observations, run.track, run.start), tracklet, is_joint=is_joint
+                )
                 if key in self._recalled_ids:
                     tracklet.reassign_id(self._recalled_ids.pop(key))
             tracklet.add_frames(
@@ -101,13 +104,16 @@ class TrackletSplitter:
                     tracklet.appearance.add(sample.camera or key.camera, histogram)
         return ObservedTracklets(rows, settled_ids)
 
-    def _start_tracklet(self, key: TrackKey, at: TrackletEndpoint, predecessor: Tracklet | None) -> Tracklet:
+    def _start_tracklet(
+        self, key: TrackKey, at: TrackletEndpoint, predecessor: Tracklet | None, *, is_joint: bool
+    ) -> Tracklet:
         tracklet = Tracklet(
             TrackletKey(*key, at.frame),
             at,
             at,
             predecessor,
             predecessor.crowd_frames_at_end if predecessor is not None else 0,
+            is_joint=is_joint,
         )
         self._current[key] = tracklet
         self._row[tracklet.key] = len(self.active)
@@ -117,8 +123,11 @@ class TrackletSplitter:
     def _starts_new_tracklet(self, tracklet: Tracklet, frame: int, *, crowded: bool) -> bool:
         """Return whether an observation in `frame` starts a new tracklet.
 
-        Without appearance and ground point there is nothing to compare, and the tracker is trusted.
+        Without appearance and ground point there is nothing to compare, and the tracker is trusted; so it is
+        where cameras track together: it has compared both, and where else the person may be.
         """
+        if tracklet.is_joint:
+            return False
         if not tracklet.appearance.by_camera and np.isnan(tracklet.end.ground_point).any():
             return False
         settings = self._settings

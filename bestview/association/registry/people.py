@@ -117,17 +117,16 @@ class PersonStore:
     ) -> bool:
         """Return whether a cluster was seen recently, and often enough to be a person."""
         settings = self._settings
+        least = settings.joint_confirmation_frames if new.is_joint else settings.confirmation_frames
         if (
-            new.detection_count < settings.confirmation_frames
+            new.detection_count < least
             or new.last_frame < frame - settings.gap_frames - settings.clustering_interval
         ):
             return False
         unconfirmed_misses = (
             max(0, count_missing_cameras(new) - len(new.cameras_so_far) + 1) if settings.ghost_penalty else 0
         )
-        return new.detection_count >= settings.confirmation_frames * (
-            1.0 + settings.ghost_penalty * unconfirmed_misses
-        )
+        return new.detection_count >= least * (1.0 + settings.ghost_penalty * unconfirmed_misses)
 
     def _merge(self, clusters: Sequence[TrackletCluster], frame: int) -> tuple[Merge, ...]:
         """Merge ids that no cluster has had for long into those of the clusters with their frames."""

@@ -23,7 +23,9 @@ from fakes.bestview.identity_scenes import (
 
 WIDE, HIGH, TALL = 640, 440, 1.75
 PICTURES = dict.fromkeys(VIEWS, (WIDE, HIGH))
-SETTINGS = IdentitySettings(confirmation_s=1.0, ghost_penalty=4.0, clustering_interval_s=0.2)
+SETTINGS = IdentitySettings(
+    confirmation_s=1.0, joint_confirmation_s=0.6, ghost_penalty=4.0, clustering_interval_s=0.2
+)
 
 
 def created_at(
@@ -52,7 +54,7 @@ def test_a_second_camera_that_sees_the_person_compensates_one_that_does_not() ->
 
 @pytest.mark.parametrize(
     ("cameras", "frame"),
-    [(("south",), (1 + 2 * 4) * 25), (("south", "west"), 15), (("south", "west", "north"), 10)],
+    [(("south",), (1 + 2 * 4) * 15), (("south", "west"), 10), (("south", "west", "north"), 5)],
 )
 def test_somebody_whom_cameras_track_together_is_confirmed_by_those_that_detect_them(
     cameras: tuple[str, ...], frame: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given, settings
@@ -47,6 +48,17 @@ def spans(tracklets: TrackletSplitter, local: int) -> list[tuple[int, int]]:
         tracklet for tracklet in tracklets.active if tracklet.key.track == TrackKey("c0", local)
     ]
     return [(tracklet.key.first_frame, tracklet.end.frame) for tracklet in tracklets_of_track]
+
+
+def test_a_gap_does_not_split_whom_several_cameras_track_together() -> None:
+    boxes = [LEFT] * 10 + [None] * 25 + [LEFT] * 10
+    alone = track_with_histograms(1, 0, boxes)
+    seen = np.array([box is not None for box in boxes])
+    together = replace(alone, detected={"west": seen, "south": np.zeros(45, dtype=np.bool_)})
+    assert spans(split_tracks([alone]), 1) == [(0, 9), (35, 44)]
+    joint = split_tracks([together])
+    assert spans(joint, 1) == [(0, 44)]
+    assert joint.active[0].detections == {"west": 20}
 
 
 def test_a_track_that_leaves_a_crowd_starts_a_new_tracklet() -> None:
