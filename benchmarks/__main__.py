@@ -35,6 +35,7 @@ BENCHMARKS = (
     Benchmark("startup", "time from a fresh clone to the first picture, step by step; 1 minute"),
     Benchmark("render", "rendering speed of recordings, and processor time by stage"),
     Benchmark("latency", "delay from the pulse to the browser, by stage; 2 minutes"),
+    Benchmark("latency.delay_modes", "what each choice of delay costs and gains; 5 minutes"),
     Benchmark("detectors", "precision, recall, calibration and tracks of detectors; 20 minutes"),
     Benchmark(
         "robustness",
