@@ -81,6 +81,15 @@ def find_views(data: Path, name: str) -> RecordedViews:
     return RecordedViews(name, videos, ground if ground.exists() else None)
 
 
+def find_or_draw(name: str, data: Path, folder: Path, seconds: float) -> RecordedViews:
+    """Find a scene's views in the data folder; the room is rendered into a new folder inside ``folder``.
+
+    Raises:
+        CannotRunError: they are missing.
+    """
+    return draw_room(folder / ROOM, seconds) if name == ROOM else find_views(data, name)
+
+
 def draw_room(folder: Path, seconds: float) -> RecordedViews:
     """Render the demo's scene into a new folder."""
     size = (_ROOM_WIDTH, _ROOM_HEIGHT, _ROOM_FPS)

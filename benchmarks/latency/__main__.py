@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 
 from benchmarks.common.browser import check_chromium, chromium
 from benchmarks.common.environment import CannotRunError, finish, parser
-from benchmarks.common.recorded_views import ROOM, RecordedViews, draw_room, find_views
+from benchmarks.common.recorded_views import ROOM, RecordedViews, find_or_draw
 from benchmarks.common.report import Report
 from benchmarks.latency.bus_subscriber import BusTimestamps, listening
-from benchmarks.latency.running_site import LOG, running_site
+from benchmarks.latency.running_site import log_of_failure, running_site
 from benchmarks.latency.shown_frames import ShownFrames, watch_page
 from benchmarks.latency.stage_delays import STAGES, StageDelays, split
 
@@ -108,18 +108,12 @@ def measure(options: argparse.Namespace) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="myview-delay-") as temporary:
         folder = Path(temporary)
-        if options.views == ROOM:
-            views = draw_room(folder / ROOM, _START_S + options.settle + options.seconds)
-        else:
-            views = find_views(options.data, options.views)
+        length = _START_S + options.settle + options.seconds
+        views = find_or_draw(options.views, options.data, folder, length)
         report = Report()
-        try:
+        with log_of_failure(folder, report):
             marks, shown = asyncio.run(watch(views, folder, options.settle, options.seconds))
             delays = split(marks, shown)
-        except Exception:
-            if (log := folder / LOG).exists():
-                report.line(log.read_text(encoding="utf-8"))
-            raise
     describe(report, views.name, delays, shown, marks.shed)
     plot(delays, shown, options.out / f"latency-{views.name}.png", views.name)
     report.save(options.out / f"latency-{views.name}.txt")

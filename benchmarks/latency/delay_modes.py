@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import statistics
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,10 +24,10 @@ from numpy.typing import NDArray
 
 from benchmarks.common.browser import check_chromium, chromium
 from benchmarks.common.environment import CannotRunError, finish, parser
-from benchmarks.common.recorded_views import ROOM, RecordedViews, draw_room, find_views
+from benchmarks.common.recorded_views import ROOM, RecordedViews, find_or_draw
 from benchmarks.common.report import Report
 from benchmarks.latency.bus_subscriber import listening
-from benchmarks.latency.running_site import LOG, running_site
+from benchmarks.latency.running_site import log_of_failure, running_site
 from benchmarks.latency.shown_frames import watch_page
 from server.service.facade.streams import ViewerDelay
 from server.service.view_selection.delay_modes import DelayMode
@@ -114,9 +113,8 @@ def plot(watched: Sequence[WatchedDelay], path: Path, name: str) -> None:
         ordered = np.sort(row.seconds)
         axes.plot(1e3 * ordered, np.linspace(0, 100, len(ordered)), color=color, label=str(row.mode))
         axes.axvline(1e3 * row.declared.lookahead_s, color=color, linestyle="--", linewidth=1)
-    median = statistics.median(float(np.max(row.seconds)) for row in watched)
     axes.set(xlabel="ms from the pulse to the screen (dashed: look-ahead)", ylabel="% of the frames")
-    axes.set(title=f"Choices of delay on {name}", xlim=(0, 2e3 * median))
+    axes.set(title=f"Choices of delay on {name}", xlim=(0, None))
     axes.legend()
     figure.tight_layout()
     figure.savefig(path, dpi=120)
@@ -130,17 +128,9 @@ def measure(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory(prefix="myview-delays-") as temporary:
         folder = Path(temporary)
         length = _START_S + len(DelayMode) * (options.settle + options.seconds + 5.0)
-        views = (
-            draw_room(folder / ROOM, length)
-            if options.views == ROOM
-            else find_views(options.data, options.views)
-        )
-        try:
+        views = find_or_draw(options.views, options.data, folder, length)
+        with log_of_failure(folder, report):
             watched = asyncio.run(watch_modes(views, folder, options.settle, options.seconds))
-        except Exception:
-            if (log := folder / LOG).exists():
-                report.line(log.read_text(encoding="utf-8"))
-            raise
     describe(report, views.name, watched)
     plot(watched, options.out / f"delay-modes-{views.name}.png", views.name)
     report.save(options.out / f"delay-modes-{views.name}.txt")

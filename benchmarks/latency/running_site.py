@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +14,7 @@ import aiohttp
 import yaml
 
 from benchmarks.common.environment import one_thread_environment
+from benchmarks.common.report import Report
 from server.cli.generated_config import free_port
 
 CONFIG = "site.yaml"
@@ -91,6 +92,17 @@ async def running_site(
         yield site
     finally:
         await _end(process)
+
+
+@contextlib.contextmanager
+def log_of_failure(folder: Path, report: Report) -> Iterator[None]:
+    """Print the log of the site in a folder if what follows fails."""
+    try:
+        yield
+    except Exception:
+        if (log := folder / LOG).exists():
+            report.line(log.read_text(encoding="utf-8"))
+        raise
 
 
 async def _until_up(site: RunningSite) -> None:

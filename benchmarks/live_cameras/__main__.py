@@ -24,7 +24,7 @@ from benchmarks.common.process_load import OTHER, ProcessorUsage, read_processor
 from benchmarks.common.recorded_views import ROOM
 from benchmarks.common.report import Report
 from benchmarks.latency.bus_subscriber import BusTimestamps, listening
-from benchmarks.latency.running_site import LOG, running_site
+from benchmarks.latency.running_site import log_of_failure, running_site
 from benchmarks.live_cameras.frame_counters import FrameCounts, read_counts
 from benchmarks.live_cameras.looped_views import CAMERAS, CROWD, FPS, LoopedViews, live_views, usual_views
 from benchmarks.live_cameras.stage_times import (
@@ -199,12 +199,8 @@ def measure(options: argparse.Namespace) -> None:
         folder = Path(temporary)
         live = live_views(name, options.data, folder)
         report = Report()
-        try:
+        with log_of_failure(folder, report):
             watched = asyncio.run(watch(live, folder, options.settle, options.seconds))
-        except Exception:
-            if (log := folder / LOG).exists():
-                report.line(log.read_text(encoding="utf-8"))
-            raise
     describe(report, name, watched)
     plot(watched, name, options.out / f"live_cameras-{name}.png")
     report.save(options.out / f"live_cameras-{name}.txt")
