@@ -18,6 +18,7 @@ import base64
 import ipaddress
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -28,7 +29,6 @@ from kubernetes_files import (
     RTSP_PORT,
     SYNC_PORT,
     ContainerSite,
-    check_size,
     read_site,
 )
 from kubernetes_pods import (
@@ -48,6 +48,8 @@ from server.config.site_config import PREFIX, Config
 from server.system.errors import UserError
 
 _GATEWAYS_MAX = 8
+_BYTES_MAX = 1_000_000
+"""Of a ConfigMap or Secret: etcd takes 1 MiB."""
 
 
 def manifests_of(site: ContainerSite, namespace: str, image: str, urls: list[str]) -> list[Manifest]:
@@ -81,8 +83,20 @@ def secrets_of(site: ContainerSite, namespace: str) -> list[Manifest]:
 
 
 def _encoded(files: dict[str, bytes], name: str) -> dict[str, str]:
-    check_size(files.values(), f"Secret {name}")
+    _check_size(files.values(), f"Secret {name}")
     return {file: base64.b64encode(value).decode() for file, value in files.items()}
+
+
+def _check_size(files: Iterable[bytes], name: str) -> None:
+    """Check that files fit into a ConfigMap or Secret.
+
+    Raises:
+        UserError: they do not.
+    """
+    if sum(map(len, files)) > _BYTES_MAX:
+        raise UserError(
+            f"{name}: the files have more than {_BYTES_MAX} bytes, which a cluster does not store"
+        )
 
 
 def _placed(manifest: Manifest, namespace: str) -> Manifest:
@@ -103,7 +117,7 @@ def _config_files(site: ContainerSite) -> dict[str, str]:
 
 def _configuration(site: ContainerSite) -> list[Manifest]:
     files = _config_files(site)
-    check_size((text.encode() for text in files.values()), "site.yaml")
+    _check_size((text.encode() for text in files.values()), "site.yaml")
     made = [] if site.is_private else [object_of("v1", "ConfigMap", "site", data=files)]
     if site.needs_files:
         made.append(object_of("v1", "PersistentVolumeClaim", "files", spec=claim_of("ReadWriteMany", "10Gi")))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,8 +31,6 @@ _EVERY_ADDRESS = "0.0.0.0"  # noqa: S104 — of a container; the NetworkPolicy s
 _START_TIMEOUT_S = 40.0
 """Containers start one after the other."""
 _URL = re.compile(r"https?://([a-z0-9]([a-z0-9-]*[a-z0-9])?\.?)+(:[0-9]{1,5})?/?")
-_BYTES_MAX = 1_000_000
-"""Of a ConfigMap or Secret: etcd takes 1 MiB."""
 
 _USED_BY: dict[Place, tuple[str, ...]] = {
     ("access", "tokens"): ("bestview",),
@@ -78,7 +75,7 @@ class ContainerSite:
     @property
     def scheme(self) -> str:
         """The scheme of the best view's addresses."""
-        return "https" if self.config.http.tls.key else "http"
+        return _http_scheme(self.config)
 
     @property
     def addresses(self) -> list[str]:
@@ -92,7 +89,7 @@ class ContainerSite:
 
     def secret_names(self, process: str, camera_id: str = "") -> list[str]:
         """Return the names of the secret files of a process: `sync`, `bestview`, `camera` or `rtsp`."""
-        names = [_file_name(place) for place in self.secret_files if process in _processes_of(place)]
+        names = [*self._files_of(process)]
         if process == "camera":
             names += ["camera.password"] if self.config.camera(camera_id).password else []
             names += [HEALTH_TOKEN] if self.config.access.tokens else []
@@ -104,11 +101,7 @@ class ContainerSite:
         Raises:
             UserError: a file cannot be read, or there is no token for the cameras' probes.
         """
-        paths = {
-            _file_name(place): path
-            for place, path in self.secret_files.items()
-            if process in _processes_of(place)
-        }
+        paths = self._files_of(process)
         values = {
             name: _read(path) for name, path in paths.items() if name not in {"sync.users", "zenoh.users"}
         }
@@ -128,6 +121,14 @@ class ContainerSite:
                 )
             values[HEALTH_TOKEN] = token.encode()
         return values
+
+    def _files_of(self, process: str) -> dict[str, Path]:
+        """Return the secret files of a process that its settings name, by their names in containers."""
+        return {
+            _file_name(place): path
+            for place, path in self.secret_files.items()
+            if process in _processes_of(place)
+        }
 
 
 def service_hosts(services: int) -> list[str]:
@@ -171,16 +172,8 @@ def read_site(path: Path, urls: list[str], services: int | None) -> ContainerSit
     return site
 
 
-def check_size(files: Iterable[bytes], name: str) -> None:
-    """Check that files fit into a ConfigMap or Secret.
-
-    Raises:
-        UserError: they do not.
-    """
-    if sum(map(len, files)) > _BYTES_MAX:
-        raise UserError(
-            f"{name}: the files have more than {_BYTES_MAX} bytes, which a cluster does not store"
-        )
+def _http_scheme(config: Config) -> str:
+    return "https" if config.http.tls.key else "http"
 
 
 def _set_addresses(content: Content, config: Config, services: int, urls: list[str]) -> None:
@@ -193,7 +186,7 @@ def _set_addresses(content: Content, config: Config, services: int, urls: list[s
     listen = f"{protocol}/{_EVERY_ADDRESS}:{BUS_PORT}"
     content.setdefault("zenoh", {}).update({"connect": routers, "listen": listen})
     content.setdefault("http", {}).update({"host": _EVERY_ADDRESS, "port": HTTP_PORT})
-    scheme = "https" if config.http.tls.key else "http"
+    scheme = _http_scheme(config)
     share = content.setdefault("view", {}).setdefault("share", {})
     share["index"] = 0  # each service has its own, from the environment
     inside = [f"{scheme}://{host}:{HTTP_PORT}/" for host in service_hosts(services)]

@@ -65,9 +65,9 @@ def _pod(
     site: ContainerSite, process: str, name: str, words: list[str], secrets: list[str], **container: Any
 ) -> Manifest:
     """Return the template of a pod with one container."""
-    is_config = {"secret": {"secretName": "site"}} if site.is_private else {"configMap": {"name": "site"}}
+    configuration = {"secret": {"secretName": "site"}} if site.is_private else {"configMap": {"name": "site"}}
     volumes = [
-        {"name": "site", **is_config},
+        {"name": "site", **configuration},
         {"name": "memory", "emptyDir": {"medium": "Memory", "sizeLimit": "256Mi"}},
     ]
     mounts = [
@@ -112,9 +112,8 @@ def _pod(
     }
     labels = labels_of(process=process) | {"app.kubernetes.io/instance": name}
     metadata: Manifest = {"labels": labels}
-    if (
-        not site.is_private
-    ):  # a changed configuration starts pods anew; of a Secret a checksum would tell something
+    if not site.is_private:
+        # A changed configuration starts pods anew. The checksum of a Secret would tell something about it.
         checksum = hashlib.sha256(dump([site.content, site.texts]).encode()).hexdigest()
         metadata["annotations"] = {"myview/configuration": checksum[:16]}
     return {"metadata": metadata, "spec": pod}
