@@ -63,9 +63,9 @@ async def test_every_box_is_drawn_on_its_own_frame(browser: Browser, *, busy: bo
         await visit.playing(1)
         if busy:
             await visit.get(BUSY)
-        distances = [box_offset(await visit.screenshot()) for _ in range(12)]
+        distances = [box_offset(await visit.screenshot()) for _ in range(25)]
         boxed = [distance for distance in distances if distance is not None]
-        assert len(boxed) >= 11
+        assert len(boxed) >= 23
         assert max(boxed) < 3  # the pattern moves by 14 pixels from frame to frame
 
 
