@@ -33,6 +33,7 @@ from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
 from server.system.errors import UserError
 from tracking import Detections
+from tracking.detectors import FusedDetector
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.interactive import PositionCorrection
 from tracking.picture_condition import PictureMonitor
@@ -178,12 +179,21 @@ class CameraPipeline:
         """Detect and track in a frame without the peer cameras."""
         return self.track_detections(self.detect(pulse, image))
 
-    def detect(self, pulse: int, image: Image | None, *, skipped: bool = False) -> DetectedFrame:
+    @property
+    def has_network(self) -> bool:
+        """Whether a network detects beside the background."""
+        return isinstance(self._detector, FusedDetector)
+
+    def detect(
+        self, pulse: int, image: Image | None, *, skipped: bool = False, network_factor: int = 1
+    ) -> DetectedFrame:
         """Detect people in a frame; ``image`` is None if it was not captured or is skipped.
 
-        ``skipped``: left out by load shedding; detections are interpolated from the frames around it. Pulses
-        must ascend.
+        ``skipped``: left out by load shedding; detections are interpolated from the frames around it.
+        ``network_factor``: factor of the interval between two runs of the network. Pulses must ascend.
         """
+        if isinstance(self._detector, FusedDetector):
+            self._detector.run_network_less_often(network_factor)
         if image is None:
             detections, has_detection = Detections.empty(self._detector.appearance_bins), False
         else:

@@ -77,7 +77,7 @@ class CameraProcess:
         self._limit_log = LogThrottle()
         # Passthrough frames depend on each other, and recordings are shown completely: neither drops frames.
         live = not (self._pipeline.source.recorded or self._pipeline.is_passthrough)
-        self._load = LoadMonitor(config, camera_id, live=live)
+        self._load = LoadMonitor(config, camera_id, live=live, has_network=self._pipeline.has_network)
         self._exchange = PeerDetectionExchange(
             config, camera_id, self._pipeline.cross_view, self._backlog.frames_max
         )
@@ -228,7 +228,8 @@ class CameraProcess:
                 image, skipped = None, True
                 self._meter.count_skipped_detection()
             began = time.perf_counter()
-            detect = partial(self._pipeline.detect, pulse, image, skipped=skipped)
+            factor = self._load.network_factor
+            detect = partial(self._pipeline.detect, pulse, image, skipped=skipped, network_factor=factor)
             frame = await self._run_in(self._tracking, detect)
             if image is not None:
                 detection_times.append(time.perf_counter() - began)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from server.camera.load.load_shedder import LevelBounds, LoadShedder, ShedLevel, shed_levels
+from server.camera.load.load_shedder import LevelBounds, LoadShedder, shed_levels
 from server.config.site_config import Config
 
 log = logging.getLogger(__name__)
@@ -16,13 +16,14 @@ _BEHIND, _KEEPS_UP = 0.25, 0.1
 class LoadMonitor:
     """Sets the shedding level by the load, and logs its changes; without `track.shed_load` it stays 0."""
 
-    def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
+    def __init__(self, config: Config, camera_id: str, *, live: bool, has_network: bool = False) -> None:
         track = config.track
         self._camera, self._stride, self._gop = camera_id, config.window.stride, config.gop
         latency_s = track.cross_view_wait_s if config.peers_of(camera_id) else 0.0
         latency_s += 1.0 / config.site.fps
         bounds = LevelBounds(latency_s + _BEHIND * track.backlog_s, latency_s + _KEEPS_UP * track.backlog_s)
-        levels = shed_levels(self._stride, live=live) if track.shed_load else (ShedLevel(),)
+        levels = shed_levels(self._stride, live=live, has_network=has_network)
+        levels = levels if track.shed_load else levels[:1]
         self._shedder = LoadShedder(levels, bounds)
 
     @property
@@ -34,6 +35,11 @@ class LoadMonitor:
     def description(self) -> str:
         """The shed work as text; empty: none."""
         return self._shedder.current.description
+
+    @property
+    def network_factor(self) -> int:
+        """Factor of the interval between two runs of the network."""
+        return self._shedder.current.network_factor
 
     def detects(self, pulse: int) -> bool:
         """Return whether detection runs on a frame."""

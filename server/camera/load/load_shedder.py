@@ -1,14 +1,16 @@
 """Load shedding: how much work a camera leaves out on an overloaded machine. Has no clock.
 
-Detection costs most, so it is skipped first. A live camera then captures fewer frames, and the
-stream fills the gaps.
+Detection costs most. A network, between whose runs silhouettes detect, runs less often first; then
+detection skips frames. A live camera finally captures fewer frames, and the stream fills the gaps.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+_NETWORK_FACTORS = (2, 4)
 _DETECTION_INTERVALS = (1, 2, 3)
+_CAPTURE_INTERVALS = (2, 4)
 _UP_AFTER_S = 0.5
 """Seconds that tracking must lag, without catching up, before the next level."""
 _DOWN_AFTER_S, _DOWN_MAX_S = 5.0, 60.0
@@ -24,10 +26,12 @@ class ShedLevel:
     """How much work one level leaves out.
 
     Attributes:
+        network_factor: factor of the interval between two runs of a network beside the background.
         detection_interval: detection runs on one in so many frames, counted back from the end of each window.
         capture_interval: one in so many frames is captured.
     """
 
+    network_factor: int = 1
     detection_interval: int = 1
     capture_interval: int = 1
 
@@ -42,24 +46,37 @@ class ShedLevel:
     @property
     def description(self) -> str:
         """The shed work as text; empty: none."""
-        if self.detection_interval == 1:
-            return ""
-        ordinal = _ORDINALS.get(self.detection_interval, f"{self.detection_interval}th")
-        capture = "" if self.capture_interval == 1 else "showing every 2nd and "
-        return f"{capture}detecting in every {ordinal} frame: the machine is too busy"
+        if self.detection_interval > 1:
+            detection = f"detecting in every {_ordinal(self.detection_interval)} frame"
+            capture = f"showing every {_ordinal(self.capture_interval)} and " * (self.capture_interval > 1)
+            return f"{capture}{detection}: the machine is too busy"
+        if self.network_factor > 1:
+            return f"running the network {self.network_factor} times less often: the machine is too busy"
+        return ""
 
 
-_ORDINALS = {2: "2nd", 3: "3rd"}
+_ORDINAL_ENDINGS = {2: "nd", 3: "rd"}
 
 
-def shed_levels(stride: int, *, live: bool) -> tuple[ShedLevel, ...]:
+def _ordinal(number: int) -> str:
+    return f"{number}{_ORDINAL_ENDINGS.get(number, 'th')}"
+
+
+def shed_levels(stride: int, *, live: bool, has_network: bool = False) -> tuple[ShedLevel, ...]:
     """Return the levels from 0 up, for windows that end every ``stride`` frames.
 
-    Frames of a recording are always captured.
+    Args:
+        stride: frames from the end of one window to that of the next.
+        live: whether frames may be left out of the stream; those of a recording are all captured.
+        has_network: whether a network detects beside the background.
     """
+    factors = _NETWORK_FACTORS if has_network else ()
     intervals = sorted({interval for interval in _DETECTION_INTERVALS if interval <= stride} | {stride})
-    levels = [ShedLevel(interval) for interval in intervals]
-    return (*levels, ShedLevel(intervals[-1], 2)) if live else tuple(levels)
+    levels = [ShedLevel(), *(ShedLevel(factor) for factor in factors)]
+    factor = levels[-1].network_factor
+    levels += [ShedLevel(factor, interval) for interval in intervals[1:]]
+    captures = _CAPTURE_INTERVALS if live and stride > 1 else ()
+    return (*levels, *(ShedLevel(factor, intervals[-1], capture) for capture in captures))
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ async def test_the_shed_level_of_a_camera_is_shown_beside_its_name(browser: Brow
         items = visit.page.locator("#cameras li")
         await expect(items.nth(0)).not_to_contain_text("searching")
         await expect(items.nth(1)).to_contain_text("detecting in every 2nd frame")
-        await expect(items.nth(2)).to_contain_text("showing every 2nd and detecting in every 5th frame")
+        await expect(items.nth(2)).to_contain_text("showing every 4th and detecting in every 5th frame")
         for busy in (1, 2):
             await expect(items.nth(busy)).to_have_attribute(
                 "title", levels[-1 if busy == 2 else 1].description

@@ -286,13 +286,13 @@ async def test_the_site_ends_with_a_camera_restarted_after_the_end_of_its_record
 class Overloaded(LoadMonitor):
     """A load monitor fixed at the highest level."""
 
-    def __init__(self, config: Config, camera_id: str, *, live: bool) -> None:
-        super().__init__(config, camera_id, live=live)
+    def __init__(self, config: Config, camera_id: str, *, live: bool, has_network: bool = False) -> None:
+        super().__init__(config, camera_id, live=live, has_network=has_network)
         self._shedder = LoadShedder(shed_levels(config.window.stride, live=True)[-1:], LevelBounds(1e9, 1e9))
 
     @property
     def level(self) -> int:
-        return 4
+        return 5
 
 
 async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
@@ -312,7 +312,7 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
 
     heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     frames = [head.pulse for head in heads]
-    assert frames[:6] == [0, 2, 4, 6, 8, 9]
+    assert frames[:6] == [0, 4, 8, 9, 12, 14]
     assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.gop))
     pairs = [(before.pulse, head.reference_pulse) for before, head in pairwise(heads) if not head.key]
     assert all(before == after for before, after in pairs), "a frame that was not captured affects no other"
@@ -324,5 +324,5 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
     assert sum(gop.frames for gop in gops) == FRAMES
     assert b"no detection" in written_files(tmp_path / "out")["late.csv"]
     statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
-    assert statuses[-1].load_level == 4
+    assert statuses[-1].load_level == 5
     assert "detecting in every 5th frame" in statuses[-1].load

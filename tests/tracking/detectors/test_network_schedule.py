@@ -34,3 +34,15 @@ def test_after_a_gap_the_network_runs_at_once() -> None:
 def test_a_schedule_that_begins_later_has_the_same_runs() -> None:
     early, late = NetworkSchedule(0.2, 25.0), NetworkSchedule(0.2, 25.0)
     assert set(runs(late, range(43, 100))) - {43} == set(runs(early, range(100))) & set(range(44, 100))
+
+
+@pytest.mark.parametrize("interval_s", [0.0, 0.2])
+def test_a_stretched_schedule_runs_in_one_of_so_many_intervals_until_it_is_as_before(
+    interval_s: float,
+) -> None:
+    schedule = NetworkSchedule(interval_s, 25.0)
+    every = schedule.every
+    schedule.stretch(4)
+    assert runs(schedule, range(80)) == list(range(0, 80, 4 * every))
+    schedule.stretch(1)
+    assert runs(schedule, range(80, 100)) == list(range(80, 100, every))

@@ -106,6 +106,11 @@ class FusedDetector:
         """Frames per regular run of the network."""
         return self._schedule.every
 
+    def run_network_less_often(self, factor: int) -> None:
+        """Run the network once in ``factor`` intervals from now on; 1: in every interval."""
+        self._schedule.stretch(factor)
+        self._run_s = self._schedule.every / self._background.fps
+
     @property
     def camera_motion(self) -> Motion:
         """Where the camera has come to rest since the background was learned, in pixels of the images."""

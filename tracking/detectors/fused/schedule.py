@@ -14,13 +14,17 @@ class NetworkSchedule:
     """Decides by frame numbers, so that the same frames have the same runs, live and offline."""
 
     def __init__(self, interval_s: float, fps: float) -> None:
-        self.every = frames_in(interval_s, fps)
+        self._unstretched = frames_in(interval_s, fps)
+        self.every = self._unstretched
         """Frames per regular run."""
-        self._early = max(self.every // _NEEDED_FASTER, 1)
         self._spare_per_frame = _SPARE_PER_S / fps
         self._spare = _SPARE_RUNS
         self._last_frame: int | None = None
         self._last_run: int | None = None
+
+    def stretch(self, factor: int) -> None:
+        """Let a regular run come once in ``factor`` intervals from now on."""
+        self.every = factor * self._unstretched
 
     def is_due(self, frame: int, *, needed: bool) -> bool:
         """Return whether the network runs on a frame, which counts as a run then. Frames ascend.
@@ -35,7 +39,8 @@ class NetworkSchedule:
         is_due = self._last_run is None or frame // self.every != self._last_run // self.every
         if not is_due and needed and self._last_run is not None:
             until_next = self.every - frame % self.every
-            is_due = min(frame - self._last_run, until_next) >= self._early and self._spare >= 1.0
+            early = max(self.every // _NEEDED_FASTER, 1)
+            is_due = min(frame - self._last_run, until_next) >= early and self._spare >= 1.0
             self._spare -= float(is_due)
         if is_due:
             self._last_run = frame
