@@ -74,9 +74,11 @@ class _ObservedPipeline(CameraPipeline):
         del image
         return AccessUnit(pulse, key=True, data=b"")
 
-    def detect(self, pulse: int, image: Image | None, *, skipped: bool = False) -> DetectedFrame:
+    def detect(
+        self, pulse: int, image: Image | None, *, skipped: bool = False, network_factor: int = 1
+    ) -> DetectedFrame:
         """Detect people in a frame, and keep them."""
-        frame = super().detect(pulse, image, skipped=skipped)
+        frame = super().detect(pulse, image, skipped=skipped, network_factor=network_factor)
         self.detections += rows_of(pulse, frame.detections)
         self.frames += 1
         return frame
