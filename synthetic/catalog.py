@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from synthetic.court.court import COURT, SPORTS_HALL
 from synthetic.court.game import Game
@@ -52,10 +53,14 @@ def catalog_entry(name: str) -> CatalogEntry:
     return _SCENES[name]
 
 
+# Instances of a scene share its visitors, whose routes take seconds to plan.
+_visitors = lru_cache(maxsize=8)(VisitingCrowd)
+
+
 def _visited(room: Room) -> Callable[[SceneParameters], World]:
     def build(parameters: SceneParameters) -> World:
         outfits = [choose_distinct_outfit(walker, parameters.seed) for walker in range(parameters.objects)]
-        return RoomWorld(room, VisitingCrowd(room, parameters.objects, parameters.seed), outfits, parameters)
+        return RoomWorld(room, _visitors(room, parameters.objects, parameters.seed), outfits, parameters)
 
     return build
 

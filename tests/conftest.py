@@ -18,11 +18,17 @@ _REAL_TIME_FOLDERS = ("tests/e2e/", "tests/client/")
 """Folders whose tests run in real time, and therefore not in parallel."""
 
 # No deadline per example, since that depends on the machine; a hanging test hits its timeout.
-# All runs try the same examples, so that no run fails by chance; `make test-slow` tries others.
+# All runs try the same examples, so that no run fails by chance; `make test-slow` tries others, and more.
 settings.register_profile(
-    "fixed examples", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
+    "fixed examples",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=True,
+    max_examples=60,
 )
-settings.register_profile("new examples", settings.get_profile("fixed examples"), derandomize=False)
+settings.register_profile(
+    "new examples", settings.get_profile("fixed examples"), derandomize=False, max_examples=200
+)
 settings.load_profile("fixed examples")
 
 # As in every process of a site: further threads would only spin.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthetic.cameras.camera_view import CameraView, DrawnPerson
-from synthetic.cameras.pinhole import Floats, PinholeCamera
+from synthetic.cameras.pinhole import Floats, PinholeCamera, Viewpoint
 from synthetic.drawing.clothing import Outfit
 from synthetic.drawing.figure import paste
 from synthetic.drawing.shadow import cast_shadow
@@ -18,6 +18,9 @@ from synthetic.ground_truth import CameraTruth, measure_truth
 from synthetic.room.room import Room
 from synthetic.walking.trajectory import Pose
 from synthetic.world import Bytes, SceneParameters
+
+_VIEWS = 12
+"""Empty rooms kept, which take a second each to draw: all cameras of a scene, of all its instances."""
 
 
 class Crowd(Protocol):
@@ -38,7 +41,6 @@ class RoomWorld:
         self._crowd = crowd
         self._outfits = outfits
         self._size = (parameters.width, parameters.height)
-        self.camera_view = lru_cache(maxsize=None)(self._create_view)
         # A recording needs the image and the ground truth of a frame: people are drawn once for both.
         self._people = lru_cache(maxsize=parameters.cameras)(self._draw_visible_people)
 
@@ -77,11 +79,17 @@ class RoomWorld:
         """Return a camera's projection."""
         return PinholeCamera.at(self.room.viewpoints[camera], *self._size)
 
-    def _create_view(self, camera: int) -> CameraView:
-        return CameraView(self.room, self.view(camera))
+    def camera_view(self, camera: int) -> CameraView:
+        """Return a camera's view of the empty room."""
+        return _camera_view(self.room, self.room.viewpoints[camera], self._size)
 
     def _draw_visible_people(self, camera: int, seconds: float) -> tuple[DrawnPerson, ...]:
         return tuple(self.camera_view(camera).draw_visible_people(self._crowd.poses(seconds), self._outfits))
+
+
+@lru_cache(maxsize=_VIEWS)
+def _camera_view(room: Room, viewpoint: Viewpoint, size: tuple[int, int]) -> CameraView:
+    return CameraView(room, PinholeCamera.at(viewpoint, *size))
 
 
 def compose(camera_view: CameraView, people: Sequence[DrawnPerson]) -> Bytes:
