@@ -21,7 +21,7 @@ from server.http.access.authentication import Authenticator
 from server.http.access.authorization import ACCESS, AccessControl, authorize, forbid_shared_caching
 from server.http.access.cors import answer_preflight
 from server.http.access.csrf import remove_cors_header
-from server.http.api import openapi, recordings
+from server.http.api import openapi, past_search, recordings
 from server.http.api import routes as api
 from server.http.api.events import EVENTS, Events
 from server.http.api.shard_redirect import redirect_to_shard
@@ -59,6 +59,7 @@ _ROUTES = (
     api,
     session_routes,
     recordings,
+    past_search,
     http_collector,
     video,
     hls,

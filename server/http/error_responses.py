@@ -13,6 +13,7 @@ from aiohttp import web
 from logthrottle import LogThrottle
 from server.http.json_responses import error_response, unavailable
 from server.service.facade.errors import (
+    BusyError,
     ConflictError,
     InvalidCommandError,
     RefusedError,
@@ -75,7 +76,7 @@ def _http_error(request: web.Request, error: web.HTTPException) -> web.Response:
 
 def refusal(error: RefusedError) -> web.Response:
     """Return the response to a query or command that the service refuses."""
-    if isinstance(error, UnknownObjectError) and error.is_recovering:
+    if isinstance(error, BusyError) or (isinstance(error, UnknownObjectError) and error.is_recovering):
         return unavailable(str(error))
     return error_response(_STATUS[type(error)], str(error))
 

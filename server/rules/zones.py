@@ -45,6 +45,18 @@ class Area:
             before = corner
         return nearest if inside else -nearest
 
+    def contains(self, points: Floats) -> NDArray[np.bool_]:
+        """Return which of N points (N, 2) are inside, as :meth:`depth` tells it, all at once: (N,)."""
+        x, y = points[:, 0], points[:, 1]
+        inside = np.zeros(len(points), dtype=np.bool_)
+        before = self.corners[-1]
+        for corner in self.corners:
+            if before[1] != corner[1]:
+                at = before[0] + (y - before[1]) * (corner[0] - before[0]) / (corner[1] - before[1])
+                inside ^= ((before[1] > y) != (corner[1] > y)) & (x < at)
+            before = corner
+        return inside
+
 
 @dataclass(frozen=True, slots=True)
 class Line:

@@ -11,6 +11,7 @@ from server.service.facade.assist import AssistService
 from server.service.facade.calibration import CalibrationService
 from server.service.facade.cameras import CameraService
 from server.service.facade.operations import OperationsService
+from server.service.facade.past_search import PastSearchService
 from server.service.facade.people import PeopleService
 from server.service.facade.recordings import RecordingService
 from server.service.facade.rendering import RenderPool
@@ -29,6 +30,7 @@ class BestViewService:
         cameras: state and diagnostics of the cameras.
         streams: live streams.
         recordings: recorded streams.
+        past_search: search of recorded decisions.
         rendering: JPEG pictures, and video with boxes burnt in.
         assist: flags for the operator, and position corrections.
         calibration: the calibration walk.
@@ -42,6 +44,7 @@ class BestViewService:
         self.cameras = CameraService(pipeline)
         self.streams = StreamService(pipeline)
         self.recordings = RecordingService(pipeline)
+        self.past_search = PastSearchService(pipeline)
         self.rendering = RenderPool(pipeline)
         self.assist = AssistService(pipeline)
         self.calibration = CalibrationService(pipeline)

@@ -38,7 +38,15 @@ _RIGHTS: dict[str, dict[str, object]] = {
 }
 _NAMES = {1: "Ada Lovelace", 2: "Charles Babbage"}
 _OPEN = {"/", "/operator", "/page/{file}", "/api", "/api/openapi.json", "/healthz", "/readyz", "/api/session"}
-_NARROW = {"/api/site", "/api/objects", "/api/cameras", "/api/events", "/api/flags", "/api/past"}
+_NARROW = {
+    "/api/site",
+    "/api/objects",
+    "/api/cameras",
+    "/api/events",
+    "/api/flags",
+    "/api/past",
+    "/api/past/search",
+}
 """Addresses that accept every token, and limit the content to its scope."""
 _ADDRESSES = ("127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.1", "127.0.0.2", "127.0.0.9")
 """Client addresses; the last one is blocked after too many wrong tokens."""

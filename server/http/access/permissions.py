@@ -47,6 +47,7 @@ _BY_ROUTE = {
     "/api/events": Permission.ANY_TOKEN,
     "/api/flags": Permission.ANY_TOKEN,
     "/api/past": Permission.ANY_TOKEN,
+    "/api/past/search": Permission.ANY_TOKEN,
     "/api/rules": Permission.SITE,
     "/api/events/{event}/picture.jpg": Permission.SITE,
     "/metrics": Permission.SITE,

@@ -14,15 +14,19 @@ from aiohttp import web
 
 from server.http.access.permissions import Permission, permission_for
 from server.http.access.session_routes import SessionInfo
+from server.http.api.past_search import PAST_SEARCH_QUERIES
 from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
 from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT
+from server.service.facade.past_search import PastSearchResult
 from server.service.facade.rules import Rules
 from server.service.facade.streams import DelayMode
 from server.service.facade.view_selection import ViewSelection
 
 routes = web.RouteTableDef()
+
+_SEARCH = "/api/past/search"
 
 _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/site": SiteInfo,
@@ -32,6 +36,7 @@ _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/cameras": Cameras,
     "/api/flags": FlagList,
     "/api/rules": Rules,
+    _SEARCH: PastSearchResult,
     "/api/objects/{object}/choice": ViewSelection,
     "/api/objects/{object}/past": Past,
     "/api/cameras/{camera}/past": Past,
@@ -76,14 +81,20 @@ _UNAVAILABLE = {
     "/readyz",
     "/api/events",
     "/api/past",
+    _SEARCH,
 } | {
     path
     for path in _MEDIA_TYPES
     if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
 _MAY_BE_UNAVAILABLE_FOR_OPERATORS = {"/api/operator/people", "/api/operator/position_corrections"}
-_OF_THE_CONFIGURATION_FILE = {"/api/operator/site_cameras", "/api/operator/zones"}
-_FROM_REQUIRED = {"/api/past", *OPERATOR_FILES}
+_NO_FILE = "The site has no configuration file, or refuses the change."
+_CONFLICTS = {
+    "/api/operator/site_cameras": _NO_FILE,
+    "/api/operator/zones": _NO_FILE,
+    _SEARCH: "The zone is on the floor, and no camera is calibrated.",
+}
+_FROM_REQUIRED = {"/api/past", _SEARCH, *OPERATOR_FILES}
 _RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
@@ -173,11 +184,11 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     responses: dict[str, Any] = _success(path, content, error)
     names = re.findall(r"\{(\w+)\}", path)
-    if names or path in OPERATOR_RESULTS:
+    if names or path in OPERATOR_RESULTS or path == _SEARCH:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
     if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | DELAY | _RECORDED_SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "Invalid query.", "content": error}
-    if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys():
+    if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys() | {_SEARCH}:
         responses["400"] = {"description": "Invalid request.", "content": error}
     if permission_for("GET", path) is not Permission.PUBLIC:
         responses["401"] = {
@@ -186,11 +197,8 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         }
         responses["403"] = {"description": "Outside the token's scope.", "content": error}
         responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
-    if path in _OF_THE_CONFIGURATION_FILE:
-        responses["409"] = {
-            "description": "The site has no configuration file, or refuses the change.",
-            "content": error,
-        }
+    if path in _CONFLICTS:
+        responses["409"] = {"description": _CONFLICTS[path], "content": error}
     if path in TIME_SHIFT | OPERATOR_FILES.keys():
         responses["416"] = {"description": "That time is not recorded.", "content": error}
     if path in _UNAVAILABLE | _MAY_BE_UNAVAILABLE_FOR_OPERATORS | _RECORDED_SPANS or "object" in names:
@@ -199,18 +207,20 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     queries = ["prefer"] * (path in CAMERA_QUERY) + ["delay"] * (path in DELAY)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
     queries += ["from", "to"] * (path in TIME_SHIFT | _RECORDED_SPANS | OPERATOR_FILES.keys())
+    queries += ["from", "to", *PAST_SEARCH_QUERIES] * (path == _SEARCH)
     queries += ["at"] * path.endswith("/choice")
     queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
     if path in CAMERA_QUERY:
         parameters.append(
             {"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["camera_query"]}
         )
+    schemas = _SCHEMAS | (PAST_SEARCH_QUERIES if path == _SEARCH else {})
     parameters += [
         {
             "name": name,
             "in": "query",
             "required": path in _FROM_REQUIRED and name == "from",
-            "schema": _SCHEMAS[name],
+            "schema": schemas[name],
         }
         for name in queries
     ]

@@ -33,3 +33,7 @@ class InvalidCommandError(RefusedError):
 
 class ConflictError(RefusedError):
     """A command is valid, but not in the service's present state."""
+
+
+class BusyError(RefusedError):
+    """A query is valid, but cannot be answered at the moment."""

@@ -18,9 +18,18 @@ _ABSENT_S = 3.0
 def create_evaluator(config: Config) -> RuleEvaluator:
     """Return an evaluator of the configuration's rules."""
     fps, scale = config.site.fps, units_per_meter(config)
-    zones = [_zone(zone, 1.0 if zone.camera else scale, fps) for zone in config.zones]
     rules = [_rule(rule, config, scale) for rule in config.rules]
-    return RuleEvaluator(zones, rules, _frames(_ABSENT_S, fps))
+    return RuleEvaluator(_zones(config), rules, _frames(_ABSENT_S, fps))
+
+
+def create_areas(config: Config) -> list[Area]:
+    """Return the configuration's areas: its zones without the lines."""
+    return [zone for zone in _zones(config) if isinstance(zone, Area)]
+
+
+def _zones(config: Config) -> list[Zone]:
+    fps, scale = config.site.fps, units_per_meter(config)
+    return [_zone(zone, 1.0 if zone.camera else scale, fps) for zone in config.zones]
 
 
 def units_per_meter(config: Config) -> float:

@@ -249,6 +249,10 @@ class ViewDecider:
             self._pictures(first + frames - 1),
         )
 
+    def ground(self, camera: str) -> Floats | None:
+        """Return the homography from the site's image to the ground, where the camera looks now, or None."""
+        return self._quality_buffer.ground(camera)
+
     def _pictures(self, pulse: int) -> dict[str, PictureState]:
         buffer = self._quality_buffer
         return {

@@ -43,6 +43,7 @@ WHO = {
     "/api/events": ALL,
     "/api/flags": ALL,
     "/api/past": ALL,
+    "/api/past/search": ALL,
     "/api/delays": ALL,
     "/api/rules": WATCHERS,
     "/api/events/{event}/picture.jpg": WATCHERS,

@@ -1,0 +1,1 @@
+"""Search of the recorded decisions: who stayed where, and when, by a separate process."""
