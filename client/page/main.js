@@ -22,6 +22,7 @@ import { Viewer } from './viewer.js';
 const READOUT_MS = 250;
 const DELAY_FRAMES = 25; // whose median is shown
 const UNKNOWN = '–';
+const BLURRED = { others: 'other people are blurred', everybody: 'people are blurred' };
 
 const stage = element('stage');
 /** @type {HTMLVideoElement} */
@@ -55,7 +56,7 @@ Object.assign(window, { myview: viewer.probe });
 function update() {
   const { site, preference } = viewer;
   if (site) {
-    element('site').textContent = site.name;
+    element('site').textContent = site.blur ? `${site.name} · ${BLURRED[site.blur]}` : site.name;
     element('toggle-sound').hidden = !site.sound;
     document.documentElement.style.setProperty('--picture', String(site.width / site.height));
     document.body.classList.add('ready');
@@ -95,7 +96,7 @@ function updateReadout() {
   if (!site || !currentFrame.mapped || probe.pulse === null || viewer.object === null) return strip.clear();
   const live = viewer.timeShift.moment === null;
   const views = (/** @type {number} */ from) => viewer.views(from);
-  void viewer.recordedViews.refresh(viewer.object);
+  if (!site.blur) void viewer.recordedViews.refresh(viewer.object);
   const seconds = range.update((decisions.end - viewer.recordedViews.first) / site.fps);
   strip.draw({ pulse: probe.pulse, live, fps: site.fps, seconds, decided: decisions.end, views, palette });
   costs.update();

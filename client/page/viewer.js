@@ -89,7 +89,7 @@ export class Viewer {
       this.timeShift.pulsesRestarted();
     }
     setServers(site.others ?? [], site.gop / site.fps);
-    this.preference.configure(site.cameras);
+    this.preference.configure(site.blur ? [] : site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
     const codec = [site.codec, site.sound].filter(Boolean).join(',');
@@ -168,6 +168,7 @@ export class Viewer {
 
   /** @param {string | null} camera to hold; the held one, or null: return to the best view */
   hold(camera) {
+    if (this.site?.blur) return this.showNotice('People are blurred only in the best view.');
     this.#changePreference(() => this.preference.hold(camera));
   }
 

@@ -92,6 +92,10 @@ def token(
     ] = False,
     number: Annotated[int | None, typer.Option("--object", min=1, help="Limit it to this person.")] = None,
     camera: Annotated[str | None, typer.Option("--camera", help="Limit it to this camera.")] = None,
+    blur: Annotated[
+        Literal["others", "everybody"] | None,
+        typer.Option("--blur", help="Pixelate everybody but the person who is watched, or everybody."),
+    ] = None,
 ) -> None:
     """Print a new token, and the line for the token file."""
     import yaml
@@ -101,7 +105,7 @@ def token(
 
     secret = secrets.token_urlsafe(_TOKEN_BYTES)
     line = {"name": name, "sha256": secret_digest(secret), "role": "operate" if operate else "watch"}
-    limits = {"object": number, "camera": camera}
+    limits = {"object": number, "camera": camera, "blur": blur}
     made = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
     content = {**line, **{key: value for key, value in limits.items() if value is not None}, "made": made}
     try:

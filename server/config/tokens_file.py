@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
+from server.config.sections.access import Blur
 from server.config.sections.base import Identifier, Section
 from server.config.values import check_depth_and_texts, redact_and_abbreviate
 from server.config.yaml_file import read_yaml
@@ -32,6 +33,8 @@ class Token(Section):
     """Limits the token to this person's views."""
     camera: Identifier | None = None
     """Limits the token to this camera."""
+    blur: Blur | None = None
+    """Whom its viewers see pixelated."""
     made: AwareDatetime | None = None
     """When it was made. If person numbers have restarted since, a token for an object is void."""
 
@@ -41,6 +44,8 @@ class Token(Section):
             raise ValueError("object, camera: a token is limited to one of them; make two tokens")
         if self.role == "operate" and (self.object is not None or self.camera is not None):
             raise ValueError("role: an operator sees everything: remove object and camera, or set watch")
+        if self.role == "operate" and self.blur is not None:
+            raise ValueError("role: an operator sees everybody: remove blur, or set watch")
         if self.object is not None and self.made is None:
             raise ValueError(
                 "made: is missing, and object numbers hold for one run of the service; "

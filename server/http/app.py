@@ -107,7 +107,7 @@ def make_app(
         f"{config.site.name}_{config.view.share.index}",
         numbered_since=lambda: service.people.numbered_since,
     )
-    app[ACCESS] = AccessControl(authenticator, service.people.current_number)
+    app[ACCESS] = AccessControl(authenticator, service.people.current_number, config.access.blur)
     register_metrics(app)
     for module in _ROUTES:
         app.add_routes(module.routes)

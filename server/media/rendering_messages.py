@@ -12,7 +12,13 @@ import msgspec
 Boxes = list[list[tuple[int, float, float, float, float]]]
 """By frame of a GOP: (object, left, top, right, bottom), as in ``GopChoices``."""
 
-StillKind = Literal["plain", "boxed"]
+PictureKind = Literal["plain", "boxed"]
+
+Region = tuple[float, float, float, float]
+"""Left, top, right, bottom in pixels of the site's picture."""
+
+WHOLE_PICTURE: Region = (0.0, 0.0, 1e6, 1e6)
+"""The region that is every picture."""
 
 TIMESCALE = 90_000
 """Ticks per second in MP4 fragments: divisible by 24, 25, 30 and 50 frames per second."""
@@ -44,13 +50,15 @@ class RenderRequest(msgspec.Struct, frozen=True, kw_only=True):
     boxes: Boxes = []
     chosen: int | None = None
     """The object whose box is highlighted."""
-    video: bool = False
-    """Whether to encode the frames with boxes."""
+    hidden: list[list[Region]] | None = None
+    """By frame as in ``boxes``: the regions to pixelate; in other frames the whole picture. Null: nothing."""
+    video: PictureKind | None = None
+    """The kind of the frames to encode as video; null: none."""
     plain: list[float] = []
     """Rates, in pictures per second, at which to encode JPEG pictures (:func:`is_at_rate`)."""
     boxed: list[float] = []
     """Rates for JPEG pictures with boxes."""
-    still: StillKind | None = None
+    still: PictureKind | None = None
     """The kind of JPEG picture to encode of the last decoded frame, of this request or an earlier one."""
 
 

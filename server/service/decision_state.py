@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
+
 from bestview import Merge, Split
 from server.messaging.messages import GopChoices, PersonMerge, PersonSplit, ViewCut
+from server.service.identity.occupied_regions import Regions
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 from server.service.view_selection.explanation import ViewCostExplanation
 from server.service.view_selection.queried_reasons import QueriedReasons, SelectedView, SelectionReason
+
+_OCCUPIED_S = 15.0
+"""Seconds for which regions are kept: longer than the smoothest delay and all queues."""
+
+
+@dataclass(frozen=True, slots=True)
+class _OccupiedGop:
+    first: int
+    regions: dict[str, Regions]
 
 
 class DecisionState:
@@ -19,6 +32,8 @@ class DecisionState:
         self.end = 0
         """The first pulse that is not decided yet."""
         self._reasons = QueriedReasons(fps)
+        self._occupied: deque[_OccupiedGop] = deque()
+        self._occupied_frames = _OCCUPIED_S * fps
 
     def put(self, decision: GopDecision) -> GopChoices:
         """Add a decision; return it as the message that is published."""
@@ -40,6 +55,7 @@ class DecisionState:
         self._reasons.put(self.selected_views, decision.first, decision.reasons)
         self.cuts += len(cuts)
         self.end = decision.first + decision.frames
+        self._put_occupied(decision)
         return GopChoices(
             first=decision.first,
             frames=decision.frames,
@@ -61,6 +77,18 @@ class DecisionState:
     def resolve(self, number: int) -> int:
         """Return a merged person's current number."""
         return self.merged.get(number, number)
+
+    def occupied(self, camera: str, first: int) -> Regions:
+        """Return the regions with people in a camera's GOP that begins with a frame; empty: not known."""
+        newest_first = reversed(self._occupied)  # pulses may have restarted
+        return next((gop.regions.get(camera, []) for gop in newest_first if gop.first == first), [])
+
+    def _put_occupied(self, decision: GopDecision) -> None:
+        if not decision.occupied:
+            return
+        self._occupied.append(_OccupiedGop(decision.first, dict(decision.occupied)))
+        while not 0 <= decision.first - self._occupied[0].first <= self._occupied_frames:
+            self._occupied.popleft()
 
     def explain(self, number: int, pulse: int | None = None) -> SelectionReason | None:
         """Explain an object's newest view, or that at a pulse of the last minute.

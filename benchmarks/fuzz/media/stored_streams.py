@@ -10,7 +10,7 @@ from benchmarks.fuzz.engine.fed_site import FPS, HEIGHT, STRIDE, WIDTH
 from benchmarks.fuzz.engine.target import Target, folder
 from benchmarks.fuzz.media.damaged_media import damage_media, stream
 from server.media.audio.audio_format import AudioFormat
-from server.media.rendering_messages import RenderRequest, RenderSettings
+from server.media.rendering_messages import PictureKind, RenderRequest, RenderSettings
 from server.service.recording.media_files import read_gops
 from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.rendering.worker.stream_renderer import StreamRenderer
@@ -47,9 +47,10 @@ class RenderedStreams(Target):
             jpeg_quality=80,
         )
         boxes = [[(1, 2.0, 3.0, 20.0, 40.0)]] * _DRAWN
-        video = zlib.crc32(data) % _ENCODED_EVERY == 0
+        hidden = [[(0.0, 1.0, 22.0, 50.0)]] * (_DRAWN - 1)
+        video: PictureKind | None = "boxed" if zlib.crc32(data) % _ENCODED_EVERY == 0 else None
         drawn = StreamRenderer(settings).render(
-            RenderRequest(fragments=data, boxes=boxes, video=video, boxed=[2.0], still="plain")
+            RenderRequest(fragments=data, boxes=boxes, hidden=hidden, video=video, boxed=[2.0], still="plain")
         )
         return drawn.newest >= 0
 

@@ -72,7 +72,11 @@ class TravelTimeModel:
     def evidence(self, arrivals: Sequence[CameraSighting], departures: Sequence[CameraSighting]) -> Floats:
         """Compute the log-likelihood ratio of arriving from a camera in that time, against chance.
 
-        By chance people arrive at any camera, at any time up to `maximum_travel_frames`.
+        By chance people arrive at any camera, at any time up to `maximum_travel_frames`. Of *n* transitions
+        out of a camera, *m* to the other, *h* in the bin of that time, whose share of all times is *w*, with
+        *C* cameras:
+
+            E = n / (n + travel_half_weight_count) ln( C (m + 1/C) / (n + 1) (h / w + 1) / (m + 1) )
 
         Args:
             arrivals: N first sightings.

@@ -17,6 +17,7 @@
  * @property {number} now Unix seconds of the server's clock
  * @property {string[]} cameras
  * @property {string[]} [others] base URLs of the services that replace this one
+ * @property {'others' | 'everybody' | null} [blur] whom the visitor sees pixelated; then there is no past, and no held camera
  *
  * @typedef {object} ViewerDelay an entry of /api/delays
  * @property {string} delay live, balanced or smooth

@@ -41,6 +41,10 @@ export class TimeShift {
     const { site, object, probe, decisions, format } = this.viewer;
     if (!site || object === null || probe.pulse === null) return;
     const pulse = Math.max(0, from);
+    if (site.blur) {
+      if (!resumedPause) this.viewer.showNotice('People are blurred only in live pictures.');
+      return this.live();
+    }
     if (this.stale || pulse >= decisions.end - LIVE_S * site.fps) return this.live();
     if (format.container === 'webm') return this.#notRecorded(); // VP8 is not recorded
     this.moment = { pulse, time: pulse / site.fps };

@@ -15,11 +15,13 @@ from dataclasses import dataclass, replace
 
 from aiohttp import web
 
+from server.config.sections.access import Blur
 from server.http.access.authentication import Authenticator, Credential, challenge
+from server.http.access.blurring import refuse_unblurred
 from server.http.access.csrf import check_csrf, route_pattern
 from server.http.access.local_requests import is_local_request
 from server.http.access.networks import network_of
-from server.http.access.permissions import ClientIdentity, Grant, Permission, permission_for
+from server.http.access.permissions import ClientIdentity, Grant, Permission, Scope, permission_for
 from server.http.json_responses import error_response
 from server.http.periodic import run_periodically
 
@@ -49,11 +51,14 @@ class _OpenRequest:
 class AccessControl:
     """Lets permitted requests through, and ends their answers when their credential becomes invalid.
 
-    ``resolve`` returns the current number of a person whose number may have been merged.
+    ``resolve`` returns the current number of a person whose number may have been merged. ``blur``: whom
+    viewers on other machines see pixelated, where there are no tokens.
     """
 
-    def __init__(self, authenticator: Authenticator, resolve: Callable[[int], int]) -> None:
-        self.authenticator, self._resolve = authenticator, resolve
+    def __init__(
+        self, authenticator: Authenticator, resolve: Callable[[int], int], blur: Blur | None = None
+    ) -> None:
+        self.authenticator, self._resolve, self._blur = authenticator, resolve, blur
         self._open_requests: dict[int, _OpenRequest] = {}
         self._followed: dict[object, _OpenRequest] = {}
         self._file_reader = ThreadPoolExecutor(1, "tokens")
@@ -66,7 +71,12 @@ class AccessControl:
     def grant(self, request: web.Request) -> Grant:
         """Return the grant of a request that is being answered."""
         opened = self._open_requests.get(id(request))
-        return Grant(is_operator=is_local_request(request)) if opened is None else opened.grant
+        return self._grant_without_token(request) if opened is None else opened.grant
+
+    def _grant_without_token(self, request: web.Request) -> Grant:
+        if is_local_request(request):
+            return Grant(is_operator=True)
+        return Grant(Scope(blur=self._blur))
 
     def client_of(self, request: web.Request) -> ClientIdentity:
         """Return the client whose share of slots a request that is being answered counts towards."""
@@ -93,9 +103,8 @@ class AccessControl:
     ) -> web.StreamResponse:
         """Answer a request if its credential grants the permission; otherwise return 401, 403 or 429."""
         if not self.needs_token:
-            grant = Grant(is_operator=is_local_request(request))
-            allowed = grant.allows(permission, request, self._resolve)
-            return await handler(request) if allowed else error_response(403, HOW_TO_OPERATE)
+            refused = self._refuse(request, permission, self._grant_without_token(request))
+            return await handler(request) if refused is None else refused
         credential = self.authenticator.credential_of(request)
         if isinstance(credential, web.Response):
             return credential
@@ -104,13 +113,24 @@ class AccessControl:
             return _unauthenticated(permission)
         if isinstance(current, str):
             return error_response(403, current)
-        if not current.allows(permission, request, self._resolve):
-            return error_response(403, f"the token {current.name!r} is only for {current}")
+        if (refused := self._refuse(request, permission, current)) is not None:
+            return refused
         self._open_requests[id(request)] = _OpenRequest(request, permission, credential, current)
         try:
             return await handler(request)
         finally:
             del self._open_requests[id(request)]
+
+    def _refuse(self, request: web.Request, permission: Permission, grant: Grant) -> web.Response | None:
+        """Return 403 for what a grant does not permit; None: it does."""
+        if (refused := refuse_unblurred(request, permission, grant.scope)) is not None:
+            return refused
+        if grant.allows(permission, request, self._resolve):
+            return None
+        no_token = grant.name is None
+        return error_response(
+            403, HOW_TO_OPERATE if no_token else f"the token {grant.name!r} is only for {grant}"
+        )
 
     def follow(self, request: web.Request) -> Callable[[Callable[[], None]], AbstractContextManager[None]]:
         """Return a context manager for what goes on after the answer to a request that is being answered.
@@ -151,6 +171,7 @@ class AccessControl:
             if (
                 isinstance(current, Grant)
                 and current.allows(opened.permission, opened.request, self._resolve)
+                and current.scope.blur == opened.grant.scope.blur
                 and (opened.permission not in _BOUND_TO_GRANT or current == opened.grant)
             ):
                 continue
@@ -185,6 +206,11 @@ def _unauthenticated(permission: Permission) -> web.Response:
     if permission is Permission.OPERATE:
         return challenge("operating needs an operator's token; sign in at /operator")
     return challenge("watching needs a token; sign in at /, or send it (docs/how-to/secure.md)")
+
+
+def blur_of(request: web.Request) -> Blur | None:
+    """Return whom the viewer who sent a request sees pixelated; None: nobody."""
+    return request.app[ACCESS].grant(request).scope.blur
 
 
 @web.middleware

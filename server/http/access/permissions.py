@@ -8,6 +8,7 @@ from enum import Enum, auto
 
 from aiohttp import web
 
+from server.config.sections.access import Blur
 from server.config.tokens_file import Token
 
 OPERATOR_PATH = "/api/operator"
@@ -77,11 +78,18 @@ class Scope:
     """Only this person's views, also after their number was merged."""
     camera: str | None = None
     """Only this camera."""
+    blur: Blur | None = None
+    """Whom the viewer sees pixelated."""
+
+    @property
+    def is_everywhere(self) -> bool:
+        """Whether all people and all cameras may be seen, pixelated or not."""
+        return self.object is None and self.camera is None
 
     @property
     def is_all(self) -> bool:
         """Whether everything may be seen."""
-        return self.object is None and self.camera is None
+        return self.is_everywhere and self.blur is None
 
 
 ALL = Scope()
@@ -108,7 +116,7 @@ class Grant:
     @classmethod
     def of(cls, token: Token) -> Grant:
         """Return the grant of a token."""
-        return cls(Scope(token.object, token.camera), token.role == "operate", token.name)
+        return cls(Scope(token.object, token.camera, token.blur), token.role == "operate", token.name)
 
     def allows(self, permission: Permission, request: web.Request, resolve: Callable[[int], int]) -> bool:
         """Return whether a permission is granted; ``resolve`` maps merged numbers to current ones."""
@@ -117,13 +125,13 @@ class Grant:
             case Permission.PUBLIC | Permission.ANY_TOKEN:
                 return True
             case Permission.OBJECT:
-                return scope.is_all or (
+                return scope.is_everywhere or (
                     scope.object is not None
                     and resolve(scope.object) == resolve(int(names["object"]))
                     and "camera" not in request.query  # a fixed camera shows more than the person
                 )
             case Permission.CAMERA:
-                return scope.is_all or scope.camera == names["camera"]
+                return scope.is_everywhere or scope.camera == names["camera"]
             case Permission.SITE:
                 return scope.is_all
             case Permission.OPERATE:
@@ -133,6 +141,7 @@ class Grant:
         """Return the grant in words, for errors."""
         if self.is_operator:
             return "operating"
+        blurred = "" if self.scope.blur is None else f", with {self.scope.blur} blurred"
         if self.scope.object is not None:
-            return f"watching object {self.scope.object}"
-        return "watching" if self.scope.camera is None else f"watching camera {self.scope.camera}"
+            return f"watching object {self.scope.object}{blurred}"
+        return f"watching{'' if self.scope.camera is None else f' camera {self.scope.camera}'}{blurred}"

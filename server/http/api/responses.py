@@ -27,14 +27,14 @@ def site_info(service: BestViewService) -> SiteInfo:
         now=time.time(),
         cameras=list(config.camera_ids),
         others=service.people.replacements,
+        blur=None,
     )
 
 
 def delays_info(service: BestViewService, scope: Scope) -> Delays:
-    """Return the delays that viewers of a scope may choose; of one person there is no live best view."""
-    return Delays(
-        [delay for delay in service.streams.delays() if scope.object is None or delay.delay != DelayMode.LIVE]
-    )
+    """Return the delays that viewers of a scope may choose; live only if they see all, and unblurred."""
+    has_live = scope.object is None and scope.blur is None
+    return Delays([delay for delay in service.streams.delays() if has_live or delay.delay != DelayMode.LIVE])
 
 
 def objects_info(service: BestViewService) -> Objects:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from server.config.sections.access import Blur
 from server.service.facade.assist import Flag
 from server.service.facade.cameras import CameraInfo
 from server.service.facade.streams import ViewerDelay
@@ -31,6 +32,8 @@ class SiteInfo(msgspec.Struct, frozen=True):
     cameras: list[str]
     others: list[str]
     """Base URLs of the services that replace this one when it does not answer."""
+    blur: Blur | None
+    """Whom the caller sees pixelated: others than the person of the stream, or everybody; null: nobody."""
 
 
 class Delays(msgspec.Struct, frozen=True):

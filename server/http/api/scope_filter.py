@@ -13,12 +13,21 @@ from server.messaging.messages import GopChoices
 from server.service.facade.assist import Flag
 from server.service.facade.rules import EventRecord
 
+_DRAWN_CODEC = "avc1.42C028"
+"""Of what the server draws where the cameras send VP8: H.264, Constrained Baseline."""
+
 Resolve = Callable[[int], int]
 """Returns the current number of a person whose number may have been merged."""
 
 
 def filter_site(site: SiteInfo, scope: Scope) -> SiteInfo:
-    """Keep only the camera of the scope; for one person keep all, since any camera may see them."""
+    """Keep only the camera of the scope; for one person keep all, since any camera may see them.
+
+    What is drawn blurred is H.264 without sound.
+    """
+    if scope.blur is not None:
+        codec = site.codec if site.container == "mp4" else site.codec and _DRAWN_CODEC
+        site = msgspec.structs.replace(site, codec=codec, container="mp4", sound=None, blur=scope.blur)
     if scope.camera is None:
         return site
     return msgspec.structs.replace(
@@ -27,8 +36,11 @@ def filter_site(site: SiteInfo, scope: Scope) -> SiteInfo:
 
 
 def filter_objects(objects: Objects, scope: Scope, resolve: Resolve) -> Objects:
-    """Keep only the person of the scope."""
-    if scope.is_all:
+    """Keep only the person of the scope; leave out names and thumbnails where people are blurred."""
+    if scope.blur is not None:
+        nameless = [msgspec.structs.replace(info, name=None, thumbnail=None) for info in objects.objects]
+        objects = Objects(nameless, objects.elsewhere)
+    if scope.is_everywhere:
         return objects
     person = None if scope.object is None else resolve(scope.object)
     return Objects([info for info in objects.objects if info.object == person], [])
@@ -45,7 +57,7 @@ def filter_cameras(cameras: Cameras, scope: Scope) -> Cameras:
 
 def filter_choices(choices: GopChoices, scope: Scope, resolve: Resolve) -> GopChoices:
     """Keep the decisions about the person of the scope, or the boxes in its camera."""
-    if scope.is_all:
+    if scope.is_everywhere:
         return choices
     if scope.object is None:
         boxes = {camera: frames for camera, frames in choices.boxes.items() if camera == scope.camera}
@@ -68,7 +80,7 @@ def filter_choices(choices: GopChoices, scope: Scope, resolve: Resolve) -> GopCh
 
 def filter_flag(flag: Flag, scope: Scope, resolve: Resolve) -> Flag | None:
     """Limit a flag to the person or the camera of the scope; None: it concerns neither."""
-    if scope.is_all:
+    if scope.is_everywhere:
         return flag
     if scope.object is not None:
         person = resolve(scope.object)
@@ -79,10 +91,17 @@ def filter_flag(flag: Flag, scope: Scope, resolve: Resolve) -> Flag | None:
 
 
 def filter_event(event: EventRecord, scope: Scope, resolve: Resolve) -> EventRecord | None:
-    """Return an event about the person of the scope alone, without its picture; None: it is about others."""
+    """Return an event about the person of the scope alone, without its picture; None: it is about others.
+
+    Events have names and pictures, so there are none where people are blurred.
+    """
     if scope.is_all:
         return event
-    if scope.object is None or [resolve(number) for number in event.objects] != [resolve(scope.object)]:
+    if (
+        scope.blur is not None
+        or scope.object is None
+        or [resolve(number) for number in event.objects] != [resolve(scope.object)]
+    ):
         return None
     return msgspec.structs.replace(event, picture=None)
 

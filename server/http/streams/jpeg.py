@@ -1,14 +1,15 @@
-"""Rendered streams over HTTP: MJPEG, single JPEGs, and the best view with boxes burnt in."""
+"""Rendered streams over HTTP: MJPEG, single JPEGs, and the best view with boxes or people pixelated."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from functools import wraps
 
 from aiohttp import web
 
-from server.http.access.authorization import is_scoped_to_person
+from server.http.access.authorization import blur_of, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.containers import MP4
@@ -22,9 +23,9 @@ from server.service.facade.rendering import (
     CameraView,
     MjpegVariant,
     PersonView,
+    PictureKind,
     PictureTimeoutError,
     RenderPoolFullError,
-    StillKind,
     Subject,
     part_and_boundary,
 )
@@ -83,10 +84,12 @@ def wants_boxes(request: web.Request) -> bool:
 
 
 @_rendering
-async def stream_boxed_mp4(request: web.Request) -> web.StreamResponse:
-    """Stream the best view of a person as fragmented MP4 with the boxes burnt in."""
+async def stream_drawn_mp4(request: web.Request) -> web.StreamResponse:
+    """Stream the best view of a person as fragmented MP4, with boxes or with people pixelated."""
     headers = {"Content-Type": "video/mp4"}
     subject = _person(request)
+    if wants_boxes(request):
+        subject = replace(subject, video="boxed")
     _newest(request, subject)
     if request.method == "HEAD":
         return _headers_only(headers)
@@ -139,20 +142,22 @@ def _subject(request: web.Request) -> Subject:
     return _camera(request) if "camera" in request.match_info else _person(request)
 
 
-def _person(request: web.Request) -> Subject:
+def _person(request: web.Request) -> PersonView:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     current, scoped = service.people.current_number(number), is_scoped_to_person(request)
     if service.streams.of_person(current, scoped_to_person=scoped) is None:
         raise service.people.unknown(number)
     if (refused := refuse_live_if_scoped(request)) is not None:
         raise _ResponseError(refused)
-    return PersonView(current, scoped, requested_delay(request))
+    blur = blur_of(request)
+    return PersonView(current, scoped, requested_delay(request), blur, "boxed" if blur is None else "plain")
 
 
 def _camera(request: web.Request) -> Subject:
     camera = request.match_info["camera"]
     request.app[SERVICE].cameras.require(camera)
-    return CameraView(camera, decided=wants_boxes(request))
+    blur = blur_of(request)
+    return CameraView(camera, decided=wants_boxes(request) or blur is not None, blur=blur)
 
 
 def _newest(request: web.Request, subject: Subject) -> int:
@@ -165,7 +170,7 @@ def _newest(request: web.Request, subject: Subject) -> int:
     return pulse
 
 
-def _kind(request: web.Request) -> StillKind:
+def _kind(request: web.Request) -> PictureKind:
     return "boxed" if wants_boxes(request) else "plain"
 
 

@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 
 from aiohttp import web
 
-from server.http.access.authorization import is_scoped_to_person
+from server.http.access.authorization import blur_of, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response
 from server.service.facade.streams import DelayMode
@@ -74,7 +74,7 @@ async def check_container(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
     """Answer 404 where a stream is requested in a container of another codec: nothing is transcoded."""
-    if _CONTAINER_PATH.fullmatch(request.path):
+    if _CONTAINER_PATH.fullmatch(request.path) and blur_of(request) is None:  # otherwise all are drawn
         container, is_webm = request.app[SERVICE].streams.container, request.path.endswith(".webm")
         if container == "webm" and not request.path.endswith((".webm", ".mjpeg", ".jpg")):
             return error_response(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from aiohttp import web
 
-from server.http.access.authorization import is_scoped_to_person
+from server.http.access.authorization import blur_of, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import unavailable
 from server.http.streams.containers import MP4, TS, WEBM, Container
-from server.http.streams.jpeg import stream_boxed_mp4, wants_boxes
+from server.http.streams.jpeg import stream_drawn_mp4, wants_boxes
 from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay
 from server.http.streams.sending import send_stream
 from server.http.streams.time_range import is_time_shifted
@@ -30,8 +30,8 @@ routes = web.RouteTableDef()
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mp4")
 async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4, without a break at cuts."""
-    if wants_boxes(request) and not is_time_shifted(request):
-        return await stream_boxed_mp4(request)
+    if blur_of(request) is not None or (wants_boxes(request) and not is_time_shifted(request)):
+        return await stream_drawn_mp4(request)
     return await _best(request, MP4)
 
 

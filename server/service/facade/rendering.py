@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.media.rendering_messages import StillKind
+from server.media.rendering_messages import PictureKind
 from server.service.rendering.mjpeg_streams import (
     CONTENT_TYPE,
     FIRST_BOUNDARY,
@@ -26,10 +26,10 @@ __all__ = [
     "CameraView",
     "MjpegVariant",
     "PersonView",
+    "PictureKind",
     "PictureTimeoutError",
     "RenderPool",
     "RenderPoolFullError",
-    "StillKind",
     "Subject",
     "part_and_boundary",
 ]

@@ -31,7 +31,7 @@ from server.service.identity.track_parts import (
 )
 from server.service.identity.undetected_frames import UndetectedFrames
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.ingest.window_history import WindowHistory
+from server.service.ingest.window_history import HistorySpan, WindowHistory
 from tracking.frame_rate import frames_in
 
 ALL = ShareSettings()
@@ -230,6 +230,10 @@ class PersonTracker:
         """Return the numbered boxes of each of a camera's frames from `first` on, by rising number."""
         spans = self._histories[camera].over(first, first + frames - 1)
         return numbered_boxes(spans, self.numbers, first, frames)
+
+    def windows(self, camera: str, first: int, last: int) -> list[HistorySpan[CameraWindow]]:
+        """Return a camera's newest windows of the frames from `first` to `last`; frames may be missing."""
+        return self._histories[camera].over(first, last)
 
     def person_of(self, camera: str, boot: int, track: int, pulse: int) -> int | None:
         """Return the person of a tracker's track in a frame; None: unknown or not confirmed."""

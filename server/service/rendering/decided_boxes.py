@@ -5,11 +5,12 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from server.media.containers.webm import CLUSTER, pulse_of
-from server.media.rendering_messages import TIMESCALE, Boxes
+from server.media.rendering_messages import TIMESCALE, WHOLE_PICTURE, Boxes, Region
 from server.messaging.messages import GopChoices
+from server.service.identity.occupied_regions import Regions
 
 _TFDT = b"tfdt"
 
@@ -23,9 +24,31 @@ class GopOverlay:
     boxes: Boxes
     chosen: int | None = None
     """The person whose box is highlighted."""
+    camera: str | None = None
+    """The camera that the GOP is from; None: not known."""
+    hidden: list[list[Region]] | None = None
+    """By frame from ``first`` on the regions to pixelate; in others the whole picture. None: nothing."""
 
 
 NO_OVERLAY = GopOverlay(0, [])
+
+
+def hide_people(
+    overlay: GopOverlay, regions: Regions, shown: int | None, resolve: Callable[[int], int]
+) -> GopOverlay:
+    """Return an overlay that hides everybody but one person; None: everybody.
+
+    ``regions`` are those with people in the overlay's GOP. Where they are not known the whole picture is
+    hidden. ``resolve`` returns the present number of a merged one.
+    """
+    person = None if shown is None else resolve(shown)
+    hidden: list[list[Region]] = [
+        [WHOLE_PICTURE]
+        if frame is None
+        else [box[1:] for box in frame if person is None or resolve(box[0]) != person]
+        for frame in regions
+    ]
+    return replace(overlay, hidden=hidden)
 
 
 def first_pulse(fragments: bytes, fps: float) -> int:
@@ -56,7 +79,9 @@ class DecidedBoxes:
     def overlay_of_camera(self, camera: str, fragments: bytes) -> GopOverlay:
         """Return all boxes in a camera's GOP."""
         choices = self._decision_of(fragments)
-        return NO_OVERLAY if choices is None else GopOverlay(choices.first, choices.boxes.get(camera, []))
+        if choices is None:
+            return NO_OVERLAY
+        return GopOverlay(choices.first, choices.boxes.get(camera, []), camera=camera)
 
     def overlay_of_person(
         self, number: int, fragments: bytes, *, scoped_to_person: bool = False
@@ -76,7 +101,7 @@ class DecidedBoxes:
         if scoped_to_person:
             person = self._resolve(number)
             boxes = [[box for box in frame if self._resolve(box[0]) == person] for frame in boxes]
-        return GopOverlay(choices.first, boxes, chosen)
+        return GopOverlay(choices.first, boxes, chosen, camera)
 
     def _decision_of(self, fragments: bytes) -> GopChoices | None:
         pulse = first_pulse(fragments, self._fps)

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from logthrottle import LogThrottle
-from server.media.rendering_messages import RenderSettings
+from server.config.sections.access import Blur
+from server.media.rendering_messages import PictureKind, RenderSettings
 from server.messaging.messages import GopChoices
 from server.service.pipeline import BestViewPipeline
-from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay
+from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay, hide_people
 from server.service.rendering.rendered_stream import RenderedStream
 from server.service.view_selection.delay_modes import DelayMode
 
@@ -31,26 +32,39 @@ class RenderPoolFullError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class PersonView:
-    """A person's best view; ``scoped_to_person``: for viewers with access to that person alone."""
+    """A person's best view; ``scoped_to_person``: for viewers with access to that person alone.
+
+    ``blur``: whom its viewers see pixelated; ``video``: whether boxes are burnt into its video.
+    """
 
     number: int
     scoped_to_person: bool = False
     delay: DelayMode = DelayMode.BALANCED
+    blur: Blur | None = None
+    video: PictureKind = "boxed"
 
     def __str__(self) -> str:
         delay = "" if self.delay is DelayMode.BALANCED else f" {self.delay}"
-        return f"object {self.number}{' scoped' * self.scoped_to_person}{delay}"
+        return f"object {self.number}{' scoped' * self.scoped_to_person}{delay}{_blur_text(self.blur)}"
 
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """A camera's live stream; ``decided``: with all boxes, and as late as a best view."""
+    """A camera's live stream; ``decided``: with all boxes, and as late as a best view.
+
+    ``blur``: everybody is pixelated, whatever it is; only where ``decided``.
+    """
 
     camera: str
     decided: bool = False
+    blur: Blur | None = None
 
     def __str__(self) -> str:
-        return f"camera {self.camera}"
+        return f"camera {self.camera}{_blur_text(self.blur)}"
+
+
+def _blur_text(blur: Blur | None) -> str:
+    return "" if blur is None else f" with {blur} blurred"
 
 
 Subject = PersonView | CameraView
@@ -205,6 +219,9 @@ class RenderPool:
                 overlay_of = partial(decided.overlay_of_camera, camera)
             case CameraView(camera):
                 broadcaster, overlay_of = splicer.cameras[camera], _no_overlay
+        if subject.blur is not None:
+            shown = subject.number if isinstance(subject, PersonView) and subject.blur == "others" else None
+            overlay_of = partial(self._hiding, overlay_of, shown)
         live = subject.delay is DelayMode.LIVE if isinstance(subject, PersonView) else not subject.decided
         return RenderedStream(
             str(subject),
@@ -213,10 +230,20 @@ class RenderPool:
             self._settings,
             live=live,
             queue_gops=self._queue_gops,
-            audio_buffer=self._pipeline.audio_buffer,
+            # People are recognized by their voices, too.
+            audio_buffer=None if subject.blur is not None else self._pipeline.audio_buffer,
+            video_kind=subject.video if isinstance(subject, PersonView) else "boxed",
             # The person may not have been present in a gap.
             mute_gaps=isinstance(subject, PersonView) and subject.scoped_to_person,
         )
+
+    def _hiding(
+        self, overlay_of: Callable[[bytes], GopOverlay], shown: int | None, fragments: bytes
+    ) -> GopOverlay:
+        """Return a GOP's overlay that hides everybody but one person; None: everybody."""
+        overlay, state = overlay_of(fragments), self._pipeline.decision_state
+        regions = [] if overlay.camera is None else state.occupied(overlay.camera, overlay.first)
+        return hide_people(overlay, regions, shown, state.resolve)
 
     def _put_mode(self, mode: DelayMode, choices: GopChoices) -> None:
         if mode is DelayMode.SMOOTH:

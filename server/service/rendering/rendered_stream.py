@@ -13,10 +13,10 @@ from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.media.rendering_messages import (
     JpegPicture,
+    PictureKind,
     RenderRequest,
     RenderResult,
     RenderSettings,
-    StillKind,
 )
 from server.service.rendering.decided_boxes import GopOverlay
 from server.service.rendering.mjpeg_streams import MjpegStreams
@@ -43,12 +43,12 @@ class StillRequests:
     """Pending requests for a still picture, by kind, with the oldest frame that satisfies them."""
 
     def __init__(self) -> None:
-        self._requests: dict[StillKind, _StillRequest] = {}
+        self._requests: dict[PictureKind, _StillRequest] = {}
         self.changed = asyncio.Event()
         """Set when a request arrives or a new frame may answer one; the reader clears it."""
         self._closed = False
 
-    async def get(self, kind: StillKind, earliest: int) -> JpegPicture | None:
+    async def get(self, kind: PictureKind, earliest: int) -> JpegPicture | None:
         """Return a picture of frame ``earliest`` or a newer one, as soon as there is one; None: the end."""
         while not self._closed:
             request = self._requests.get(kind)
@@ -60,11 +60,11 @@ class StillRequests:
                 return request.picture  # an older picture answered an earlier request
         return None
 
-    def answerable(self, newest: int) -> list[StillKind]:
+    def answerable(self, newest: int) -> list[PictureKind]:
         """Return the kinds that can be answered when ``newest`` is the newest frame."""
         return [kind for kind, request in self._requests.items() if request.earliest <= newest]
 
-    def answer(self, kind: StillKind, picture: JpegPicture | None) -> None:
+    def answer(self, kind: PictureKind, picture: JpegPicture | None) -> None:
         """Answer all requests of a kind."""
         request = self._requests.pop(kind)
         request.picture = picture
@@ -93,7 +93,7 @@ class RenderedStream:
 
     A slow worker loses whole GOPs, like a slow viewer, and delays nothing else. ``overlay_of`` returns the
     boxes of fragments. ``live`` pictures are shown as they arrive, others in real time. ``audio_buffer`` and
-    ``mute_gaps`` are those of :class:`OverlayVideoPublisher`.
+    ``mute_gaps`` are those of :class:`OverlayVideoPublisher`; ``video_kind``: with boxes or not.
     """
 
     def __init__(
@@ -107,7 +107,9 @@ class RenderedStream:
         queue_gops: int,
         audio_buffer: AudioBuffer | None = None,
         mute_gaps: bool = False,
+        video_kind: PictureKind = "boxed",
     ) -> None:
+        self._video_kind: PictureKind = video_kind
         self._name, self._broadcaster, self._overlay_of = name, broadcaster, overlay_of
         self._settings, self._live, self._queue_gops = settings, live, queue_gops
         self._audio_buffer, self._mute_gaps = audio_buffer, mute_gaps
@@ -150,7 +152,7 @@ class RenderedStream:
             self._has_users.clear()
             self._reset_outputs()
 
-    async def still(self, kind: StillKind, earliest: int) -> JpegPicture:
+    async def still(self, kind: PictureKind, earliest: int) -> JpegPicture:
         """Return a picture of frame ``earliest`` or a newer one.
 
         Raises:
@@ -273,7 +275,8 @@ class RenderedStream:
                 first=overlay.first,
                 boxes=overlay.boxes,
                 chosen=overlay.chosen,
-                video=self.video.users > 0,
+                hidden=overlay.hidden,
+                video=self._video_kind if self.video.users else None,
                 plain=self.mjpeg.rates(boxed=False),
                 boxed=self.mjpeg.rates(boxed=True),
             )

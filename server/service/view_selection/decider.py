@@ -13,6 +13,7 @@ from bestview import NO_CAMERA, Merge, Split, select_views_by_gop
 from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
+from server.service.identity.occupied_regions import OccupiedRegions, Regions
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots
@@ -73,6 +74,8 @@ class GopDecision:
     """The costs behind the choices."""
     pictures: Mapping[str, PictureState] = field(default_factory=dict, compare=False, repr=False)
     """By camera, of those that have sent the last frame."""
+    occupied: Mapping[str, Regions] = field(default_factory=dict, compare=False, repr=False)
+    """By camera: the regions with people, where viewers may see them pixelated."""
 
 
 def camera_homographies(config: Config) -> dict[str, Floats | None]:
@@ -116,6 +119,9 @@ class ViewDecider:
             config.joint_cameras,
         )
         stride, gop = config.window.stride, config.gop
+        self._occupied = (
+            OccupiedRegions(self.people, self._cameras, fps, stride) if config.access.may_blur else None
+        )
         self._max_gops_per_epoch = -(-stride // gop) + 1
         """One more than an epoch completes, so that a backlog after a shorter look-ahead shrinks."""
         self._quality_buffer = ViewQualityBuffer(config, camera_homographies, self.people.letterboxes)
@@ -227,6 +233,11 @@ class ViewDecider:
         self._next_gop = first + self._config.gop
         self.modes.add(part, frames, gops, weight, views, before.cameras)
         boxes = {camera: people.boxes(camera, first, frames) for camera in self._cameras}
+        occupied = (
+            {}
+            if self._occupied is None
+            else {camera: self._occupied.next(camera, first, frames) for camera in self._cameras}
+        )
         self._quality_buffer.forget_before(self._next_gop)
         people.forget_before(self._next_gop)
         names = [*self._cameras, None]  # NO_CAMERA, -1, indexes the last one
@@ -247,6 +258,7 @@ class ViewDecider:
             people.take_corrections(),
             reasons,
             self._pictures(first + frames - 1),
+            occupied,
         )
 
     def ground(self, camera: str) -> Floats | None:

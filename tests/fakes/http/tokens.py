@@ -19,6 +19,9 @@ TOKEN_ENTRIES: dict[str, dict[str, Any]] = {
     "desk": {"role": "watch"},
     "family": {"role": "watch", "object": 1, "made": IN_FUTURE},
     "door": {"role": "watch", "camera": "c0"},
+    "guest": {"role": "watch", "blur": "others"},
+    "carer": {"role": "watch", "object": 1, "blur": "others", "made": IN_FUTURE},
+    "yard": {"role": "watch", "camera": "c0", "blur": "everybody"},
 }
 
 

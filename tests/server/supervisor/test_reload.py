@@ -50,6 +50,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "view.identity.merge_threshold": (BEST_VIEW, 1.0),
     "http.port": (BEST_VIEW, 8123),
     "record.keep_s": (BEST_VIEW, 5.0),
+    "access.blur": (BEST_VIEW, "others"),
     "rtsp.port": (GATEWAY, 8600),
     "rtsp.udp": (GATEWAY, False),
     "rtsp.enabled": (SITE, True),

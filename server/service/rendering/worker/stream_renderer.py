@@ -16,8 +16,11 @@ from av.video.frame import VideoFrame
 from server.camera.encoder import Encoder
 from server.media.color_conversion import to_bgr
 from server.media.rendering_messages import (
+    WHOLE_PICTURE,
     EncodedFrame,
     JpegPicture,
+    PictureKind,
+    Region,
     RenderRequest,
     RenderResult,
     RenderSettings,
@@ -26,6 +29,7 @@ from server.media.rendering_messages import (
 from server.messaging.number_types import PULSE_MAX
 from server.service.rendering.worker.box_overlay import Image, draw_boxes
 from server.service.rendering.worker.demuxers import demux_mp4, demux_webm
+from server.service.rendering.worker.pixelation import RegionMemory, pixelate
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +43,14 @@ class DecodedFrame:
     frame: VideoFrame
     boxes: Sequence[tuple[int, float, float, float, float]]
     chosen: int | None
+    hidden: Sequence[Region] = ()
+    """The regions to pixelate."""
 
     @cached_property
     def plain(self) -> Image:
-        """The image, ``(height, width, 3)`` BGR."""
-        return to_bgr(self.frame)
+        """The image, ``(height, width, 3)`` BGR, with the hidden regions pixelated."""
+        image = to_bgr(self.frame)
+        return pixelate(image, self.hidden) if self.hidden else image
 
     @cached_property
     def boxed(self) -> Image:
@@ -65,6 +72,7 @@ class StreamRenderer:
         self._encoder: Encoder | None = None
         self._encoded_last = -1
         self._last: DecodedFrame | None = None
+        self._regions = RegionMemory()
 
     def render(self, request: RenderRequest) -> RenderResult:
         """Decode the frames and return the requested outputs."""
@@ -74,8 +82,8 @@ class StreamRenderer:
         boxed: list[JpegPicture] = []
         for picture in self._decode(request):
             self._last, pulse = picture, picture.pulse
-            if request.video:
-                video.append(self._encode(picture))
+            if request.video is not None:
+                video.append(self._encode(picture, request.video))
             if any(is_at_rate(pulse, rate, fps) for rate in request.plain):
                 plain.append(self._jpeg(pulse, picture.plain))
             if any(is_at_rate(pulse, rate, fps) for rate in request.boxed):
@@ -111,13 +119,21 @@ class StreamRenderer:
                 pulse = demuxed.pulse if frame.pts is None else frame.pts
                 place = pulse - request.first
                 boxes = request.boxes[place] if 0 <= place < len(request.boxes) else []
-                yield DecodedFrame(pulse, demuxed.duration, frame, boxes, request.chosen)
+                hidden = self._hidden(frame, place, request.hidden)
+                yield DecodedFrame(pulse, demuxed.duration, frame, boxes, request.chosen, hidden)
 
-    def _encode(self, picture: DecodedFrame) -> EncodedFrame:
+    def _hidden(
+        self, frame: VideoFrame, place: int, hidden: Sequence[Sequence[Region]] | None
+    ) -> Sequence[Region]:
+        if hidden is None:
+            return ()
+        return self._regions.regions_in(frame, hidden[place] if 0 <= place < len(hidden) else [WHOLE_PICTURE])
+
+    def _encode(self, picture: DecodedFrame, kind: PictureKind) -> EncodedFrame:
         if self._encoder is None or picture.pulse <= self._encoded_last:  # the pulses have restarted
             self._encoder = Encoder(self._settings, self._settings)
         self._encoded_last = picture.pulse
-        unit = self._encoder.encode(picture.pulse, picture.boxed)
+        unit = self._encoder.encode(picture.pulse, picture.boxed if kind == "boxed" else picture.plain)
         return EncodedFrame(unit.pulse, unit.key, unit.data, picture.duration)
 
     def _jpeg(self, pulse: int, image: Image) -> JpegPicture:

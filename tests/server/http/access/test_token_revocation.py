@@ -91,12 +91,29 @@ async def test_streams_of_its_sessions_end_too_and_those_of_a_signed_out_session
 
 
 @pytest.mark.parametrize("path", ["/cameras/c0/live.mp4", "/api/events"])
-@pytest.mark.parametrize("less", [{"camera": "c1"}, {"object": 9, "made": IN_FUTURE}])
+@pytest.mark.parametrize(
+    "less",
+    [
+        {"camera": "c1"},
+        {"object": 9, "made": IN_FUTURE},
+        {"blur": "others"},
+        {"camera": "c0", "blur": "everybody"},
+    ],
+)
 async def test_streams_outside_a_narrowed_scope_end(
     site: ServedSite, tmp_path: Path, path: str, less: dict[str, object]
 ) -> None:
     answer = await stream(site, path, **bearer("desk"))
     write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", **less))
+    await wait_for_end(answer)
+
+
+@pytest.mark.parametrize("path", ["/objects/1/best.mp4", "/cameras/c0/live.mjpeg"])
+async def test_a_stream_ends_when_its_token_becomes_blurred(
+    site: ServedSite, tmp_path: Path, path: str
+) -> None:
+    answer = await stream(site, path, **bearer("desk"))
+    write_tokens(tmp_path / "tokens.yaml", token_entry("desk", role="watch", blur="others"))
     await wait_for_end(answer)
 
 

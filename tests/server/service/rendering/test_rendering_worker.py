@@ -130,10 +130,10 @@ def test_a_fragment_with_an_impossible_time_is_skipped(ticks: int) -> None:
     start = whole.index(b"tfdt") + len(b"tfdt") + 4
     renderer = StreamRenderer(RENDER_SETTINGS)
     broken = whole[:start] + ticks.to_bytes(8, "big") + whole[start + 8 :]
-    assert renderer.render(RenderRequest(fragments=broken, video=True, still="plain")) == RenderResult(
+    assert renderer.render(RenderRequest(fragments=broken, video="boxed", still="plain")) == RenderResult(
         newest=-1
     )
-    assert len(renderer.render(RenderRequest(fragments=fragments(GOP, GOP), video=True)).video) == GOP
+    assert len(renderer.render(RenderRequest(fragments=fragments(GOP, GOP), video="boxed")).video) == GOP
 
 
 def test_the_video_has_the_gops_of_the_camera_and_a_keyframe_where_time_goes_back() -> None:
@@ -141,7 +141,7 @@ def test_the_video_has_the_gops_of_the_camera_and_a_keyframe_where_time_goes_bac
     keys = [
         [
             frame.key
-            for frame in renderer.render(RenderRequest(fragments=fragments(first, GOP), video=True)).video
+            for frame in renderer.render(RenderRequest(fragments=fragments(first, GOP), video="boxed")).video
         ]
         for first in (0, GOP, GOP)
     ]
@@ -163,7 +163,7 @@ def test_the_box_of_the_chosen_person_is_drawn_over_the_others() -> None:
 def test_the_worker_answers_until_its_input_ends() -> None:
     requests = (
         encode_message(RENDER_SETTINGS)
-        + encode_message(RenderRequest(fragments=fragments(0, GOP), video=True))
+        + encode_message(RenderRequest(fragments=fragments(0, GOP), video="boxed"))
         + encode_message(RenderRequest())
     )
     for cut in (0, 1, 7):

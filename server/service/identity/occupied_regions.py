@@ -1,0 +1,148 @@
+"""Where people are in a camera's frames, for viewers who must not recognize them.
+
+More than the published boxes: also tracks that are not a confirmed person yet, people whom a camera does not
+detect for a moment, and a margin, since boxes are cut short and may be a little old.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bestview import TrackKey
+from server.messaging.messages import NumberedBox
+from server.service.identity.camera_window import CameraWindow
+from server.service.identity.people import PersonTracker
+from server.service.identity.track_parts import UNCONFIRMED
+from server.service.ingest.window_history import HistorySpan
+from tracking.frame_rate import frames_in
+
+Regions = list[list[NumberedBox] | None]
+"""By frame: the regions with people, by person or `UNCONFIRMED`; None: the camera has not looked."""
+
+HOLD_S = 0.5
+"""Seconds for which a region stays before a track's first box and after its last one."""
+MARGIN = 0.2
+"""How far a region reaches beyond a box, on each side, in parts of its width and height."""
+_GROWTH = 0.4
+"""How much further it reaches `HOLD_S` away from the next box: people move on."""
+_MARGIN_MIN = 4.0
+"""Pixels of the margin at least."""
+
+
+@dataclass(slots=True)
+class _TrackBoxes:
+    """A track's known boxes, by rising frame, and the last frame in which the tracker still follows it."""
+
+    pulses: list[int] = field(default_factory=list)
+    boxes: list[NDArray[np.float64]] = field(default_factory=list)
+    followed_to: int = -1
+    number: int = UNCONFIRMED
+
+
+class OccupiedRegions:
+    """Returns the regions with people, GOP by GOP in order; ``stride`` frames are between two windows."""
+
+    def __init__(self, people: PersonTracker, cameras: Sequence[str], fps: float, stride: int) -> None:
+        self._people = people
+        self._hold = max(frames_in(HOLD_S, fps), stride)
+        self._before: dict[str, dict[TrackKey, _TrackBoxes]] = {camera: {} for camera in cameras}
+        """By camera: the last box of each track before the next GOP."""
+        self._searched: dict[str, int] = {}
+        """By camera: the last frame before the next GOP in which it looked for people."""
+
+    def next(self, camera: str, first: int, frames: int) -> Regions:
+        """Return the regions of the next GOP, the frames from ``first`` on."""
+        hold, end = self._hold, first + frames
+        spans = self._people.windows(camera, first, end - 1 + hold)
+        tracks = self._tracks(camera, first, end, spans)
+        searched = self._searched_frames(camera, first, end, spans)
+        regions: Regions = [
+            [] if np.abs(searched - pulse).min(initial=hold + 1) <= hold else None
+            for pulse in range(first, end)
+        ]
+        numbers = self._people.numbers(list(tracks), first, frames).tolist()
+        for track, track_numbers in zip(tracks.values(), numbers, strict=True):
+            pulses, boxes = self._extended(track, first, end)
+            for pulse, box in zip(pulses.tolist(), boxes.tolist(), strict=True):
+                number = track_numbers[pulse - first]
+                frame = regions[pulse - first]
+                if frame is not None:
+                    frame.append((track.number if number == UNCONFIRMED else number, *box))
+        self._remember(camera, end, tracks, [row[-1] for row in numbers], searched)
+        return regions
+
+    def _tracks(
+        self, camera: str, first: int, end: int, spans: Sequence[HistorySpan[CameraWindow]]
+    ) -> dict[TrackKey, _TrackBoxes]:
+        """Return the tracks' boxes from before the GOP to as far as is known behind it."""
+        tracks = {
+            key: track
+            for key, track in self._before[camera].items()
+            if first - self._hold <= track.followed_to < first
+        }
+        for span in spans:
+            window, at = span.window, span.first - span.window.first
+            part = window.boxes[:, at : at + span.last - span.first + 1]
+            for key, boxes in zip(window.keys, part, strict=True):
+                track = tracks.setdefault(key, _TrackBoxes())
+                track.followed_to = min(span.last, end - 1)
+                (known,) = np.nonzero(~np.isnan(boxes[:, 0]))
+                track.pulses += (known + span.first).tolist()
+                track.boxes += list(boxes[known])
+        return {key: track for key, track in tracks.items() if track.pulses}
+
+    def _searched_frames(
+        self, camera: str, first: int, end: int, spans: Sequence[HistorySpan[CameraWindow]]
+    ) -> NDArray[np.int64]:
+        """Return the frames near the GOP in which the camera looked for people."""
+        count = end - first + self._hold
+        searched = np.zeros(count, dtype=np.bool_)
+        for span in spans:
+            searched[span.first - first : span.last - first + 1] = True
+        searched &= ~self._people.undetected.over(camera, first, count)
+        before = self._searched.get(camera)
+        return np.concatenate(([] if before is None else [before], first + np.flatnonzero(searched))).astype(
+            np.int64
+        )
+
+    def _extended(
+        self, track: _TrackBoxes, first: int, end: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return the frames of the GOP in which a track may be, (F,), and its regions there, (F, 4)."""
+        known, boxes = np.array(track.pulses), np.array(track.boxes)
+        begins = max(first, track.pulses[0] - self._hold)
+        ends = min(end, max(track.pulses[-1], track.followed_to) + self._hold + 1)
+        pulses = np.arange(begins, max(begins, ends))
+        between = np.stack([np.interp(pulses, known, side) for side in boxes.T], axis=1)
+        age = np.abs(pulses[:, None] - known).min(axis=1)
+        reach = MARGIN + _GROWTH * np.minimum(1, age / self._hold)
+        size = between[:, 2:] - between[:, :2]
+        margin = np.maximum(_MARGIN_MIN, reach[:, None] * size)
+        return pulses, np.hstack([between[:, :2] - margin, between[:, 2:] + margin])
+
+    def _remember(
+        self,
+        camera: str,
+        end: int,
+        tracks: dict[TrackKey, _TrackBoxes],
+        numbers: Sequence[int],
+        searched: NDArray[np.int64],
+    ) -> None:
+        """Keep each track's last box in or before the GOP that ends."""
+        self._before[camera] = remembered = {}
+        for (key, track), number in zip(tracks.items(), numbers, strict=True):
+            past = [at for at, pulse in enumerate(track.pulses) if pulse < end]
+            if past:
+                last = past[-1]
+                remembered[key] = _TrackBoxes(
+                    [track.pulses[last]],
+                    [track.boxes[last]],
+                    max(track.pulses[last], track.followed_to),
+                    track.number if number == UNCONFIRMED else number,
+                )
+        if (before := searched[searched < end]).size:
+            self._searched[camera] = int(before[-1])

@@ -1,0 +1,159 @@
+"""The regions that hide people: wider, longer and of more people than the published boxes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fakes.service.fed_site import A, B
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    LARGE,
+    SMALL,
+    STRIDE,
+    FedService,
+    TrackNumbers,
+    camera_tracks,
+    small_config,
+    tracks,
+)
+from server.messaging.epochs import end_of_epoch
+from server.messaging.messages import Box, TrackMessage
+from server.service.identity.occupied_regions import Regions
+
+HOLD = 12
+"""Frames of half a second."""
+
+
+class Site:
+    """A site whose viewers see people pixelated; tracks below 0 are not confirmed."""
+
+    def __init__(self) -> None:
+        self.service = FedService(small_config(access={"blur": "others"}))
+        self.service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+        self.service.connect_cameras(*CAMERAS)
+        self.service.on_decision.append(lambda choices: self.seen.append(choices.first))
+        self.seen: list[int] = []
+        self._epoch = 0
+
+    def feed(self, boxes: dict[int, list[Box | None]] | None, **changes: Any) -> None:
+        """Feed an epoch of camera A, a box per frame and track; None: it reports nothing. B sees nobody."""
+        seen = [
+            TrackMessage(id=track, boxes=places, confidence=1.0) for track, places in (boxes or {}).items()
+        ]
+        if boxes is not None:
+            message = camera_tracks(A, self._epoch, {}, tracks=seen, **changes)
+            self.service.ingest.tracks(tracks(message))
+        self.service.ingest.tracks(tracks(camera_tracks(B, self._epoch, {})))
+        self.service.pulses.newest = end_of_epoch(self._epoch, STRIDE)
+        self.service.decide()
+        self._epoch += 1
+
+    def regions(self) -> Regions:
+        """Return the regions of all frames that are decided."""
+        state = self.service.decision_state
+        return [frame for first in self.seen for frame in state.occupied(A, first)]
+
+
+def covers(region: tuple[int, float, float, float, float], box: Box) -> bool:
+    left, top, right, bottom = region[1:]
+    return left < box[0] and top < box[1] and right > box[2] and bottom > box[3]
+
+
+def test_a_region_reaches_beyond_the_box_on_all_sides() -> None:
+    site = Site()
+    for _ in range(4):
+        site.feed({1: [LARGE] * STRIDE})
+    for frame in site.regions():
+        assert frame is not None
+        ((number, left, top, right, bottom),) = frame
+        assert number == 1
+        assert left <= LARGE[0] - 3.2
+        assert right >= LARGE[2] + 3.2
+        assert top <= LARGE[1] - 8
+        assert bottom >= LARGE[3] + 8
+    site.service.close()
+
+
+def test_people_are_hidden_before_they_are_detected_and_after() -> None:
+    site = Site()
+    absent: list[Box | None] = [None] * STRIDE
+    for epoch in range(12):
+        site.feed({1: [SMALL] * STRIDE if epoch in (3, 4) else absent} if 3 <= epoch < 5 else {})
+    detected = range(3 * STRIDE, 5 * STRIDE)
+    for pulse, frame in enumerate(site.regions()):
+        assert frame is not None
+        near = detected.start - STRIDE <= pulse < detected.stop + HOLD
+        far = not detected.start - HOLD <= pulse < detected.stop + HOLD
+        if near:
+            assert any(covers(region, SMALL) for region in frame), pulse
+        assert not (far and frame), pulse
+    site.service.close()
+
+
+def test_a_person_whom_the_tracker_still_follows_stays_hidden_where_they_were() -> None:
+    site = Site()
+    for epoch in range(14):
+        site.feed({1: [SMALL if epoch < 2 else None] * STRIDE})
+    assert all(frame and covers(frame[0], SMALL) for frame in site.regions())
+    site.service.close()
+
+
+def test_between_two_boxes_the_region_moves() -> None:
+    site = Site()
+    away: Box = (SMALL[0] + 30, SMALL[1], SMALL[2] + 30, SMALL[3])
+    for epoch in range(6):
+        box = SMALL if epoch < 2 else away
+        site.feed({1: [box, None, None, None, box] if epoch == 2 else [box] * STRIDE})
+    lefts = [frame[0][1] for frame in site.regions() if frame]
+    assert lefts[0] < 10 < lefts[-1]
+    site.service.close()
+
+
+def test_a_track_without_a_number_is_hidden() -> None:
+    site = Site()
+    site.service.decider.people.numbers = (  # type: ignore[method-assign]
+        lambda keys, _, frames: np.full((len(keys), frames), -1)
+    )
+    for _ in range(4):
+        site.feed({1: [SMALL] * STRIDE})
+    assert all(frame and frame[0][0] == -1 and covers(frame[0], SMALL) for frame in site.regions())
+    site.service.close()
+
+
+def test_nothing_is_known_where_the_camera_has_not_looked_for_long() -> None:
+    site = Site()
+    blind = range(4, 12)
+    for epoch in range(16):
+        frames = list(range(epoch * STRIDE, (epoch + 1) * STRIDE))
+        site.feed({}, without_detection=frames if epoch in blind else [])
+    regions = site.regions()
+    for pulse, frame in enumerate(regions):
+        last, then = blind.start * STRIDE - 1, blind.stop * STRIDE
+        if pulse <= last + HOLD or pulse >= then - STRIDE:  # the look-ahead is short
+            assert frame is not None, pulse
+        elif pulse < then - HOLD:
+            assert frame is None, pulse
+    site.service.close()
+
+
+def test_nothing_is_known_of_a_camera_that_reports_nothing() -> None:
+    site = Site()
+    for _ in range(4):
+        site.feed({})
+    for _ in range(10):
+        site.feed(None)
+    regions = site.regions()
+    assert regions[0] == []
+    assert regions[-1] is None
+    site.service.close()
+
+
+def test_without_blurred_viewers_no_regions_are_kept() -> None:
+    service = FedService(small_config())
+    service.connect_cameras(*CAMERAS)
+    for epoch in range(4):
+        service.feed(epoch, {A: {1: SMALL}, B: {1: LARGE}})
+    assert service.decision_state.occupied(A, 0) == []
+    service.close()
