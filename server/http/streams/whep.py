@@ -89,7 +89,13 @@ async def _begin(
     offer = (await request.read()).decode("utf-8", "replace")
     try:
         session, answer = await request.app[WHEP_SESSIONS].answer(
-            offer, channel, service.config.site.fps, request.app[TRAFFIC], request.path, holding
+            offer,
+            channel,
+            service.config.site.fps,
+            request.app[TRAFFIC],
+            request.path,
+            request.remote or "",
+            holding,
         )
     except NoWebRtcError:
         return error_response(501, HOW_TO_INSTALL)

@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import importlib
 import logging
+import re
 import secrets
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
@@ -29,6 +30,8 @@ _CLOCK = 90_000
 _CONNECT_S = 20.0
 """Seconds within which a viewer must connect."""
 _START_CODE = b"\x00\x00\x00\x01"
+_HIDDEN_HOST = re.compile(r"^(a=candidate:\S+ \d+ \S+ \d+ )[0-9A-Za-z-]+\.local(?= )", re.MULTILINE)
+"""The beginning of a candidate (RFC 8839, 5.1) whose host is a multicast DNS name."""
 HOW_TO_INSTALL = "WebRTC needs aiortc: pip install 'myview[webrtc]'"
 
 
@@ -51,6 +54,17 @@ async def load_webrtc() -> ModuleType:
 def access_unit(picture: EncodedPicture) -> bytes:
     """Return a picture as Annex B; a keyframe with its parameter sets, for who begins there."""
     return b"".join(_START_CODE + unit for unit in split_sample(picture.sample))
+
+
+def reveal_viewer(offer: str, address: str) -> str:
+    """Return an SDP offer with a viewer's address in place of the names that browsers hide it behind.
+
+    Multicast DNS resolves these (draft-ietf-mmusic-mdns-ice-candidates) neither from another network, as
+    from a container, nor in time on a busy machine. Without any address aioice gives up at once, although the
+    viewer's own checks would arrive; these are enough where the address is that of a proxy.
+    """
+    host, _, _ = address.partition("%")  # without the scope of a link-local address
+    return _HIDDEN_HOST.sub(rf"\g<1>{host}", offer) if host else offer
 
 
 async def timed_packets(viewer: Subscriber, fps: float, traffic: Traffic) -> AsyncIterator[tuple[bytes, int]]:
@@ -126,6 +140,7 @@ class WhepSessions:
         fps: float,
         traffic: Traffic,
         path: str,
+        address: str,
         holding: Callable[[WhepSession], contextlib.AbstractContextManager[None]],
     ) -> tuple[WhepSession, str]:
         """Begin a session for an SDP offer; return it and the SDP answer.
@@ -136,6 +151,7 @@ class WhepSessions:
             fps: the site's rate.
             traffic: counts what is sent.
             path: of the stream's WHEP address.
+            address: of the viewer; empty: unknown.
             holding: entered while the session lasts.
 
         Raises:
@@ -147,7 +163,7 @@ class WhepSessions:
         traffic.join(viewer)
         try:
             track = webrtc.EncodedTrack(timed_packets(viewer, fps, traffic))
-            connection, text = await webrtc.answer_offer(offer, track)
+            connection, text = await webrtc.answer_offer(reveal_viewer(offer, address), track)
         except BaseException:
             traffic.leave(viewer)
             channel.unsubscribe(viewer)

@@ -15,6 +15,9 @@ const STATES = { raised: 'open', followed: 'being followed', answered: 'answered
 export class FlagList {
   /** @type {Map<number, Flag>} */
   #flags = new Map();
+  /** Flags of events since the last request: newer than its answer.
+   * @type {Map<number, Flag>} */
+  #updated = new Map();
   #list = element('flag-list');
   #none = element('no-flags');
 
@@ -30,15 +33,19 @@ export class FlagList {
   close() {}
 
   open() {
+    /** @type {Map<number, Flag>} */
+    const updated = new Map();
+    this.#updated = updated;
     void getJson('api/flags').then(({ flags }) => {
-      this.#flags.clear();
-      for (const flag of flags.reverse()) this.#flags.set(flag.id, flag);
+      if (updated !== this.#updated) return; // there is a later request
+      this.#flags = new Map([...flags.reverse(), ...updated.values()].map((flag) => [flag.id, flag]));
       this.#show();
     }, this.showError);
   }
 
   /** @param {Flag} flag */
   update(flag) {
+    this.#updated.set(flag.id, flag);
     this.#flags.set(flag.id, flag);
     this.#show();
   }

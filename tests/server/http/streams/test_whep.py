@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import importlib
-from collections.abc import AsyncIterator
+import re
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -78,12 +79,16 @@ async def post(
 
 @asynccontextmanager
 async def watching(
-    site: ServedSite, path: str, headers: dict[str, str] | None = None
+    site: ServedSite,
+    path: str,
+    headers: dict[str, str] | None = None,
+    change: Callable[[str], str] = str,
 ) -> AsyncIterator[Viewer]:
+    """Watch a stream; the offer may be changed on its way."""
     connection = await offer("VP8", "H264")  # as browsers do
     tracks = asyncio.Queue[Any]()
     connection.on("track", tracks.put_nowait)
-    status, session, answer = await post(site, path, connection.localDescription.sdp, headers)
+    status, session, answer = await post(site, path, change(connection.localDescription.sdp), headers)
     assert status == 201, answer
     await connection.setRemoteDescription(RTCSessionDescription(answer, "answer"))
     try:
@@ -128,6 +133,20 @@ async def test_a_session_is_live_and_ends_by_delete(path: str) -> None:
                 async with site.session.delete(viewer.session) as answer:
                     assert answer.status == status
                 await until_ended(site)
+
+
+def hide_addresses(sdp: str) -> str:
+    """Replace all addresses by one name that nobody resolves, as browsers in another network do."""
+    hidden = re.sub(r"(?m)^(a=candidate:\S+ \d+ \S+ \d+ )\S+", r"\g<1>3c7f5a2e-0b1d.local", sdp)
+    assert hidden != sdp
+    return hidden
+
+
+async def test_a_browser_that_hides_its_address_is_reached(site_with_people: ServedSite) -> None:
+    async with watching(site_with_people, "/cameras/c0/whep", change=hide_addresses) as viewer:
+        site_with_people.service.feed(3, {A: {1: LARGE}, B: {1: SMALL}})
+        assert await viewer.picture()
+        assert "c0/whep" in viewer.session
 
 
 @pytest.mark.parametrize(
