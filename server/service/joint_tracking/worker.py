@@ -14,7 +14,7 @@ from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.joint_tracking.epochs import joint_setup, joint_task, with_joint_tracks, without_tracks
-from server.service.joint_tracking.joint_messages import JointSetup, JointTracks
+from server.service.joint_tracking.joint_messages import JointSetup, JointTask, JointTracks
 from server.system.worker.process import WorkerDiedError, WorkerProcess
 
 log = logging.getLogger(__name__)
@@ -22,13 +22,16 @@ log = logging.getLogger(__name__)
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 30.0
 _ANSWER_S = 10.0
 """A process that takes longer for an epoch hangs: it is replaced."""
+_LATE_S = 0.6
+"""Seconds after which an epoch is decided without joint tracks, at least."""
 
 
 class JointWorker:
     """Replaces the own tracks of the cameras of the common ground by joint ones, epoch by epoch.
 
     If the process dies it is replaced, and people are known again by where they are and how they look. Until
-    then epochs have no tracks in these cameras; a process that dies again and again is replaced less often.
+    then, and while it is late, epochs have no tracks in these cameras: decisions do not wait. A process that
+    dies again and again is replaced less often.
     """
 
     def __init__(self, config: Config) -> None:
@@ -39,7 +42,10 @@ class JointWorker:
         self._logged: set[str] = set()
         self._runs = count()
         self._worker: WorkerProcess[JointTracks] | None = None
-        self._failures = LogThrottle()
+        self._answer: asyncio.Task[JointTracks] | None = None
+        """To the last task, while the process works on it."""
+        self._patience_s = max(_LATE_S, config.track.cross_view_wait_s)
+        self._failures, self._late = LogThrottle(), LogThrottle()
         self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         self._retry_at = 0.0
         """When to start a process at the earliest, by the loop's clock."""
@@ -56,19 +62,46 @@ class JointWorker:
         """Return the epoch with joint tracks; unchanged where no cameras are tracked jointly."""
         if self._setup is None:
             return epoch
-        if self._worker is not None or asyncio.get_running_loop().time() >= self._retry_at:
-            task = joint_task(epoch, self._cameras)
-            try:
-                worker = await self._running(self._setup)
-                joint = await worker.ask(task)
-                self._backoff.reset()
-            except WorkerDiedError as error:
-                await self._replace(error)
-            else:
-                self._joint = self._joint - task.cameras.keys() | joint.cameras.keys()
-                self._log_joint_cameras(joint.cameras)
-                return with_joint_tracks(epoch, joint)
-        return without_tracks(epoch, self._joint)
+        if not await self._is_idle():
+            return without_tracks(epoch, self._joint)
+        task = joint_task(epoch, self._cameras)
+        self._answer = asyncio.create_task(self._ask(task, self._setup), name="joint tracking")
+        await asyncio.wait({self._answer}, timeout=self._patience_s)
+        if not self._answer.done():
+            if (more := self._late.record()) is not None:
+                log.warning(
+                    "the process that tracks jointly is late%s: its cameras show nobody meanwhile", more
+                )
+            return without_tracks(epoch, self._joint)
+        joint = await self._take_answer()
+        if joint is None:
+            return without_tracks(epoch, self._joint)
+        self._joint = self._joint - task.cameras.keys() | joint.cameras.keys()
+        self._log_joint_cameras(joint.cameras)
+        return with_joint_tracks(epoch, joint)
+
+    async def _is_idle(self) -> bool:
+        """Return whether the process can be asked: not if it is late, or is started again only later."""
+        if self._answer is not None:
+            if not self._answer.done():
+                return False
+            await self._take_answer()  # to an epoch that has been decided without it
+        return self._worker is not None or asyncio.get_running_loop().time() >= self._retry_at
+
+    async def _ask(self, task: JointTask, setup: JointSetup) -> JointTracks:
+        return await (await self._running(setup)).ask(task)
+
+    async def _take_answer(self) -> JointTracks | None:
+        """Return the answer that is there; None: the process has died, and is replaced."""
+        assert self._answer is not None  # noqa: S101 — callers have asked
+        answer, self._answer = self._answer, None
+        try:
+            joint = answer.result()
+        except WorkerDiedError as error:
+            await self._replace(error)
+            return None
+        self._backoff.reset()
+        return joint
 
     def _log_joint_cameras(self, cameras: Collection[str]) -> None:
         """Log which cameras are tracked jointly, when more are."""
@@ -92,6 +125,10 @@ class JointWorker:
 
     async def close(self) -> None:
         """End the process."""
+        answer, self._answer = self._answer, None
+        if answer is not None:
+            answer.cancel()
+            await asyncio.gather(answer, return_exceptions=True)
         worker, self._worker = self._worker, None
         if worker is not None:
             await worker.kill()

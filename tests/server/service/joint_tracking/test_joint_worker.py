@@ -17,9 +17,16 @@ from server.system.worker import process as process_module
 from server.system.worker.process import WorkerDiedError, WorkerProcess
 
 
-async def test_the_process_gives_the_same_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker_module, "_ANSWER_S", PATIENCE)
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait for the process however busy the machine is."""
+    for name in ("_ANSWER_S", "_LATE_S"):
+        monkeypatch.setattr(worker_module, name, PATIENCE)
     monkeypatch.setattr(process_module, "START_S", PATIENCE)
+
+
+@pytest.mark.usefixtures("patient")
+async def test_the_process_gives_the_same_tracks() -> None:
     config, epochs = joint_config(), list(walked_epochs(walk_past(16)))
     worker, stage = JointWorker(config), JointStage(config)
     try:
@@ -29,9 +36,8 @@ async def test_the_process_gives_the_same_tracks(monkeypatch: pytest.MonkeyPatch
         await worker.close()
 
 
-async def test_the_process_is_started_before_the_first_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker_module, "_ANSWER_S", PATIENCE)
-    monkeypatch.setattr(process_module, "START_S", PATIENCE)
+@pytest.mark.usefixtures("patient")
+async def test_the_process_is_started_before_the_first_epoch() -> None:
     worker = JointWorker(joint_config())
     try:
         async with asyncio.timeout(PATIENCE):
@@ -44,12 +50,11 @@ async def test_the_process_is_started_before_the_first_epoch(monkeypatch: pytest
         await worker.close()
 
 
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 async def test_a_process_that_dies_or_hangs_is_replaced(
     how: signal.Signals, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(worker_module, "_ANSWER_S", PATIENCE)
-    monkeypatch.setattr(process_module, "START_S", PATIENCE)
     epochs = list(walked_epochs(walk_past()))
     worker = JointWorker(joint_config())
     try:
@@ -68,6 +73,32 @@ async def test_a_process_that_dies_or_hangs_is_replaced(
     assert after.joint.tracks.run == before.joint.tracks.run + 1
     assert len(after.tracks["c0"].tracks) == 2
     assert sum("started anew" in record.message for record in caplog.records) == 1
+
+
+@pytest.mark.usefixtures("patient")
+async def test_decisions_do_not_wait_for_a_process_that_is_late(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    epochs = iter(walked_epochs(walk_past()))
+    worker = JointWorker(joint_config())
+    try:
+        async with asyncio.timeout(PATIENCE):
+            assert (await worker.step(next(epochs))).joint is not None
+            pid = worker.pid
+            assert pid is not None
+            os.kill(pid, signal.SIGSTOP)
+            monkeypatch.setattr(worker, "_patience_s", 0.01)
+            late = [await worker.step(next(epochs)) for _ in range(3)]
+            os.kill(pid, signal.SIGCONT)
+            assert worker._answer is not None
+            await worker._answer
+            monkeypatch.setattr(worker, "_patience_s", PATIENCE)
+            assert (await worker.step(next(epochs))).joint is not None
+            assert worker.pid == pid
+    finally:
+        await worker.close()
+    assert [(epoch.joint, epoch.tracks["c0"].tracks) for epoch in late] == [(None, [])] * 3
+    assert sum("is late" in record.message for record in caplog.records) == 1
 
 
 async def test_a_process_that_dies_again_and_again_is_replaced_less_often(
