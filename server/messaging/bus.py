@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from collections.abc import Callable, Mapping
 from typing import Any, Self
 
@@ -20,6 +21,9 @@ from server.system.errors import UserError
 _DROP_AFTER_US = 20_000
 """How long a message waits at a full queue; zenoh's default of 1 ms is too short for a keyframe."""
 
+_FEW_THREADS = 8
+"""Threads for receiving in a process with connections to a few others."""
+_SESSIONS_OF_CAMERA = 2
 _OPEN_WITHIN_MS = 5_000
 _MESSAGE_MAX = 1 << 25
 """Bytes of one message; a 4K keyframe has some millions."""
@@ -37,17 +41,20 @@ class Bus:
         self._undeclare: list[Callable[[], None]] = []
 
     @classmethod
-    def router(cls, settings: ZenohSettings, access: Mapping[str, Any] | None = None) -> Self:
+    def router(
+        cls, settings: ZenohSettings, access: Mapping[str, Any] | None = None, cameras: int = 0
+    ) -> Self:
         """Open the session of a best-view service, to which cameras connect.
 
         Routers do not forward to each other: a camera sends to all of them, so each message comes once, and a
         router that stops takes nothing from the other services.
 
-        ``access`` is zenoh's access control for the users in ``settings.users``.
+        ``access`` is zenoh's access control for the users in ``settings.users``; ``cameras`` is their number.
 
         Raises:
             UserError: the address cannot be listened on.
         """
+        _set_receiving_threads(_FEW_THREADS + _SESSIONS_OF_CAMERA * cameras)
         config = _config(settings, "router", None)
         if settings.users is not None:
             config.insert_json5("transport/auth/usrpwd/dictionary_file", json.dumps(str(settings.users)))
@@ -77,6 +84,7 @@ class Bus:
             UserError: zenoh does not support the address, or there is no such user.
         """
         # A peer, not a client: a client session has one router, and cannot be opened while that is down.
+        _set_receiving_threads(_FEW_THREADS)
         config = _config(settings, "peer", user)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
         config.insert_json5("connect/exit_on_failure", "false")
@@ -103,6 +111,7 @@ class Bus:
         Raises:
             UserError: the router cannot be reached.
         """
+        _set_receiving_threads(_FEW_THREADS)
         config = _config(settings, "client", user)
         try:
             config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
@@ -209,6 +218,16 @@ def _sender(message: Message) -> str:
 
 def _size(message: Message) -> int:
     return len(message.payload) + len(message.attachment)
+
+
+def _set_receiving_threads(threads: int) -> None:
+    """Set how many threads this process receives with, before its first session.
+
+    zenoh sets SO_LINGER, so that closing a connection to a host that is cut off blocks a thread for ten
+    seconds (github.com/eclipse-zenoh/zenoh/issues/2350). Of two threads, zenoh's default, none would be left
+    to receive from other hosts.
+    """
+    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {threads}), net: (worker_threads: 4))")
 
 
 def _config(settings: ZenohSettings, mode: str, user: str | None) -> zenoh.Config:

@@ -48,7 +48,9 @@ class BusConnection:
         Raises:
             UserError: the address is in use, or a password file cannot be read.
         """
-        self._bus = bus = Bus.router(self._config.zenoh, access_control_of(self._config))
+        self._bus = bus = Bus.router(
+            self._config.zenoh, access_control_of(self._config), len(self._config.cameras)
+        )
         for topic, handler in camera_handlers.items():
             self.inboxes.append(bus.subscribe(self._keys.camera("*", topic), handler))
         if on_audio is not None:

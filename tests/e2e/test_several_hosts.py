@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -47,7 +48,9 @@ async def test_a_service_whose_host_is_cut_off_is_replaced(tmp_path: Path, hosts
             recording = asyncio.create_task(watch(site.urls[0], number, tmp_path / "one.mp4", 12.0))
             await survivor.until(survivor.last_pulse + round(3 * FPS))
             hosts.cut("one")
-            await survivor.until(survivor.last_pulse + round(6 * FPS))
+            cut_at = survivor.last_pulse
+            await survivor.until(cut_at + round(6 * FPS))
+            assert longest_without_boxes(survivor, cut_at) <= 3 * FPS, "the cameras still reach the survivor"
             hosts.cut("one", is_cut=False)
             result = await recording
             assert (result.complete, result.reconnections > 0) == (True, True)
@@ -57,6 +60,12 @@ async def test_a_service_whose_host_is_cut_off_is_replaced(tmp_path: Path, hosts
                 while not agree(returned, survivor):
                     await returned.until(returned.last_pulse + 1)
                     await survivor.until(returned.last_pulse)
+
+
+def longest_without_boxes(watched: Watcher, since: int) -> int:
+    """Return the most pulses in a row without anybody's box, at a service that decides on."""
+    shown = [gop.first for _, gop in watched.gops if gop.first > since and any(map(any, gop.boxes.values()))]
+    return max(after - before for before, after in pairwise([since, *shown, watched.last_pulse]))
 
 
 def agree(one: Watcher, other: Watcher) -> bool:
