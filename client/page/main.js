@@ -8,6 +8,7 @@ import { element, setText } from './shared/dom.js';
 import { ServerEvents } from './shared/events.js';
 import { SelectionCosts } from './people/selection_costs.js';
 import { longLabel } from './people/names.js';
+import { PastSearch } from './timeline/past_search.js';
 import { Overlay } from './player/overlay.js';
 import { Painter } from './player/painter.js';
 import { PersonCards } from './people/person_cards.js';
@@ -45,6 +46,7 @@ const strip = new TimelineStrip(element('strip'));
 const range = new RangeSelect(element('span'), element('strip'), updateReadout);
 const reason = new SelectionReason(element('reason'));
 const delayChoice = new DelayChoice(element('delay-choice'), (delay) => viewer.chooseDelay(delay));
+const search = new PastSearch(viewer);
 const costs = new SelectionCosts(viewer, strip, element('why'));
 const sitePoller = new SitePoller(viewer);
 const painter = new Painter(video, viewer, overlay, showCamera, () => pointing.addFrame());
@@ -71,6 +73,7 @@ function update() {
     cards.show(viewer.people, viewer.object, viewer.tiles, viewer.palette, (person) => viewer.isGone(person));
     element('no-people').hidden = viewer.people.length > 0;
   }
+  search.update();
   delayChoice.show(viewer.delays, viewer.delay);
   events?.choose(viewer.delay);
   tiles.show(viewer.tiles);

@@ -166,6 +166,16 @@ export class Viewer {
     this.#writeAddress(true);
   }
 
+  /**
+   * @param {number} object selected by the user, who may have left long ago
+   * @param {number} pulse to play their best view from
+   */
+  selectAt(object, pulse) {
+    this.select(object);
+    this.hold(null);
+    this.timeShift.watchFrom(pulse);
+  }
+
   /** @param {string | null} camera to hold; the held one, or null: return to the best view */
   hold(camera) {
     if (this.site?.blur) return this.showNotice('People are blurred only in the best view.');
@@ -242,8 +252,8 @@ export class Viewer {
       known: this.site !== null && this.people !== null,
       people: this.people?.length ?? 0,
       object: this.object,
-      listed: this.selected !== undefined,
-      visible: this.selected?.visible ?? false,
+      listed: this.selected !== undefined || this.timeShift.moment !== null,
+      visible: this.timeShift.moment !== null || (this.selected?.visible ?? false),
       paused: this.player.video.paused && exists,
       moving: advancing && (switching || this.player.shown?.object === this.object),
     });
@@ -310,8 +320,8 @@ export class Viewer {
 
   #updatePlayer() {
     if (!this.site?.codec || !this.supported || !this.people) return;
-    if (this.object === null || !this.selected) return this.player.stop();
     const past = this.timeShift.moment;
+    if (this.object === null || !(this.selected || past)) return this.player.stop();
     const { held, preferred } = this.preference;
     const delay = past ? null : this.delay;
     this.player.select({ object: this.object, camera: held, prefer: past ? null : preferred, delay, past });

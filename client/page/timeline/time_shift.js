@@ -38,8 +38,8 @@ export class TimeShift {
    * @param {boolean} resumedPause whether that is where the video was paused
    */
   watchFrom(from, resumedPause = false) {
-    const { site, object, probe, decisions, format } = this.viewer;
-    if (!site || object === null || probe.pulse === null) return;
+    const { site, object, decisions, format } = this.viewer;
+    if (!site || object === null) return;
     const pulse = Math.max(0, from);
     if (site.blur) {
       if (!resumedPause) this.viewer.showNotice('People are blurred only in live pictures.');

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import io
 import json
+import sys
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
@@ -64,6 +65,8 @@ class FakeSite:
         flags: Flags for the operator.
         pointed: The position corrections received.
         busy: Messages of cameras about shed load.
+        stays: Stays that a search of the past finds, one answer each; what is missing is filled in.
+        searched: Queries of searches of the past.
         pulse0: Unix seconds at which pulse 0 was due.
     """
 
@@ -87,6 +90,8 @@ class FakeSite:
     flags: list[dict[str, Any]] = field(default_factory=list)
     pointed: list[dict[str, Any]] = field(default_factory=list)
     busy: dict[str, str] = field(default_factory=dict)
+    stays: list[dict[str, Any]] = field(default_factory=list)
+    searched: list[dict[str, str]] = field(default_factory=list)
     pulse0: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -263,6 +268,8 @@ class SiteServer:
         app.router.add_get("/api/objects/{k}/choice", self._choice)
         app.router.add_get("/api/objects/{k}/past", self._past)
         app.router.add_get("/api/past", self._decisions)
+        app.router.add_get("/api/past/search", self._search)
+        app.router.add_get("/api/rules", self._rules)
         app.router.add_get("/objects/{k}/best.mp4", self._best)
         app.router.add_get("/cameras/{camera}/live.mp4", self._best)
         app.router.add_get("/{of}/{k}/hls/index.m3u8", self._playlist)
@@ -324,6 +331,32 @@ class SiteServer:
         gops = range(first - first % GOP, min(end, self.site.edge), GOP)
         return web.Response(text="".join(json.dumps(self.site.gop(gop)) + "\n" for gop in gops))
 
+    async def _search(self, request: web.Request) -> web.Response:
+        """Answer with one stay at a time."""
+        site = self.site
+        site.searched.append(dict(request.query))
+        if not site.stays:
+            return web.json_response({"error": "zone: 'till': there is no such area"}, status=400)
+        stay = site.stays[len(site.searched) - 1]
+        is_last = len(site.searched) == len(site.stays)
+        begins = datetime.fromtimestamp(site.pulse0 + stay["first"] / FPS, UTC).isoformat()
+        filled: dict[str, Any] = {
+            "run": None,
+            "name": None,
+            "zone": None,
+            "camera": None,
+            "begins": begins,
+            "clip": None,
+        }
+        filled |= {"seconds": stay["frames"] / FPS, "cameras": list(CAMERAS[:2]), **stay}
+        next_pulse = None if is_last else stay["first"] + stay["frames"]
+        answer = {"stays": [filled], "found": 1, "next": next_pulse, "ends": begins, "zones": ["till"]}
+        return web.json_response(answer)
+
+    async def _rules(self, _: web.Request) -> web.Response:
+        zones = [{"zone": "till", "area": [[0, 0], [1, 0], [1, 1]]}, {"zone": "door", "area": None}]
+        return web.json_response({"units_per_meter": 1.0, "zones": zones, "rules": [], "events": []})
+
     async def _thumbnail(self, request: web.Request) -> web.Response:
         return web.Response(body=thumbnail(int(request.match_info["k"])), content_type="image/jpeg")
 
@@ -337,6 +370,7 @@ class SiteServer:
         if "from" in request.query and first < site.replayable_from:
             return web.json_response({"error": "not kept"}, status=416)
         first -= first % GOP
+        end = int(request.query.get("to", f"p{sys.maxsize}")[1:])
         waits = site.past_released if "from" in request.query else None
         response = web.StreamResponse(headers={"Content-Type": "video/mp4"})
         await response.prepare(request)
@@ -346,6 +380,8 @@ class SiteServer:
         with contextlib.suppress(ConnectionError):
             await response.write(pattern(0).init)
             async for pulse in site.released(first):
+                if pulse >= end:
+                    break
                 if pulse not in site.skipped:
                     shown = site.shown(k, pulse, held, request.query.get("prefer"))
                     await response.write(pattern(shown).fragment(pulse))
