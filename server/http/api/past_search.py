@@ -13,7 +13,7 @@ from server.http.access.permissions import Scope
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, json_response
 from server.http.streams.time_range import parse_time_range
-from server.http.viewers.viewer_limits import event_slot, evict_or_refuse_listener
+from server.http.viewers.viewer_limits import evict_or_refuse_search, search_slot
 from server.service.facade.errors import InvalidCommandError
 from server.service.facade.past_search import ALL, PastQuery
 from server.service.facade.recordings import TimeReferenceError
@@ -66,12 +66,10 @@ async def search_past(request: web.Request) -> web.Response:
         query = _parse_query(request, scope)
     except (TimeReferenceError, InvalidCommandError) as error:
         return error_response(400, str(error))
-    refused = _refuse_outside(query, scope, service.people.current_number) or evict_or_refuse_listener(
-        request
-    )
+    refused = _refuse_outside(query, scope, service.people.current_number) or evict_or_refuse_search(request)
     if refused is not None:
         return refused
-    with event_slot(request):
+    with search_slot(request):
         return json_response(await service.past_search.search(query))
 
 

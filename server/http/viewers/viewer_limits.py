@@ -18,6 +18,9 @@ VIEWER_SLOTS = web.AppKey("viewer slots", FairShare)
 """Slots of viewers, by stream."""
 EVENT_SLOTS = web.AppKey("event slots", FairShare)
 """Slots of clients that receive events or recorded decisions."""
+SEARCH_SLOTS = web.AppKey("search slots", FairShare)
+"""Slots of searches of the past, of which one works while the others wait."""
+_SEARCHES_MAX = 8
 
 
 def evict_or_refuse_viewer(
@@ -60,6 +63,21 @@ def evict_or_refuse_listener(request: web.Request) -> web.Response | None:
 def event_slot(request: web.Request) -> Iterator[None]:
     """Hold an event slot inside."""
     with _slot(request, request.app[EVENT_SLOTS], ""):
+        yield
+
+
+def evict_or_refuse_search(request: web.Request) -> web.Response | None:
+    """Return 503 if too many searches of the past wait; None: another may, or has replaced one."""
+    slots = request.app[SEARCH_SLOTS]
+    if slots.all < _SEARCHES_MAX or _evict(request, slots):
+        return None
+    return unavailable("too many searches of the past wait already; try again later")
+
+
+@contextmanager
+def search_slot(request: web.Request) -> Iterator[None]:
+    """Hold a search slot inside."""
+    with _slot(request, request.app[SEARCH_SLOTS], ""):
         yield
 
 

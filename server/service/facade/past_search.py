@@ -33,8 +33,6 @@ ALL = "*"
 """Every zone, or every camera."""
 _WORK_S = 5.0
 """Processor seconds of one search; what is left is searched by another."""
-_WAITING_MAX = 8
-"""Searches that wait while one runs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +134,6 @@ class PastSearchService:
     def __init__(self, pipeline: BestViewPipeline) -> None:
         self._pipeline = pipeline
         self._turn = asyncio.Semaphore(1)
-        self._waiting = 0
 
     async def search(self, query: PastQuery) -> PastSearchResult:
         """Search.
@@ -145,20 +142,15 @@ class PastSearchService:
             InvalidCommandError: there is no such area.
             UnknownCameraError: there is no such camera.
             ConflictError: the area is on the floor, and no camera is calibrated.
-            BusyError: too many searches wait, or the search failed.
+            BusyError: the search failed.
         """
         task = self._task(query)
-        if self._waiting >= _WAITING_MAX:
-            raise BusyError("too many searches of the past wait already; try again later")
-        self._waiting += 1
         try:
             async with self._turn:
                 result = await run_search(task)
         except SearchError as error:
             log.warning("searching the past: %s", error)
             raise BusyError(f"searching the past: {error}") from error
-        finally:
-            self._waiting -= 1
         names = {} if query.only_camera is not None else self._pipeline.decider.people.registry.names
         on_floor = any(zone.camera is None for zone in task.zones)
         return PastSearchResult(

@@ -9,16 +9,19 @@ from random import Random
 from typing import Any
 from urllib.parse import quote
 
+import aiohttp
 import pytest
 
 from fakes.http.tokens import bearer, serve_with_tokens
 from fakes.service.fed_site import ServedSite, serve_site, show_people
 from fakes.service.scripted_cameras import CAMERAS
+from fakes.service.scripted_recordings import PULSE0, UNLIMITED, gop_record, written_folder
 from server.messaging.messages import Box
 from server.service.facade import past_search
 from server.service.past_search import worker
 from server.service.past_search.search import search
 from server.service.past_search.worker import SearchResult, SearchTask
+from server.service.recording.recording_folder import RecordingFolder
 
 A, B = CAMERAS
 LEFT: Box = (2.0, 10.0, 8.0, 28.0)
@@ -30,8 +33,8 @@ ZONES = [
     {"id": "floor", "area": [[32, 0], [64, 0], [64, 48], [32, 48]]},
     {"id": "door", "line": [[0, 0], [1, 0]], "inner": [0, 1]},
 ]
-EPOCHS = 40
-"""Person 1 is left for 20 GOPs of 0.2 s, then right; person 2 is in c1 in the first ten."""
+EPOCHS = 20
+"""Person 1 is left for ten GOPs of 0.2 s, then right; person 2 is in c1 in the first eight."""
 
 
 async def search_here(task: SearchTask) -> SearchResult:
@@ -50,7 +53,7 @@ async def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
         served.service.connect_cameras(*CAMERAS)
         for epoch in range(EPOCHS):
             box = LEFT if epoch < EPOCHS // 2 else RIGHT
-            served.service.feed(epoch, {A: {1: box}, B: {1: None, 2: MIDDLE if epoch < 10 else None}})
+            served.service.feed(epoch, {A: {1: box}, B: {1: None, 2: MIDDLE if epoch < 8 else None}})
         served.service.decider.people.registry.names = {1: "Ann"}
         yield served
 
@@ -189,20 +192,28 @@ async def test_no_query_of_a_search_fails(open_site: ServedSite) -> None:
         assert code == 200 or "\n" not in content["error"]
 
 
+class Waiting:
+    """Searches that wait until they are released."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.running = self.most = 0
+        self.go_on = asyncio.Event()
+        monkeypatch.setattr(past_search, "run_search", self.search)
+
+    async def search(self, task: SearchTask) -> SearchResult:
+        self.running += 1
+        self.most = max(self.most, self.running)
+        try:
+            await self.go_on.wait()
+        finally:
+            self.running -= 1
+        return search(task)
+
+
 async def test_searches_are_made_one_by_one_and_few_wait(
     open_site: ServedSite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    running, most, go_on = 0, 0, asyncio.Event()
-
-    async def slow(task: SearchTask) -> SearchResult:
-        nonlocal running, most
-        running += 1
-        most = max(most, running)
-        await go_on.wait()
-        running -= 1
-        return search(task)
-
-    monkeypatch.setattr(past_search, "run_search", slow)
+    waiting = Waiting(monkeypatch)
     many = [asyncio.create_task(open_site.get("/api/past/search?from=-9")) for _ in range(12)]
     refused = 0
     for done in asyncio.as_completed(many):
@@ -211,5 +222,46 @@ async def test_searches_are_made_one_by_one_and_few_wait(
             assert content["error"].startswith("too many searches of the past wait")
             refused += 1
             if refused == 4:
-                go_on.set()
-    assert (most, refused) == (1, 4)
+                waiting.go_on.set()
+    assert (waiting.most, refused) == (1, 4)
+
+
+async def test_searches_of_one_token_make_way_for_those_of_another(
+    site: ServedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waiting = Waiting(monkeypatch)
+    many = [asyncio.create_task(ask(site, "?from=p0")) for _ in range(9)]
+    done, many_left = await asyncio.wait(many, return_when=asyncio.FIRST_COMPLETED)
+    assert [task.result()[0] for task in done] == [503]
+    other = asyncio.create_task(ask(site, "?from=p0", "family"))
+    evicted, left = await asyncio.wait(many_left, return_when=asyncio.FIRST_COMPLETED)
+    (one,) = evicted
+    # The connection was reset; aiohttp asks again where it had been used before.
+    assert isinstance(one.exception(), aiohttp.ClientError) or one.result()[0] == 503
+    waiting.go_on.set()
+    assert (await other)[0] == 200
+    assert {(await task)[0] for task in left} == {200}
+
+
+async def test_people_of_an_earlier_run_are_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(past_search, "run_search", search_here)
+    earlier = [gop_record(gop, {1: A}) for gop in range(4)]
+    written_folder(RecordingFolder(tmp_path / "kept", UNLIMITED), earlier).close()
+    async for served in serve_site(record={"folder": str(tmp_path / "kept")}):
+        served.service.pulses.pulse0 = PULSE0
+        served.service.recorder.open()
+        served.service.connect_cameras(*CAMERAS)
+        for epoch in range(5, 8):
+            served.service.feed(epoch, {A: {1: LEFT}, B: {}})
+        found = (await served.get_json("/api/past/search?from=p0&min_s=0&order=longest"))["stays"]
+        (folder,) = served.service.recorder.folder.earlier  # type: ignore[union-attr]
+        assert [(stay["object"], stay["run"], stay["first"], stay["frames"]) for stay in found] == [
+            (1, folder.folder.name, 0, 20),
+            (1, None, 30, 5),
+        ]
+        assert [stay["clip"] for stay in found] == [
+            "cameras/c0/live.mp4?from=p0&to=p20",
+            "objects/1/best.mp4?from=p30&to=p35",
+        ]
+        own = (await served.get_json("/api/past/search?from=p0&min_s=0&object=1"))["stays"]
+        assert [stay["run"] for stay in own] == [None]
