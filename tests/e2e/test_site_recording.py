@@ -17,6 +17,7 @@ from fakes.running.beeps import sample_and_beep_times, write_beeps
 from fakes.running.site import CAMERAS, RunningSite, configuration, running, with_timeout
 from fakes.running.stream_frames import FPS, pictures
 from fakes.timeouts import PATIENCE
+from server.service.facade.past_search import SAMPLE_S
 
 pytestmark = [
     pytest.mark.live,
@@ -67,6 +68,7 @@ async def by_its_address_it_is_what_the_cameras_showed(site: RunningSite, folder
             camera: await downloaded(session, f"/cameras/{camera}/live.mp4?from=p{start}&to=p{end}", folder)
             for camera in CAMERAS
         }
+        await a_search_finds_when_they_were_seen(session, site, number, range(start, end))
     assert len(shown) > 3 * FPS
     chosen = {
         pulse: gop.choices.get(number)
@@ -77,6 +79,26 @@ async def by_its_address_it_is_what_the_cameras_showed(site: RunningSite, folder
         camera = chosen.get(pulse)
         if camera is not None and pulse in cameras[camera]:
             np.testing.assert_array_equal(picture, cameras[camera][pulse], f"{pulse}: {camera}")
+
+
+async def a_search_finds_when_they_were_seen(
+    session: aiohttp.ClientSession, site: RunningSite, number: int, pulses: range
+) -> None:
+    query = f"from=p{pulses.start}&to=p{pulses.stop}&object={number}&min_s=0&gap_s=0"
+    async with session.get(f"/api/past/search?{query}") as answer:
+        assert answer.status == 200, await answer.text()
+        stays = (await with_timeout(answer.json()))["stays"]
+    found = {pulse for stay in stays for pulse in range(stay["first"], stay["first"] + stay["frames"])}
+    seen = {
+        gop.first + place
+        for gop in site.gops
+        for frames in gop.boxes.values()
+        for place, boxes in enumerate(frames)
+        if any(box.object == number for box in boxes)
+    }
+    sampled = {pulse for pulse in seen & set(pulses) if pulse % round(SAMPLE_S * FPS) == 0}
+    assert sampled
+    assert sampled <= found
 
 
 def it_beeps_every_second_without_a_hole(film: Path) -> None:

@@ -101,11 +101,11 @@ export class PastSearch {
         found += answer.found;
         stays = joinStays([...stays, ...answer.stays], order, fps);
         this.#list(stays);
-        if (answer.next === null) return this.#report(summary(stays, found, answer.zones.length > 0));
+        if (answer.next === null) return this.#report(summary(stays, found, question.place));
         question.from = `p${answer.next}`;
         this.#report(`Searched until ${new Date(answer.ends).toLocaleString()}…`);
       }
-      this.#report(`Searched only a part: ${summary(stays, found, false)}`);
+      this.#report(`Searched only a part: ${summary(stays, found, question.place)}`);
     } catch (error) {
       if (search === this.#count) this.#report(error instanceof Error ? error.message : String(error));
     }
@@ -160,15 +160,16 @@ export function spanOf(span, from, to, now) {
 /**
  * @param {PastStay[]} stays
  * @param {number} found
- * @param {boolean} byZone
+ * @param {string} place
  */
-function summary(stays, found, byZone) {
+function summary(stays, found, place) {
   if (!stays.length) return 'No one was seen there.';
   const people = new Set(stays.map(({ run, object }) => `${run} ${object}`)).size;
   const total = duration(stays.reduce((sum, { seconds }) => sum + seconds, 0));
+  const all = ['zones', 'cameras', 'places'].includes(place) ? '' : `, ${total} in all`; // those overlap
   const listed = stays.length < found && stays.length >= 200 ? `${stays.length} of ${found}` : String(stays.length);
-  const zones = byZone ? ' Zones are where they are today.' : '';
-  return `${listed} ${stays.length === 1 ? 'stay' : 'stays'} of ${people} ${people === 1 ? 'person' : 'people'}, ${total} in all.${zones}`;
+  const zones = /zone|places/.test(place) ? ' Zones are where they are today.' : '';
+  return `${listed} ${stays.length === 1 ? 'stay' : 'stays'} of ${people} ${people === 1 ? 'person' : 'people'}${all}.${zones}`;
 }
 
 /** @param {PastStay} stay */

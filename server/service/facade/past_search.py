@@ -23,6 +23,7 @@ from server.service.past_search.worker import (
     run_search,
 )
 from server.service.pipeline import BestViewPipeline
+from server.service.recording.media_files import run_in_reader_thread
 from server.service.rules.setup import create_areas
 
 log = logging.getLogger(__name__)
@@ -31,6 +32,8 @@ SAMPLE_S = 0.4
 """Seconds between the frames that are looked at."""
 ALL = "*"
 """Every zone, or every camera."""
+_FILES_MAX = 2000
+"""Files of one search: about a day."""
 _WORK_S = 5.0
 """Processor seconds of one search; what is left is searched by another."""
 
@@ -145,6 +148,8 @@ class PastSearchService:
             BusyError: the search failed.
         """
         task = self._task(query)
+        runs, end = await run_in_reader_thread(self._files, query)  # of a month that are very many
+        task = msgspec.structs.replace(task, runs=runs, end=end)
         try:
             async with self._turn:
                 result = await run_search(task)
@@ -178,13 +183,6 @@ class PastSearchService:
                     f"zone: {query.zone} is on the floor, and no calibrated camera has sent pictures yet"
                 )
             zones = [zone for zone in zones if zone.camera is not None]
-        same_persons = recorder.sessions_with_same_persons
-        runs = [
-            RunFiles("" if session in same_persons else session.folder.name, files)
-            for session in recorder.compatible_sessions
-            if session in same_persons or not query.is_scoped
-            if (files := [str(path) for path in session.decision_files(query.start, query.end)])
-        ]
         recent = [choices for choices in recorder.recent.choices(query.start) if choices.first < query.end]
         state = pipeline.decision_state
         return SearchTask(
@@ -193,7 +191,7 @@ class PastSearchService:
             step=max(1, round(SAMPLE_S * fps)),
             gap=math.floor(query.gap_s * fps),
             shortest=math.ceil(query.min_s * fps),
-            runs=runs,
+            runs=[],
             recent=b"\n".join(msgspec.json.encode(choices) for choices in recent),
             site_size=config.site.size,
             cameras=cameras,
@@ -206,6 +204,22 @@ class PastSearchService:
             limit=query.limit,
             work_s=_WORK_S,
         )
+
+    def _files(self, query: PastQuery) -> tuple[list[RunFiles], int]:
+        """Return the files to search, and the pulse before which they are all that there are."""
+        runs: list[RunFiles] = []
+        recorder, left = self._pipeline.recorder, _FILES_MAX
+        same_persons = recorder.sessions_with_same_persons
+        for session in recorder.compatible_sessions:
+            if session not in same_persons and query.is_scoped:
+                continue
+            files = session.decision_files(query.start, query.end)
+            name = "" if session in same_persons else session.folder.name
+            runs.append(RunFiles(name, [str(path) for path in files[:left]]))
+            if len(files) > left:
+                return runs, max(int(files[left].stem), query.start + 1)
+            left -= len(files)
+        return runs, query.end
 
     def _camera(self, camera: str) -> CameraMessage:
         pipeline = self._pipeline

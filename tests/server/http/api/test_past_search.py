@@ -96,6 +96,23 @@ async def test_who_was_in_a_zone_and_where_a_person_went(site: ServedSite) -> No
     assert stays(short) == []
 
 
+async def test_a_search_of_many_files_continues(site: ServedSite, monkeypatch: pytest.MonkeyPatch) -> None:
+    while site.service.recorder.writer is not None and site.service.recorder.writer.written < 15:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    monkeypatch.setattr(past_search, "_FILES_MAX", 1)
+    start, answers = 0, 0
+    while True:
+        _, content = await ask(site, f"?from=p{start}&min_s=0&object=1")
+        ((number, _, first, frames),) = stays(content)
+        assert (number, first) == (1, -(-start // 10) * 10), "each pulse is searched once"
+        answers += 1
+        if content["next"] is None:
+            break
+        start = content["next"]
+    assert first + frames == site.service.decision_state.end
+    assert answers > 2
+
+
 async def test_a_search_runs_in_another_process(site: ServedSite, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = await ask(site, "?from=p0&zone=floor")
     monkeypatch.setattr(past_search, "run_search", worker.run_search)
