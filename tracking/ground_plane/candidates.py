@@ -68,7 +68,7 @@ class Candidates:
         """
         free = _free_places(places, chosen)
         found = self._found(places, chosen, settings)
-        begun = -places.costs[free]
+        begun = -places.arrival_costs[free]
         continued = self._continued(places, free, settings) + begun
         continued[sorted(found)] = -np.inf
         rows, columns = assign_pairs(continued, 0.0)
@@ -134,7 +134,7 @@ def _free_places(places: Places, chosen: Sequence[int]) -> list[int]:
     """Return the likeliest places that exclude neither each other nor the chosen ones."""
     taken, free = list(chosen), list[int]()
     for k in np.argsort(places.costs, kind="stable").tolist():
-        if places.costs[k] < 0.0 and not places.conflicts[k, taken].any():
+        if places.arrival_costs[k] < 0.0 and not places.conflicts[k, taken].any():
             taken.append(k)
             free.append(k)
     return free

@@ -67,7 +67,8 @@ def build_ground_network(
     pair[:, :, gone, gone] = pair[:, :, hidden, hidden] = 0.0
     source[:, hidden] = 0.0
     for m, places in enumerate(frames):
-        node[:, m, : len(places)] = places.costs
+        node[: len(people), m, : len(places)] = places.costs
+        node[len(people) :, m, : len(places)] = places.arrival_costs
     for n, person in enumerate(people):
         node[n, :, hidden] = np.maximum(person.hidden, _MIN_HIDDEN_COST)
         source[n, gone] = departure

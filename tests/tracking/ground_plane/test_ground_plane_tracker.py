@@ -97,6 +97,35 @@ def test_false_detections_alone_are_nobody() -> None:
     assert sum(len(frame.tracks) for frame in frames) < 0.15 * FRAMES
 
 
+def with_furniture(found: dict[str, Detections], score: float) -> dict[str, Detections]:
+    """Return detections with one of a thing that never moves, in one camera."""
+    boxes = np.concatenate([found["c0"].boxes, VIEWS["c0"].box(np.array([2.0, 2.0]))[None]])
+    scores = np.append(found["c0"].scores, score)
+    return {**found, "c0": Detections(boxes, scores, np.zeros((len(boxes), found["c0"].histograms.shape[1])))}
+
+
+@pytest.mark.parametrize("score", [0.0, 0.05, 0.15])
+def test_furniture_that_looks_a_little_like_a_person_never_becomes_one(score: float) -> None:
+    nobody = [detect_walkers(np.full((1, 1, 2), np.nan), VIEWS, FloorNoise())[0]] * (10 * FRAMES)
+    alone = tracker({"c0": CAMERAS["c0"]})
+    furnished = ({"c0": with_furniture(found, score)["c0"]} for found in nobody)
+    frames = track_ground_plane(alone, enumerate(furnished))
+    assert not any(frame.tracks for frame in frames)
+
+
+def test_a_known_person_is_followed_by_detections_that_are_hardly_one() -> None:
+    walks = crossing_walks(2)
+    detections = [
+        {
+            name: Detections(part.boxes, np.full(len(part), 0.9 if number < 10 else 0.05), part.histograms)
+            for name, part in found.items()
+        }
+        for number, found in enumerate(detect_walkers(walks, VIEWS, FloorNoise(deviation=0.006)))
+    ]
+    frames = track_ground_plane(tracker(), enumerate(detections))
+    assert [len(frame.tracks) for frame in frames[10:]] == [2] * (FRAMES - 10)
+
+
 def test_parts_of_people_are_seldom_somebody() -> None:
     walks = crossing_walks(3)
     detections = detect_walkers(walks, VIEWS, FloorNoise(deviation=0.006))

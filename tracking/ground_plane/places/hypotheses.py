@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +35,16 @@ _CERTAIN_MERGE_GAIN = 2.0
 """Above it they are of one person, so that neither is a hypothesis alone."""
 _PREDICTION_GATE, _GROUP_GATE = 11.0, 9.2
 """Squared Mahalanobis distances, quantiles .996 and .99 of two degrees of freedom."""
+_CLEAR_LOG_ODDS = -1.4
+"""Log odds (a probability of .2) from which a detection may be somebody who is not known yet.
+
+Furniture that looks a little like a person does so forever: what little each frame says must not add up.
+"""
 _MAX_COST = 8.0
 """Hypotheses that cost more are never chosen."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Places:
     """The K hypotheses of a frame.
 
@@ -63,6 +69,15 @@ class Places:
     def locating(self, k: int) -> list[int]:
         """Return the detections that locate place `k`: those with their feet on it."""
         return [d for d in self.groups[k] if not self.misplaced[k, d]]
+
+    @cached_property
+    def arrival_costs(self) -> Floats:
+        """The costs for somebody who is not known yet, (K,): places that nobody sees clearly gain nothing."""
+        odds = self.measurements.log_odds
+        is_clear = np.array(
+            [(odds[list(group)] >= _CLEAR_LOG_ODDS).any() for group in self.groups], dtype=np.bool_
+        )
+        return np.where(is_clear, self.costs, np.maximum(self.costs, 0.0))
 
     def __len__(self) -> int:
         return len(self.groups)

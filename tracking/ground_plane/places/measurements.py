@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,7 @@ class Measurements:
         places: (D, 2) of the feet, metres.
         covariances: (D, 2, 2) of the places, m²: the noise of a foot carried through the homography, so that
             distant feet are long ellipses, and that of the calibration.
+        log_odds: (D,) of the scores.
         log_clutter: (D,) log of the expected false detections per m² there, less the log odds of the score,
             which counts for less within better boxes of the camera: those are parts of a person more often.
     """
@@ -50,6 +52,7 @@ class Measurements:
     histograms: tuple[Floats, ...]
     places: Floats
     covariances: Floats
+    log_odds: Floats
     log_clutter: Floats
 
     def __len__(self) -> int:
@@ -78,15 +81,25 @@ def measure(
         np.concatenate([np.arange(len(found)) for found in all_found]),
         np.concatenate([found.boxes for found in all_found]),
         tuple(histogram for found in all_found for histogram in found.histograms),
-        np.concatenate([places for places, _, _ in parts]),
-        np.concatenate([covariances for _, covariances, _ in parts]),
-        np.concatenate([clutter for _, _, clutter in parts]),
+        np.concatenate([part.places for part in parts]),
+        np.concatenate([part.covariances for part in parts]),
+        np.concatenate([part.log_odds for part in parts]),
+        np.concatenate([part.log_clutter for part in parts]),
     )
+
+
+class _Located(NamedTuple):
+    """Fields of `Measurements` of one camera, by where its detections are and by their scores."""
+
+    places: Floats
+    covariances: Floats
+    log_odds: Floats
+    log_clutter: Floats
 
 
 def _measure_camera(
     camera: GroundCamera, found: Detections, factor: float, settings: GroundSettings
-) -> tuple[Floats, Floats, Floats]:
+) -> _Located:
     points = feet(found.boxes)
     jacobians = camera.jacobians(points)
     deviations = settings.foot_noise * np.maximum(heights(found.boxes), 1.0)
@@ -95,9 +108,9 @@ def _measure_camera(
     per_pixel = settings.false_per_frame / (camera.width * camera.height)
     scores = np.clip(found.scores, 1e-6, 1.0 - 1e-6)
     odds = np.clip(np.log(scores / (1.0 - scores)), _MIN_LOG_ODDS, _MAX_LOG_ODDS)
-    odds -= settings.covered_log_odds * covered_by_better(found.boxes, odds)
-    log_clutter = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - odds
-    return camera.to_ground(points), covariances, log_clutter
+    counted = odds - settings.covered_log_odds * covered_by_better(found.boxes, odds)
+    log_clutter = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - counted
+    return _Located(camera.to_ground(points), covariances, odds, log_clutter)
 
 
 def covered_by_better(boxes: Floats, log_odds: Floats) -> Floats:
