@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, zip_longest
 from pathlib import Path
 
@@ -15,11 +15,11 @@ from bestview import NO_CAMERA, IdentityUpdate, TrackletKey, TrackUpdate, size_q
 from server.cli.evaluate.choices_file import Choice, read_choices
 from server.config.site_config import Config
 from server.messaging.epochs import epoch_of_recording_end
-from server.messaging.messages import Box, CameraTracks, TrackMessage
+from server.messaging.messages import Box, CameraTracks, NumberedBox, TrackMessage
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.joint_tracking.stage import JointStage
-from server.service.view_selection.decider import ViewDecider, camera_homographies
+from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 from tracking.boxes import Floats
 from tracking.motchallenge import MotRow, read_rows
 
@@ -30,6 +30,8 @@ class Rendering:
 
     tracks: dict[str, list[MotRow]]
     choices: list[Choice]
+    occupied: dict[str, dict[int, list[NumberedBox] | None]] = field(default_factory=dict)
+    """By camera and frame: the regions with people, where `access` may blur them."""
 
 
 class GroundTruthRegistry:
@@ -60,20 +62,27 @@ def decide(config: Config, messages: Messages, people: Sequence[int] | None = No
     for camera in config.camera_ids:
         aligner.camera_connected(camera)
         aligner.frame_received(camera, messages[camera][0].boot, 0)
+    occupied: dict[str, dict[int, list[NumberedBox] | None]] = {camera: {} for camera in config.camera_ids}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+
+        def write(decision: GopDecision) -> None:
+            recorder.write(decision)
+            for camera, regions in decision.occupied.items():
+                occupied[camera].update(enumerate(regions, start=decision.first))
+
         recorder = DecisionWriter(folder, config.camera_ids, decider.people.letterboxes)
         for message in chain.from_iterable(zip_longest(*messages.values())):
             if message is not None:
                 aligner.add_tracks(message)
             for epoch in aligner.take_ready(now=-1):
                 for decision in decider.step(joint.step(epoch)):
-                    recorder.write(decision)
+                    write(decision)
         for decision in decider.finish(max(last.values())):
-            recorder.write(decision)
+            write(decision)
         recorder.close()
         tracks = {camera: read_rows(folder / "tracks" / f"{camera}.txt") for camera in config.camera_ids}
-        return Rendering(tracks, read_choices(folder / "choices.csv"))
+        return Rendering(tracks, read_choices(folder / "choices.csv"), occupied)
 
 
 def decide_with_true_ids(config: Config, rows: Rows, frames: int) -> Rendering:

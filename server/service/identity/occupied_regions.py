@@ -23,10 +23,15 @@ from tracking.frame_rate import frames_in
 Regions = list[list[NumberedBox] | None]
 """By frame: the regions with people, by person or `UNCONFIRMED`; None: the camera has not looked."""
 
-HOLD_S = 0.5
-"""Seconds for which a region stays before a track's first box and after its last one."""
-MARGIN = 0.2
-"""How far a region reaches beyond a box, on each side, in parts of its width and height."""
+HOLD_S = 1.0
+"""Seconds for which a region stays before a track's first box, as far as that is known, and after its last."""
+UNSEARCHED_S = 0.5
+"""Seconds from the next frame in which the camera has looked for people after which nothing is known."""
+MARGIN = 0.3
+"""How far a region reaches beyond a box, on each side, in parts of its width and height.
+
+Boxes often end below the hair (`python -m benchmarks.blurring`).
+"""
 _GROWTH = 0.4
 """How much further it reaches `HOLD_S` away from the next box: people move on."""
 _MARGIN_MIN = 4.0
@@ -49,6 +54,7 @@ class OccupiedRegions:
     def __init__(self, people: PersonTracker, cameras: Sequence[str], fps: float, stride: int) -> None:
         self._people = people
         self._hold = max(frames_in(HOLD_S, fps), stride)
+        self._unsearched = max(frames_in(UNSEARCHED_S, fps), stride)
         self._before: dict[str, dict[TrackKey, _TrackBoxes]] = {camera: {} for camera in cameras}
         """By camera: the last box of each track before the next GOP."""
         self._searched: dict[str, int] = {}
@@ -56,12 +62,12 @@ class OccupiedRegions:
 
     def next(self, camera: str, first: int, frames: int) -> Regions:
         """Return the regions of the next GOP, the frames from ``first`` on."""
-        hold, end = self._hold, first + frames
-        spans = self._people.windows(camera, first, end - 1 + hold)
+        end = first + frames
+        spans = self._people.windows(camera, first, end - 1 + self._hold)
         tracks = self._tracks(camera, first, end, spans)
         searched = self._searched_frames(camera, first, end, spans)
         regions: Regions = [
-            [] if np.abs(searched - pulse).min(initial=hold + 1) <= hold else None
+            [] if (np.abs(searched - pulse) <= self._unsearched).any() else None
             for pulse in range(first, end)
         ]
         numbers = self._people.numbers(list(tracks), first, frames).tolist()

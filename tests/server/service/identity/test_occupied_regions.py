@@ -22,8 +22,8 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, TrackMessage
 from server.service.identity.occupied_regions import Regions
 
-HOLD = 12
-"""Frames of half a second."""
+HOLD, UNSEARCHED = 25, 12
+"""Frames of a second, and of half a second."""
 
 
 class Site:
@@ -79,7 +79,7 @@ def test_a_region_reaches_beyond_the_box_on_all_sides() -> None:
 def test_people_are_hidden_before_they_are_detected_and_after() -> None:
     site = Site()
     absent: list[Box | None] = [None] * STRIDE
-    for epoch in range(12):
+    for epoch in range(14):
         site.feed({1: [SMALL] * STRIDE if epoch in (3, 4) else absent} if 3 <= epoch < 5 else {})
     detected = range(3 * STRIDE, 5 * STRIDE)
     for pulse, frame in enumerate(site.regions()):
@@ -131,9 +131,9 @@ def test_nothing_is_known_where_the_camera_has_not_looked_for_long() -> None:
     regions = site.regions()
     for pulse, frame in enumerate(regions):
         last, then = blind.start * STRIDE - 1, blind.stop * STRIDE
-        if pulse <= last + HOLD or pulse >= then - STRIDE:  # the look-ahead is short
+        if pulse <= last + UNSEARCHED or pulse >= then - STRIDE:  # the look-ahead is short
             assert frame is not None, pulse
-        elif pulse < then - HOLD:
+        elif pulse < then - UNSEARCHED:
             assert frame is None, pulse
     site.service.close()
 
