@@ -43,6 +43,7 @@ BENCHMARKS = (
         ("--scene", "terrace", "--scene", "pets09", "--strength", "middle"),
     ),
     Benchmark("picture_condition", "seconds until a camera says that its lens is covered; 15 minutes"),
+    Benchmark("blurring", "who is seen although people are blurred; 10 minutes"),
     Benchmark("rates", "frame rates from 2 to 60 a second; 40 minutes"),
     Benchmark("detectors.score_calibration", "fits the probabilities of installed networks; 10 minutes"),
     Benchmark("detectors.network_speed", "networks by provider and batch size, cameras of a GPU; 2 minutes"),

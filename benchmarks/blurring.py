@@ -70,13 +70,14 @@ def frames_of(rows: Sequence[MotRow], frames: int) -> Iterator[tuple[int, list[M
 def score(config: Config, truth: Mapping[str, Sequence[MotRow]], hidden: Hidden, frames: int) -> list[str]:
     """Return the cells of a row."""
     bodies, heads, room, whole = [], [], [], 0
+    picture: Box = (0.0, 0.0, float(config.site.width), float(config.site.height))
     of_person: dict[tuple[str, int], list[float]] = defaultdict(list)
     for camera, rows in truth.items():
         for frame, people in frames_of(rows, frames):
             mask, outside = np.zeros((2, config.site.height, config.site.width), dtype=np.bool_)
             boxes = hidden[camera].get(frame)
             whole += boxes is None
-            for box in [(0.0, 0.0, *map(float, config.site.size))] if boxes is None else boxes:
+            for box in [picture] if boxes is None else boxes:
                 fill(mask, box)
             for row in people:
                 left, top, right, bottom = row.box

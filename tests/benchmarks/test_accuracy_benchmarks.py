@@ -9,13 +9,14 @@ from typing import Any
 
 import pytest
 
-from benchmarks import ablation
+from benchmarks import ablation, blurring
 from benchmarks.ablation import ABLATIONS, DEFAULT, Ablation, cell
 from benchmarks.common.environment import SKIPPED
 from benchmarks.common.public_detections import Recording, find_recordings, track
 from benchmarks.other_trackers import __main__ as peers
 from benchmarks.other_trackers import virtual_environment as peer_environment
 from benchmarks.other_trackers.virtual_environment import OtherTrackersUnavailableError
+from fakes.service.scripted_cameras import small_config
 from server.cli.track.command import track_one
 from server.system.errors import UserError
 from tracking import OnlineTracker
@@ -150,3 +151,11 @@ def test_without_recordings_the_benchmarks_are_skipped(
             benchmark.main()
         assert ended.value.code == SKIPPED
         assert "skipped: needs detections and ground truth" in capsys.readouterr().out
+
+
+def test_the_shares_of_pixelated_bodies_and_heads_are_of_all_true_boxes() -> None:
+    person = (10.0, 8.0, 20.0, 28.0)  # whose head is 4 pixels high
+    truth = {"c0": [MotRow(frame, 1, 10.0, 8.0, 10.0, 20.0) for frame in (1, 2, 3, 4)]}
+    hidden = {"c0": {0: [person], 1: [(10.0, 18.0, 20.0, 28.0)], 2: [], 3: None}}
+    cells = blurring.score(small_config(["c0"]), truth, hidden, 4)
+    assert cells == ["4", "62.5", "50.0", "50.0", "100.0", "25.0", "25.0"]

@@ -24,7 +24,7 @@ Regions = list[list[NumberedBox] | None]
 """By frame: the regions with people, by person or `UNCONFIRMED`; None: the camera has not looked."""
 
 HOLD_S = 1.0
-"""Seconds for which a region stays before a track's first box, as far as that is known, and after its last."""
+"""Seconds for which a region stays before a first box, as far as that is known, and after a last one."""
 UNSEARCHED_S = 0.5
 """Seconds from the next frame in which the camera has looked for people after which nothing is known."""
 MARGIN = 0.3
