@@ -50,7 +50,7 @@ export class PastSearch {
 
   /** VP8 is not recorded. */
   update() {
-    this.#details.hidden = this.viewer.format.container === 'webm';
+    this.#details.hidden = this.viewer.format.container === 'webm' || Boolean(this.viewer.site?.blur);
   }
 
   async #opened() {

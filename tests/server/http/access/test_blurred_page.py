@@ -55,7 +55,8 @@ async def test_the_page_plays_the_drawn_stream_and_offers_only_that(tmp_path: Pa
         for key, notice in ((",", "only in live pictures"), ("1", "only in the best view")):
             await page.keyboard.press(key)
             await expect(page.locator("#notice")).to_contain_text(notice)
-        await expect(page.locator("#live")).to_be_hidden()
+        for control in ("#live", "#search"):
+            await expect(page.locator(control)).to_be_hidden()
         await assert_displayed_frame_hides_others(room, page)
         sending.cancel()
         assert refused == []
