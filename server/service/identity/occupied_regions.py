@@ -17,6 +17,7 @@ from server.messaging.messages import NumberedBox
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.people import PersonTracker
 from server.service.identity.track_parts import UNCONFIRMED
+from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import HistorySpan
 from tracking.frame_rate import frames_in
 
@@ -57,8 +58,19 @@ class OccupiedRegions:
         self._unsearched = max(frames_in(UNSEARCHED_S, fps), stride)
         self._before: dict[str, dict[TrackKey, _TrackBoxes]] = {camera: {} for camera in cameras}
         """By camera: the last box of each track before the next GOP."""
+        self._trackless: dict[str, set[int]] = {camera: set() for camera in cameras}
+        """By camera: frames whose newest window has no tracks because they were late."""
         self._searched: dict[str, int] = {}
         """By camera: the last frame before the next GOP in which it looked for people."""
+
+    def take(self, epoch: Epoch) -> None:
+        """Take the windows of an epoch, which must be in the person tracker already."""
+        for camera, message in epoch.tracks.items():
+            frames = range(message.first, message.last + 1)
+            if camera in epoch.trackless:
+                self._trackless[camera].update(frames)
+            else:
+                self._trackless[camera].difference_update(frames)
 
     def next(self, camera: str, first: int, frames: int) -> Regions:
         """Return the regions of the next GOP, the frames from ``first`` on."""
@@ -110,6 +122,7 @@ class OccupiedRegions:
         for span in spans:
             searched[span.first - first : span.last - first + 1] = True
         searched &= ~self._people.undetected.over(camera, first, count)
+        searched &= [first + at not in self._trackless[camera] for at in range(count)]
         before = self._searched.get(camera)
         return np.concatenate(([] if before is None else [before], first + np.flatnonzero(searched))).astype(
             np.int64
@@ -150,5 +163,6 @@ class OccupiedRegions:
                     max(track.pulses[last], track.followed_to),
                     track.number if number == UNCONFIRMED else number,
                 )
+        self._trackless[camera] = {pulse for pulse in self._trackless[camera] if pulse >= end}
         if (before := searched[searched < end]).size:
             self._searched[camera] = int(before[-1])

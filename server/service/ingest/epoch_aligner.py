@@ -40,6 +40,8 @@ class Epoch:
     """Epochs before it that are skipped: no camera reported them, and they are too old."""
     joint: JointEpoch | None = None
     """Set once the cameras of the common ground have been tracked jointly."""
+    trackless: frozenset[str] = frozenset()
+    """Cameras whose joint tracks were late: their windows show nobody, whoever is there."""
 
     def is_joint(self, camera: str) -> bool:
         """Return whether a camera's window has tracks on the ground instead of its own."""

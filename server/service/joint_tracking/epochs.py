@@ -92,7 +92,7 @@ def without_tracks(epoch: Epoch, cameras: Collection[str]) -> Epoch:
         for camera, message in epoch.tracks.items()
         if camera in cameras
     }
-    return replace(epoch, tracks=epoch.tracks | empty)
+    return replace(epoch, tracks=epoch.tracks | empty, trackless=frozenset(empty))
 
 
 def _first_frames(track: TrackMessage, frames: int, last: int) -> TrackMessage:

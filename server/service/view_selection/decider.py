@@ -169,6 +169,8 @@ class ViewDecider:
             start = epoch.last - self._config.window.stride + 1
             self._next_gop = -(-start // gop) * gop
         self._quality_buffer.put(self.people.update(epoch))
+        if self._occupied is not None:
+            self._occupied.take(epoch)
         window_of_epoch = cache(partial(self._window, self._next_gop, epoch.last))
         if self._next_gop <= epoch.last:
             self.modes.step(epoch.last, window_of_epoch, skipped=bool(epoch.skipped))

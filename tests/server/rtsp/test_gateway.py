@@ -177,6 +177,7 @@ async def test_a_best_view_goes_on_through_cuts_with_the_cameras_own_pictures(
         ("/objects/1", basic("any", token_of("door")), 403),
         ("/objects/1", basic("any", token_of("family")), 200),
         ("/objects/2", basic("any", token_of("family")), 403),
+        ("/cameras/c0", basic("any", token_of("guest")), 403),
         ("/objects/77", basic("any", token_of("desk")), 404),
         ("/cameras/c7", basic("any", token_of("desk")), 404),
         ("/api/site", basic("any", token_of("desk")), 404),

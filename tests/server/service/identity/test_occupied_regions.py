@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from fakes.service.fed_site import A, B
 from fakes.service.scripted_cameras import (
@@ -21,6 +22,7 @@ from fakes.service.scripted_cameras import (
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, TrackMessage
 from server.service.identity.occupied_regions import Regions
+from server.service.joint_tracking.epochs import without_tracks
 
 HOLD, UNSEARCHED = 25, 12
 """Frames of a second, and of half a second."""
@@ -134,6 +136,26 @@ def test_nothing_is_known_where_the_camera_has_not_looked_for_long() -> None:
         if pulse <= last + UNSEARCHED or pulse >= then - STRIDE:  # the look-ahead is short
             assert frame is not None, pulse
         elif pulse < then - UNSEARCHED:
+            assert frame is None, pulse
+    site.service.close()
+
+
+def test_nothing_is_known_while_joint_tracks_are_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    site = Site()
+    late = range(4, 12)
+    step = site.service.decider.step
+    monkeypatch.setattr(
+        site.service.decider,
+        "step",
+        lambda epoch: step(without_tracks(epoch, {A}) if epoch.number in late else epoch),
+    )
+    for _ in range(16):
+        site.feed({1: [SMALL] * STRIDE})
+    for pulse, frame in enumerate(site.regions()):
+        if pulse < late.start * STRIDE + UNSEARCHED or pulse >= late.stop * STRIDE:
+            assert frame is not None, pulse
+            assert any(covers(region, SMALL) for region in frame), pulse
+        elif pulse < late.stop * STRIDE - UNSEARCHED:
             assert frame is None, pulse
     site.service.close()
 
