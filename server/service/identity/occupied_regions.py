@@ -17,8 +17,10 @@ from server.messaging.messages import NumberedBox
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.people import PersonTracker
 from server.service.identity.track_parts import UNCONFIRMED
+from server.service.ingest.box_arrays import boxes_array
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import HistorySpan
+from tracking.boxes import iou
 from tracking.frame_rate import frames_in
 
 Regions = list[list[NumberedBox] | None]
@@ -37,6 +39,8 @@ _GROWTH = 0.4
 """How much further it reaches `HOLD_S` away from the next box: people move on."""
 _MARGIN_MIN = 4.0
 """Pixels of the margin at least."""
+_SAME_PERSON_IOU = 0.5
+"""Overlap of two regions from which they are of one person."""
 
 
 @dataclass(slots=True)
@@ -60,6 +64,8 @@ class OccupiedRegions:
         """By camera: the last box of each track before the next GOP."""
         self._trackless: dict[str, set[int]] = {camera: set() for camera in cameras}
         """By camera: frames whose newest window has no tracks because they were late."""
+        self._own: dict[str, dict[int, NDArray[np.float64]]] = {camera: {} for camera in cameras}
+        """By camera that is tracked jointly, and frame: the boxes of its own tracks, (N, 4)."""
         self._searched: dict[str, int] = {}
         """By camera: the last frame before the next GOP in which it looked for people."""
 
@@ -71,6 +77,13 @@ class OccupiedRegions:
                 self._trackless[camera].update(frames)
             else:
                 self._trackless[camera].difference_update(frames)
+        for camera, message in {} if epoch.joint is None else epoch.joint.own.items():
+            count = max(0, message.last - message.first + 1)
+            boxes = boxes_array(track.boxes for track in message.tracks).reshape(
+                len(message.tracks), count, 4
+            )
+            for at in range(count):
+                self._own[camera][message.first + at] = boxes[~np.isnan(boxes[:, at, 0]), at]
 
     def next(self, camera: str, first: int, frames: int) -> Regions:
         """Return the regions of the next GOP, the frames from ``first`` on."""
@@ -90,8 +103,21 @@ class OccupiedRegions:
                 frame = regions[pulse - first]
                 if frame is not None:
                     frame.append((track.number if number == UNCONFIRMED else number, *box))
+        for pulse, frame in enumerate(regions, start=first):
+            if frame is not None:
+                self._add_own(frame, self._own[camera].pop(pulse, np.empty((0, 4))))
         self._remember(camera, end, tracks, [row[-1] for row in numbers], searched)
         return regions
+
+    def _add_own(self, frame: list[NumberedBox], own: NDArray[np.float64]) -> None:
+        """Add the people whom a camera tracks by itself alone: joint tracking may have doubts about them."""
+        if not len(own):
+            return
+        widened = _with_margin(own, MARGIN)
+        known = np.array([region[1:] for region in frame]).reshape(-1, 4)
+        is_new = iou(widened[:, None], known).max(axis=1, initial=0.0) < _SAME_PERSON_IOU
+        for left, top, right, bottom in widened[is_new].tolist():
+            frame.append((UNCONFIRMED, left, top, right, bottom))
 
     def _tracks(
         self, camera: str, first: int, end: int, spans: Sequence[HistorySpan[CameraWindow]]
@@ -139,9 +165,7 @@ class OccupiedRegions:
         between = np.stack([np.interp(pulses, known, side) for side in boxes.T], axis=1)
         age = np.abs(pulses[:, None] - known).min(axis=1)
         reach = MARGIN + _GROWTH * np.minimum(1, age / self._hold)
-        size = between[:, 2:] - between[:, :2]
-        margin = np.maximum(_MARGIN_MIN, reach[:, None] * size)
-        return pulses, np.hstack([between[:, :2] - margin, between[:, 2:] + margin])
+        return pulses, _with_margin(between, reach[:, None])
 
     def _remember(
         self,
@@ -163,6 +187,13 @@ class OccupiedRegions:
                     max(track.pulses[last], track.followed_to),
                     track.number if number == UNCONFIRMED else number,
                 )
+        self._own[camera] = {pulse: own for pulse, own in self._own[camera].items() if pulse >= end}
         self._trackless[camera] = {pulse for pulse in self._trackless[camera] if pulse >= end}
         if (before := searched[searched < end]).size:
             self._searched[camera] = int(before[-1])
+
+
+def _with_margin(boxes: NDArray[np.float64], reach: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return boxes (N, 4) that reach further on each side, by parts of their width and height."""
+    margin = np.maximum(_MARGIN_MIN, reach * (boxes[:, 2:] - boxes[:, :2]))
+    return np.hstack([boxes[:, :2] - margin, boxes[:, 2:] + margin])

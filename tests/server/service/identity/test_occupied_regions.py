@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -22,7 +23,9 @@ from fakes.service.scripted_cameras import (
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, TrackMessage
 from server.service.identity.occupied_regions import Regions
+from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 from server.service.joint_tracking.epochs import without_tracks
+from server.service.joint_tracking.joint_messages import JointTracks
 
 HOLD, UNSEARCHED = 25, 12
 """Frames of a second, and of half a second."""
@@ -157,6 +160,26 @@ def test_nothing_is_known_while_joint_tracks_are_late(monkeypatch: pytest.Monkey
             assert any(covers(region, SMALL) for region in frame), pulse
         elif pulse < late.stop * STRIDE - UNSEARCHED:
             assert frame is None, pulse
+    site.service.close()
+
+
+def test_whom_a_jointly_tracked_camera_follows_alone_is_hidden_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    site = Site()
+    occupied = site.service.decider._occupied
+    assert occupied is not None
+    take = occupied.take
+
+    def take_joint(epoch: Epoch) -> None:
+        own = {A: camera_tracks(A, epoch.number, {4: SMALL, 5: LARGE})}
+        take(replace(epoch, joint=JointEpoch(cast("JointTracks", None), own)))
+
+    monkeypatch.setattr(occupied, "take", take_joint)
+    for _ in range(5):
+        site.feed({1: [SMALL] * STRIDE})
+    for frame in site.regions():
+        assert frame is not None
+        assert [region[0] for region in frame] == [1, -1]
+        assert covers(frame[1], LARGE)
     site.service.close()
 
 
