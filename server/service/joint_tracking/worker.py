@@ -22,8 +22,11 @@ log = logging.getLogger(__name__)
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 30.0
 _ANSWER_S = 10.0
 """A process that takes longer for an epoch hangs: it is replaced."""
-_LATE_S = 0.6
-"""Seconds after which an epoch is decided without joint tracks, at least."""
+_LATE_S, _LATE_MAX_S = 0.6, 5.0
+"""Limits of the seconds after which an epoch is decided without joint tracks."""
+_LATE_FACTOR, _SLOWEST_KEPT = 2.0, 0.95
+"""An answer is late that takes so many times as long as the slowest one, of which this share counts for the
+next: on a busy machine answers take longer, and nobody is to vanish there."""
 
 
 class JointWorker:
@@ -44,7 +47,9 @@ class JointWorker:
         self._worker: WorkerProcess[JointTracks] | None = None
         self._answer: asyncio.Task[JointTracks] | None = None
         """To the last task, while the process works on it."""
-        self._patience_s = max(_LATE_S, config.track.cross_view_wait_s)
+        self._least_patience_s = max(_LATE_S, config.track.cross_view_wait_s)
+        self._slowest_s = 0.0
+        """The slowest of the last answers, seconds."""
         self._failures, self._late = LogThrottle(), LogThrottle()
         self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         self._retry_at = 0.0
@@ -68,7 +73,7 @@ class JointWorker:
         self._answer = asyncio.create_task(self._ask(task, self._setup), name="joint tracking")
         await asyncio.wait({self._answer}, timeout=self._patience_s)
         if not self._answer.done():
-            if (more := self._late.record()) is not None:
+            if self._logged and (more := self._late.record()) is not None:
                 log.warning(
                     "the process that tracks jointly is late%s: its cameras show nobody meanwhile", more
                 )
@@ -88,8 +93,18 @@ class JointWorker:
             await self._take_answer()  # to an epoch that has been decided without it
         return self._worker is not None or asyncio.get_running_loop().time() >= self._retry_at
 
+    @property
+    def _patience_s(self) -> float:
+        """Seconds for which an epoch waits for joint tracks."""
+        return max(self._least_patience_s, min(_LATE_FACTOR * self._slowest_s, _LATE_MAX_S))
+
     async def _ask(self, task: JointTask, setup: JointSetup) -> JointTracks:
-        return await (await self._running(setup)).ask(task)
+        worker, loop = await self._running(setup), asyncio.get_running_loop()
+        await worker.wait_until_ready()
+        asked = loop.time()
+        joint = await worker.ask(task)
+        self._slowest_s = max(loop.time() - asked, _SLOWEST_KEPT * self._slowest_s)
+        return joint
 
     async def _take_answer(self) -> JointTracks | None:
         """Return the answer that is there; None: the process has died, and is replaced."""

@@ -87,12 +87,14 @@ async def test_decisions_do_not_wait_for_a_process_that_is_late(
             pid = worker.pid
             assert pid is not None
             os.kill(pid, signal.SIGSTOP)
-            monkeypatch.setattr(worker, "_patience_s", 0.01)
+            monkeypatch.setattr(worker, "_least_patience_s", 0.01)
+            worker._slowest_s = 0.0
             late = [await worker.step(next(epochs)) for _ in range(3)]
             os.kill(pid, signal.SIGCONT)
             assert worker._answer is not None
             await worker._answer
-            monkeypatch.setattr(worker, "_patience_s", PATIENCE)
+            assert worker._patience_s > 0.01, "an answer that was late lets the next ones take longer"
+            monkeypatch.setattr(worker, "_least_patience_s", PATIENCE)
             assert (await worker.step(next(epochs))).joint is not None
             assert worker.pid == pid
     finally:
