@@ -54,8 +54,8 @@ class Bus:
         Raises:
             UserError: the address cannot be listened on.
         """
-        _set_receiving_threads(_FEW_THREADS + _SESSIONS_OF_CAMERA * cameras)
-        config = _config(settings, "router", None)
+        threads = _FEW_THREADS + _SESSIONS_OF_CAMERA * cameras
+        config = _config(settings, "router", None, threads)
         if settings.users is not None:
             config.insert_json5("transport/auth/usrpwd/dictionary_file", json.dumps(str(settings.users)))
         for key, file in (("certificate", settings.tls.certificate), ("private_key", settings.tls.key)):
@@ -84,7 +84,6 @@ class Bus:
             UserError: zenoh does not support the address, or there is no such user.
         """
         # A peer, not a client: a client session has one router, and cannot be opened while that is down.
-        _set_receiving_threads(_FEW_THREADS)
         config = _config(settings, "peer", user)
         config.insert_json5("connect/timeout_ms", "-1")  # keep trying in the background
         config.insert_json5("connect/exit_on_failure", "false")
@@ -111,7 +110,6 @@ class Bus:
         Raises:
             UserError: the router cannot be reached.
         """
-        _set_receiving_threads(_FEW_THREADS)
         config = _config(settings, "client", user)
         try:
             config.insert_json5("connect/timeout_ms", str(_OPEN_WITHIN_MS))
@@ -230,7 +228,10 @@ def _set_receiving_threads(threads: int) -> None:
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {threads}), net: (worker_threads: 4))")
 
 
-def _config(settings: ZenohSettings, mode: str, user: str | None) -> zenoh.Config:
+def _config(
+    settings: ZenohSettings, mode: str, user: str | None, threads: int = _FEW_THREADS
+) -> zenoh.Config:
+    _set_receiving_threads(threads)
     config = zenoh.Config()
     for key, value in {
         "mode": mode,

@@ -6,14 +6,13 @@ and time, so that no camera can harm the one that serves.
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 from typing import TypeVar
 
 import msgspec
 
-from server.system.child_process import start_worker
 from server.system.errors import UserError
+from server.system.worker.process import WorkerDiedError
+from server.system.worker.single_request import ask_new_worker
 
 MODULE = "server.setup"
 TRIAL_S = 40.0
@@ -101,19 +100,10 @@ async def _ask(request: msgspec.Struct, answer_type: type[Answer], seconds: floa
         UserError: it cannot be started, died, or took too long.
     """
     try:
-        process = await start_worker(MODULE)
-    except OSError as error:
-        raise UserError(f"the camera cannot be tried: {error.strerror}") from error
-    try:
-        async with asyncio.timeout(seconds):
-            output, _ = await process.communicate(msgspec.msgpack.encode(request))
-        return msgspec.msgpack.decode(output, type=answer_type)
+        return await ask_new_worker(MODULE, request, answer_type, seconds)
     except TimeoutError:
         raise UserError(f"no answer within {seconds:g} s") from None
-    except msgspec.DecodeError:
+    except OSError as error:
+        raise UserError(f"the camera cannot be tried: {error.strerror}") from error
+    except WorkerDiedError:
         raise UserError("what it sends cannot be read") from None
-    finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()

@@ -53,10 +53,9 @@ def viewer_slot(request: web.Request, stream: str) -> Iterator[Slot]:
 
 def evict_or_refuse_listener(request: web.Request) -> web.Response | None:
     """Return 503 if no event slot is free; None: one is free, or has been evicted."""
-    slots, most = request.app[EVENT_SLOTS], request.app[SERVICE].config.http.viewers_max
-    if slots.all < most or _evict(request, slots):
-        return None
-    return unavailable("the server has as many event streams as allowed (http.viewers_max)")
+    most = request.app[SERVICE].config.http.viewers_max
+    why = "the server has as many event streams as allowed (http.viewers_max)"
+    return _evict_or_refuse(request, request.app[EVENT_SLOTS], most, why)
 
 
 @contextmanager
@@ -68,10 +67,8 @@ def event_slot(request: web.Request) -> Iterator[None]:
 
 def evict_or_refuse_search(request: web.Request) -> web.Response | None:
     """Return 503 if too many searches of the past wait; None: another may, or has replaced one."""
-    slots = request.app[SEARCH_SLOTS]
-    if slots.all < _SEARCHES_MAX or _evict(request, slots):
-        return None
-    return unavailable("too many searches of the past wait already; try again later")
+    why = "too many searches of the past wait already; try again later"
+    return _evict_or_refuse(request, request.app[SEARCH_SLOTS], _SEARCHES_MAX, why)
 
 
 @contextmanager
@@ -79,6 +76,11 @@ def search_slot(request: web.Request) -> Iterator[None]:
     """Hold a search slot inside."""
     with _slot(request, request.app[SEARCH_SLOTS], ""):
         yield
+
+
+def _evict_or_refuse(request: web.Request, slots: FairShare, most: int, why: str) -> web.Response | None:
+    """Return 503 if ``most`` slots are taken and none can be evicted; None: one is free."""
+    return None if slots.all < most or _evict(request, slots) else unavailable(why)
 
 
 def _evict(request: web.Request, slots: FairShare, streams: tuple[str, ...] | None = None) -> bool:

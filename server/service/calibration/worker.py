@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 
 import msgspec
 
-from server.system.child_process import start_worker
+from server.system.worker.process import WorkerDiedError
+from server.system.worker.single_request import ask_new_worker
 
 
 class CameraBoxes(msgspec.Struct, frozen=True, array_like=True):
@@ -60,17 +60,9 @@ log = logging.getLogger(__name__)
 async def run_calibration(task: CalibrationTask) -> CalibrationResult:
     """Calibrate from a walk in a separate process, which is killed if the caller is cancelled."""
     try:
-        process = await start_worker("server.service.calibration")
+        return await ask_new_worker("server.service.calibration", task, CalibrationResult)
     except OSError as error:
         return CalibrationResult(error=f"the calibration cannot be started: {error.strerror}")
-    try:
-        output, _ = await process.communicate(msgspec.msgpack.encode(task))
-        return msgspec.msgpack.decode(output, type=CalibrationResult)
-    except msgspec.DecodeError:
-        log.error("the calibration process ended with status %s", process.returncode)  # noqa: TRY400
+    except WorkerDiedError as error:
+        log.error("the calibration process %s", error)  # noqa: TRY400
         return CalibrationResult(error="the calibration failed; see the server's log")
-    finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()

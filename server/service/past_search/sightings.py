@@ -10,12 +10,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from server.messaging.messages import DECODE_ERRORS
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _Pulse = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
 _Number = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
-_DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 class _Merge(msgspec.Struct, frozen=True):
@@ -81,7 +82,7 @@ def read_sightings(
             last = min(until, end, decision.first + max(map(len, decision.boxes.values()), default=0))
             for pulse in range(-(-begin // step) * step, last, step):
                 rows += _rows(decision, pulse, cameras)
-        except _DECODE_ERRORS:
+        except DECODE_ERRORS:
             continue
         merges += [(merge.kept, merge.lost) for merge in decision.merged]
         at = min(until, end)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-
 import msgspec
 
-from server.system.child_process import start_worker
+from server.system.worker.process import WorkerDiedError
+from server.system.worker.single_request import ask_new_worker
 
 SEARCH_TIMEOUT_S = 30.0
 """How long a search may take; a disk that hangs must not keep processes for ever."""
@@ -124,19 +122,10 @@ async def run_search(task: SearchTask) -> SearchResult:
         SearchError: the process cannot be started, failed, or took too long.
     """
     try:
-        process = await start_worker("server.service.past_search")
-    except OSError as error:
-        raise SearchError(f"the search cannot be started: {error.strerror}") from error
-    try:
-        async with asyncio.timeout(SEARCH_TIMEOUT_S):
-            output, _ = await process.communicate(msgspec.msgpack.encode(task))
-        return msgspec.msgpack.decode(output, type=SearchResult)
+        return await ask_new_worker("server.service.past_search", task, SearchResult, SEARCH_TIMEOUT_S)
     except TimeoutError as error:
         raise SearchError(f"the recording was not read within {SEARCH_TIMEOUT_S:g} s") from error
-    except msgspec.DecodeError as error:
-        raise SearchError(f"the search process ended with status {process.returncode}") from error
-    finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+    except OSError as error:
+        raise SearchError(f"the search cannot be started: {error.strerror}") from error
+    except WorkerDiedError as error:
+        raise SearchError(f"the search process {error}") from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +87,8 @@ def measure(
     )
 
 
-class _Located(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class _Located:
     """Fields of `Measurements` of one camera, by where its detections are and by their scores."""
 
     places: Floats
