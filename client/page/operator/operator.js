@@ -2,7 +2,7 @@
 
 import { ServerEvents } from '../shared/events.js';
 import { element, setText } from '../shared/dom.js';
-import { getJson, HttpError, requestOperator } from '../shared/requests.js';
+import { getJson, HttpError, requestOperator, untilAnswered } from '../shared/requests.js';
 import { CameraTiles } from './camera_tiles.js';
 import { setNames } from '../people/names.js';
 import { ViewSelectionForm } from './view_selection.js';
@@ -42,10 +42,10 @@ function askForToken() {
 
 async function enter() {
   try {
-    const session = await signIn.getSession();
+    const session = await untilAnswered(() => signIn.getSession(), showError);
     if (!session) return showSection(null);
     if (session.role !== 'operate') return await showRefusal(session);
-    const site = await getJson('api/site');
+    const site = await untilAnswered(() => getJson('api/site'), showError);
     showError(null);
     if (!sections.size) createSections(site);
     showSection(location.hash.slice(1));

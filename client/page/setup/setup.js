@@ -1,7 +1,7 @@
 /** Entry point of the set-up page: finds and tries cameras, names them, writes the configuration, and waits for the site. */
 
 import { element, setText } from '../shared/dom.js';
-import { pause, requestJson, requestOperator } from '../shared/requests.js';
+import { pause, requestJson, requestOperator, untilAnswered } from '../shared/requests.js';
 import { AddedCameras } from './added_cameras.js';
 import { CameraSearch } from './camera_search.js';
 import { SiteForm } from './site_form.js';
@@ -56,9 +56,9 @@ async function enter() {
   try {
     if (token) {
       history.replaceState(null, '', location.pathname);
-      await requestJson('api/session', 'POST', { token });
+      await untilAnswered(() => requestJson('api/session', 'POST', { token }), showError);
     }
-    show(await requestOperator('setup'));
+    show(await untilAnswered(() => requestOperator('setup'), showError));
     await search.run();
   } catch (error) {
     showError(error);

@@ -2,6 +2,7 @@
 
 const TIMEOUT_MS = 4000;
 const OPERATOR_TIMEOUT_MS = 8000;
+const RETRY_MS = 1000;
 
 /** An HTTP answer with an error status. */
 export class HttpError extends Error {
@@ -79,6 +80,27 @@ async function send(path, method, content, timeoutMs) {
     });
   } catch {
     throw new Error('The server does not answer.');
+  }
+}
+
+/**
+ * Repeat a request until the server answers, even if with a permanent error.
+ *
+ * @template T
+ * @param {() => Promise<T>} request
+ * @param {(error: unknown) => void} showError receives why it failed so far
+ * @returns {Promise<T>}
+ * @throws {HttpError} a permanent one
+ */
+export async function untilAnswered(request, showError) {
+  for (;;) {
+    try {
+      return await request();
+    } catch (error) {
+      if (error instanceof HttpError && error.permanent) throw error;
+      showError(error);
+      await pause(RETRY_MS);
+    }
   }
 }
 

@@ -1,7 +1,7 @@
 /** Signing in and out, on both pages: exchanges a token for a cookie that scripts cannot read. */
 
 import { element } from './dom.js';
-import { HttpError, requestJson } from './requests.js';
+import { HttpError, requestJson, untilAnswered } from './requests.js';
 
 /** @import {Session} from './api_types.js' */
 
@@ -43,7 +43,8 @@ export class SignIn {
     const [, token] = TOKEN_IN_LINK.exec(location.hash) ?? [];
     if (!token) return;
     history.replaceState(null, '', location.pathname + location.search);
-    await this.#signIn(token);
+    const request = () => requestJson(SESSION, 'POST', { token });
+    await untilAnswered(request, this.showError).then(() => this.showError(null), this.showError);
   }
 
   /**
