@@ -45,7 +45,7 @@ async def assisted_site(
             "assist": {"enabled": True, "crossing_margin": 1000.0, "swap_margin": 100.0, **assist},
             **PATIENT_CAMERAS,
         },
-        "view": {"late_after_s": 60, "flags": {"per_minute": 60, "risk": 0.0}},
+        "view": {"late_after_s": 60, "flags": {"per_minute": 60, "risk": 0.0, "answer_s": 600}},
     }
     path = folder / "demo.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
