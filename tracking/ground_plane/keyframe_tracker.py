@@ -130,8 +130,8 @@ class KeyframeTracker:
     def provisional(self) -> list[GroundFrame]:
         """Return the frames that are not final yet, as the last solution has them.
 
-        Valid after a `push` that returned frames. Who has arrived since the last final frame has no number
-        yet, and is left out.
+        Frames since that solution are left out, and so is who has arrived since the last final frame, since
+        they have no number yet.
         """
         return [
             GroundFrame(frame.number, self._provisional_tracks(frame, m), self._report)

@@ -96,8 +96,8 @@ class GroundPlaneTracker:
     def provisional(self) -> list[GroundFrame]:
         """Return the frames that are not final yet, as the last solution has them.
 
-        Valid after a `push` that returned frames. Who has arrived since the last final frame has no number
-        yet, and is left out.
+        Since that solution people stay where they were. Who has arrived since the last final frame has no
+        number yet, and is left out.
         """
         previous, found = self._previous, list[GroundFrame]()
         for people in self._keyframes.provisional():

@@ -108,7 +108,7 @@ class JointTracker:
         final = _without_gap(final)
         if final:
             self._final_to = final[-1].frame
-        ahead = self._tracker.provisional() if final and not all_ended else []
+        ahead = [] if all_ended else self._tracker.provisional()
         # Before the first solution nobody is known.
         unsolved = range(self._final_to + 1 + len(ahead), last + 1)
         return final, [*ahead, *(GroundFrame(frame, (), None) for frame in unsolved)]

@@ -139,3 +139,24 @@ def test_windows_that_do_not_overlap_are_tracked_too() -> None:
     stage = JointStage(joint_config(track={"joint": True, "window": window}))
     epochs = [stage.step(epoch) for epoch in walked_epochs(walk_past(), stride=3)]
     assert {track.id for track in epochs[-1].tracks["c0"].tracks} == {1, 2}
+
+
+@pytest.mark.parametrize("fps", [10.0, 25.0, 30.0])
+def test_people_are_in_every_frame_of_every_epoch_at_any_rate(fps: float) -> None:
+    """Also in epochs in which no frame becomes final, since windows and keyframes do not end together."""
+    config = joint_config(
+        site={"name": "hall", "fps": fps, "width": SIZE[0], "height": SIZE[1]},
+        encode={"gop_s": 0.2},
+        track={"joint": True, "window": {"length_s": 1.0, "min_frames": 3}},
+        view={"lookahead_s": 1.0},
+    )
+    stage = JointStage(config)
+    epochs = walked_epochs(walk_past(round(4 * fps)), stride=config.window.stride)
+    final = -1
+    for epoch in list(map(stage.step, epochs))[:-1]:
+        for name in ("c0", "c1"):
+            message = epoch.tracks[name]
+            assert message.first == final + 1
+            if message.first > fps:
+                assert [None in track.boxes for track in message.tracks] == [False, False]
+        final = epoch.tracks["c0"].final_to
