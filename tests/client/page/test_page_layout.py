@@ -54,9 +54,12 @@ async def test_on_a_desktop_everything_fits_without_scrolling(browser: Browser, 
             await expect(visit.page.locator(part)).to_be_in_viewport(ratio=1)
 
 
-@pytest.mark.parametrize("width", [360, 1600])
-async def test_opening_and_switching_cause_no_layout_shifts(browser: Browser, width: int) -> None:
-    async with visiting(browser, width=width) as visit:
+@pytest.mark.parametrize(("width", "slowness"), [(360, 1), (360, 20), (1600, 1)])
+async def test_opening_and_switching_cause_no_layout_shifts(
+    browser: Browser, width: int, slowness: int
+) -> None:
+    """At a 20th of the speed the page appears before the site is known."""
+    async with visiting(browser, width=width, slowness=slowness) as visit:
         await visit.get(f"{{ {WATCH_SHIFTS} }}")
         await visit.playing(1)
         await visit.until("myview.cuts.length >= 1")

@@ -28,8 +28,9 @@ class Visit:
     server: SiteServer
 
     async def until(self, condition: str) -> None:
-        """Wait until a JavaScript expression holds."""
-        await self.page.wait_for_function(condition, timeout=PATIENCE_MS)
+        """Wait until a JavaScript expression holds; the page may load once more meanwhile."""
+        loaded = "typeof myview !== 'undefined'"
+        await self.page.wait_for_function(f"{loaded} && ({condition})", timeout=PATIENCE_MS)
 
     async def playing(self, person: int) -> None:
         """Wait until frames of a person are shown."""
@@ -64,13 +65,20 @@ async def visiting(
     width: int = 800,
     height: int = 900,
     script: str = "",
+    slowness: int = 1,
 ) -> AsyncIterator[Visit]:
-    """Open the page of a site, after an optional script; an exception in the page fails the test."""
+    """Open the page of a site, after an optional script; an exception in the page fails the test.
+
+    `slowness`: by how much processing takes longer.
+    """
     failures: list[str] = []
     async with serving(site or FakeSite()) as server:
         # The site's policy forbids eval, which evaluates the conditions of these tests.
         page = await new_page(browser, viewport={"width": width, "height": height}, bypass_csp=True)
         page.on("pageerror", lambda error: failures.append(str(error)))
+        if slowness > 1:
+            session = await page.context.new_cdp_session(page)
+            await session.send("Emulation.setCPUThrottlingRate", {"rate": slowness})
         if script:
             await page.add_init_script(script)
         try:

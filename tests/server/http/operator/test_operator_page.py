@@ -37,6 +37,7 @@ from fakes.service.scripted_cameras import (
     status,
     tracks,
 )
+from fakes.timeouts import PATIENCE
 from server.cli.calibrate.points_file import read_points
 from server.config.loader import load_config
 from server.config.running_config import ConfigFileState
@@ -128,7 +129,7 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
     control = SiteControl(path, asyncio.Event())
     with closing(RtspCamera(gops, FPS, login=("viewer", "s3cret"), live=True)) as stream:
         async with open_operator_page(
-            browser, "#cameras", patience=100, on_disk=on_disk, control=control
+            browser, "#cameras", patience=PATIENCE, on_disk=on_disk, control=control
         ) as (_, page):
             names = page.get_by_label(re.compile("^Name of camera"))
             await expect(names).to_have_count(1)
@@ -137,11 +138,11 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
             await page.get_by_label("Password").fill("wrong")
             await page.get_by_label("Name", exact=True).fill("door")
             await page.get_by_role("button", name="Try and add").click()
-            await expect(page.locator("#error-message")).to_contain_text("401", timeout=20_000)
+            await expect(page.locator("#error-message")).to_contain_text("401")
             await expect(page.locator("#restart")).to_be_hidden()
             await page.get_by_label("Password").fill("s3cret")
             await page.get_by_role("button", name="Try and add").click()
-            await expect(names).to_have_count(2, timeout=20_000)
+            await expect(names).to_have_count(2)
             await expect(page.locator("#error-message")).to_be_empty()
             await expect(page.get_by_label("Password")).to_have_value("")
             await expect(page.locator("#restart-state")).to_contain_text("not in force: cameras.")
