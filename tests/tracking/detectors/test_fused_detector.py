@@ -78,6 +78,15 @@ def test_of_two_people_the_one_that_the_network_misses_is_found_by_the_silhouett
     assert 0.3 < mean_score(found, OTHER, frames) < mean_score(found, WALKER, frames)
 
 
+def test_a_thing_that_stands_still_is_no_person_after_some_seconds_although_people_pass_it() -> None:
+    thing = Figure(150, 220, speed=0.0, begin=60)
+    walkers = [Figure(10, 200, speed=1.0, begin=40), thing]
+
+    found = detect_all(lambda frame: [(walkers[0].box(frame), 0.9)], walkers, range(300))
+    assert mean_score(found, thing, range(80, 100)) > 0.3
+    assert mean_score(found, thing, range(270, 300)) < 0.25
+
+
 def test_a_person_is_counted_once() -> None:
     shift = np.array([6.0, -4.0, 6.0, -4.0])
     found = detect_all(

@@ -24,6 +24,7 @@ from tracking.detectors.fused.explanation import (
 )
 from tracking.detectors.fused.reliance import NetworkReliance
 from tracking.detectors.fused.schedule import NetworkSchedule
+from tracking.detectors.fused.still_silhouettes import StillSilhouettes
 from tracking.types import Detections
 
 _WEIGHTS = FusionWeights()
@@ -38,6 +39,8 @@ _CLEAR = 0.6
 """Least gain per visible area of a clear silhouette."""
 _CROSSING = 0.2
 """Overlap (IoU) of two people from which they are about to cross."""
+_CONFIRMS = -2.2
+"""Least log-odds of a network box that confirms a silhouette: a probability of .1."""
 _KNOWN = 0.3
 """Least overlap (IoU) of a person with one who was there at the last run; below, somebody is new."""
 
@@ -96,6 +99,8 @@ class FusedDetector:
         self._run_s = self._schedule.every / background.fps
         self._carried = CarriedBoxes()
         self._reliance = NetworkReliance()
+        self._still = StillSilhouettes()
+        self._last_run = 0
         self._known = np.empty((0, 4))
         """The people at the last run of the network, in cells."""
         self._is_needed = True
@@ -169,6 +174,7 @@ class FusedDetector:
             self._reliance.observe(fused.supports[: fused.person_count][is_clear] >= 0)
             self._background.observe_people(self._agreed_people(fused, network), self._run_s)
             self._known = fused.boxes[: fused.person_count]
+            self._observe_still(fused, network)
         self._is_needed = self._needs_network(fused)
         self._background.learn(scan, fused.boxes[: fused.person_count])
         return self._background.detections(
@@ -180,6 +186,15 @@ class FusedDetector:
         self._is_needed = True
         boxes = self._background.grid.work_to_cells(found.boxes)
         return self._background.detections(work_image, boxes, found.scores)
+
+    def _observe_still(self, fused: FusedHypotheses, network: NetworkBoxes) -> None:
+        """Record which silhouettes this run of the network confirms."""
+        is_confirmed = fused.supports >= 0
+        is_confirmed[is_confirmed] = network.log_odds[fused.supports[is_confirmed]] >= _CONFIRMS
+        seconds = min((self._frame - self._last_run) / self._background.fps, self._run_s)
+        shown = (fused.silhouettes >= _AGREED) | is_confirmed
+        self._still.update(fused.boxes[shown], is_confirmed[shown], self._reliance.share * seconds)
+        self._last_run = self._frame
 
     def _needs_network(self, fused: FusedHypotheses) -> bool:
         """Return whether somebody seems to be new or two people are about to cross."""
@@ -199,7 +214,7 @@ class FusedDetector:
         fit = replace(scan.fit, max_people=max(scan.fit.max_people, seen))
         body = self._background.settings.box_filter.body
         weights = replace(_WEIGHTS, unsupported=self._reliance.share * _WEIGHTS.unsupported)
-        return explain_frame(scan, network, body, fit, weights, least)
+        return explain_frame(scan, network, body, fit, weights, least, self._still)
 
     def _is_flooded(self, scan: ForegroundScan, network: NetworkBoxes) -> bool:
         """Return whether much of the image is foreground outside of the network's boxes."""

@@ -27,6 +27,7 @@ from tracking.detectors.background.foreground_fit import (
     shrink_to_foreground,
 )
 from tracking.detectors.background.silhouette import Body, body_rectangles, integral_image
+from tracking.detectors.fused.still_silhouettes import StillSilhouettes
 
 _MIN_SUPPORT = 0.5
 """Least overlap (IoU) of a hypothesis with the network box that supports it."""
@@ -94,6 +95,7 @@ class FusedSearch(GreedySearch):
         settings: ForegroundFitSettings,
         weights: FusionWeights,
         min_log_odds: float,
+        penalties: Floats,
     ) -> None:
         """Start without people; the first candidates are the network's boxes, in cells."""
         super().__init__(candidates, scan.foreground, scan.cost, scan.weight, settings)
@@ -103,6 +105,7 @@ class FusedSearch(GreedySearch):
         said = weights.network * network.log_odds[None]
         # The last column stands for no box.
         self._support = np.full((len(candidates.boxes), len(network) + 1), weights.unsupported)
+        self._support[:, -1] -= penalties
         self._support[:, :-1] = np.where(overlaps >= _MIN_SUPPORT, said, -np.inf)
         # A box says the same of a large and of a small silhouette: it counts with its own area.
         self._support_areas = np.tile(candidates.areas[:, None], (1, len(network) + 1))
@@ -160,6 +163,7 @@ def explain_frame(
     settings: ForegroundFitSettings,
     weights: FusionWeights,
     min_log_odds: float,
+    still: StillSilhouettes,
 ) -> FusedHypotheses:
     """Select the people that explain a frame, then alternatives.
 
@@ -170,9 +174,12 @@ def explain_frame(
         settings: limits of the foreground fit.
         weights: weights of the log-odds.
         min_log_odds: least log-odds of a person.
+        still: silhouettes that are hardly people.
     """
     candidates = join_candidates(scan, network.boxes, body)
-    search = FusedSearch(candidates, network, scan, settings, weights, min_log_odds)
+    search = FusedSearch(
+        candidates, network, scan, settings, weights, min_log_odds, still.penalties(candidates.boxes)
+    )
     chosen = search.select_people()
     alternative_odds, alternative_shares = search.log_odds(), search.gain_per_visible_area()
     log_odds, supports, shares = [], [], []

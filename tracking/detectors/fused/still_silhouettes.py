@@ -1,0 +1,76 @@
+"""Silhouettes that stand still and that the network hardly ever confirms: things, more and more likely.
+
+A drop on the lens, a parked bicycle or a moved chair differs from the background for as long as a person
+would, and its silhouette is taken for one. A network that finds people misses one now and then, but hardly
+one who stands still for many of its runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from tracking.boxes import Floats, iou
+
+_SAME = 0.6
+"""Least overlap (IoU) of a silhouette with itself at the last run."""
+_FORGET_S = 2.0
+"""Seconds unseen after which a silhouette is forgotten."""
+_LOG_ODDS_PER_S = 0.5
+"""By how much the log-odds of a person fall per second: runs soon after each other err alike."""
+_MOST = 6.0
+"""By how much they fall at most."""
+_CONFIRMATION, _MOST_CONFIRMED_S = 3.0, 10.0
+"""How many unconfirmed seconds a confirmed one outweighs, and how many that follow at most have no effect.
+
+Whoever passes a thing confirms it for a moment only."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Silhouette:
+    """A silhouette at a place.
+
+    Attributes:
+        box: (4,) at the beginning: what moves away from it does not stand still.
+        doubt_s: seconds for which the network has not confirmed it, less those that confirmations outweigh.
+        unseen_s: seconds since it was seen last.
+    """
+
+    box: Floats
+    doubt_s: float = 0.0
+    unseen_s: float = 0.0
+
+
+class StillSilhouettes:
+    """The silhouettes that have stood still over the last runs of the network."""
+
+    def __init__(self) -> None:
+        self._known: list[_Silhouette] = []
+
+    def penalties(self, boxes: Floats) -> Floats:
+        """Return by how much the log-odds of hypotheses (P, 4) without a network box fall, (P,)."""
+        if not self._known:
+            return np.zeros(len(boxes))
+        seconds = np.array([max(known.doubt_s, 0.0) for known in self._known])
+        places = np.array([known.box for known in self._known])
+        here = np.where(iou(boxes[:, None], places[None]) >= _SAME, seconds, 0.0).max(axis=1)
+        return np.asarray(np.minimum(_LOG_ODDS_PER_S * here, _MOST))
+
+    def update(self, boxes: Floats, is_confirmed: npt.NDArray[np.bool_], seconds: float) -> None:
+        """Take the silhouettes (K, 4) in a run of the network, and which of them it confirms, (K,).
+
+        `seconds`: since the last run; fewer if the silence of the network says little.
+        """
+        is_new, kept = np.ones(len(boxes), dtype=np.bool_), []
+        for known in self._known:
+            is_same = iou(boxes, known.box[None]) >= _SAME
+            is_new &= ~is_same
+            if is_same.any():
+                change = -_CONFIRMATION * seconds if (is_same & is_confirmed).any() else seconds
+                doubt = max(known.doubt_s + change, -_MOST_CONFIRMED_S)
+                kept.append(_Silhouette(known.box, doubt))
+            elif known.unseen_s + seconds < _FORGET_S:
+                kept.append(replace(known, unseen_s=known.unseen_s + seconds))
+        self._known = [*kept, *map(_Silhouette, boxes[is_new])]
