@@ -15,7 +15,7 @@ def observed(
     silhouettes: StillSilhouettes, seconds: float, box: Floats = PLACE, *, confirmed: bool = False
 ) -> None:
     for _ in range(round(seconds / RUN_S)):
-        silhouettes.update(box[None], np.array([confirmed]), RUN_S)
+        silhouettes.update(box[None], np.array([confirmed]), RUN_S, 1.0)
 
 
 def penalty(silhouettes: StillSilhouettes, box: Floats = PLACE) -> float:
@@ -71,8 +71,17 @@ def test_what_was_not_seen_for_some_seconds_is_new() -> None:
     silhouettes = StillSilhouettes()
     observed(silhouettes, 10.0)
     for _ in range(round(1.0 / RUN_S)):
-        silhouettes.update(np.empty((0, 4)), np.empty(0, dtype=np.bool_), RUN_S)
+        silhouettes.update(np.empty((0, 4)), np.empty(0, dtype=np.bool_), RUN_S, 1.0)
     assert penalty(silhouettes) > 0.0
     for _ in range(round(2.0 / RUN_S)):
-        silhouettes.update(np.empty((0, 4)), np.empty(0, dtype=np.bool_), RUN_S)
+        silhouettes.update(np.empty((0, 4)), np.empty(0, dtype=np.bool_), RUN_S, 1.0)
     assert penalty(silhouettes) == 0.0
+
+
+def test_where_the_network_finds_nobody_silhouettes_are_forgotten_and_not_doubted() -> None:
+    silhouettes = StillSilhouettes()
+    for step in range(500):
+        box = PLACE + np.array([step, 0.0, step, 0.0])
+        silhouettes.update(np.stack([PLACE, box]), np.zeros(2, dtype=np.bool_), RUN_S, 0.0)
+    assert penalty(silhouettes) == 0.0
+    assert len(silhouettes._known) < 30

@@ -39,8 +39,8 @@ _CLEAR = 0.6
 """Least gain per visible area of a clear silhouette."""
 _CROSSING = 0.2
 """Overlap (IoU) of two people from which they are about to cross."""
-_CONFIRMS = -2.2
-"""Least log-odds of a network box that confirms a silhouette: a probability of .1."""
+_CONFIRMING = 0.1
+"""Least probability of a network box that confirms a silhouette."""
 _KNOWN = 0.3
 """Least overlap (IoU) of a person with one who was there at the last run; below, somebody is new."""
 
@@ -190,10 +190,12 @@ class FusedDetector:
     def _observe_still(self, fused: FusedHypotheses, network: NetworkBoxes) -> None:
         """Record which silhouettes this run of the network confirms."""
         is_confirmed = fused.supports >= 0
-        is_confirmed[is_confirmed] = network.log_odds[fused.supports[is_confirmed]] >= _CONFIRMS
+        is_confirmed[is_confirmed] = network.log_odds[fused.supports[is_confirmed]] >= to_log_odds(
+            np.array(_CONFIRMING)
+        )
         seconds = min((self._frame - self._last_run) / self._background.fps, self._run_s)
         shown = (fused.silhouettes >= _AGREED) | is_confirmed
-        self._still.update(fused.boxes[shown], is_confirmed[shown], self._reliance.share * seconds)
+        self._still.update(fused.boxes[shown], is_confirmed[shown], seconds, self._reliance.share)
         self._last_run = self._frame
 
     def _needs_network(self, fused: FusedHypotheses) -> bool:

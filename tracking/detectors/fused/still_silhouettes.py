@@ -7,6 +7,7 @@ one who stands still for many of its runs.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,26 +52,32 @@ class StillSilhouettes:
 
     def penalties(self, boxes: Floats) -> Floats:
         """Return by how much the log-odds of hypotheses (P, 4) without a network box fall, (P,)."""
-        if not self._known:
+        doubted = [known for known in self._known if known.doubt_s > 0.0]
+        if not doubted:
             return np.zeros(len(boxes))
-        seconds = np.array([max(known.doubt_s, 0.0) for known in self._known])
-        places = np.array([known.box for known in self._known])
-        here = np.where(iou(boxes[:, None], places[None]) >= _SAME, seconds, 0.0).max(axis=1)
+        seconds = np.array([known.doubt_s for known in doubted])
+        here = np.where(_are_same(boxes, doubted), seconds, 0.0).max(axis=1)
         return np.asarray(np.minimum(_LOG_ODDS_PER_S * here, _MOST))
 
-    def update(self, boxes: Floats, is_confirmed: npt.NDArray[np.bool_], seconds: float) -> None:
+    def update(
+        self, boxes: Floats, is_confirmed: npt.NDArray[np.bool_], seconds: float, reliance: float
+    ) -> None:
         """Take the silhouettes (K, 4) in a run of the network, and which of them it confirms, (K,).
 
-        `seconds`: since the last run; fewer if the silence of the network says little.
+        `seconds`: since the last run; `reliance`: how much the silence of the network says, 0 to 1.
         """
-        is_new, kept = np.ones(len(boxes), dtype=np.bool_), []
-        for known in self._known:
-            is_same = iou(boxes, known.box[None]) >= _SAME
-            is_new &= ~is_same
+        same, kept = _are_same(boxes, self._known), []
+        for known, is_same in zip(self._known, same.T, strict=True):
             if is_same.any():
-                change = -_CONFIRMATION * seconds if (is_same & is_confirmed).any() else seconds
-                doubt = max(known.doubt_s + change, -_MOST_CONFIRMED_S)
+                weight = -_CONFIRMATION if is_confirmed[is_same].any() else 1.0
+                doubt = max(known.doubt_s + weight * reliance * seconds, -_MOST_CONFIRMED_S)
                 kept.append(_Silhouette(known.box, doubt))
             elif known.unseen_s + seconds < _FORGET_S:
                 kept.append(replace(known, unseen_s=known.unseen_s + seconds))
-        self._known = [*kept, *map(_Silhouette, boxes[is_new])]
+        self._known = [*kept, *map(_Silhouette, boxes[~same.any(axis=1)])]
+
+
+def _are_same(boxes: Floats, known: Sequence[_Silhouette]) -> npt.NDArray[np.bool_]:
+    """Return which boxes (K, 4) are at the places of known silhouettes, (K, N)."""
+    places = np.array([silhouette.box for silhouette in known]).reshape(-1, 4)
+    return np.asarray(iou(boxes[:, None], places[None]) >= _SAME)
