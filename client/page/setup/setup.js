@@ -1,14 +1,14 @@
 /** Entry point of the set-up page: finds and tries cameras, names them, writes the configuration, and waits for the site. */
 
 import { element, setText } from '../shared/dom.js';
-import { pause, requestJson, requestOperator, untilAnswered } from '../shared/requests.js';
+import { pause, requestOperator, untilAnswered } from '../shared/requests.js';
+import { exchangeTokenInLink } from '../shared/sign_in.js';
 import { AddedCameras } from './added_cameras.js';
 import { CameraSearch } from './camera_search.js';
 import { SiteForm } from './site_form.js';
 
 /** @import {SetupState, WrittenSite} from './api_types.js' */
 
-const TOKEN_IN_LINK = /^#token=([\w-]+)$/;
 const POLL_MS = 500;
 const TIMEOUT_MS = 3000;
 
@@ -50,14 +50,10 @@ async function siteRuns() {
   }
 }
 
-/** Exchange the token in the page's address for a cookie, and remove it from there. */
+/** Sign in by the page's address, and show what there is to set up. */
 async function enter() {
-  const [, token] = TOKEN_IN_LINK.exec(location.hash) ?? [];
   try {
-    if (token) {
-      history.replaceState(null, '', location.pathname);
-      await untilAnswered(() => requestJson('api/session', 'POST', { token }), showError);
-    }
+    await exchangeTokenInLink(showError);
     show(await untilAnswered(() => requestOperator('setup'), showError));
     await search.run();
   } catch (error) {

@@ -1,8 +1,9 @@
 /** JSON requests with timeouts. Addresses are relative to the page, for reverse proxies. */
 
+import { Backoff } from './backoff.js';
+
 const TIMEOUT_MS = 4000;
 const OPERATOR_TIMEOUT_MS = 8000;
-const RETRY_MS = 1000;
 
 /** An HTTP answer with an error status. */
 export class HttpError extends Error {
@@ -93,13 +94,14 @@ async function send(path, method, content, timeoutMs) {
  * @throws {HttpError} a permanent one
  */
 export async function untilAnswered(request, showError) {
+  const backoff = new Backoff();
   for (;;) {
     try {
       return await request();
     } catch (error) {
       if (error instanceof HttpError && error.permanent) throw error;
       showError(error);
-      await pause(RETRY_MS);
+      await pause(backoff.next());
     }
   }
 }

@@ -9,6 +9,25 @@ const SESSION = 'api/session';
 const NEEDS_TOKEN = [401, 403, 429]; // no token, an invalid one, too many attempts
 const TOKEN_IN_LINK = /^#token=([\w-]+)$/;
 
+/**
+ * Exchange the token in the page's address, if there is one, and remove it from there. As a fragment it is sent to
+ * no server and appears in no log.
+ *
+ * @param {(error: unknown) => void} showError receives why the server has not answered so far
+ * @throws {HttpError} the token is not valid
+ */
+export async function exchangeTokenInLink(showError) {
+  const [, token] = TOKEN_IN_LINK.exec(location.hash) ?? [];
+  if (!token) return;
+  history.replaceState(null, '', location.pathname + location.search);
+  await untilAnswered(() => exchange(token), showError);
+}
+
+/** @param {string} token */
+function exchange(token) {
+  return requestJson(SESSION, 'POST', { token });
+}
+
 export class SignIn {
   /** @type {HTMLFormElement} */
   #form = element('sign-in');
@@ -35,16 +54,9 @@ export class SignIn {
     });
   }
 
-  /**
-   * Sign in with the token in the page's address, if there is one, and remove it from there. As a fragment it is
-   * sent to no server and appears in no log.
-   */
+  /** Sign in with the token in the page's address, if there is one. */
   async signInByLink() {
-    const [, token] = TOKEN_IN_LINK.exec(location.hash) ?? [];
-    if (!token) return;
-    history.replaceState(null, '', location.pathname + location.search);
-    const request = () => requestJson(SESSION, 'POST', { token });
-    await untilAnswered(request, this.showError).then(() => this.showError(null), this.showError);
+    await exchangeTokenInLink(this.showError).then(() => this.showError(null), this.showError);
   }
 
   /**
@@ -74,7 +86,7 @@ export class SignIn {
   /** @param {string} token */
   async #signIn(token) {
     try {
-      await requestJson(SESSION, 'POST', { token });
+      await exchange(token);
       this.#form.hidden = true;
       this.showError(null);
       return true;
