@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, Route, expect
+from playwright.async_api import Browser, Page, Route, expect
 
 from fakes.http.tokens import serve_with_tokens, token_of
 from fakes.page.browser import new_page
@@ -18,6 +18,21 @@ from fakes.service.fed_site import serve_site
 PAGES = Path(str(files("client") / "page"))
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+
+async def fail_once(page: Page, path: str, method: str) -> list[str]:
+    """Let the first request of a path fail; return the list in which it will be."""
+    failed: list[str] = []
+
+    async def handle(route: Route) -> None:
+        if failed or route.request.method != method:
+            await route.continue_()
+        else:
+            failed.append(route.request.url)
+            await route.abort("internetdisconnected")
+
+    await page.route(f"**/{path}", handle)
+    return failed
 
 
 @needs_chromium
@@ -37,18 +52,9 @@ async def test_a_page_is_complete_although_a_request_failed(
     browser: Browser, address: str, failing: str
 ) -> None:
     """As all requests fail while a browser changes from one network to another."""
-    failed: list[str] = []
-
-    async def fail_once(route: Route) -> None:
-        if failed:
-            await route.continue_()
-        else:
-            failed.append(route.request.url)
-            await route.abort("internetdisconnected")
-
     async with aclosing(serve_site()) as sites:
         page = await new_page(browser)
-        await page.route(f"**/{failing}", fail_once)
+        failed = await fail_once(page, failing, "GET")
         await page.goto(f"http://127.0.0.1:{(await anext(sites)).port}/{address}")
         await expect(page.locator("#site")).not_to_be_empty()
         await page.wait_for_function(
@@ -62,18 +68,9 @@ async def test_a_page_is_complete_although_a_request_failed(
 async def test_a_link_with_a_token_signs_in_although_the_first_request_failed(
     browser: Browser, tmp_path: Path
 ) -> None:
-    failed: list[str] = []
-
-    async def fail_once(route: Route) -> None:
-        if route.request.method == "POST" and not failed:
-            failed.append(route.request.url)
-            await route.abort("internetdisconnected")
-        else:
-            await route.continue_()
-
     async with serve_with_tokens(tmp_path) as served:
         page = await new_page(browser)
-        await page.route("**/api/session", fail_once)
+        failed = await fail_once(page, "api/session", "POST")
         await page.goto(f"http://127.0.0.1:{served.port}/operator#token={token_of('lead')}")
         await expect(page.locator("#cameras")).to_be_visible()
         await page.close()
