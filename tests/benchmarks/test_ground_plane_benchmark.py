@@ -20,7 +20,7 @@ from tracking.ground_plane import GroundPlaneTracker, GroundSettings, track_grou
 VIEWS = floor_views()
 CAMERAS = {name: view.camera for name, view in VIEWS.items()}
 FRAMES = 20
-CROWD_FRAMES = 15
+CROWD_FRAMES = 8
 SHARES = np.linspace(0.0, 1.0, FRAMES)[:, None, None]
 WALKS = (1.0 - SHARES) * [[2.0, 3.0], [8.0, 6.0]] + SHARES * [[8.0, 3.0], [2.0, 6.0]]
 DETECTIONS = detect_walkers(np.asarray(WALKS), VIEWS, FloorNoise(deviation=0.005))

@@ -20,6 +20,7 @@ from fakes.timeouts import PATIENCE, PATIENCE_MS
 
 pytestmark = [
     pytest.mark.live,
+    pytest.mark.slow,
     pytest.mark.asyncio,
     needs_chromium,
 ]

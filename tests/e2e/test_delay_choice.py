@@ -12,7 +12,7 @@ from fakes.page.browser import new_page
 from fakes.programs import needs_chromium
 from fakes.running.several_services import configuration, several_services
 
-pytestmark = [pytest.mark.live, needs_chromium, pytest.mark.asyncio]
+pytestmark = [pytest.mark.live, pytest.mark.slow, needs_chromium, pytest.mark.asyncio]
 
 SMOOTH_S = 3.0
 """Look-ahead of the smooth view, in seconds: no picture of it is shown earlier."""

@@ -18,7 +18,13 @@ _AFTER = round(4 * FPS)
 """Pulses for which the survivor is watched after the fault."""
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(signal.SIGKILL, id="killed"),
+        pytest.param(signal.SIGSTOP, id="frozen", marks=pytest.mark.slow),
+    ],
+)
 async def test_the_other_service_goes_on_for_all_viewers_with_the_same_numbers(
     tmp_path: Path, how: signal.Signals
 ) -> None:
