@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmarks.bestview.camera_tracks import Messages, Rows
 from bestview import IdentitySettings, foot_points, person_heights, to_ground
+from server.messaging.packed_arrays import unpack_boxes
 from tracking.boxes import Floats
 from tracking.evaluation import oracle_association
 from tracking.evaluation.frame_matching import align_frames
@@ -43,9 +44,10 @@ def own_tracks(messages: Messages) -> dict[str, list[MotRow]]:
         for message in camera_messages:
             final_to = message.last if message.ended else message.final_to
             for track in message.tracks:
+                boxes = unpack_boxes([track.boxes])
                 for frame in range(max(done + 1, message.first), final_to + 1):
-                    box = track.boxes[frame - message.first]
-                    if box is not None:
+                    box = boxes[frame - message.first]
+                    if not np.isnan(box[0]):
                         rows.append(MotRow.of_box(frame + 1, track.id, box))
             done = max(done, final_to)
         tracks[camera] = sorted(rows, key=lambda row: (row.frame, row.id))

@@ -16,6 +16,7 @@ from server.cli.evaluate.choices_file import Choice, read_choices
 from server.config.site_config import Config
 from server.messaging.epochs import epoch_of_recording_end
 from server.messaging.messages import Box, CameraTracks, NumberedBox, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.joint_tracking.stage import JointStage
@@ -114,7 +115,7 @@ def _messages_of(
             tracks=[
                 TrackMessage(
                     id=number + 1,
-                    boxes=[boxes.get((person, frame)) for frame in range(first, last + 1)],
+                    boxes=pack_boxes([boxes.get((person, frame)) for frame in range(first, last + 1)]),
                     confidence=1.0,
                 )
                 for number, person in enumerate(people)

@@ -19,6 +19,7 @@ import numpy as np
 
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
+from benchmarks.scaling.message_sizes import track_message_size
 from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.scaling.simulated_site import SiteLoad, carry
 from benchmarks.scaling.timed_service import REST, STAGES
@@ -93,6 +94,11 @@ def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
         rows,
     )
     report.line("messages and bytes: at 25 pulses a second; late: windows decided without their camera")
+    size = track_message_size(SimulatedHall(loads[0].cameras, loads[0].per_camera))
+    report.line(
+        f"tracks of a camera with {loads[0].per_camera} people: {size.packed:.0f} kB a second"
+        f" (as JSON with all digits: {size.json:.0f})"
+    )
 
 
 def _services(loads: Sequence[SiteLoad]) -> str:

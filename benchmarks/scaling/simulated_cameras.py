@@ -75,19 +75,19 @@ def _frames(
     unit = gop[pulse % len(gop)]
     now = time.time()
     head = FrameHeader(pulse=pulse, key=unit.key, boot=boot, due=now, captured_at=now, encoded=now)
-    attachment = msgspec.json.encode(head)
+    attachment = msgspec.msgpack.encode(head)
     for camera in cameras:
         bus.publish(keys.camera(hall.ids[camera], "video"), unit.data, attachment)
 
 
 def _tracks(bus: Bus, keys: ZenohKeys, message: CameraTracks) -> None:
-    bus.publish(keys.camera(message.camera, "tracks"), msgspec.json.encode(message))
+    bus.publish(keys.camera(message.camera, "tracks"), msgspec.msgpack.encode(message))
 
 
 def _thumbnails(bus: Bus, keys: ZenohKeys, message: CameraTracks) -> None:
     for track in message.tracks:
         head = ThumbnailHeader(track=track.id, boot=message.boot, pulse=message.last)
-        bus.publish(keys.camera(message.camera, f"thumbs/{track.id}"), _THUMB, msgspec.json.encode(head))
+        bus.publish(keys.camera(message.camera, f"thumbs/{track.id}"), _THUMB, msgspec.msgpack.encode(head))
 
 
 def main() -> None:

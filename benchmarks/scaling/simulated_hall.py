@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
+from server.messaging.packed_arrays import pack_boxes, pack_histograms
 from tracking.boxes import Floats
 
 WIDTH, HEIGHT = 640, 360
@@ -147,11 +148,11 @@ class SimulatedTracker:
         tracks = [
             TrackMessage(
                 id=self._number(person, epoch),
-                boxes=[None if np.isnan(box[0]) else tuple(box) for box in rows],
+                boxes=pack_boxes(rows),
                 confidence=0.8,
                 appearance=self._looks(person, first, final_to),
             )
-            for person, rows in zip(view.people.tolist(), view.boxes.tolist(), strict=True)
+            for person, rows in zip(view.people.tolist(), view.boxes, strict=True)
         ]
         return CameraTracks(
             camera=self._hall.ids[self._camera],
@@ -170,7 +171,7 @@ class SimulatedTracker:
     def _looks(self, person: int, first: int, final_to: int) -> list[AppearanceHistogram]:
         if final_to < first:
             return []
-        histogram = self._hall.histograms[person].round(5).tolist()
+        histogram = pack_histograms(self._hall.histograms[person])
         return [AppearanceHistogram(first=first, last=final_to, histogram=histogram)]
 
     def _number(self, person: int, epoch: int) -> int:

@@ -64,13 +64,13 @@ class PacedCameras:
         for name, film in zip(self._hall.ids, self._films, strict=True):
             unit = film[number % len(film)]
             head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, captured_at=0.0, encoded=0.0)
-            service.ingest.video(self._message(name, "video", unit.data, msgspec.json.encode(head)))
+            service.ingest.video(self._message(name, "video", unit.data, msgspec.msgpack.encode(head)))
         service.pulses.newest = number
         if (number + 1) % STRIDE:
             return
         places = self._hall.places(max(0, number + 1 - WINDOW), number)
         for name, tracker in zip(self._hall.ids, self._trackers, strict=True):
-            payload = msgspec.json.encode(tracker.message(number // STRIDE, places))
+            payload = msgspec.msgpack.encode(tracker.message(number // STRIDE, places))
             service.ingest.tracks(self._message(name, "tracks", payload, b""))
         service.decide()
 

@@ -80,12 +80,12 @@ async def serve(config: Config, films: list[list[AccessUnit]], hall: SimulatedHa
                         captured_at=now,
                         encoded=now,
                     )
-                    bus.publish(keys.camera(name, "video"), unit.data, msgspec.json.encode(head))
+                    bus.publish(keys.camera(name, "video"), unit.data, msgspec.msgpack.encode(head))
                 if (pulse.number + 1) % STRIDE == 0:
                     places = hall.places(max(0, pulse.number + 1 - WINDOW), pulse.number)
                     for name, tracker in zip(hall.ids, trackers, strict=True):
                         message = tracker.message(pulse.number // STRIDE, places)
-                        bus.publish(keys.camera(name, "tracks"), msgspec.json.encode(message))
+                        bus.publish(keys.camera(name, "tracks"), msgspec.msgpack.encode(message))
                         await asyncio.sleep(0)  # lets the bus's threads and the next pulse run
     finally:
         bus.close()

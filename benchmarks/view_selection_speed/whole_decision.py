@@ -14,6 +14,7 @@ from server.config.loader import build_config
 from server.config.site_config import Config
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMessage
+from server.messaging.packed_arrays import pack_boxes, pack_histograms
 from server.service.decision_state import DecisionState
 from server.service.identity.camera_window import WindowReader
 from server.service.identity.people import PersonTracker
@@ -24,6 +25,8 @@ from server.service.view_selection.lookahead_window import LookaheadPart, Lookah
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 _SEED, _WIDTH, _HEIGHT = 5, 1280, 720
+_IDS = 1000
+"""More than there are people: a person's share of the first bin is a thousandth of their id."""
 _WARM = 6
 """Epochs before the measurement, which fill the look-ahead."""
 _ALL = QualitySettings(
@@ -61,12 +64,14 @@ class SimulatedCrowd:
             for person in range(self.people):
                 feet = begin[person] + walk[person] * np.arange(first, last + 1)[:, None]
                 tall = height[person]
-                boxes = (feet[:, [0, 1, 0, 1]] + np.array([-0.2, -1.0, 0.2, 0.0]) * tall).tolist()
+                boxes = feet[:, [0, 1, 0, 1]] + np.array([-0.2, -1.0, 0.2, 0.0]) * tall
+                share = (person + 1) / _IDS
+                look = pack_histograms(np.array([share, 1.0 - share]))
                 track = TrackMessage(
                     id=person,
-                    boxes=[(a, b, c, d) for a, b, c, d in boxes],
+                    boxes=pack_boxes(boxes),
                     confidence=0.7,
-                    appearance=[AppearanceHistogram(first=first, last=first, histogram=[float(person + 1)])],
+                    appearance=[AppearanceHistogram(first=first, last=first, histogram=look)],
                 )
                 for camera in cameras[person]:
                     tracks[config.camera_ids[camera]].append(track)
@@ -110,7 +115,9 @@ class _AppearanceRegistry:
     ) -> IdentityUpdate:
         """Return the id of every tracklet."""
         del last_frame, picture_sizes
-        numbers = {TrackletKey(*track.key, 0): int(track.appearance[0].histogram[0]) for track in tracks}
+        numbers = {
+            TrackletKey(*track.key, 0): round(track.appearance[0].histogram[0] * _IDS) for track in tracks
+        }
         return IdentityUpdate(numbers, created=(), returned=(), departed=(), merged=(), split=())
 
 

@@ -10,7 +10,7 @@ from server.messaging.bus import Bus
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS, EndReceived, ZenohKeys
 
-_DECODER = msgspec.json.Decoder(EndReceived)
+_DECODER = msgspec.msgpack.Decoder(EndReceived)
 
 
 class EndConfirmation:

@@ -6,17 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.media.letterbox import Letterbox
-from server.messaging.number_types import COORDINATE_MAX
-from server.messaging.observations import (
+from server.messaging.observations import FrameObservations
+from server.messaging.packed_arrays import (
     FRAME_DETECTIONS_MAX,
-    FrameObservations,
-    ScoredBox,
+    PackedDetections,
+    pack_detections,
     pack_histograms,
 )
 from tracking import Detections
 from tracking.detectors.background.motion import STILL, Motion
-
-_PIXEL_DIGITS, _SCORE_DIGITS = 1, 3
 
 
 def calibrated_camera_boxes(
@@ -33,14 +31,12 @@ def most_confident(detections: Detections) -> NDArray[np.int64]:
     return np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
 
 
-def scored_boxes(
+def packed_detections(
     detections: Detections, chosen: NDArray[np.int64], letterbox: Letterbox, motion: Motion
-) -> list[ScoredBox]:
-    """Return the chosen detections as a message has them, rounded."""
-    boxes = calibrated_camera_boxes(detections.boxes[chosen], letterbox, motion).round(_PIXEL_DIGITS)
-    scores = detections.scores[chosen].round(_SCORE_DIGITS)
-    rows = np.clip(np.column_stack([boxes, scores]), -COORDINATE_MAX, COORDINATE_MAX)
-    return [(row[0], row[1], row[2], row[3], row[4]) for row in rows.tolist()]
+) -> PackedDetections:
+    """Return the chosen detections as a message has them."""
+    boxes = calibrated_camera_boxes(detections.boxes[chosen], letterbox, motion)
+    return pack_detections(boxes, detections.scores[chosen])
 
 
 class ObservationCollector:
@@ -53,7 +49,7 @@ class ObservationCollector:
     def add(self, pulse: int, detections: Detections, motion: Motion) -> None:
         """Add the detections of a frame that was searched."""
         chosen = most_confident(detections)
-        boxes = scored_boxes(detections, chosen, self._letterbox, motion)
+        boxes = packed_detections(detections, chosen, self._letterbox, motion)
         histograms = pack_histograms(detections.histograms[chosen])
         self._frames.append(FrameObservations(pulse=pulse, boxes=boxes, histograms=histograms))
 

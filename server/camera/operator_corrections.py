@@ -18,7 +18,7 @@ from tracking.interactive import PositionCorrection
 
 log = logging.getLogger(__name__)
 
-_DECODER = msgspec.json.Decoder(PositionCorrections)
+_DECODER = msgspec.msgpack.Decoder(PositionCorrections)
 
 
 class CorrectionInbox:

@@ -49,7 +49,7 @@ class CameraPublisher:
             captured_at=captured_at,
             encoded=self._clock(),
         )
-        self._publish("video", unit.data, msgspec.json.encode(head))
+        self._publish("video", unit.data, msgspec.msgpack.encode(head))
 
     def publish_audio(self, frames: Sequence[EncodedAudioFrame]) -> None:
         """Publish frames of the site's audio, one message for each run of consecutive frames."""
@@ -58,21 +58,22 @@ class CameraPublisher:
         for run in consecutive_runs(frames):
             head = AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
             data = b"".join(frame.data for frame in run)
-            self._bus.publish(self._keys.sound, data, msgspec.json.encode(head))
+            self._bus.publish(self._keys.sound, data, msgspec.msgpack.encode(head))
 
     def publish_tracks(self, tracks: CameraTracks) -> None:
         """Publish the tracks of a window, solved just now."""
-        self._publish("tracks", msgspec.json.encode(msgspec.structs.replace(tracks, solved_at=self._clock())))
+        message = msgspec.structs.replace(tracks, solved_at=self._clock())
+        self._publish("tracks", msgspec.msgpack.encode(message))
 
     def publish_thumbnails(self, thumbnails: Mapping[int, bytes], pulse: int) -> None:
         """Publish the JPEGs of a frame by track."""
         for track, jpeg in thumbnails.items():
             head = ThumbnailHeader(track=track, boot=self._boot, pulse=pulse)
-            self._publish(f"thumbs/{track}", jpeg, msgspec.json.encode(head))
+            self._publish(f"thumbs/{track}", jpeg, msgspec.msgpack.encode(head))
 
     def publish_status(self, status: CameraStatus) -> None:
         """Publish the camera's status."""
-        self._publish("status", msgspec.json.encode(status))
+        self._publish("status", msgspec.msgpack.encode(status))
 
     def publish_retained_identities(self, snapshot: bytes) -> None:
         """Send the retained identity snapshot, encoded already, back to the best-view service."""

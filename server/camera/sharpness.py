@@ -8,6 +8,7 @@ import numpy as np
 
 from server.camera.sources import Image
 from server.messaging.messages import Box, CameraTracks
+from server.messaging.packed_arrays import last_box
 
 _WIDTH, _HEIGHT = 32, 64
 """People are scaled to this size first, so that detail is measured per person, not per pixel."""
@@ -32,7 +33,7 @@ class SharpnessMemory:
     def measure(self, message: CameraTracks, last_image: Image | None) -> CameraTracks:
         """Return the message with its tracks' sharpness in the window's last image, if there is one."""
         for track in message.tracks:
-            box = track.boxes[-1] if track.boxes else None
+            box = last_box(track.boxes)
             value = None if last_image is None or box is None else sharpness(last_image, box)
             if value is not None:
                 self._values[track.id] = value

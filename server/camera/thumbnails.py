@@ -7,6 +7,7 @@ import numpy as np
 
 from server.camera.sources import Image
 from server.messaging.messages import Box, CameraTracks
+from server.messaging.packed_arrays import last_box
 
 _HEIGHT = 160
 """Height in pixels: sharp enough on a high-resolution screen."""
@@ -19,7 +20,7 @@ def encode_thumbnails(image: Image, tracks: CameraTracks) -> dict[int, bytes]:
     """Return by track the JPEG thumbnail of each person visible in the window's last frame, ``image``."""
     thumbnails = {}
     for track in tracks.tracks:
-        box = track.boxes[-1] if track.boxes else None
+        box = last_box(track.boxes)
         crop = None if box is None else _crop(image, box)
         if crop is None:
             continue

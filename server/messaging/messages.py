@@ -1,8 +1,8 @@
 """The messages on the bus, and the keys they travel under.
 
-Everything but pictures and audio is JSON, so that any zenoh subscriber can read it; video is plain Annex B
-H.264 (or VP8 frames) with a small JSON header in zenoh's attachment. JSON floats are written with as many
-digits as they need to be read back exactly.
+Video is plain Annex B H.264 (or VP8 frames). Choices are JSON, like the events of the HTTP API. All else,
+which MyView's processes tell each other, is MessagePack with named fields, as is the header in zenoh's
+attachment; boxes and histograms are packed (`packed_arrays`).
 
 ===============================================  ===================================  =======================
 key                                              payload                              attachment
@@ -36,12 +36,13 @@ import msgspec
 
 from server.messaging.camera_status import PictureMotion
 from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
-from server.messaging.observations import FRAME_DETECTIONS_MAX, FrameObservations, ScoredBox
+from server.messaging.observations import FrameObservations
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
+from server.messaging.packed_arrays import PackedBoxes, PackedDetections, PackedHistogram, check_detections
 from tracking.types import PictureCondition
 
 DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-"""The exceptions of a decoder: invalid JSON, invalid UTF-8, nested too deeply."""
+"""The exceptions of a decoder: an invalid message, invalid UTF-8, nested too deeply."""
 
 Box = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 """Left, top, right, bottom in pixels of the site's image."""
@@ -67,19 +68,13 @@ class FrameHeader(msgspec.Struct, frozen=True, kw_only=True):
     encoded: Time
 
 
-HISTOGRAM_BINS_MAX = 1024
-"""Bins of a histogram, at most; more would not distinguish people better."""
-
-
 class AppearanceHistogram(msgspec.Struct, frozen=True, kw_only=True):
     """Appearance of a person: mean color histogram of consecutive frames with no one else in the box."""
 
     first: Pulse
     last: Pulse
-    histogram: Annotated[
-        list[Annotated[float, msgspec.Meta(le=1e6)]], msgspec.Meta(max_length=HISTOGRAM_BINS_MAX)
-    ]
-    """The mean of these frames' histograms."""
+    histogram: PackedHistogram
+    """The mean of these frames' histograms; its shares sum to 1."""
 
 
 AUDIO_FRAMES_MAX = 16_384
@@ -102,8 +97,8 @@ class TrackMessage(msgspec.Struct, frozen=True, kw_only=True):
 
     id: Number
     """The tracker's own number: one per person, camera and boot."""
-    boxes: list[Box | None]
-    """One per frame of the window; null where the person is hidden."""
+    boxes: PackedBoxes
+    """One per frame of the window, in pixels of the site's image; NaN where the person is hidden."""
     confidence: Cost
     appearance: list[AppearanceHistogram] = []
     """In frames up to ``final_to`` without other people in the box, in order."""
@@ -179,10 +174,18 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
     size: tuple[Pixels, Pixels]
     """Width and height of the camera's image."""
     pulse: Pulse
-    boxes: Annotated[list[ScoredBox], msgspec.Meta(max_length=FRAME_DETECTIONS_MAX)] | None
+    boxes: PackedDetections | None
     """Null: detection did not run."""
     ended: bool = False
     """Whether the recording has ended before this pulse: this is its last message."""
+
+    def __post_init__(self) -> None:
+        """Check the boxes.
+
+        Raises:
+            ValueError: they are none; decoders then raise a `ValidationError`.
+        """
+        check_detections(self.boxes or b"")
 
 
 class ThumbnailHeader(msgspec.Struct, frozen=True, kw_only=True):

@@ -18,8 +18,8 @@ from server.messaging.camera_identity_snapshot import (
     CameraIdentitySnapshot,
     PersonNumber,
 )
-from server.messaging.messages import HISTOGRAM_BINS_MAX
 from server.messaging.number_types import Number, Pulse
+from server.messaging.packed_arrays import HISTOGRAM_BINS_MAX
 
 SERVICES_MAX = 64
 """Best-view services of a site, at most."""

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-import tracking
-from server.messaging.messages import AppearanceHistogram, Box, SolverReport, TrackMessage
-from server.messaging.number_types import COORDINATE_MAX
+from server.messaging.messages import AppearanceHistogram, SolverReport, TrackMessage
+from server.messaging.packed_arrays import pack_boxes, pack_histograms
 from tracking import SolveReport, WindowTrack
-
-_SHARE_DIGITS = 5
-"""Decimals of histogram values."""
 
 
 def track_message(track: WindowTrack) -> TrackMessage:
@@ -19,20 +12,13 @@ def track_message(track: WindowTrack) -> TrackMessage:
     # Interpolated boxes: a short occlusion should not cause a cut to another camera.
     return TrackMessage(
         id=track.id,
-        boxes=[_box(row) for row in track.interpolated],
+        boxes=pack_boxes(track.interpolated),
         confidence=float(track.confidence),
-        appearance=[_appearance_message(histogram) for histogram in track.appearance_histograms],
+        appearance=[
+            AppearanceHistogram(first=one.first, last=one.last, histogram=pack_histograms(one.histogram))
+            for one in track.appearance_histograms
+        ],
     )
-
-
-def _appearance_message(appearance: tracking.AppearanceHistogram) -> AppearanceHistogram:
-    shares = [round(float(share), _SHARE_DIGITS) for share in appearance.histogram]
-    return AppearanceHistogram(first=appearance.first, last=appearance.last, histogram=shares)
-
-
-def _box(row: NDArray[np.float64]) -> Box | None:
-    left, top, right, bottom = (float(side) for side in np.clip(row, -COORDINATE_MAX, COORDINATE_MAX))
-    return None if np.isnan(left) else (left, top, right, bottom)
 
 
 def solver_report(report: SolveReport | None) -> SolverReport | None:

@@ -108,7 +108,7 @@ class BusConnection:
     def confirm_end(self, camera: str, boot: int) -> None:
         """Confirm to a camera that the last tracks of its recording have been received."""
         received = EndReceived(service=self._keys.bestview("alive", self._index), boot=boot)
-        self.send_to_camera("end_received", camera, msgspec.json.encode(received))
+        self.send_to_camera("end_received", camera, msgspec.msgpack.encode(received))
 
     def publish_choices(self, choices: GopChoices) -> None:
         """Publish the choices of a GOP."""

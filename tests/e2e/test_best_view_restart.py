@@ -83,7 +83,7 @@ async def test_a_restarted_best_view_shows_the_same_people_under_the_same_addres
 
 
 def read(message: Message) -> CameraTracks:
-    return msgspec.json.decode(message.payload, type=CameraTracks)
+    return msgspec.msgpack.decode(message.payload, type=CameraTracks)
 
 
 async def kill_and_check(site: RunningSite, messages: list[CameraTracks]) -> None:

@@ -6,7 +6,7 @@ from random import Random
 
 import msgspec
 
-from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
+from benchmarks.fuzz.engine.mutations import as_message, mutate_bytes, mutate_value
 from server.messaging.inbox import Message
 
 
@@ -15,8 +15,7 @@ def damaged_message(rng: Random, message: Message) -> Message:
     key, payload, head = message.key, message.payload, message.attachment
     choice = rng.random()
     if choice < 0.55:
-        json = head or payload
-        changed = as_json(mutate_value(rng, msgspec.json.decode(json)))
+        changed = as_message(mutate_value(rng, msgspec.msgpack.decode(head or payload)))
         return Message(key, payload, changed) if head else Message(key, changed, b"")
     if choice < 0.75:
         return Message(key, mutate_bytes(rng, payload), head)

@@ -6,6 +6,7 @@ import asyncio
 from random import Random
 
 import msgspec
+import numpy as np
 from prometheus_client import generate_latest
 
 from benchmarks.fuzz.bus.damaged_messages import damaged_message
@@ -40,6 +41,7 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX, CorrectedPosition, PositionCorrections
+from server.messaging.packed_arrays import pack_detections
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.service import BestViewService
@@ -113,9 +115,10 @@ class PeerMessages(ScriptTarget):
         """Return some messages of the other camera."""
         script: Script = []
         for pulse in range(3):
-            boxes = [(1.0, 2.0, 9.0, 30.0, 0.9)] * rng.randrange(3)
+            count = rng.randrange(3)
+            boxes = pack_detections(np.full((count, 4), [1.0, 2.0, 9.0, 30.0]), np.full(count, 0.9))
             detections = FrameDetections(camera="c1", boot=1, size=(WIDTH, HEIGHT), pulse=pulse, boxes=boxes)
-            message = Message(KEYS.camera("c1", "detections"), msgspec.json.encode(detections), b"")
+            message = Message(KEYS.camera("c1", "detections"), msgspec.msgpack.encode(detections), b"")
             sent = damaged_message(rng, message) if rng.random() < 0.7 else message
             script.append((sent.key, sent.payload, b""))
         return _packed(script)
@@ -147,7 +150,7 @@ class OperatorPlaces(ScriptTarget):
         for pulse in range(3):
             place = CorrectedPosition(pulse=pulse, track=1, x=9.0, y=9.0, tolerance=rng.random() + 0.1)
             points = [place] * rng.randrange(3)
-            payload = msgspec.json.encode(PositionCorrections(boot=1, corrections=points))
+            payload = msgspec.msgpack.encode(PositionCorrections(boot=1, corrections=points))
             message = Message(KEYS.camera("c0", "position_corrections"), payload, b"")
             sent = damaged_message(rng, message) if rng.random() < 0.7 else message
             script.append((sent.key, sent.payload, b""))
@@ -242,9 +245,9 @@ def read_api(service: FedService) -> None:
     """Read everything in a service's API."""
     facade = BestViewService(service)
     for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
-        msgspec.json.encode(content)
+        msgspec.msgpack.encode(content)
     for number in [*service.decision_state.selected_views, 99]:
-        msgspec.json.encode(facade.people.view_selection_of(number))
+        msgspec.msgpack.encode(facade.people.view_selection_of(number))
     generate_latest(make_app(facade)[METRICS])
 
 

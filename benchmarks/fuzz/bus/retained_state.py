@@ -42,7 +42,8 @@ class RetainedStates(ScriptTarget):
                 numbered_since=rng.random(),
                 people=[self._person_snapshot(rng) for _ in range(rng.randrange(4))],
             )
-            message = Message(KEYS.camera(camera, "retained_identities"), msgspec.json.encode(snapshot), b"")
+            payload = msgspec.msgpack.encode(snapshot)
+            message = Message(KEYS.camera(camera, "retained_identities"), payload, b"")
             sent = damaged_message(rng, message) if rng.random() < 0.5 else message
             script.append((sent.key, sent.payload))
         return msgspec.msgpack.encode((rng.randrange(1000), script))
@@ -87,5 +88,5 @@ class RetainedStates(ScriptTarget):
                 "a merged number is still in use"
             )
         for payload in published:
-            msgspec.json.decode(payload, type=CameraIdentitySnapshot)
+            msgspec.msgpack.decode(payload, type=CameraIdentitySnapshot)
         return not bad

@@ -28,6 +28,7 @@ from server.messaging.messages import (
     ZenohKeys,
 )
 from server.messaging.operator_messages import RiskEvent
+from server.messaging.packed_arrays import pack_boxes, pack_histograms
 from server.service.pipeline import BestViewPipeline
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
@@ -94,7 +95,7 @@ def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
         captured_at=unit.pulse / FPS,
         encoded=unit.pulse / FPS,
     )
-    return Message(KEYS.camera(camera, "video"), unit.data, msgspec.json.encode(head))
+    return Message(KEYS.camera(camera, "video"), unit.data, msgspec.msgpack.encode(head))
 
 
 def make_tracks(rng: Random, camera: str, epoch: int) -> CameraTracks:
@@ -129,11 +130,11 @@ def _track(rng: Random, person: int, first: int) -> TrackMessage:
     appearance = AppearanceHistogram(
         first=first,
         last=first + STRIDE - 1,
-        histogram=[float(place == person % _BINS) for place in range(_BINS)],
+        histogram=pack_histograms(np.eye(_BINS)[person % _BINS]),
     )
     return TrackMessage(
         id=person,
-        boxes=[*boxes],
+        boxes=pack_boxes(boxes),
         confidence=1.0,
         appearance=[appearance],
         sharpness=rng.choice((None, rng.random())),
@@ -148,22 +149,22 @@ def make_separate_tracks(rng: Random, camera: str, epoch: int) -> CameraTracks:
         AppearanceHistogram(
             first=first,
             last=first + STRIDE - 1,
-            histogram=[float(bin_number == number) for bin_number in range(8)],
+            histogram=pack_histograms(np.eye(_BINS)[number]),
         )
     ]
-    track = TrackMessage(id=1, boxes=[*boxes], confidence=1.0, appearance=appearance, sharpness=0.5)
+    track = TrackMessage(id=1, boxes=pack_boxes(boxes), confidence=1.0, appearance=appearance, sharpness=0.5)
     return msgspec.structs.replace(make_tracks(rng, camera, epoch), tracks=[track], shed=[])
 
 
 def tracks(message: CameraTracks) -> Message:
     """Return a track message as a bus message."""
-    return Message(KEYS.camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
+    return Message(KEYS.camera(message.camera, "tracks"), msgspec.msgpack.encode(message), b"")
 
 
 def thumbnail(camera: str, pulse: int) -> Message:
     """Return a thumbnail as a bus message."""
     head = ThumbnailHeader(track=1, boot=1, pulse=pulse)
-    return Message(KEYS.camera(camera, "thumbs/1"), b"\xff\xd8jpeg", msgspec.json.encode(head))
+    return Message(KEYS.camera(camera, "thumbs/1"), b"\xff\xd8jpeg", msgspec.msgpack.encode(head))
 
 
 def status(camera: str, pulse: int) -> Message:
@@ -180,13 +181,13 @@ def status(camera: str, pulse: int) -> Message:
         clock_offset=0.0,
         round_trip=0.001,
     )
-    return Message(KEYS.camera(camera, "status"), msgspec.json.encode(camera_status), b"")
+    return Message(KEYS.camera(camera, "status"), msgspec.msgpack.encode(camera_status), b"")
 
 
 def sound(epoch: int) -> Message:
     """Return the audio of an epoch as a bus message."""
     head = AudioHeader(first=epoch * 9, sizes=[_SOUND_BYTES] * 9)
-    return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.json.encode(head))
+    return Message(KEYS.sound, bytes(_SOUND_BYTES * 9), msgspec.msgpack.encode(head))
 
 
 class FedService(BestViewPipeline):

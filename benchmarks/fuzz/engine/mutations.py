@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from random import Random
 from typing import Any
 
+import msgspec
+
 WORDS = (
     b"\x00",
     b"\n",
@@ -120,6 +122,8 @@ def _mutations(value: Any) -> Sequence[Callable[[Random], Any]]:
             lambda rng: [*value, odd(rng)],
             lambda rng: rng.sample(value, len(value)),
         )
+    if isinstance(value, bytes):
+        return (odd, lambda rng: mutate_bytes(rng, value))
     if isinstance(value, bool) or value is None or isinstance(value, str):
         return (odd,)
     return (
@@ -142,9 +146,17 @@ def _without_key(rng: Random, value: dict[str, Any]) -> dict[str, Any]:
     return {key: item for key, item in value.items() if key != removed}
 
 
+def as_message(value: Any) -> bytes:
+    """Encode a value as MessagePack, or as JSON what that cannot hold, such as long integers."""
+    try:
+        return msgspec.msgpack.encode(value)
+    except (OverflowError, UnicodeEncodeError, RecursionError):
+        return as_json(value)
+
+
 def as_json(value: Any) -> bytes:
-    """Encode a value as JSON, including Python's non-standard numbers."""
-    return json.dumps(value).encode()
+    """Encode a value as JSON, including Python's non-standard numbers; bytes as text."""
+    return json.dumps(value, default=bytes.hex).encode()
 
 
 def _flip(rng: Random, data: bytes, _: Sequence[bytes]) -> bytes:

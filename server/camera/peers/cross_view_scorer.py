@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bestview import CameraDetections, CameraGeometry, rescore_detections, views_overlap
-from server.camera.observations import calibrated_camera_boxes, most_confident, scored_boxes
+from server.camera.observations import calibrated_camera_boxes, most_confident, packed_detections
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import FrameDetections
+from server.messaging.packed_arrays import PackedDetections, unpack_detections
 from tracking import Detections
 from tracking.detectors.background.motion import STILL, Motion
 
@@ -44,7 +45,7 @@ class CrossViewScorer:
         """
         boxes = None
         if detections is not None:
-            boxes = scored_boxes(detections, most_confident(detections), self._letterbox, motion)
+            boxes = packed_detections(detections, most_confident(detections), self._letterbox, motion)
         return FrameDetections(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
@@ -89,8 +90,8 @@ def _geometry(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGe
     return CameraGeometry(np.array(camera.ground, dtype=np.float64), size, (*camera_ignore, *site_ignore))
 
 
-def _camera_detections(rows: Sequence[tuple[float, ...]]) -> CameraDetections:
+def _camera_detections(packed: PackedDetections) -> CameraDetections:
     """Return boxes and scores as arrays, without empty boxes."""
-    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-    table = table[(table[:, 0] < table[:, 2]) & (table[:, 1] < table[:, 3])]
-    return CameraDetections(table[:, :4], table[:, 4])
+    boxes, scores = unpack_detections(packed)
+    kept = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
+    return CameraDetections(boxes[kept], scores[kept])

@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 _RETRY_S = 1.0
 _LISTENERS_S = 1.0
 """How long the first message waits for all peers to subscribe, or half as long as for their detections."""
-_DECODER = msgspec.json.Decoder(FrameDetections)
+_DECODER = msgspec.msgpack.Decoder(FrameDetections)
 
 
 class PeerDetectionExchange:
@@ -167,7 +167,7 @@ class PeerDetectionExchange:
             await self._wait_until(
                 lambda: {peer for _, peer in self._listening}.issuperset(self._peers), deadline
             )
-        payload = msgspec.json.encode(message)
+        payload = msgspec.msgpack.encode(message)
         for bus in self._buses:
             bus.publish(self._keys.camera(self._camera, "detections"), payload)
 

@@ -13,7 +13,7 @@ import msgspec
 
 from server.messaging.messages import FrameDetections
 
-_DECODER = msgspec.json.Decoder(FrameDetections)
+_DECODER = msgspec.msgpack.Decoder(FrameDetections)
 
 
 class PeerLink(Protocol):
@@ -37,7 +37,7 @@ class PeerPipes:
 
     def exchange(self, detections: FrameDetections) -> Sequence[FrameDetections]:
         """Send this camera's detections in a frame; return those of the peers that have not ended."""
-        data = msgspec.json.encode(detections)
+        data = msgspec.msgpack.encode(detections)
         for camera, connection in list(self.outgoing.items()):
             try:
                 connection.send_bytes(data)

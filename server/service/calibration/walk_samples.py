@@ -11,8 +11,8 @@ from bestview import foot_points
 from bestview.calibration import Floats, boxes_at_edge
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
+from server.messaging.packed_arrays import unpack_boxes
 from server.service.calibration.worker import CameraBoxes
-from server.service.ingest.box_arrays import boxes_array
 
 Ints = NDArray[np.int64]
 
@@ -62,7 +62,7 @@ class CalibrationWalk:
         self._next = last + 1 - start
         self._size = message.size
         frames = message.last - message.first + 1
-        boxes = boxes_array(track.boxes for track in message.tracks).reshape(len(message.tracks), frames, 4)
+        boxes = unpack_boxes(track.boxes for track in message.tracks).reshape(len(message.tracks), frames, 4)
         boxes = boxes[:, first - message.first : last + 1 - message.first]
         track, frame = np.nonzero(~np.isnan(boxes[:, :, 0]))
         indices = [

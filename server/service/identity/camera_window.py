@@ -12,9 +12,9 @@ from bestview import AppearanceHistogram, TrackKey, TrackUpdate
 from server.media.letterbox import Letterbox
 from server.messaging import messages
 from server.messaging.messages import CameraTracks
+from server.messaging.packed_arrays import unpack_boxes, unpack_histograms
 from server.messaging.picture_motion import calibrated_boxes
 from server.service.identity.local_numbers import GROUND, LocalNumbers
-from server.service.ingest.box_arrays import boxes_array
 from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 
 Floats = NDArray[np.float64]
@@ -87,7 +87,7 @@ def _appearance_histograms(
     """Return the histograms in the frames from `first` on."""
     return tuple(
         AppearanceHistogram(
-            max(message.first, first), message.last, np.array(message.histogram, dtype=np.float64)
+            max(message.first, first), message.last, unpack_histograms(message.histogram, 1)[0]
         )
         for message in histograms
         if message.last >= first
@@ -133,7 +133,7 @@ class WindowReader:
         else:
             keys = self.local_numbers.of(message)
         frames = max(0, message.last - message.first + 1)
-        boxes = boxes_array(track.boxes for track in message.tracks)
+        boxes = unpack_boxes(track.boxes for track in message.tracks)
         local_ids = np.array([key.local_id for key in keys], dtype=np.int64)
         fresh = message.first
         if message.revised_from is not None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bestview import AppearanceHistogram, Merge, Split, TrackKey, TrackUpdate
 from server.messaging.messages import CameraTracks
+from server.messaging.packed_arrays import unpack_histograms
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.local_numbers import GROUND, LocalNumbers, TrackName
 from server.service.identity.own_tracks import OwnTracks
@@ -100,7 +101,7 @@ def ground_updates(
         for track in message.tracks:
             looks.setdefault(track.id, []).extend(
                 AppearanceHistogram(
-                    sample.first, sample.last, np.array(sample.histogram, dtype=np.float64), message.camera
+                    sample.first, sample.last, unpack_histograms(sample.histogram, 1)[0], message.camera
                 )
                 for sample in track.appearance
                 if joint.first <= sample.first and sample.last <= joint.final_to

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from bestview import TrackKey
 from server.messaging.messages import NumberedBox
+from server.messaging.packed_arrays import unpack_boxes
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.people import PersonTracker
 from server.service.identity.track_parts import UNCONFIRMED
-from server.service.ingest.box_arrays import boxes_array
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import HistorySpan
 from tracking.boxes import iou
@@ -79,7 +79,7 @@ class OccupiedRegions:
                 self._trackless[camera].difference_update(frames)
         for camera, message in {} if epoch.joint is None else epoch.joint.own.items():
             count = max(0, message.last - message.first + 1)
-            boxes = boxes_array(track.boxes for track in message.tracks).reshape(
+            boxes = unpack_boxes(track.boxes for track in message.tracks).reshape(
                 len(message.tracks), count, 4
             )
             for at in range(count):

@@ -12,9 +12,9 @@ import scipy
 
 from bestview import TrackKey
 from server.messaging.messages import CameraTracks
+from server.messaging.packed_arrays import unpack_boxes
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.local_numbers import TrackName
-from server.service.ingest.box_arrays import boxes_array
 from tracking.boxes import Floats, iou
 
 _SAME_IOU = 0.5
@@ -64,7 +64,7 @@ def _matches(message: CameraTracks, window: CameraWindow) -> dict[TrackName, Tra
     if not message.tracks or not window.keys or not max(first, window.first) <= frame:
         return {}
     frames = message.last - first + 1
-    boxes = boxes_array(track.boxes for track in message.tracks).reshape(len(message.tracks), frames, 4)
+    boxes = unpack_boxes(track.boxes for track in message.tracks).reshape(len(message.tracks), frames, 4)
     overlaps = _overlaps(boxes[:, frame - first], window.boxes[:, frame - window.first])
     rows, columns = scipy.optimize.linear_sum_assignment(overlaps, maximize=True)
     return {

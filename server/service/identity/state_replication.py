@@ -100,7 +100,7 @@ class StateReplication:
         self._reported.add(camera)
         if not message.payload:
             return
-        snapshot = msgspec.json.decode(message.payload, type=CameraIdentitySnapshot)
+        snapshot = msgspec.msgpack.decode(message.payload, type=CameraIdentitySnapshot)
         self._first_free[camera] = first_free_number(snapshot)
         if is_repeated:
             self._people.reserve_numbers_below(
@@ -195,7 +195,7 @@ class StateReplication:
             before = self._sent.get(camera)
             if before is not None and pulse - before.pulse < _INTERVAL_S * self._fps and _same(before, now):
                 continue
-            payload = msgspec.json.encode(now)
+            payload = msgspec.msgpack.encode(now)
             if len(payload) <= SNAPSHOT_BYTES_MAX:
                 self._sent[camera] = now
                 self._send(camera, payload)

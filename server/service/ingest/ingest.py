@@ -146,11 +146,11 @@ class Ingest:
             camera: OrderedDict() for camera in frame_buffers
         }
         """By camera, boot and track; the newest is the last."""
-        self._frame_header = msgspec.json.Decoder(FrameHeader)
-        self._camera_tracks = msgspec.json.Decoder(CameraTracks)
-        self._camera_status = msgspec.json.Decoder(CameraStatus)
-        self._audio_header = msgspec.json.Decoder(AudioHeader)
-        self._thumbnail_header = msgspec.json.Decoder(ThumbnailHeader)
+        self._frame_header = msgspec.msgpack.Decoder(FrameHeader)
+        self._camera_tracks = msgspec.msgpack.Decoder(CameraTracks)
+        self._camera_status = msgspec.msgpack.Decoder(CameraStatus)
+        self._audio_header = msgspec.msgpack.Decoder(AudioHeader)
+        self._thumbnail_header = msgspec.msgpack.Decoder(ThumbnailHeader)
 
     def alive(self, key: str, is_present: bool) -> None:
         """Record that a camera's liveliness token appeared or disappeared."""

@@ -10,6 +10,7 @@ import msgspec
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks, TrackMessage
+from server.messaging.packed_arrays import first_boxes
 from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 from server.service.joint_tracking.joint_messages import (
     CameraObservations,
@@ -96,10 +97,11 @@ def without_tracks(epoch: Epoch, cameras: Collection[str]) -> Epoch:
 
 
 def _first_frames(track: TrackMessage, frames: int, last: int) -> TrackMessage:
-    if len(track.boxes) == frames:
+    boxes = first_boxes(track.boxes, frames)
+    if boxes == track.boxes:
         return track
     appearance = [sample for sample in track.appearance if sample.last <= last]
-    return msgspec.structs.replace(track, boxes=track.boxes[:frames], appearance=appearance)
+    return msgspec.structs.replace(track, boxes=boxes, appearance=appearance)
 
 
 def _rows(homography: Sequence[Sequence[float]]) -> tuple[Row, Row, Row]:

@@ -82,7 +82,7 @@ class OperatorAssist:
         corrections = corrections_for_tracker(self._people, camera, number, positions)
         if corrections is None:
             return 0, []
-        self._send(camera, msgspec.json.encode(corrections))
+        self._send(camera, msgspec.msgpack.encode(corrections))
         self.corrections_sent += len(corrections.corrections)
         return len(corrections.corrections), self.flags.pointed(
             number, camera, [correction.pulse for correction in corrections.corrections]

@@ -46,8 +46,8 @@ _OWN_RECORDS = 30
 """Own records kept, to be compared with the others' of the same pulse."""
 _NUMBERS_AHEAD_MAX = 10_000
 """Numbers by which another service may be ahead."""
-_RECORD = msgspec.json.Decoder(ServiceRecord)
-_STATE = msgspec.json.Decoder(ServiceState)
+_RECORD = msgspec.msgpack.Decoder(ServiceRecord)
+_STATE = msgspec.msgpack.Decoder(ServiceState)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ class ServiceReplication:
             record = self._record()
             self._own[epoch.last] = record
             self._own = dict(list(self._own.items())[-_OWN_RECORDS:])
-            payload = msgspec.json.encode(record)
+            payload = msgspec.msgpack.encode(record)
             if len(payload) <= RECORD_BYTES_MAX:
                 self._bus.publish_record(payload)
         self._compare()
@@ -222,7 +222,7 @@ class ServiceReplication:
         """Return the state for a service that starts; empty: there is none yet."""
         if self._unbroken_since is None:
             return b""
-        return msgspec.json.encode(state_of(self._people, self._record()))
+        return msgspec.msgpack.encode(state_of(self._people, self._record()))
 
     def _decode_state(self, answer: bytes) -> ServiceState | None:
         try:

@@ -27,6 +27,7 @@ from benchmarks.bestview.service_decisions import Rendering, decide_with_true_id
 from benchmarks.bestview.visibility_losses import VisibilityLosses, losses
 from server.cli.evaluate.choices_file import Choice
 from server.messaging.messages import CameraTracks, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from tracking.motchallenge import MotRow
 
 FRAMES = 60
@@ -146,7 +147,7 @@ def test_a_cameras_own_tracks_are_what_was_final() -> None:
             final_to=final_to,
             ended=ended,
             shed=[],
-            tracks=[TrackMessage(id=3, boxes=boxes, confidence=1.0)],
+            tracks=[TrackMessage(id=3, boxes=pack_boxes(boxes), confidence=1.0)],
             solve=None,
         )
 

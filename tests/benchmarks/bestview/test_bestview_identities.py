@@ -12,6 +12,7 @@ from benchmarks.bestview.identity_errors import MatchedBoxes, PairScores
 from benchmarks.bestview.tracklet_cuts import own_tracklets
 from server.config.loader import build_config
 from server.messaging.messages import Box, CameraTracks, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from tracking.motchallenge import MotRow
 
 CROSSING = range(40, 50)
@@ -62,7 +63,7 @@ def test_of_two_boxes_at_one_person_one_counts() -> None:
 
 def message(boxes: Sequence[Sequence[Box | None]], frames: int) -> CameraTracks:
     tracks = [
-        TrackMessage(id=number, boxes=list(track_boxes), confidence=1.0)
+        TrackMessage(id=number, boxes=pack_boxes(track_boxes), confidence=1.0)
         for number, track_boxes in enumerate(boxes, start=1)
     ]
     return CameraTracks(

@@ -12,6 +12,7 @@ from bestview import to_ground
 from fakes.service.scripted_cameras import STRIDE, small_config
 from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from server.service.ingest.epoch_aligner import Epoch
 from synthetic import Scene
 from synthetic.cameras.pinhole import PinholeCamera
@@ -57,7 +58,7 @@ def walk_epochs(config: Config, places: Floats, epoch: int = 0, boot: int = 1) -
 
 def _message(camera: str, boxes: list[Box | None], epoch: int, boot: int) -> CameraTracks:
     first, last = epoch * STRIDE, (epoch + 1) * STRIDE - 1
-    track = TrackMessage(id=1, boxes=boxes, confidence=1.0)
+    track = TrackMessage(id=1, boxes=pack_boxes(boxes), confidence=1.0)
     return CameraTracks(
         camera=camera,
         boot=boot,

@@ -105,7 +105,9 @@ def audio_messages(frames: list[EncodedAudioFrame]) -> list[Message]:
         Message(
             ZenohKeys("hall").sound,
             b"".join(frame.data for frame in run),
-            msgspec.json.encode(AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])),
+            msgspec.msgpack.encode(
+                AudioHeader(first=run[0].number, sizes=[len(frame.data) for frame in run])
+            ),
         )
         for run in consecutive_runs(frames)
     ]

@@ -31,6 +31,7 @@ from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, GopChoices, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from server.service.rendering import rendered_stream
 from server.service.service import BestViewService
 from server.system.worker import process
@@ -92,7 +93,7 @@ class DrawnSite(ServedSite):
                 for unit in units(number, FRAMES)[first : first + STRIDE]:
                     self.service.ingest.video(video(camera, unit))
                 seen = [
-                    TrackMessage(id=person, boxes=places, confidence=1.0)
+                    TrackMessage(id=person, boxes=pack_boxes(places), confidence=1.0)
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
                 self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {}, tracks=seen, size=SIZE)))

@@ -15,6 +15,7 @@ from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, CameraTracks, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from server.service.ingest.epoch_aligner import Epoch
 from tracking import Detections
 from tracking.boxes import Floats
@@ -103,7 +104,9 @@ def walked_epochs(
                 tracks=[
                     TrackMessage(
                         id=person + 1,
-                        boxes=[_box(walks[frame - first, person], name) for frame in range(start, last + 1)],
+                        boxes=pack_boxes(
+                            [_box(walks[frame - first, person], name) for frame in range(start, last + 1)]
+                        ),
                         confidence=1.0,
                     )
                     for person in range(walks.shape[1])

@@ -27,6 +27,7 @@ from server.messaging.messages import (
     TrackMessage,
     ZenohKeys,
 )
+from server.messaging.packed_arrays import PackedHistogram, pack_boxes, pack_histograms
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.pipeline import BestViewPipeline
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -93,9 +94,9 @@ def joined_fragments(frame_buffer: FrameBuffer, first: int, frames: int) -> byte
     return b"".join(picture.fragment for picture in pictures)
 
 
-def color_histogram(person: int) -> list[float]:
+def color_histogram(person: int) -> PackedHistogram:
     """Return a color histogram that distinguishes a person from others."""
-    return [1.0 if place == person % 8 else 0.0 for place in range(8)]
+    return pack_histograms(np.eye(8)[person % 8])
 
 
 def camera_tracks(camera: str, epoch: int, boxes: Mapping[int, Box | None], **changes: Any) -> CameraTracks:
@@ -114,7 +115,7 @@ def camera_tracks(camera: str, epoch: int, boxes: Mapping[int, Box | None], **ch
         tracks=[
             TrackMessage(
                 id=track,
-                boxes=[box] * STRIDE,
+                boxes=pack_boxes([box] * STRIDE),
                 confidence=1.0,
                 appearance=[]
                 if box is None
@@ -137,18 +138,18 @@ def epoch_of(number: int, *words: CameraTracks) -> Epoch:
 def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
     """Return a frame as received from the bus."""
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=boot, due=0.0, captured_at=0.0, encoded=0.0)
-    return Message(ZenohKeys("hall").camera(camera, "video"), unit.data, msgspec.json.encode(head))
+    return Message(ZenohKeys("hall").camera(camera, "video"), unit.data, msgspec.msgpack.encode(head))
 
 
 def tracks(message: CameraTracks) -> Message:
     """Return a track message as received from the bus."""
-    return Message(ZenohKeys("hall").camera(message.camera, "tracks"), msgspec.json.encode(message), b"")
+    return Message(ZenohKeys("hall").camera(message.camera, "tracks"), msgspec.msgpack.encode(message), b"")
 
 
 def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:
     """Return a thumbnail as received from the bus."""
     head = ThumbnailHeader(track=track, boot=boot, pulse=pulse)
-    return Message(ZenohKeys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.json.encode(head))
+    return Message(ZenohKeys("hall").camera(camera, f"thumbs/{track}"), jpeg, msgspec.msgpack.encode(head))
 
 
 def status(camera: str, **changes: Any) -> Message:
@@ -165,7 +166,7 @@ def status(camera: str, **changes: Any) -> Message:
         clock_offset=0.0,
         round_trip=0.001,
     )
-    payload = msgspec.json.encode(msgspec.structs.replace(status, **changes))
+    payload = msgspec.msgpack.encode(msgspec.structs.replace(status, **changes))
     return Message(ZenohKeys("hall").camera(camera, "status"), payload, b"")
 
 

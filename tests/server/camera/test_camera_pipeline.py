@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -20,6 +21,7 @@ from server.config.loader import build_config
 from server.config.sections import SiteSettings
 from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks
+from server.messaging.packed_arrays import unpack_boxes
 from server.system.errors import UserError
 from synthetic import Scene, write_recording
 
@@ -106,12 +108,12 @@ def test_an_offset_shifts_boxes_and_frames(recording: Path) -> None:
 
 def _boxes(batches: list[EpochBatch]) -> dict[tuple[int, int], Box]:
     return {
-        (batch.tracks.first + place, track.id): box
+        (batch.tracks.first + place, track.id): (box[0], box[1], box[2], box[3])
         for batch in batches
         if batch.tracks is not None
         for track in batch.tracks.tracks
-        for place, box in enumerate(track.boxes)
-        if box is not None
+        for place, box in enumerate(unpack_boxes([track.boxes]).tolist())
+        if not math.isnan(box[0])
     }
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 import zenoh
+from msgspec.msgpack import decode
 
 from fakes.media.videos import write_video
 from fakes.service.camera_processes import FPS, SiteInOneLoop, written_files
@@ -133,10 +134,10 @@ async def test_recordings_run_to_their_end_without_losses(
     assert written["choices.csv"].count(b"\n") > 1, "a person is shown"
     assert written == render_offline(config, tmp_path / "offline"), "live output equals offline output"
 
-    frames = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
+    frames = [decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     assert [frame.pulse for frame in frames] == list(range(FRAMES))
     assert all(frame.due <= frame.encoded and frame.captured_at <= frame.encoded for frame in frames)
-    messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
+    messages = [decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
     assert [message.epoch for message in messages] == list(range(FRAMES // 5 + 1))
     assert messages[-1].ended
     assert messages[0].solved_at > 0
@@ -144,7 +145,7 @@ async def test_recordings_run_to_their_end_without_losses(
         msgspec.json.decode(payload, type=GopChoices) for payload, _ in subscriber.of("bestview/choices")
     ]
     assert published == gops
-    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
+    statuses = [decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
     assert statuses[-1].state == "ended"
     assert statuses[-1].missed == 0
 
@@ -310,19 +311,19 @@ async def test_at_the_highest_shedding_level_every_gop_and_window_is_complete(
         await asyncio.gather(over, *(whole_site.camera(camera) for camera in config.camera_ids))
     await asyncio.to_thread(subscriber.wait_and_close, "bestview/choices", len(gops))
 
-    heads = [msgspec.json.decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
+    heads = [decode(head, type=FrameHeader) for _, head in subscriber.of("c0/video")]
     frames = [head.pulse for head in heads]
     assert frames[:6] == [0, 4, 8, 9, 12, 14]
     assert [head.pulse for head in heads if head.key] == list(range(0, FRAMES, config.gop))
     pairs = [(before.pulse, head.reference_pulse) for before, head in pairwise(heads) if not head.key]
     assert all(before == after for before, after in pairs), "a frame that was not captured affects no other"
-    messages = [msgspec.json.decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
+    messages = [decode(payload, type=CameraTracks) for payload, _ in subscriber.of("c0/tracks")]
     assert [message.epoch for message in messages] == list(range(FRAMES // 5 + 1))
     assert sorted(pulse for message in messages for pulse in message.shed) == [
         number for number in range(FRAMES) if number % 5 != 4
     ], "all but the last of every window"
     assert sum(gop.frames for gop in gops) == FRAMES
     assert b"no detection" in written_files(tmp_path / "out")["late.csv"]
-    statuses = [msgspec.json.decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
+    statuses = [decode(payload, type=CameraStatus) for payload, _ in subscriber.of("c0/status")]
     assert statuses[-1].load_level == 5
     assert "detecting in every 5th frame" in statuses[-1].load

@@ -17,7 +17,7 @@ FIRST, SECOND = "myview/hall/bestview/alive", "myview/hall/bestview/1/alive"
 
 
 def confirmation(service: str, boot: int = BOOT) -> Message:
-    return Message("key", msgspec.json.encode(EndReceived(service=service, boot=boot)), b"")
+    return Message("key", msgspec.msgpack.encode(EndReceived(service=service, boot=boot)), b"")
 
 
 @pytest.fixture

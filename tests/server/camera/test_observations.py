@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from server.camera.observations import ObservationCollector
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
-from server.messaging.observations import (
-    FRAME_DETECTIONS_MAX,
-    FrameObservations,
-    pack_histograms,
-    unpack_observations,
-)
+from server.messaging.observations import FrameObservations, unpack_observations
+from server.messaging.packed_arrays import FRAME_DETECTIONS_MAX, pack_detections, pack_histograms
 from server.service.ingest.validation import is_plausible
 from tracking import Detections
 from tracking.detectors.background.motion import STILL, Motion
@@ -35,7 +32,7 @@ def test_detections_arrive_as_they_were_found(count: int, bins: int, seed: int) 
     found, collector = some_detections(count, bins, seed), ObservationCollector(Letterbox(SIZE, SIZE))
     collector.add(7, found, STILL)
     (sent,) = collector.take()
-    received = msgspec.json.decode(msgspec.json.encode(sent), type=FrameObservations)
+    received = msgspec.msgpack.decode(msgspec.msgpack.encode(sent), type=FrameObservations)
     assert received.pulse == 7
     assert collector.take() == []
     arrived = unpack_observations(received)
@@ -80,13 +77,25 @@ def message(*frames: FrameObservations) -> CameraTracks:
 
 
 def test_observations_that_do_not_fit_are_refused() -> None:
-    box, look = (1.0, 1.0, 5.0, 9.0, 0.5), pack_histograms(np.ones((1, 4)) / 4)
-    good = FrameObservations(pulse=8, boxes=[box], histograms=look)
-    assert is_plausible(message(good, FrameObservations(pulse=9, boxes=[])), 5)
-    for bad in (
-        FrameObservations(pulse=10, boxes=[box]),  # of the next epoch
-        FrameObservations(pulse=8, boxes=[box]),  # twice
-        FrameObservations(pulse=9, boxes=[box, box], histograms=look[:-2]),
-        FrameObservations(pulse=9, boxes=[], histograms=look),
-    ):
-        assert not is_plausible(message(good, bad), 5)
+    box = pack_detections(np.array([[1.0, 1.0, 5.0, 9.0]]), np.array([0.5]))
+    good = FrameObservations(pulse=8, boxes=box, histograms=pack_histograms(np.ones((1, 4)) / 4))
+    assert is_plausible(message(good, FrameObservations(pulse=9)), 5)
+    assert not is_plausible(message(good, FrameObservations(pulse=10, boxes=box)), 5), "of the next epoch"
+    assert not is_plausible(message(good, FrameObservations(pulse=8, boxes=box)), 5), "twice"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"boxes": b"19 bytes are no row"},
+        {"boxes": pack_detections(np.full((1, 4), np.nan), np.array([0.5]))},
+        {"boxes": pack_detections(np.zeros((1, 4)), np.array([1.5]))},
+        {"boxes": np.full(5, 2e6, "<f4").tobytes()},
+        {"boxes": pack_detections(np.zeros((2, 4)), np.zeros(2)), "histograms": bytes(6)},
+        {"boxes": b"", "histograms": bytes(8)},
+    ],
+)
+def test_arrays_that_are_none_are_refused(changes: dict[str, bytes]) -> None:
+    payload = msgspec.msgpack.encode({"pulse": 9, **changes})
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.msgpack.decode(payload, type=FrameObservations)

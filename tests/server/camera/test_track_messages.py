@@ -7,6 +7,7 @@ import numpy as np
 
 from server.camera.track_messages import TrackMessageBuilder
 from server.messaging.messages import Box, CameraTracks
+from server.messaging.packed_arrays import pack_boxes
 from tracking import WindowResult, WindowTrack
 
 SEEN: Box = (10.0, 20.0, 40.0, 110.0)
@@ -20,7 +21,7 @@ def test_bridged_occlusions_have_interpolated_boxes() -> None:
     message = TrackMessageBuilder("c0", 1, (640, 360), stride=4).regular(
         WindowResult(0, 3, 3, (track,), None)
     )
-    assert [track.boxes for track in message.tracks] == [[SEEN, SEEN, SEEN, None]]
+    assert [track.boxes for track in message.tracks] == [pack_boxes([SEEN, SEEN, SEEN, None])]
 
 
 def test_a_box_far_outside_the_image_can_be_encoded() -> None:
@@ -29,4 +30,4 @@ def test_a_box_far_outside_the_image_can_be_encoded() -> None:
     message = TrackMessageBuilder("c0", 1, (640, 360), stride=1).regular(
         WindowResult(0, 0, 1, (track,), None)
     )
-    assert msgspec.json.decode(msgspec.json.encode(message), type=CameraTracks) == message
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=CameraTracks) == message

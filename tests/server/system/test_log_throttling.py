@@ -40,7 +40,9 @@ KEYS = ZenohKeys("hall")
 
 def found(camera: str, pulse: int) -> bytes:
     """Return a message of a camera about a frame."""
-    return msgspec.json.encode(FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[]))
+    return msgspec.msgpack.encode(
+        FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=b"")
+    )
 
 
 async def test_repeated_late_messages_are_logged_rarely_and_when_they_end(
@@ -78,7 +80,7 @@ async def test_invalid_messages_of_a_camera_are_logged_once(
 
     for frame in range(250):
         clock[0] = frame / 25
-        hear("c1", b'{"camera": "c1"}')
+        hear("c1", msgspec.msgpack.encode({"camera": "c1"}))
         hear("c2", found("c2", frame))
     clock[0] += 60.0
     hear("c1", found("c1", 1750))

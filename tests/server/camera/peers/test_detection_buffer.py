@@ -12,7 +12,7 @@ PATIENCE, MOST = 0.2, 50
 
 
 def detections(pulse: int, camera: str = "c1", boot: int = 1, *, ended: bool = False) -> FrameDetections:
-    return FrameDetections(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=[], ended=ended)
+    return FrameDetections(camera=camera, boot=boot, size=(640, 480), pulse=pulse, boxes=b"", ended=ended)
 
 
 def buffer(*peers: str, has_common_ground: bool = True) -> PeerDetectionBuffer:

@@ -28,7 +28,7 @@ from server.config.sections.site import ZenohSettings
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.messages import FrameDetections, ZenohKeys
-from server.messaging.observations import FRAME_DETECTIONS_MAX
+from server.messaging.packed_arrays import FRAME_DETECTIONS_MAX, pack_detections, unpack_detections
 from synthetic import Scene, write_recording
 from tracking import Detections
 
@@ -182,9 +182,8 @@ def now() -> float:
 
 
 def detections(camera: str, pulse: int) -> FrameDetections:
-    return FrameDetections(
-        camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=[(1.5, 2.0, 20.25, 60.0, 0.5)]
-    )
+    box = pack_detections(np.array([[1.5, 2.0, 20.25, 60.0]]), np.array([0.5]))
+    return FrameDetections(camera=camera, boot=1, size=(192, 108), pulse=pulse, boxes=box)
 
 
 async def exchange_both(
@@ -276,7 +275,7 @@ async def test_invalid_messages_are_counted_and_ignored(
     await exchange_both(one, two, needed=False)
     key = ZenohKeys("hall").camera("c1", "detections")
     assert two._buses
-    far = msgspec.json.encode(detections("c0", 1))
+    far = msgspec.msgpack.encode(detections("c0", 1))
     for payload in (b"", b"{", b"[1]", b'{"camera": "c1"}', far, b"\xff\xfe"):
         two._buses[0].publish(key, payload)
     await two.exchange(1, detections("c1", 1), now(), needed=False)
@@ -285,24 +284,29 @@ async def test_invalid_messages_are_counted_and_ignored(
 
 
 NUMBER = st.floats() | st.integers(-(2**70), 2**70) | st.text(max_size=3) | st.none()
+BYTES = st.binary(max_size=50) | st.lists(st.floats(width=32), min_size=5, max_size=5).map(
+    lambda row: np.array(row, dtype="<f4").tobytes()
+)
 ROWS = st.lists(st.lists(NUMBER, min_size=4, max_size=6), max_size=4) | NUMBER
 
 
 @settings(deadline=None, max_examples=100)
 @given(
     st.fixed_dictionaries(
-        {"camera": st.just("c1"), "boot": NUMBER, "size": ROWS, "pulse": NUMBER, "boxes": ROWS}
+        {"camera": st.just("c1"), "boot": NUMBER, "size": ROWS, "pulse": NUMBER, "boxes": BYTES}
     ),
     st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4, st.floats(0, 1)), max_size=FRAME_DETECTIONS_MAX),
 )
 def test_every_decoded_message_can_be_used_for_scoring(message: dict[str, Any], boxes: list[Any]) -> None:
     config = _room()
     cross_view = CrossViewScorer(config, "c0", (640, 360), 1)
+    rows = np.array(boxes).reshape(-1, 5)
+    packed = pack_detections(rows[:, :4], rows[:, 4])
     found = Detections(np.array([[300.0, 100.0, 340.0, 220.0]]), np.array([0.5]), np.ones((1, 1)))
-    good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": boxes}
+    good = {"camera": "c1", "boot": 1, "size": [640, 360], "pulse": 3, "boxes": packed}
     for content in (message, {**good, "boxes": message["boxes"]}, {**good, "size": message["size"]}, good):
         try:
-            decoded = msgspec.json.decode(msgspec.json.encode(content), type=FrameDetections)
+            decoded = msgspec.msgpack.decode(msgspec.msgpack.encode(content), type=FrameDetections)
         except (msgspec.ValidationError, msgspec.DecodeError, OverflowError):
             assert content is not good
             continue
@@ -329,10 +333,11 @@ def test_only_the_most_confident_boxes_are_sent_in_order() -> None:
         5, Detections(boxes, scores, np.empty((150, 0)))
     )
     assert message.boxes is not None
-    assert len(message.boxes) == FRAME_DETECTIONS_MAX
-    assert [row[0] for row in message.boxes] == sorted(row[0] for row in message.boxes)
+    corners, sent = unpack_detections(message.boxes)
+    assert len(sent) == FRAME_DETECTIONS_MAX
+    assert corners[:, 0].tolist() == sorted(corners[:, 0])
     left_out = sorted(scores)[: 150 - FRAME_DETECTIONS_MAX]
-    assert sorted(scores) == sorted([*(row[4] for row in message.boxes), *left_out])
+    assert sorted([*sent, *left_out]) == pytest.approx(sorted(scores))
 
 
 def test_frames_without_detection_are_not_sent_as_empty(recording: Path) -> None:

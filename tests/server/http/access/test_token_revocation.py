@@ -203,7 +203,7 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
             )
             key = ZenohKeys("hall").camera("c0", "retained_identities")
             served.service.state_replication.snapshot_received(
-                Message(key, msgspec.json.encode(snapshot), b"")
+                Message(key, msgspec.msgpack.encode(snapshot), b"")
             )
         while True:  # the file of tokens is looked at now and then
             await asyncio.sleep(0.1)

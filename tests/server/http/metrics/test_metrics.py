@@ -47,7 +47,7 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(served: Serve
     unit = encoded(0)[15]
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, captured_at=100.03, encoded=100.04)
     served.service.ingest.video(
-        Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.json.encode(head))
+        Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.msgpack.encode(head))
     )
     solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3, limit="work")
     message = camera_tracks(A, 3, {1: SMALL}, solve=solve, detection_s=0.02, solve_s=0.2, solved_at=100.5)

@@ -22,6 +22,7 @@ from fakes.service.scripted_cameras import (
 )
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, TrackMessage
+from server.messaging.packed_arrays import pack_boxes
 from server.service.identity.occupied_regions import Regions
 from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 from server.service.joint_tracking.epochs import without_tracks
@@ -45,7 +46,8 @@ class Site:
     def feed(self, boxes: dict[int, list[Box | None]] | None, **changes: Any) -> None:
         """Feed an epoch of camera A, a box per frame and track; None: it reports nothing. B sees nobody."""
         seen = [
-            TrackMessage(id=track, boxes=places, confidence=1.0) for track, places in (boxes or {}).items()
+            TrackMessage(id=track, boxes=pack_boxes(places), confidence=1.0)
+            for track, places in (boxes or {}).items()
         ]
         if boxes is not None:
             message = camera_tracks(A, self._epoch, {}, tracks=seen, **changes)

@@ -396,7 +396,7 @@ def test_two_simultaneous_tracks_are_two_people_despite_snapshots(
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
         people = [msgspec.structs.replace(person, manual=False) for person in retained.people]
-        snapshot = msgspec.json.encode(msgspec.structs.replace(retained, people=people))
+        snapshot = msgspec.msgpack.encode(msgspec.structs.replace(retained, people=people))
         site.cameras[camera].replace(Message("", snapshot, b""))
     site.start()
     site.track_epochs(range(7, 12), {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}})
@@ -410,7 +410,7 @@ def test_arbitrary_snapshots_do_not_stop_the_service(
 ) -> None:
     site = Site()
     for camera, retained in zip(CAMERAS, (one, other), strict=True):
-        site.cameras[camera].replace(Message("", msgspec.json.encode(retained), b""))
+        site.cameras[camera].replace(Message("", msgspec.msgpack.encode(retained), b""))
     site.start()
     site.track_epochs(range(7, 10))
     people = site.service.decider.people
@@ -420,9 +420,9 @@ def test_arbitrary_snapshots_do_not_stop_the_service(
 
 def falsify_snapshot(site: Site, camera: str, **changes: object) -> None:
     """Change the snapshot that a camera retains."""
-    snapshot = msgspec.json.decode(site.cameras[camera]._snapshot, type=CameraIdentitySnapshot)
+    snapshot = msgspec.msgpack.decode(site.cameras[camera]._snapshot, type=CameraIdentitySnapshot)
     site.cameras[camera].replace(
-        Message("", msgspec.json.encode(msgspec.structs.replace(snapshot, **changes)), b"")
+        Message("", msgspec.msgpack.encode(msgspec.structs.replace(snapshot, **changes)), b"")
     )
 
 

@@ -9,6 +9,7 @@ from bestview import IdentitySettings
 from fakes.service.scripted_cameras import HEIGHT, STRIDE, WIDTH, camera_tracks, epoch_of
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, CameraTracks
+from server.messaging.packed_arrays import first_boxes
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 
@@ -23,7 +24,10 @@ def late_revision(epoch: int) -> CameraTracks:
     last = end_of_epoch(epoch, STRIDE)
     revision = camera_tracks("c0", epoch, {1: RIGHT, 2: LEFT}, first=REVISED_FROM, revised_from=REVISED_FROM)
     frames = last - REVISED_FROM + 1
-    tracks = [msgspec.structs.replace(track, boxes=track.boxes[:1] * frames) for track in revision.tracks]
+    tracks = [
+        msgspec.structs.replace(track, boxes=first_boxes(track.boxes, 1) * frames)
+        for track in revision.tracks
+    ]
     return msgspec.structs.replace(revision, tracks=tracks)
 
 

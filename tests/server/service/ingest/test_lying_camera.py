@@ -9,9 +9,11 @@ from dataclasses import replace
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from prometheus_client import generate_latest
 
+from benchmarks.fuzz.engine.mutations import as_message
 from fakes.service.scripted_cameras import (
     CAMERAS,
     GOP,
@@ -41,6 +43,7 @@ from server.messaging.messages import (
     TrackMessage,
     ZenohKeys,
 )
+from server.messaging.packed_arrays import pack_boxes
 from server.service.service import BestViewService
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.media_chunk import MediaChunk
@@ -61,7 +64,7 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
         Message(
             message.key,
             message.payload,
-            json.dumps(msgspec.json.decode(message.attachment) | changes).encode(),
+            as_message(msgspec.msgpack.decode(message.attachment) | changes),
         )
         for message in sent
     ]
@@ -69,19 +72,19 @@ def frames(epoch: int, /, **changes: Any) -> list[Message]:
 
 def altered_tracks(epoch: int, /, **changes: Any) -> list[Message]:
     """Return its track message of an epoch with changed fields."""
-    fields = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))
-    return [Message(KEYS.camera(LIAR, "tracks"), json.dumps(fields | changes).encode(), b"")]
+    fields = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}), builtin_types=(bytes,))
+    return [Message(KEYS.camera(LIAR, "tracks"), as_message(fields | changes), b"")]
 
 
 def altered_track(epoch: int, /, **changes: Any) -> list[Message]:
-    (track,) = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}))["tracks"]
+    (track,) = msgspec.to_builtins(camera_tracks(LIAR, epoch, {1: SMALL}), builtin_types=(bytes,))["tracks"]
     return altered_tracks(epoch, tracks=[track | changes])
 
 
 def too_many_tracks(epoch: int) -> list[Message]:
     boxes = [SMALL] * STRIDE
     track_messages = [
-        TrackMessage(id=number, boxes=[*boxes], confidence=1.0) for number in range(TRACKS_MAX + 1)
+        TrackMessage(id=number, boxes=pack_boxes(boxes), confidence=1.0) for number in range(TRACKS_MAX + 1)
     ]
     return altered_tracks(epoch, tracks=msgspec.to_builtins(track_messages))
 
@@ -111,11 +114,15 @@ REFUSED: dict[str, LyingMessages] = {
     "infinite clock offset": lambda _: [status(LIAR, clock_offset=-1e308)],
     "at pulse 10^18": lambda _: [status(LIAR, pulse=10**18)],
     "state of a million characters": lambda _: [status(LIAR, state="x" * 10**6)],
-    "infinite histogram": lambda epoch: altered_track(
-        epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e308] * 8}]
+    "half a histogram value": lambda epoch: altered_track(
+        epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": bytes(7)}]
     ),
+    "infinite box": lambda epoch: altered_track(
+        epoch, boxes=np.full(4 * STRIDE, np.inf, dtype="<f4").tobytes()
+    ),
+    "half a box": lambda epoch: altered_track(epoch, boxes=bytes(16 * STRIDE - 8)),
     "histogram of too many colors": lambda epoch: altered_track(
-        epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [0.1] * 10_000}]
+        epoch, appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": bytes(20_000)}]
     ),
     "thumbnails far ahead": lambda _: [thumbnail(LIAR, 1, b"jpeg", pulse=FAR)],
     "thumbnails that are too large": lambda _: [thumbnail(LIAR, 1, bytes(10**6))],
@@ -133,11 +140,13 @@ ACCEPTED: dict[str, LyingMessages] = {
     ],
     "ended at every epoch": lambda epoch: [*frames(epoch), *altered_tracks(epoch, ended=True)],
     "pictures of any size": lambda epoch: altered_tracks(epoch, size=[1 + epoch * 997, 1 + epoch * 31]),
-    "largest boxes": lambda epoch: altered_track(epoch, boxes=[[-1e6, -1e6, 1e6, 1e6]] * STRIDE),
-    "inverted boxes": lambda epoch: altered_track(epoch, boxes=[[1e6, 1e6, -1e6, -1e6]] * STRIDE),
+    "largest boxes": lambda epoch: altered_track(epoch, boxes=pack_boxes([(-1e6, -1e6, 1e6, 1e6)] * STRIDE)),
+    "inverted boxes": lambda epoch: altered_track(epoch, boxes=pack_boxes([(1e6, 1e6, -1e6, -1e6)] * STRIDE)),
     "histograms of changing length": lambda epoch: altered_track(
         epoch,
-        appearance=[{"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": [1e6] * (8 + epoch)}],
+        appearance=[
+            {"first": epoch * STRIDE, "last": epoch * STRIDE, "histogram": b"\x01\x00" * (8 + epoch)}
+        ],
     ),
     "changing track ids": lambda epoch: altered_track(epoch, id=2**62 - epoch),
     "endless thumbnails": lambda epoch: [
@@ -252,7 +261,7 @@ def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
 def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
     head = {"first": 2**62, "sizes": [1] * (AUDIO_FRAMES_MAX + 1)}
     with pytest.raises(msgspec.ValidationError):
-        msgspec.json.decode(json.dumps(head).encode(), type=AudioHeader)
+        msgspec.msgpack.decode(as_message(head), type=AudioHeader)
     frame_buffer = AudioBuffer(AudioFormat(48_000, 2), 25.0, 10.0)
     for first in range(0, 20 * AUDIO_FRAMES_MAX, AUDIO_FRAMES_MAX):
         frame_buffer.put(AudioHeader(first=first, sizes=[1] * AUDIO_FRAMES_MAX), bytes(AUDIO_FRAMES_MAX))
@@ -261,9 +270,9 @@ def test_an_audio_message_with_too_many_frames_is_refused_quickly() -> None:
 
 def test_unaltered_scripted_messages_equal_a_cameras() -> None:
     messages = [video(LIAR, unit) for unit in encoded(0)[:STRIDE]]
-    assert [msgspec.json.decode(frame.attachment) for frame in frames(0)] == [
-        msgspec.json.decode(message.attachment) for message in messages
+    assert [msgspec.msgpack.decode(frame.attachment) for frame in frames(0)] == [
+        msgspec.msgpack.decode(message.attachment) for message in messages
     ]
-    assert msgspec.json.decode(altered_tracks(1)[0].payload, type=CameraTracks) == camera_tracks(
+    assert msgspec.msgpack.decode(altered_tracks(1)[0].payload, type=CameraTracks) == camera_tracks(
         LIAR, 1, {1: SMALL}
     )

@@ -48,7 +48,7 @@ class Network:
         self.records: list[ServiceRecord] = []
 
     def send(self, index: int, payload: bytes) -> None:
-        self.records.append(msgspec.json.decode(payload, type=ServiceRecord))
+        self.records.append(msgspec.msgpack.decode(payload, type=ServiceRecord))
         for other, receive in self.present.items():
             if other != index:
                 receive(Message(KEYS.bestview("record", index), payload, b""))
@@ -84,7 +84,7 @@ class Services:
         replication._bus = NetworkEnd(self.network, index)  # type: ignore[assignment]
         replication._clock = lambda: self.now
         if takes_over_from is not None:
-            state = msgspec.json.decode(
+            state = msgspec.msgpack.decode(
                 self.running[takes_over_from].replication._encoded_state(), type=ServiceState
             )
             replication.restore(state)

@@ -20,6 +20,7 @@ from fakes.service.scripted_cameras import (
     small_config,
 )
 from server.messaging.messages import Box, CameraTracks
+from server.messaging.packed_arrays import pack_boxes
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.lookahead_window import LookaheadWindow
@@ -57,7 +58,7 @@ def window_message(camera: str, epoch: int, boxes: Mapping[int, Sequence[Box | N
     tracks = [
         type(track)(
             id=track.id,
-            boxes=list(boxes[track.id][: message_of_epoch.last - first + 1]),
+            boxes=pack_boxes(boxes[track.id][: message_of_epoch.last - first + 1]),
             appearance=track.appearance,
             confidence=1.0,
         )
