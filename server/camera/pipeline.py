@@ -52,6 +52,7 @@ class DetectedFrame:
         image: None: there was none.
         detections: empty where detection did not run.
         has_detection: whether detection ran.
+        shows_its_place: whether detections are where the homography says: the camera is not turned away.
         message: the detections as sent to the peer cameras; None without peers.
         motion: how the picture has moved since the camera was calibrated, pixels of the site's image.
         skipped: whether load shedding left the frame out.
@@ -61,6 +62,7 @@ class DetectedFrame:
     image: Image | None
     detections: Detections
     has_detection: bool
+    shows_its_place: bool
     message: FrameDetections | None
     motion: Motion = STILL
     skipped: bool = False
@@ -200,13 +202,13 @@ class CameraPipeline:
             self.picture.observe(image, pulse)
             detections = self._detector.detect(image, pulse)
             has_detection = not self._detector.warming_up
-        motion = self.motion
+        shown, motion = self.picture.shows_its_place, self.motion
         message = (
-            self.cross_view.build_message(pulse, detections if has_detection else None, motion)
+            self.cross_view.build_message(pulse, detections if has_detection and shown else None, motion)
             if self.cross_view
             else None
         )
-        return DetectedFrame(pulse, image, detections, has_detection, message, motion, skipped)
+        return DetectedFrame(pulse, image, detections, has_detection, shown, message, motion, skipped)
 
     def track_detections(
         self,
@@ -231,7 +233,7 @@ class CameraPipeline:
             self._messages.add_without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
             self._messages.add_without_image([pulse])
-        if self._observations is not None and frame.has_detection:
+        if self._observations is not None and frame.has_detection and frame.shows_its_place:
             self._observations.add(pulse, detections, frame.motion)
         if self.cross_view is not None and frame.depends_on_peers:
             detections = self.cross_view.rescore(detections, peers.messages, frame.motion)

@@ -23,6 +23,8 @@ _ACCEPT_S = 300.0
 # Seconds of signs until a condition is reported, and without them until it is taken back; the share of the
 # pictures that must agree.
 _REPORT_S, _RECOVER_S, _AGREE = 3.0, 2.0, 0.9
+# The picture does not show what happens where the camera is calibrated.
+_ELSEWHERE = {"covered", "turned", "frozen"}
 # What covers a lens may look like another scene: the first report of either stands.
 _HIDING = {"covered", "turned"}
 # Seconds between the pictures that show whether something stands still.
@@ -49,6 +51,11 @@ class PictureMonitor:
         """What is wrong with the picture."""
         self.since = 0
         """The frame in which that began."""
+
+    @property
+    def shows_its_place(self) -> bool:
+        """Whether what is seen is now, and where the camera is calibrated."""
+        return self.condition not in _ELSEWHERE
 
     def observe(self, image: Image, frame: int | None = None) -> PictureCondition:
         """Return the camera's condition up to the next frame.

@@ -269,6 +269,30 @@ def test_track_messages_have_the_condition_of_the_picture(recording: Path) -> No
     assert {condition for last, condition in found.items() if last >= 75 + 4 * 25} == {"covered"}
 
 
+@pytest.mark.parametrize("joint", [True, False])
+def test_a_covered_camera_says_nothing_about_the_common_ground(recording: Path, *, joint: bool) -> None:
+    ground = [[0.02, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 1.0]]
+    site = {"fps": 25, "width": 192, "height": 108}
+    cameras = [
+        {"id": name, "source": str(recording / f"{name}.mp4"), "ground": ground} for name in ("c0", "c1")
+    ]
+    config = build_config(
+        {"site": site, "track": {"joint": joint}, "cameras": cameras}, where="site", folder=recording
+    )
+    pipeline = CameraPipeline(config, "c0", source=CoveredLater(covered=75, frames=200))
+    told = []
+    for pulse in range(200):
+        frame = pipeline.detect(pulse, pipeline.take(pulse))
+        message = pipeline.track_detections(frame)
+        if joint and message is not None:
+            told += [found.pulse for found in message.observations]
+        elif frame.message is not None and frame.message.boxes is not None:
+            told.append(pulse)
+    pipeline.close()
+    assert set(range(30, 75)) <= set(told)
+    assert max(told) < 75 + 4 * 25
+
+
 def test_a_homography_without_floor_in_the_picture_is_refused(recording: Path) -> None:
     ground = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 109.0]]  # the floor ends below the picture
     with pytest.raises(UserError) as caught:
