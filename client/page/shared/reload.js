@@ -7,6 +7,7 @@
 (() => {
   const AGAIN_MS = 3000;
   const FIRST_MS = 100;
+  const TIMEOUT_MS = 4000;
   let failed = false;
 
   async function reloadWhenServed() {
@@ -16,7 +17,11 @@
     for (;;) {
       await new Promise((resolve) => setTimeout(resolve, wait));
       wait = AGAIN_MS;
-      const { ok } = await fetch(location.href, { method: 'HEAD', cache: 'no-store' }).catch(() => ({ ok: false }));
+      const { ok } = await fetch(location.href, {
+        method: 'HEAD',
+        cache: 'no-store',
+        signal: AbortSignal.timeout(TIMEOUT_MS),
+      }).catch(() => ({ ok: false }));
       if (ok) return location.reload();
     }
   }
