@@ -70,9 +70,9 @@ def test_who_moves_is_new_at_every_place() -> None:
 def test_what_was_not_seen_for_some_seconds_is_new() -> None:
     silhouettes = StillSilhouettes()
     observed(silhouettes, 10.0)
-    for _ in range(round(1.0 / RUN_S)):
+    for _ in range(round(9.0 / RUN_S)):
         silhouettes.update(np.empty((0, 4)), np.empty(0, dtype=np.bool_), RUN_S, 1.0)
-    assert penalty(silhouettes) > 0.0
+    assert penalty(silhouettes) > 0.0, "what flickers comes back"
     for _ in range(round(2.0 / RUN_S)):
         silhouettes.update(np.empty((0, 4)), np.empty(0, dtype=np.bool_), RUN_S, 1.0)
     assert penalty(silhouettes) == 0.0

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats, iou
 
-_SAME = 0.6
+_SAME = 0.5
 """Least overlap (IoU) of a silhouette with itself at the last run."""
-_FORGET_S = 2.0
-"""Seconds unseen after which a silhouette is forgotten."""
+_FORGET_S = 10.0
+"""Seconds unseen after which a silhouette is forgotten: what flickers, such as a screen, returns."""
 _LOG_ODDS_PER_S = 0.5
 """By how much the log-odds of a person fall per second: runs soon after each other err alike."""
 _MOST = 6.0
