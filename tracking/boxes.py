@@ -72,6 +72,12 @@ def mean_corner_distance(first: Floats, second: Floats) -> Floats:
     return _MEAN_SIDES * _side_distance(first, second)
 
 
+def corner_distance_in_heights(first: Floats, second: Floats) -> Floats:
+    """Return the mean city-block distance of the corners in mean box heights, shape (...)."""
+    mean = (heights(first) + heights(second)) / 2.0
+    return np.asarray(mean_corner_distance(first, second) / np.where(mean > 0.0, mean, 1.0))
+
+
 def distance_in_heights(first: Floats, second: Floats) -> Floats:
     """Return the distance between boxes in mean box heights, shape (...).
 

@@ -57,7 +57,7 @@ class OnlineTracker:
         """
         self._center = center
         self._window = window.resolve(fps)
-        self._cost_settings, self._fps = costs, fps
+        self._cost_settings = costs
         self._displacements = DisplacementScale(fps)
         self._costs = costs.for_fps(fps)
         """For the next window: what is an ordinary displacement is measured."""
@@ -134,7 +134,7 @@ class OnlineTracker:
     def _solve(self, end: int, final_to: int) -> WindowResult:
         """Solve the window that ends at `end` and make the frames up to `final_to` final."""
         first = self._first if self._first is not None else end
-        self._costs = self._cost_settings.for_fps(self._fps, self._displacements.ordinary)
+        self._costs = self._cost_settings.for_fps(self._window.fps, self._displacements.ordinary)
         numbers = range(first, end + 1)
         frames = [self._frame(number) for number in numbers]
         states, report = self._assign(first, frames)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracking.appearance import appearance_distance_matrix
-from tracking.boxes import BOX_SIDES, Floats, heights, mean_corner_distance
+from tracking.boxes import BOX_SIDES, Floats, corner_distance_in_heights, mean_corner_distance
 from tracking.model.motion import MotionModel
 from tracking.model.object_state import Template
 from tracking.model.observations import ObservationArrays
@@ -128,10 +128,8 @@ def sink_costs(objects: int, places: ObservationArrays, settings: CostSettings) 
 def _displacement_costs(before: Floats, after: Floats, settings: CostSettings) -> Floats:
     """Return the cost of moving from boxes (..., I, 4) to boxes (..., J, 4), (..., I, J)."""
     before, after = before[..., :, None, :], after[..., None, :, :]
-    moved = mean_corner_distance(before, after)
-    if settings.displacement_unit == "heights":
-        mean = (heights(before) + heights(after)) / 2.0
-        moved = moved / np.where(mean > 0.0, mean, 1.0)
+    in_heights = settings.displacement_unit == "heights"
+    moved = (corner_distance_in_heights if in_heights else mean_corner_distance)(before, after)
     costs = settings.displacement * moved
     if settings.gate is not None:
         costs[moved > settings.gate] = np.inf

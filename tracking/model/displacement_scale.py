@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.boxes import heights, iou, mean_corner_distance
+from tracking.boxes import corner_distance_in_heights, iou
 from tracking.model.settings import walking_displacement
 from tracking.types import Detections
 
@@ -43,8 +43,7 @@ class DisplacementScale:
         best = overlaps.argmax(axis=1)
         rows = np.arange(len(first))
         is_mutual = (overlaps.argmax(axis=0)[best] == rows) & (overlaps[rows, best] >= _MIN_OVERLAP)
-        first, second = first[is_mutual], second[best[is_mutual]]
-        moved = 2.0 * mean_corner_distance(first, second) / np.maximum(heights(first) + heights(second), 1.0)
+        moved = corner_distance_in_heights(first[is_mutual], second[best[is_mutual]])
         self._sum, self._count = self._sum + float(moved.sum()), self._count + len(moved)
         if self._count > _MEMORY:
             self._sum, self._count = self._sum * _MEMORY / self._count, _MEMORY

@@ -129,8 +129,8 @@ class CostSettings:
         scale = ordinary / walking_displacement(DEFAULT_FPS)
         gate = self.gate
         if gate is not None:
-            jitter = max(gate - _TOP_SPEED / DEFAULT_FPS, gate / 2.0)
-            gate = jitter * scale + _TOP_SPEED / fps
+            running = min(_TOP_SPEED / DEFAULT_FPS, gate / 2.0)
+            gate = (gate - running) * scale + running * DEFAULT_FPS / fps
         return replace(self, displacement=self.displacement / scale, gate=gate)
 
 

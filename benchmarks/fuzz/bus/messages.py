@@ -245,9 +245,9 @@ def read_api(service: FedService) -> None:
     """Read everything in a service's API."""
     facade = BestViewService(service)
     for content in (site_info(facade), objects_info(facade), cameras_info(facade)):
-        msgspec.msgpack.encode(content)
+        msgspec.json.encode(content)
     for number in [*service.decision_state.selected_views, 99]:
-        msgspec.msgpack.encode(facade.people.view_selection_of(number))
+        msgspec.json.encode(facade.people.view_selection_of(number))
     generate_latest(make_app(facade)[METRICS])
 
 

@@ -66,6 +66,11 @@ def test_an_ordinary_displacement_costs_the_same(fps: float) -> None:
         assert costs.for_fps(fps, displacement).displacement * moved == pytest.approx(ordinary)
 
 
+@pytest.mark.parametrize("gate", [0.05, 0.15, 0.2, 0.6])
+def test_a_gate_is_as_set_where_boxes_are_steady_at_25_frames_a_second(gate: float) -> None:
+    assert CostSettings(gate=gate).for_fps(25.0).gate == pytest.approx(gate)
+
+
 def test_pixels_are_the_papers() -> None:
     pixels = replace(CostSettings(), displacement_unit="pixels", displacement=0.01, gate=None)
     assert pixels.for_fps(5.0, 0.3) is pixels

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from tracking.boxes import Floats, iou
 
 _SAME = 0.5
-"""Least overlap (IoU) of a silhouette with itself at the last run."""
+"""Least overlap (IoU) of a silhouette with where it was first."""
 _FORGET_S = 10.0
 """Seconds unseen after which a silhouette is forgotten: what flickers, such as a screen, returns."""
 _LOG_ODDS_PER_S = 0.5
