@@ -16,7 +16,6 @@ from tracking.interpolation import interpolate_gaps
 from tracking.lifecycle.gating import gate_detections, restrict_network
 from tracking.lifecycle.initiation import Birth, find_births
 from tracking.lifecycle.termination import terminated_ids
-from tracking.model.displacement_scale import DisplacementScale
 from tracking.model.network import CostSettings, Network, build_network
 from tracking.model.object_state import Sighting, TrackedObject
 from tracking.solvers.base import OCCLUDED, Solver, SolveReport, create_solver
@@ -57,10 +56,7 @@ class OnlineTracker:
         """
         self._center = center
         self._window = window.resolve(fps)
-        self._cost_settings = costs
-        self._displacements = DisplacementScale(fps)
         self._costs = costs.for_fps(fps)
-        """For the next window: what is an ordinary displacement is measured."""
         self._solver = solver
         # For a single object dynamic programming is exact.
         self._single = create_solver("separate-dp")
@@ -97,8 +93,6 @@ class OnlineTracker:
                 self._solve(end, end - self._window.min_final_lag)
                 for end in self._window_ends(self._last + 1, frame)
             ]
-        if frame - 1 in self._detections:
-            self._displacements.add(self._detections[frame - 1], detections)
         self._detections[frame] = detections
         self._last = frame
         if (frame + 1) % self._window.stride == 0:
@@ -134,7 +128,6 @@ class OnlineTracker:
     def _solve(self, end: int, final_to: int) -> WindowResult:
         """Solve the window that ends at `end` and make the frames up to `final_to` final."""
         first = self._first if self._first is not None else end
-        self._costs = self._cost_settings.for_fps(self._window.fps, self._displacements.ordinary)
         numbers = range(first, end + 1)
         frames = [self._frame(number) for number in numbers]
         states, report = self._assign(first, frames)

@@ -13,9 +13,9 @@ ConflictRows = Literal["clique", "star"]
 DisplacementUnit = Literal["pixels", "heights"]
 
 
-_JITTER, _SPEED, _TOP_SPEED = 0.008, 0.36, 2.5
-"""Heights by which the box of somebody who stands changes from frame to frame; heights per second of people,
-most of whom walk or stand, and of somebody who runs."""
+_JITTER, _SPEED, _TOP_SPEED = 0.1, 1.0, 2.5
+"""Heights by which the box of somebody who stands changes from frame to frame; heights per second of somebody
+who walks, and who runs."""
 # Pixels: a smaller gate was probably meant in heights.
 _MIN_GATE_PIXELS = 2.0
 
@@ -34,9 +34,9 @@ class CostSettings:
 
     # λ1: weight of the change of appearance between two frames; no unit (g is in [0, 1]).
     appearance: float = 0.25
-    # λ2: weight of the displacement between two frames; cost per displacement unit (below). In heights it is
-    # for frames 0.04 seconds apart and a detector whose boxes are steady.
-    displacement: float = 3.5
+    # λ2: weight of the displacement between two frames, 0.04 seconds apart; cost per displacement unit
+    # (below).
+    displacement: float = 2.0
     # Unit of displacement and gate: pixels of the image, or mean heights of the two boxes.
     displacement_unit: DisplacementUnit = "heights"
     # c_a: cost of a typical change of position and appearance between two frames.
@@ -70,7 +70,7 @@ class CostSettings:
     # How histograms are compared: g(.), in [0, 1].
     measure: AppearanceMeasure = "bhattacharyya"
     # Longest displacement within 0.04 seconds, in displacement units; None: any.
-    gate: float | None = 0.2
+    gate: float | None = 0.6
     # μ: weight of the spatial layout term, cost per pixel of L1 change between two objects; 0 is off.
     layout: float = 0.0
     # When two boxes conflict: by the city-block distance of their corners, or by their overlap.
@@ -116,27 +116,20 @@ class CostSettings:
         """The cost of an arc into an occlusion or into the sink."""
         return self.change + self.occlusion if self.occlusion_adds_change else self.occlusion
 
-    def for_fps(self, fps: float, displacement: float | None = None) -> CostSettings:
+    def for_fps(self, fps: float) -> CostSettings:
         """Return the settings for so many frames per second.
 
-        An ordinary displacement costs the same at every frame rate and with every detector. `displacement`:
-        what is ordinary, in heights between two frames; None: the expected one. Pixels, the paper's unit, are
-        left as they are.
+        People walk further between two frames that are further apart, while boxes jitter alike: displacements
+        are weighed and limited by what both add up to. Pixels, the paper's unit, are left as they are.
         """
-        if self.displacement_unit == "pixels":
+        if self.displacement_unit == "pixels" or fps == DEFAULT_FPS:
             return self
-        ordinary = walking_displacement(fps) if displacement is None else displacement
-        scale = ordinary / walking_displacement(DEFAULT_FPS)
+        scale = (_JITTER + _SPEED / fps) / (_JITTER + _SPEED / DEFAULT_FPS)
         gate = self.gate
         if gate is not None:
-            running = min(_TOP_SPEED / DEFAULT_FPS, gate / 2.0)
-            gate = (gate - running) * scale + running * DEFAULT_FPS / fps
+            longer = 1.0 / fps - 1.0 / DEFAULT_FPS
+            gate = max(gate + _TOP_SPEED * longer, gate / 2.0)
         return replace(self, displacement=self.displacement / scale, gate=gate)
-
-
-def walking_displacement(fps: float) -> float:
-    """Return how far people's boxes are expected to move between two frames, in heights, on average."""
-    return _JITTER + _SPEED / fps
 
 
 PAPER_COSTS = CostSettings(

@@ -182,7 +182,7 @@ def test_detections_belong_to_the_pictures_they_were_made_from(tmp_path: Path, m
     """A detector counts pictures; tracks count frames of the site's clock."""
     times = [(n + 2 * (n // 10)) / 25 for n in range(40)]  # every now and then two are not taken
     video = write_timed(tmp_path / "phone.mp4", times)
-    made_of = [MotRow(n + 1, -1, 10.0 + n / 4, 5.0, 12.0, 30.0, 1.0) for n in range(len(times))]
+    made_of = [MotRow(n + 1, -1, 10.0 + n, 5.0, 12.0, 30.0, 1.0) for n in range(len(times))]
     write_rows(tmp_path / "det.txt", made_of)
     (tmp_path / "site.yaml").write_text("site: {fps: 25, width: 64, height: 48}")
     result = myview(
@@ -191,4 +191,4 @@ def test_detections_belong_to_the_pictures_they_were_made_from(tmp_path: Path, m
     )
     assert result.code == 0, result.err
     found = {row.frame - 1: row.left for row in read_rows(tmp_path / "tracks.txt")}
-    assert [found[round(time * 25)] for time in times] == [10.0 + n / 4 for n in range(len(times))]
+    assert [found[round(time * 25)] for time in times] == [10.0 + n for n in range(len(times))]
