@@ -66,6 +66,12 @@ def score_row(scores: Sequence[WayScore]) -> list[str]:
     ]
 
 
+def _stage_times(scores: Sequence[WayScore]) -> str:
+    """Return the median of each stage's time over the seeds."""
+    medians = {stage: np.median([score.stages[stage] for score in scores]) for stage in scores[0].stages}
+    return ", ".join(f"{stage} {ms:.1f}" for stage, ms in medians.items())
+
+
 def _mean_and_range(values: Sequence[float]) -> str:
     half = (max(values) - min(values)) / 2.0
     return f"{np.mean(values):.1f}" + (f" ±{half:.1f}" if len(values) > 1 else "")
@@ -104,6 +110,9 @@ def measure(options: argparse.Namespace) -> None:
                 report.line(f"{name}: skipped: {problem}")
                 continue
             report.table(name, COLUMNS, [score_row(found) for found in scores.values()])
+            for way, found in scores.items():
+                if found[0].stages:
+                    report.line(f"{way}, ms by stage: {_stage_times(found)}")
             joint[name] = {
                 way: 100 * float(np.mean([score.scores.joint.idf1 for score in found]))
                 for way, found in scores.items()

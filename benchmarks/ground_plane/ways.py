@@ -11,6 +11,7 @@ from benchmarks.bestview.camera_tracks import Rows, SceneDetections, track_scene
 from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import decide
 from benchmarks.ground_plane.frame_by_frame import track_frame_by_frame
+from benchmarks.ground_plane.stages import ClockedSolver, timed_stages
 from tracking import Detections, create_solver
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.ground_plane import (
@@ -42,6 +43,8 @@ class WayScore:
     scores: MultiCameraScores
     ms: float
     """Processor time per frame of all cameras, without detection."""
+    stages: Mapping[str, float]
+    """The same by stage, where it is known."""
 
 
 def run_ways(
@@ -65,15 +68,19 @@ def run_ways(
     ]
     fps = config.site.fps
 
-    def score(way: str, rows: Rows, began: float) -> WayScore:
+    def score(way: str, rows: Rows, began: float, stages: Mapping[str, float] | None = None) -> WayScore:
         ms = 1e3 * (time.process_time() - began) / length
         recordings = {camera: TruthAndTracks(scene.gt[camera], rows[camera]) for camera in scene.gt}
-        return WayScore(way, evaluate_cameras(recordings, MIN_IOU), ms)
+        by_stage = {stage: 1e3 * seconds / length for stage, seconds in (stages or {}).items()}
+        return WayScore(way, evaluate_cameras(recordings, MIN_IOU), ms, by_stage)
 
     if JOINT in ways:
         began = time.process_time()
-        tracker = GroundPlaneTracker(cameras, GroundSettings(), create_solver(solver), fps)
-        yield score(JOINT, rows_of(track_ground_plane(tracker, enumerate(frames)), cameras), began)
+        with timed_stages() as clock:
+            timed = ClockedSolver(create_solver(solver), clock)
+            tracker = GroundPlaneTracker(cameras, GroundSettings(), timed, fps)
+            joint = rows_of(track_ground_plane(tracker, enumerate(frames)), cameras)
+        yield score(JOINT, joint, began, clock.seconds)
     if BY_FRAME in ways:
         began = time.process_time()
         yield score(BY_FRAME, track_frame_by_frame(_in_metres(cameras, frames), frames, fps), began)

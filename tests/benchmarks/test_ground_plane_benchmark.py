@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from benchmarks.ground_plane import __main__ as benchmark
+from benchmarks.ground_plane import growth, stages
 from benchmarks.ground_plane.frame_by_frame import track_frame_by_frame
+from benchmarks.ground_plane.square import SimulatedSquare
+from benchmarks.ground_plane.stages import NETWORK, OTHER, SOLVING, STAGES, StageClock
 from benchmarks.ground_plane.ways import BY_FRAME, JOINT, rows_of, run_ways
 from benchmarks.ground_plane.wildtrack import wildtrack
 from fakes.tracking.walked_floor import FPS, FloorNoise, detect_walkers, floor_views
@@ -66,3 +69,29 @@ def test_a_real_crowd_is_tracked_better_jointly_than_frame_by_frame(
         replace(scene, gt=truth), replace(found, frames=shown), [JOINT, BY_FRAME], "arcs"
     )
     assert joint.scores.joint.idf1 > max(0.8, by_frame.scores.joint.idf1)
+
+
+def test_time_within_a_stage_counts_for_the_innermost(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = iter([0.0, 1.0, 3.0, 6.0, 10.0, 15.0])
+    monkeypatch.setattr(stages.time, "process_time", lambda: next(now))
+    clock = StageClock()
+    solve = clock.timed(SOLVING, lambda: None)
+    clock.timed(NETWORK, solve)()
+    clock.stop()
+    assert clock.seconds == dict.fromkeys(STAGES, 0.0) | {OTHER: 1.0 + 5.0, NETWORK: 2.0 + 4.0, SOLVING: 3.0}
+
+
+def test_everybody_on_the_simulated_square_is_tracked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(growth, "SIZES", ((4, 4), (4, 8)))
+    monkeypatch.setattr(sys, "argv", ["growth", "--frames", "2", "--out", str(tmp_path)])
+    growth.main()
+    rows = [line.split("\u2502")[1:-1] for line in capsys.readouterr().out.splitlines() if "\u2502" in line]
+    tracked = {tuple(cell.strip() for cell in (*row[:2], row[-1])) for row in rows}
+    assert {("4", "4", "4"), ("4", "8", "8"), ("exponent in people", "", "")} <= tracked
+
+
+def test_people_on_the_simulated_square_are_seen_by_most_cameras() -> None:
+    found = next(SimulatedSquare(6, 20).frames(1))
+    assert all(12 <= len(part) <= 22 for part in found.values())

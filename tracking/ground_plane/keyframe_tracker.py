@@ -17,21 +17,18 @@ from tracking.frame_rate import frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.candidates import Candidates
 from tracking.ground_plane.motion_scale import MotionScale
-from tracking.ground_plane.network import build_ground_network
 from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.places.hypotheses import find_places
 from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_metre, measure
 from tracking.ground_plane.places.place_noise import PlaceNoise
+from tracking.ground_plane.program.costs import program_costs
+from tracking.ground_plane.program.solution import solve_program
+from tracking.ground_plane.program.useful_arcs import GONE
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
 from tracking.ground_plane.window import WindowFrame, known_people, missed_costs, predict_places
-from tracking.solvers.base import OCCLUDED, Solver, SolveReport
+from tracking.solvers.base import Solver, SolveReport
 from tracking.types import Detections
-
-_NEWCOMERS = 4
-"""People who may arrive in one window; doubled as long as all of them do."""
-_GONE = OCCLUDED - 1
-"""State of a person who has left for good."""
 
 
 class KeyframeTracker:
@@ -165,7 +162,7 @@ class KeyframeTracker:
         return final
 
     def _solve(self) -> None:
-        """Solve the window's program, with as many possible arrivals as it takes."""
+        """Solve the window's program."""
         frames = [frame.places for frame in self._window]
         people = known_people(
             self._people, self._window, self._cameras, self._sizes, self._seconds, self._settings
@@ -175,20 +172,9 @@ class KeyframeTracker:
             rate = self._settings.people_density
         arrival_cost = -float(np.log(rate))
         first = arrival_cost - np.minimum(self._candidates.discounts(frames[0], self._settings), arrival_cost)
-        newcomers = _NEWCOMERS
-        while True:
-            network = build_ground_network(
-                people, newcomers, frames, self._seconds, arrival_cost, first, self._settings
-            )
-            solution = self._solver.solve(network)
-            gone = network.max_places - 1
-            states = np.where(solution.states == gone, _GONE, solution.states)
-            arrived = (states[len(people) :] >= 0).any(axis=1)
-            if not arrived.all():
-                break
-            newcomers *= 2
-        rows = np.concatenate([np.ones(len(people), dtype=np.bool_), arrived])
-        self._states, self._report = states[rows], solution.report
+        costs = program_costs(people, frames, self._seconds, arrival_cost, first, self._settings)
+        solution = solve_program(costs, frames, self._solver)
+        self._states, self._report = solution.states, solution.report
 
     def _is_beginning(self, number: int) -> bool:
         """Return whether people whom nobody has found yet may have been there from the first detection on."""
@@ -206,7 +192,7 @@ class KeyframeTracker:
                 person = self._people[n]
                 if state >= 0:
                     self._move(person, frame, state)
-                elif state == _GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
+                elif state == GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
                     continue
             elif state >= 0:
                 person = self._arrive(frame, state)

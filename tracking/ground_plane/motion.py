@@ -7,6 +7,7 @@ of both, so that a turn costs more than walking on, but less than leaving and ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,11 +27,11 @@ _TURN_NOISE_M = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionState:
-    """Place and velocity of a person.
+    """Place and velocity of a person, or of each of several, along leading axes of all arrays.
 
     Attributes:
-        mean: (4,) x, y in metres, and velocities in metres per second.
-        covariance: (4, 4).
+        mean: (..., 4) x, y in metres, and velocities in metres per second.
+        covariance: (..., 4, 4).
     """
 
     mean: Floats
@@ -43,44 +44,53 @@ class MotionState:
         joint[:2, :2], joint[2:, 2:] = covariance, speed**2 * np.eye(2)
         return cls(np.concatenate([place, np.zeros(2)]), joint)
 
+    @classmethod
+    def stack(cls, states: Sequence[MotionState]) -> MotionState:
+        """Return the states of several people as one, with a leading axis."""
+        means = np.array([state.mean for state in states]).reshape(-1, 4)
+        return cls(means, np.array([state.covariance for state in states]).reshape(-1, 4, 4))
+
     @property
     def place(self) -> Floats:
-        """Its place, (2,)."""
-        return self.mean[:2]
+        """Its place, (..., 2)."""
+        return self.mean[..., :2]
 
     @property
     def velocity(self) -> Floats:
-        """Its velocity, (2,)."""
-        return self.mean[2:]
+        """Its velocity, (..., 2)."""
+        return self.mean[..., 2:]
 
     @property
     def place_covariance(self) -> Floats:
-        """The covariance of the place, (2, 2)."""
-        return self.covariance[:2, :2]
+        """The covariance of the place, (..., 2, 2)."""
+        return self.covariance[..., :2, :2]
 
     @property
     def velocity_covariance(self) -> Floats:
-        """The covariance of the velocity, (2, 2)."""
-        return self.covariance[2:, 2:]
+        """The covariance of the velocity, (..., 2, 2)."""
+        return self.covariance[..., 2:, 2:]
 
-    def predict(self, seconds: float, acceleration: float) -> MotionState:
-        """Return the state of somebody who walks on."""
-        step = np.eye(4)
-        step[0, 2] = step[1, 3] = seconds
-        noise = np.concatenate([0.5 * seconds**2 * np.eye(2), seconds * np.eye(2)])
+    def predict(self, seconds: float | Floats, acceleration: float) -> MotionState:
+        """Return the state of somebody who walks on for so many seconds, (...) or alike for all."""
+        time = np.asarray(seconds)[..., None, None]
+        step, noise = _identities(time, 4), np.zeros((*time.shape[:-2], 4, 2))
+        step[..., :2, 2:] = time * np.eye(2)
+        noise[..., :2, :], noise[..., 2:, :] = 0.5 * time**2 * np.eye(2), time * np.eye(2)
+        grown = acceleration**2 * noise @ np.swapaxes(noise, -1, -2)
         return MotionState(
-            step @ self.mean, step @ self.covariance @ step.T + acceleration**2 * noise @ noise.T
+            (step @ self.mean[..., None])[..., 0],
+            step @ self.covariance @ np.swapaxes(step, -1, -2) + grown,
         )
 
     def update(self, place: Floats, covariance: Floats) -> MotionState:
-        """Return the state after a measurement of the place."""
+        """Return the state of one person after a measurement of the place."""
         gain = self.covariance[:, :2] @ np.linalg.inv(self.place_covariance + covariance)
         return MotionState(
             self.mean + gain @ (place - self.place), self.covariance - gain @ self.covariance[:2]
         )
 
 
-def move_costs(walked: OffsetDensities, turned: OffsetDensities, turns: float) -> Floats:
+def move_costs(walked: OffsetDensities, turned: OffsetDensities, turns: float | Floats) -> Floats:
     """Return the negative log densities of moves: of walking on, or of turning with the probability `turns`.
 
     Both densities are of offsets: from where somebody walks on to, and from where they were. Infinite where
@@ -95,16 +105,32 @@ def is_possible(moves: OffsetDensities) -> NDArray[np.bool_]:
     return np.asarray(moves.distances < _MOTION_GATE)
 
 
+def may_walk(places: Floats, spreads: Floats, means: Floats, covariances: Floats) -> NDArray[np.bool_]:
+    """Return which of the places `means` (K, 2) people whom one expects at `places` (N, 2) may be at, (N, K).
+
+    No possible move is left out, but some impossible ones are not: a covariance is not larger than its trace.
+    """
+    reach = np.trace(spreads, axis1=1, axis2=2)[:, None] + np.trace(covariances, axis1=1, axis2=2)
+    distances = (means[:, 0] - places[:, :1]) ** 2 + (means[:, 1] - places[:, 1:]) ** 2
+    return np.asarray(distances < _MOTION_GATE * reach)
+
+
 def reach_costs(
-    state: MotionState, seconds: float, means: Floats, covariances: Floats, settings: GroundSettings
+    state: MotionState, seconds: float | Floats, means: Floats, covariances: Floats, settings: GroundSettings
 ) -> Floats:
-    """Return the costs of a person being at places (K, 2) after so many seconds, (K,)."""
+    """Return the costs of people being at places (K, 2) after so many seconds, (...,), (..., K)."""
+    time = np.asarray(seconds)[..., None]
     ahead = state.predict(seconds, settings.acceleration)
-    spread = (settings.speed * min(seconds, _MAX_TURN_S)) ** 2 * np.eye(2)
+    spread = (settings.speed * np.minimum(time, _MAX_TURN_S)[..., None]) ** 2 * np.eye(2)
+    near = state.place_covariance + spread
+
+    def densities(places: Floats, spreads: Floats) -> OffsetDensities:
+        return OffsetDensities.of(means - places[..., None, :], covariances + spreads[..., None, :, :])
+
     return move_costs(
-        OffsetDensities.of(means - ahead.place, covariances + ahead.place_covariance),
-        OffsetDensities.of(means - state.place, covariances + state.place_covariance + spread),
-        settings.turn_probability(seconds),
+        densities(ahead.place, ahead.place_covariance),
+        densities(state.place, near),
+        settings.turn_probability(time),
     )
 
 
@@ -125,6 +151,13 @@ def follow(
     return ahead.update(place, covariance)
 
 
-def _log_densities(walked: OffsetDensities, turned: OffsetDensities, turns: float) -> tuple[Floats, Floats]:
+def _identities(like: Floats, size: int) -> Floats:
+    """Return identity matrices along the leading axes of `like` (..., 1, 1)."""
+    return np.broadcast_to(np.eye(size), (*like.shape[:-2], size, size)).copy()
+
+
+def _log_densities(
+    walked: OffsetDensities, turned: OffsetDensities, turns: float | Floats
+) -> tuple[Floats, Floats]:
     """Return the log densities of having walked on and of having turned, each with its probability."""
     return np.log1p(-turns) - walked.costs, np.log(turns) - turned.costs

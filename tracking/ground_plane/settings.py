@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
+
+import numpy as np
+
+from tracking.boxes import Floats
 
 _MAY_BE_ANY = {"appearance", "unknown_appearance", "covered_log_odds"}
 
@@ -50,9 +53,9 @@ class GroundSettings:
             if field.name not in _MAY_BE_ANY and not getattr(self, field.name) > 0.0:
                 raise ValueError(f"{field.name} must be above 0, not {getattr(self, field.name)}")
 
-    def turn_probability(self, seconds: float) -> float:
+    def turn_probability(self, seconds: float | Floats) -> Floats:
         """Return the probability that somebody starts, stops or turns within so many seconds."""
-        return -math.expm1(-self.turn_rate * seconds)
+        return np.asarray(-np.expm1(-self.turn_rate * np.asarray(seconds)))
 
     def detection_weight(self, seconds: float) -> float:
         """Return for how much a frame's detections and misses count beside those that err on their own.

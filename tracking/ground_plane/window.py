@@ -10,11 +10,11 @@ import numpy as np
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.motion import MotionState
-from tracking.ground_plane.network import KnownPerson
 from tracking.ground_plane.person import GroundPerson, appearance_costs
 from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.places.measurements import Measurements
 from tracking.ground_plane.places.visibility import detection_probabilities
+from tracking.ground_plane.program.costs import KnownPeople
 from tracking.ground_plane.settings import GroundSettings
 
 _MAX_DETECTION_PROBABILITY = 0.97
@@ -71,32 +71,17 @@ def known_people(
     sizes: Sequence[BoxSizes],
     seconds_per_frame: float,
     settings: GroundSettings,
-) -> list[KnownPerson]:
+) -> KnownPeople:
     """Return the people known, with what the window's frames say of each."""
-    if not people:
-        return []
+    states = MotionState.stack([person.state for person in people])
+    unseen = np.array([person.seconds_unseen(window[0].number) for person in people])
     weight = settings.detection_weight(seconds_per_frame)
-    hidden = [
-        weight
-        * missed_costs(
-            np.array([person.ahead(frame.number, settings).place for person in people]),
-            frame.places.measurements,
-            cameras,
-            sizes,
-            settings,
-        )
-        for frame in window
-    ]
+    hidden = []
+    for m, frame in enumerate(window):
+        ahead = states.predict(unseen + m * seconds_per_frame, settings.acceleration)
+        hidden.append(weight * missed_costs(ahead.place, frame.places.measurements, cameras, sizes, settings))
     appearance = [appearance_costs(people, frame.places, settings) for frame in window]
-    return [
-        KnownPerson(
-            person.state,
-            person.seconds_unseen(window[0].number),
-            np.array([costs[n] for costs in hidden]),
-            [costs[n] for costs in appearance],
-        )
-        for n, person in enumerate(people)
-    ]
+    return KnownPeople(states, unseen, np.stack(hidden, axis=1), appearance)
 
 
 def missed_costs(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import ClassVar, Literal, Protocol, cast
@@ -115,6 +116,24 @@ class Solver(Protocol):
         A warm start (`Solution.warm_start.shift(...)` of the previous window) only makes it faster.
         """
 
+    def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
+        """Return the solutions of networks that are parts of one, and share the budget of one."""
+
+
+def add_reports(solver: str, reports: Sequence[SolveReport], rest: float = 0.0) -> SolveReport:
+    """Return what is proven about parts that share nothing together; `rest`: the cost of what needed none."""
+    return SolveReport(
+        solver=solver,
+        objective=rest + math.fsum(report.objective for report in reports),
+        bound=rest + math.fsum(report.bound for report in reports),
+        integral=all(report.integral for report in reports),
+        conflicts=sum(report.conflicts for report in reports),
+        rounds=sum(report.rounds for report in reports),
+        limit=next((report.limit for report in reports if report.limit), None),
+        skipped=tuple(dict.fromkeys(step for report in reports for step in report.skipped)),
+        seconds=math.fsum(report.seconds for report in reports),
+    )
+
 
 def solver_names() -> tuple[str, ...]:
     """Return the names of all solvers, sorted."""
@@ -146,8 +165,24 @@ class TimedSolver(ABC):
 
     def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
         """Return the states of all objects in all frames; a warm start only makes it faster."""
+        return self._timed(network, warm_start, BudgetMeter(self._budget))
+
+    def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
+        """Return the solutions of networks that share the budget, the smallest first.
+
+        The hardest parts get what is left, so that they keep no other from being solved.
+        """
+        meter = BudgetMeter(self._budget)
+        solutions: dict[int, Solution] = {}
+        for k in sorted(range(len(networks)), key=lambda k: networks[k].node.size):
+            part = meter.rest()
+            solutions[k] = self._timed(networks[k], None, part)
+            meter.work_s += part.work_s
+        return [solutions[k] for k in range(len(networks))]
+
+    def _timed(self, network: Network, warm_start: WarmStart | None, meter: BudgetMeter) -> Solution:
         start = time.perf_counter()
-        solution = self._solve(network, warm_start, BudgetMeter(self._budget))
+        solution = self._solve(network, warm_start, meter)
         seconds = time.perf_counter() - start
         return replace(solution, report=replace(solution.report, seconds=seconds))
 

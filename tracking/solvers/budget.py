@@ -27,6 +27,7 @@ _ITERATION, _ITERATION_ENTRY = 1e-5, 5e-9
 """Seconds for a simplex iteration, and more for each entry of the matrix."""
 _INTERIOR_ENTRY = 3e-7
 """Seconds for an entry of the matrix in an iteration of the interior-point method."""
+_HARDLY_ANY = 1e-9
 _STEP = 5e-4
 """Seconds for whatever else a step of a search does."""
 
@@ -76,6 +77,14 @@ class BudgetMeter:
         if clock is not None:
             left = min(left, share * clock - (time.perf_counter() - self._start))
         return max(left, 0.0)
+
+    def rest(self) -> BudgetMeter:
+        """Return a meter of what is left; nothing left is hardly anything."""
+        work, clock = self._budget.work_s, self._budget.time_s
+        left = None if work is None else max(work - self.work_s, _HARDLY_ANY)
+        if clock is not None:
+            clock = max(clock - (time.perf_counter() - self._start), _HARDLY_ANY)
+        return BudgetMeter(SolverBudget(left, clock))
 
     def add_step(self) -> None:
         """Add a step of a search."""

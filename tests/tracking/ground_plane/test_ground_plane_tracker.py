@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -188,6 +190,9 @@ class ComparedSolvers:
         self.proven += one.report.status == other.report.status == "optimal"
         self.solved += 1
         return one
+
+    def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
+        return [self.solve(network) for network in networks]
 
 
 @pytest.mark.parametrize("lag_s", [0.2, 0.6])
