@@ -110,9 +110,9 @@ def measure(options: argparse.Namespace) -> None:
                 report.line(f"{name}: skipped: {problem}")
                 continue
             report.table(name, COLUMNS, [score_row(found) for found in scores.values()])
-            for way, found in scores.items():
-                if found[0].stages:
-                    report.line(f"{way}, ms by stage: {_stage_times(found)}")
+            for way, draws in scores.items():
+                if draws[0].stages:
+                    report.line(f"{way}, ms by stage: {_stage_times(draws)}")
             joint[name] = {
                 way: 100 * float(np.mean([score.scores.joint.idf1 for score in found]))
                 for way, found in scores.items()

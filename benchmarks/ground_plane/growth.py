@@ -20,8 +20,10 @@ from tracking import create_solver
 from tracking.ground_plane import GroundPlaneTracker, GroundSettings
 
 SIZES = ((4, 15), (4, 30), (4, 60), (8, 15), (8, 30), (8, 60), (16, 15), (16, 30), (16, 60))
-_BEFORE = 10
-"""Frames until everybody is known, which are not counted."""
+_BEFORE = 24
+"""Frames that are not counted: at first everybody may arrive."""
+_RESOLUTION = 1e-3
+"""Milliseconds."""
 
 
 def measure_square(cameras: int, people: int, frames: int, solver: str) -> dict[str, float]:
@@ -39,21 +41,22 @@ def measure_square(cameras: int, people: int, frames: int, solver: str) -> dict[
     return {stage: 1e3 * clock.seconds[stage] / frames for stage in STAGES} | {"tracks": tracks}
 
 
-def exponent(larger: float, smaller: float) -> str:
-    """Return the growth exponent of a time from half of the size to all of it."""
-    return f"{math.log2(larger / smaller):.1f}" if min(larger, smaller) > 0.0 else ""
-
-
 def exponent_rows(times: Mapping[tuple[int, int], Mapping[str, float]]) -> list[list[str]]:
-    """Return the exponents of each stage in people and in cameras, at the largest size measured."""
+    """Return the growth exponents of each stage in people and in cameras, from half of the largest size."""
     cameras, people = max(times)
     rows = []
     for title, half in (("people", (cameras, people // 2)), ("cameras", (cameras // 2, people))):
         if half in times:
-            pairs = [(times[cameras, people][stage], times[half][stage]) for stage in STAGES]
-            pairs.append(tuple(map(sum, zip(*pairs, strict=True))))
-            rows.append([f"exponent in {title}", "", *(exponent(*pair) for pair in pairs), ""])
+            larger, smaller = (_with_sum(times[size]) for size in ((cameras, people), half))
+            exponents = [f"{math.log2(a / b):.1f}" for a, b in zip(larger, smaller, strict=True)]
+            rows.append([f"exponent in {title}", "", *exponents, ""])
     return rows
+
+
+def _with_sum(found: Mapping[str, float]) -> list[float]:
+    """Return the milliseconds of each stage, not zero, and of all."""
+    stages = [max(found[stage], _RESOLUTION) for stage in STAGES]
+    return [*stages, sum(stages)]
 
 
 def measure(options: argparse.Namespace) -> None:
@@ -67,8 +70,7 @@ def measure(options: argparse.Namespace) -> None:
         [
             str(cameras),
             str(people),
-            *(f"{found[stage]:.1f}" for stage in STAGES),
-            f"{sum(found[stage] for stage in STAGES):.1f}",
+            *(f"{ms:.1f}" for ms in _with_sum(found)),
             f"{found['tracks']:.0f}",
         ]
         for (cameras, people), found in times.items()

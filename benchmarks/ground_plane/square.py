@@ -38,7 +38,9 @@ class SimulatedSquare:
     def views(self) -> dict[str, GroundCamera]:
         """The cameras by name, over the floor in meters."""
         return {
-            f"c{index:02d}": GroundCamera(np.linalg.inv(projection[:, [0, 1, 3]]), _WIDTH, _HEIGHT)
+            f"c{index:02d}": GroundCamera(
+                np.linalg.inv(projection[:, [0, 1, 3]]).astype(np.float64), _WIDTH, _HEIGHT
+            )
             for index, projection in enumerate(self._projections)
         }
 

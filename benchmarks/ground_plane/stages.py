@@ -10,7 +10,7 @@ from unittest.mock import patch
 
 from tracking.ground_plane import keyframe_tracker
 from tracking.model.network import Network
-from tracking.solvers import Solution, Solver, WarmStart
+from tracking.solvers import PartsSolver, Solution, WarmStart
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -61,7 +61,7 @@ class StageClock:
 class ClockedSolver:
     """A solver whose time counts as that of solving."""
 
-    def __init__(self, solver: Solver, clock: StageClock) -> None:
+    def __init__(self, solver: PartsSolver, clock: StageClock) -> None:
         self._solver = solver
         self._solve = clock.timed(SOLVING, solver.solve)
         self._solve_parts = clock.timed(SOLVING, solver.solve_parts)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.ground_plane import __main__ as benchmark
-from benchmarks.ground_plane import growth, stages
+from benchmarks.ground_plane import growth
 from benchmarks.ground_plane.frame_by_frame import track_frame_by_frame
 from benchmarks.ground_plane.square import SimulatedSquare
 from benchmarks.ground_plane.stages import NETWORK, OTHER, SOLVING, STAGES, StageClock
@@ -73,7 +73,7 @@ def test_a_real_crowd_is_tracked_better_jointly_than_frame_by_frame(
 
 def test_time_within_a_stage_counts_for_the_innermost(monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter([0.0, 1.0, 3.0, 6.0, 10.0, 15.0])
-    monkeypatch.setattr(stages.time, "process_time", lambda: next(now))
+    monkeypatch.setattr("benchmarks.ground_plane.stages.time.process_time", lambda: next(now))
     clock = StageClock()
     solve = clock.timed(SOLVING, lambda: None)
     clock.timed(NETWORK, solve)()

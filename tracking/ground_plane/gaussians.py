@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,3 +70,34 @@ def fuse(places: Floats, covariances: Floats) -> tuple[Floats, Floats]:
     weights = inverses(covariances)
     covariance = inverses(weights.sum(axis=0))
     return np.asarray(covariance @ np.einsum("nij,nj->i", weights, places)), covariance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FusedPlaces:
+    """The places that groups of measurements determine.
+
+    Attributes:
+        means: (G, 2).
+        covariances: (G, 2, 2).
+        costs: (G,) negative logs of the densities of each group's measurements, integrated over the place.
+    """
+
+    means: Floats
+    covariances: Floats
+    costs: Floats
+
+    @classmethod
+    def of(cls, places: Floats, covariances: Floats, groups: Sequence[Sequence[int]]) -> FusedPlaces:
+        """Fuse each of the groups, not empty, of measurements (N, 2) with covariances (N, 2, 2)."""
+        if not groups:
+            return cls(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
+        members = np.concatenate([np.array(group) for group in groups])
+        sizes = np.array([len(group) for group in groups])
+        begins = np.cumsum(sizes) - sizes
+        weights = inverses(covariances)[members]
+        fused = inverses(np.add.reduceat(weights, begins))
+        weighted = (weights @ places[members][:, :, None])[:, :, 0]
+        means = (fused @ np.add.reduceat(weighted, begins)[:, :, None])[:, :, 0]
+        offsets = places[members] - np.repeat(means, sizes, axis=0)
+        costs = np.add.reduceat(negative_log_densities(offsets, covariances[members]), begins)
+        return cls(means, fused, costs - 0.5 * np.log(determinants(fused)) - LOG_2PI)

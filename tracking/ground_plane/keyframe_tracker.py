@@ -8,7 +8,8 @@ their first final place on.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,18 +17,20 @@ from tracking.boxes import Floats
 from tracking.frame_rate import frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.candidates import Candidates
+from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.places.hypotheses import find_places
 from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_metre, measure
 from tracking.ground_plane.places.place_noise import PlaceNoise
+from tracking.ground_plane.predicted_boxes import predict_boxes, usual_boxes
 from tracking.ground_plane.program.costs import program_costs
 from tracking.ground_plane.program.solution import solve_program
 from tracking.ground_plane.program.useful_arcs import GONE
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
 from tracking.ground_plane.window import WindowFrame, known_people, missed_costs, predict_places
-from tracking.solvers.base import Solver, SolveReport
+from tracking.solvers.base import PartsSolver, SolveReport
 from tracking.types import Detections
 
 
@@ -41,7 +44,7 @@ class KeyframeTracker:
         self,
         cameras: Mapping[str, GroundCamera],
         settings: GroundSettings,
-        solver: Solver,
+        solver: PartsSolver,
         fps: float,
         units_per_metre: float | None = None,
     ) -> None:
@@ -137,7 +140,7 @@ class KeyframeTracker:
         ]
 
     def _provisional_tracks(self, frame: WindowFrame, m: int) -> tuple[GroundTrack, ...]:
-        tracks = []
+        found = []
         for person, row in zip(self._people, self._states, strict=False):
             if row[m] >= 0:
                 places = frame.places
@@ -147,8 +150,8 @@ class KeyframeTracker:
                 place, covariance = ahead.place, ahead.place_covariance
             else:
                 continue
-            tracks.append(self._track(person, frame, int(row[m]), place, covariance))
-        return tuple(sorted(tracks, key=lambda track: track.id))
+            found.append(_Located(person, int(row[m]), place, covariance))
+        return self._tracks(found, frame)
 
     def flush(self) -> list[GroundFrame]:
         """End the recording: return the remaining frames; everybody is forgotten."""
@@ -185,14 +188,15 @@ class KeyframeTracker:
     def _finish_oldest(self) -> GroundFrame:
         """Make the oldest frame final: people move, arrive and leave."""
         frame = self._window.popleft()
-        people, rows, arriving, tracks = [], [], [], []
+        people, rows, arriving, found = [], [], [], []
+        self._move_people(frame)
+        usual = usual_boxes(frame.places.measurements, self._sizes)
         for n, row in enumerate(self._states):
             state = int(row[0])
             if n < len(self._people):
                 person = self._people[n]
-                if state >= 0:
-                    self._move(person, frame, state)
-                elif state == GONE or person.seconds_unseen(frame.number) > self._settings.forget_after_s:
+                unseen = person.seconds_unseen(frame.number)
+                if state == GONE or unseen > self._settings.forget_after_s:
                     continue
             elif state >= 0:
                 person = self._arrive(frame, state)
@@ -202,10 +206,10 @@ class KeyframeTracker:
             people.append(person)
             rows.append(n)
             if state >= 0:
-                person.learn(frame.places, state, self._sizes)
+                person.learn(frame.places, state, usual)
             if state >= 0 or (row[1:] >= 0).any():
                 ahead = person.ahead(frame.number, self._settings)
-                tracks.append(self._track(person, frame, state, ahead.place, ahead.place_covariance))
+                found.append(_Located(person, state, ahead.place, ahead.place_covariance))
         chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
         self._noise.update(frame.places, chosen)
         missed = missed_costs(
@@ -215,30 +219,57 @@ class KeyframeTracker:
         self._candidates.update(frame.places, chosen, missed, self._settings)
         self._people = people
         self._states = self._states[rows + arriving, 1:]
-        return GroundFrame(frame.number, tuple(sorted(tracks, key=lambda track: track.id)), self._report)
+        return GroundFrame(frame.number, self._tracks(found, frame), self._report)
 
-    def _move(self, person: GroundPerson, frame: WindowFrame, state: int) -> None:
-        places, seconds = frame.places, person.seconds_unseen(frame.number)
-        self._motion.update(person.state, seconds, places.means[state], places.covariances[state])
-        person.move(frame.number, places, state, self._settings)
+    def _move_people(self, frame: WindowFrame) -> None:
+        """Move the people known to their places in a frame."""
+        places = frame.places
+        moved = [
+            (person, int(row[0]))
+            for person, row in zip(self._people, self._states, strict=False)
+            if row[0] >= 0
+        ]
+        if not moved:
+            return
+        states = [state for _, state in moved]
+        costs = self._motion.move_costs(
+            MotionState.stack([person.state for person, _ in moved]),
+            np.array([person.seconds_unseen(frame.number) for person, _ in moved]),
+            places.means[states],
+            places.covariances[states],
+        )
+        for (person, state), row in zip(moved, costs, strict=True):
+            self._motion.learn(row)
+            person.move(frame.number, places, state, self._settings)
 
     def _arrive(self, frame: WindowFrame, state: int) -> GroundPerson:
         number, self._next_id = self._next_id, self._next_id + 1
         return GroundPerson(number, frame.number, frame.places, state, self._seconds, self._settings)
 
-    def _track(
-        self, person: GroundPerson, frame: WindowFrame, state: int, place: Floats, covariance: Floats
-    ) -> GroundTrack:
-        """Return the person's place and boxes: detections, and predicted boxes in the other cameras."""
-        boxes = {}
-        measurements = frame.places.measurements
-        for k in frame.places.groups[state] if state >= 0 else ():
-            camera = int(measurements.camera[k])
-            boxes[self._names[camera]] = GroundBox(measurements.boxes[k], int(measurements.index[k]))
-        for camera, name in enumerate(self._names):
-            if name not in boxes:
-                box = person.boxes.predict(place, self._cameras[camera], self._sizes[camera])
-                if box is not None:
-                    boxes[name] = GroundBox(box, None)
-        units = self._units_per_metre or 1.0
-        return GroundTrack(person.id, units * place, units**2 * covariance, boxes)
+    def _tracks(self, found: Sequence[_Located], frame: WindowFrame) -> tuple[GroundTrack, ...]:
+        """Return people's places and boxes, by id: detections, and predicted boxes in the other cameras."""
+        places = np.array([each.place for each in found]).reshape(-1, 2)
+        predicted = predict_boxes([each.person.boxes for each in found], places, self._cameras, self._sizes)
+        known = np.asarray(np.isfinite(predicted).all(axis=2))
+        units, measurements = self._units_per_metre or 1.0, frame.places.measurements
+        tracks = []
+        for n, each in enumerate(found):
+            boxes = {}
+            for k in frame.places.groups[each.state] if each.state >= 0 else ():
+                camera = int(measurements.camera[k])
+                boxes[self._names[camera]] = GroundBox(measurements.boxes[k], int(measurements.index[k]))
+            for camera in np.flatnonzero(known[n]).tolist():
+                if self._names[camera] not in boxes:
+                    boxes[self._names[camera]] = GroundBox(predicted[n, camera], None)
+            tracks.append(GroundTrack(each.person.id, units * each.place, units**2 * each.covariance, boxes))
+        return tuple(sorted(tracks, key=lambda track: track.id))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Located:
+    """A person in a frame: the state, below 0 where they are not seen, the place and its covariance."""
+
+    person: GroundPerson
+    state: int
+    place: Floats
+    covariance: Floats

@@ -40,11 +40,18 @@ class MotionScale:
         ]
         self._costs: Floats = np.zeros(len(_FACTORS))
 
-    def update(self, state: MotionState, seconds: float, place: Floats, covariance: Floats) -> None:
-        """Learn from a person, last in `state`, who was found at a place (2,) after so many seconds."""
-        costs = [
-            float(reach_costs(state, seconds, place[None], covariance[None], settings)[0])
+    def move_costs(self, states: MotionState, seconds: Floats, places: Floats, covariances: Floats) -> Floats:
+        """Return the costs (P, F) of moves under each factor, for `learn`.
+
+        P people, last in `states`, were found at `places` (P, 2) after so many `seconds` (P,).
+        """
+        found = [
+            reach_costs(states, seconds, places[:, None], covariances[:, None], settings)[:, 0]
             for settings in self._candidates
         ]
-        self._costs += np.minimum(costs, _MAX_COST) - self._costs / _MEMORY
+        return np.minimum(np.stack(found, axis=1), _MAX_COST)
+
+    def learn(self, costs: Floats) -> None:
+        """Learn from one person's move, with costs (F,)."""
+        self._costs += costs - self._costs / _MEMORY
         self.settings = self._candidates[int(np.argmin(self._costs + _PENALTIES))]

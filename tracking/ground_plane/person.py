@@ -8,7 +8,6 @@ import numpy as np
 
 from tracking.appearance import appearance_distance_matrix
 from tracking.boxes import Floats
-from tracking.ground_plane.camera import BoxSizes
 from tracking.ground_plane.motion import MotionState, follow
 from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.predicted_boxes import PersonBoxes
@@ -62,8 +61,8 @@ class GroundPerson:
         """Return the mean histogram in a camera, (B,); B = 0: not known."""
         return self._histograms.get(camera, _UNKNOWN)
 
-    def learn(self, places: Places, k: int, sizes: Sequence[BoxSizes]) -> None:
-        """Learn appearance and size from the detections of place `k`."""
+    def learn(self, places: Places, k: int, usual: Floats) -> None:
+        """Learn appearance and size from the detections of place `k`; `usual` (D, 4): others' boxes there."""
         measurements = places.measurements
         for index in places.groups[k]:
             camera, histogram = int(measurements.camera[index]), measurements.histograms[index]
@@ -73,7 +72,7 @@ class GroundPerson:
             if len(histogram):
                 self._histograms[camera] = histogram
             if not places.misplaced[k, index]:
-                self.boxes.update(measurements.boxes[index], sizes[camera])
+                self.boxes.update(measurements.boxes[index], usual[index])
 
 
 def appearance_costs(people: Sequence[GroundPerson], places: Places, settings: GroundSettings) -> Floats:

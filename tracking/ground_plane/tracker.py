@@ -14,7 +14,7 @@ from tracking.ground_plane.camera import GroundCamera
 from tracking.ground_plane.keyframe_tracker import KeyframeTracker
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracks import GroundFrame
-from tracking.solvers.base import Solver
+from tracking.solvers.base import PartsSolver
 from tracking.types import Detections
 
 
@@ -29,7 +29,7 @@ class GroundPlaneTracker:
         self,
         cameras: Mapping[str, GroundCamera],
         settings: GroundSettings,
-        solver: Solver,
+        solver: PartsSolver,
         fps: float = DEFAULT_FPS,
         units_per_metre: float | None = None,
     ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tracking.solvers.base import (
     DEFAULT_SOLVER,
     OCCLUDED,
+    PartsSolver,
     Solution,
     Solver,
     SolveReport,
@@ -19,6 +20,7 @@ __all__ = [
     "OCCLUDED",
     "UNKNOWN_STATE",
     "ConflictPrice",
+    "PartsSolver",
     "Solution",
     "SolveReport",
     "Solver",

@@ -116,6 +116,10 @@ class Solver(Protocol):
         A warm start (`Solution.warm_start.shift(...)` of the previous window) only makes it faster.
         """
 
+
+class PartsSolver(Solver, Protocol):
+    """Also solves parts that have nothing in common."""
+
     def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
         """Return the solutions of networks that are parts of one, and share the budget of one."""
 
@@ -140,7 +144,7 @@ def solver_names() -> tuple[str, ...]:
     return tuple(sorted(_SOLVERS))
 
 
-def create_solver(name: str, budget: SolverBudget | None = None) -> Solver:
+def create_solver(name: str, budget: SolverBudget | None = None) -> PartsSolver:
     """Return the solver of that name; `budget` limits each of its solves.
 
     When a limit is reached, the solver rounds what it has and returns the cheapest answer and the best bound
@@ -152,7 +156,7 @@ def create_solver(name: str, budget: SolverBudget | None = None) -> Solver:
     if name not in _SOLVERS:
         raise ValueError(f"no solver is called {name!r}; there are {', '.join(solver_names())}")
     module, factory = _SOLVERS[name]
-    return cast("Solver", getattr(import_module(module), factory)(budget))
+    return cast("PartsSolver", getattr(import_module(module), factory)(budget))
 
 
 class TimedSolver(ABC):

@@ -113,8 +113,8 @@ def undivided_network(window: Window, newcomers: int) -> Network:
     states = [MotionState(*each) for each in zip(people.states.mean, people.states.covariance, strict=True)]
     for n, state in enumerate(states):
         for m, places in enumerate(frames):
-            after = float(people.seconds[n]) + m * SECONDS
-            reach = reach_costs(state, after, places.means, places.covariances, SETTINGS)
+            unseen = float(people.seconds[n]) + m * SECONDS
+            reach = reach_costs(state, unseen, places.means, places.covariances, SETTINGS)
             (source[n] if m == 0 else pair[n, m - 1, hidden])[: len(places)] = reach
     for m, (before, after) in enumerate(pairwise(frames)):
         offsets = after.means[None] - before.means[:, None]

@@ -18,6 +18,7 @@ from tracking.ground_plane.gaussians import OffsetDensities
 from tracking.ground_plane.person import GroundPerson, appearance_costs
 from tracking.ground_plane.places.hypotheses import Places, find_places
 from tracking.ground_plane.places.measurements import measure
+from tracking.ground_plane.predicted_boxes import usual_boxes
 
 VIEWS = floor_views()
 CAMERAS = [view.camera for view in VIEWS.values()]
@@ -46,7 +47,7 @@ def test_appearance_costs_are_the_sum_over_the_detections_of_a_place(seed: int, 
     before, places = places_with_looks(random, 3), places_with_looks(random, 3)
     known = [GroundPerson(k, 0, before, k, 0.04, SETTINGS) for k in range(people)]
     for k, person in enumerate(known):
-        person.learn(before, k, SIZES)
+        person.learn(before, k, usual_boxes(before.measurements, SIZES))
     costs = appearance_costs(known, places, SETTINGS)
     assert costs.shape == (people, len(places))
     measurements = places.measurements

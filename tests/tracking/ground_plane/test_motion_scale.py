@@ -32,7 +32,8 @@ def learned(places: Floats, scale: MotionScale | None = None) -> MotionScale:
     scale = scale or MotionScale(ASSUMED)
     state = MotionState.at(places[0], COVARIANCE, scale.settings.speed)
     for place in places[1:]:
-        scale.update(state, SECONDS, place, COVARIANCE)
+        moved = MotionState.stack([state]), np.array([SECONDS]), place[None], COVARIANCE[None]
+        scale.learn(scale.move_costs(*moved)[0])
         state = follow(state, SECONDS, place, COVARIANCE, scale.settings)
     return scale
 

@@ -13,6 +13,7 @@ from fakes.tracking.random_networks import SETTINGS, Case, cases, network_of
 from tracking.model.network import Network, Template, build_network
 from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import SolverBudget, create_solver, solver_names
+from tracking.solvers.base import add_reports
 from tracking.solvers.objective import total_cost
 from tracking.types import Detections
 
@@ -98,3 +99,18 @@ def test_a_limit_by_the_clock_stops_the_solver(monkeypatch: pytest.MonkeyPatch) 
 def test_a_budget_is_above_zero(limits: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="above 0"):
         SolverBudget(**limits)
+
+
+def test_parts_share_a_budget_and_a_hard_one_keeps_no_other_from_being_solved() -> None:
+    hard, easy = crowded_window(0.0), crowded_window(0.0, people=2, places=3, frames=4)
+    solver = create_solver("columns", SolverBudget(0.02))
+    first, second, third = (solution.report for solution in solver.solve_parts([hard, easy, hard]))
+    assert (second.limit, second.status) == (None, "optimal")
+    assert first.limit == third.limit == "work"
+    assert solver.solve(hard).report.bound >= third.bound
+    together = add_reports("columns", [first, second, third], rest=1.0)
+    assert together.objective == pytest.approx(1.0 + first.objective + second.objective + third.objective)
+    assert together.bound == pytest.approx(1.0 + first.bound + second.bound + third.bound)
+    assert (together.status, together.limit, together.conflicts) == ("limit", "work", 0)
+    assert not together.integral
+    assert set(together.skipped) == {*first.skipped, *third.skipped}

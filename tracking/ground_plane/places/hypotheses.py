@@ -17,22 +17,13 @@ from numpy.typing import NDArray
 
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
-from tracking.ground_plane.gaussians import (
-    LOG_2PI,
-    determinants,
-    fuse,
-    negative_log_densities,
-    squared_distances,
-)
+from tracking.ground_plane.gaussians import FusedPlaces, determinants, fuse, squared_distances
+from tracking.ground_plane.places.agglomeration import agglomerate
 from tracking.ground_plane.places.measurements import Measurements
 from tracking.ground_plane.places.misplaced_feet import find_misplaced
 from tracking.ground_plane.places.visibility import detection_probabilities
 from tracking.ground_plane.settings import GroundSettings
 
-_MIN_MERGE_GAIN = -4.0
-"""Log likelihood ratio below which two groups are certainly of two people."""
-_CERTAIN_MERGE_GAIN = 2.0
-"""Above it they are of one person, so that neither is a hypothesis alone."""
 _PREDICTION_GATE, _GROUP_GATE = 11.0, 9.2
 """Squared Mahalanobis distances, quantiles .996 and .99 of two degrees of freedom."""
 _CLEAR_LOG_ODDS = -1.4
@@ -102,18 +93,12 @@ def find_places(
         if group:
             candidates[group] = None
     groups = list(candidates)
-    fused = [fuse(measurements.places[[*group]], measurements.covariances[[*group]]) for group in groups]
-    means = np.array([mean for mean, _ in fused]).reshape(-1, 2)
-    covariances = np.array([covariance for _, covariance in fused]).reshape(-1, 2, 2)
-    costs = np.array(
-        [
-            group_cost(measurements, group, mean, covariance, settings.detection_probability)
-            for group, (mean, covariance) in zip(groups, fused, strict=True)
-        ]
-    )
+    fused = FusedPlaces.of(measurements.places, measurements.covariances, groups)
+    means, covariances = fused.means, fused.covariances
     members = np.zeros((len(groups), len(measurements)), dtype=np.bool_)
     for k, group in enumerate(groups):
         members[k, list(group)] = True
+    costs = group_costs(measurements, members, fused, settings.detection_probability)
     probabilities = detection_probabilities(
         means, cameras, sizes, measurements, members, settings.detection_probability
     )
@@ -142,74 +127,27 @@ def find_places(
     )
 
 
-def group_cost(
-    measurements: Measurements,
-    group: tuple[int, ...],
-    mean: Floats,
-    covariance: Floats,
-    probability: float,
-) -> float:
-    """Return the cost of the detections of a group alone, without the cameras that miss the person."""
-    chosen = list(group)
-    offsets = measurements.places[chosen] - mean
-    consistency = negative_log_densities(offsets, measurements.covariances[chosen]).sum()
-    # The integral of the product of the densities over the place.
-    consistency -= 0.5 * np.log(determinants(covariance)) + LOG_2PI
-    return float(consistency + measurements.log_clutter[chosen].sum() - len(chosen) * np.log(probability))
+def group_costs(
+    measurements: Measurements, members: NDArray[np.bool_], fused: FusedPlaces, probability: float
+) -> Floats:
+    """Return the costs of the detections of groups alone, without the cameras that miss the person, (G,).
 
-
-def agglomerate(measurements: Measurements, density: float) -> list[tuple[int, ...]]:
-    """Merge the likeliest pair of groups until none is likely; return all groups that are in doubt.
-
-    The gain of a merge is the log likelihood ratio of one person to two, who are somewhere among `density`
-    people per m².
+    `members` (G, D): the detections of each group.
     """
-    count = len(measurements)
-    size = 2 * count
-    groups: list[tuple[int, ...]] = [(k,) for k in range(count)]
-    means, covariances = np.zeros((size, 2)), np.tile(np.eye(2), (size, 1, 1))
-    means[:count], covariances[:count] = measurements.places, measurements.covariances
-    seen_by = np.zeros((size, int(measurements.camera.max(initial=0)) + 1), dtype=np.bool_)
-    seen_by[np.arange(count), measurements.camera] = True
-    open_groups, certain = np.zeros(size, dtype=np.bool_), set[int]()
-    gains = np.full((size, size), -np.inf)
-
-    def add(index: int) -> None:
-        others = np.flatnonzero(open_groups)
-        offsets = means[others] - means[index]
-        found = -negative_log_densities(offsets, covariances[others] + covariances[index]) - np.log(density)
-        gains[index, others] = np.where((seen_by[others] & seen_by[index]).any(axis=1), -np.inf, found)
-        open_groups[index] = True
-
-    for index in range(count):
-        add(index)
-    while len(groups) < size:
-        known = gains[: len(groups), : len(groups)]
-        first, second = divmod(int(known.argmax()), len(groups))
-        if known[first, second] < _MIN_MERGE_GAIN:
-            break
-        if known[first, second] > _CERTAIN_MERGE_GAIN:
-            certain.update((first, second))
-        pair, merged = [first, second], len(groups)
-        groups.append(tuple(sorted(groups[first] + groups[second])))
-        means[merged], covariances[merged] = fuse(means[pair], covariances[pair])
-        seen_by[merged] = seen_by[pair].any(axis=0)
-        open_groups[pair] = False
-        gains[pair, :] = gains[:, pair] = -np.inf
-        add(merged)
-    return [group for index, group in enumerate(groups) if index not in certain]
+    clutter = members @ measurements.log_clutter
+    return np.asarray(fused.costs + clutter - members.sum(axis=1) * np.log(probability))
 
 
 def _group_near(measurements: Measurements, mean: Floats, covariance: Floats) -> tuple[int, ...]:
     """Return the detections, the likeliest of each camera, that fit a predicted place and each other."""
     spread = measurements.covariances + covariance
     distances = squared_distances(measurements.places - mean, spread)
-    costs = distances + np.log(determinants(spread)) + 2.0 * measurements.log_clutter
-    group = []
-    for camera in np.unique(measurements.camera):
-        near = np.flatnonzero((measurements.camera == camera) & (distances < _PREDICTION_GATE))
-        if len(near):
-            group.append(int(near[costs[near].argmin()]))
+    near = np.flatnonzero(distances < _PREDICTION_GATE)
+    costs = distances[near] + np.log(determinants(spread[near])) + 2.0 * measurements.log_clutter[near]
+    # The cheapest of each camera, whose detections follow each other.
+    order = near[np.lexsort((costs, measurements.camera[near]))]
+    cameras = measurements.camera[order]
+    group = order[np.diff(cameras, prepend=-1) > 0].tolist()
     for _ in range(2):
         if not group:
             break

@@ -11,7 +11,7 @@ from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.program.costs import Ints, ProgramCosts
 from tracking.ground_plane.program.parts import Part, divide, part_network
 from tracking.ground_plane.program.useful_arcs import GONE, HIDDEN, UnseenPaths, unseen_paths, useful_arcs
-from tracking.solvers.base import Solution, Solver, SolveReport, add_reports
+from tracking.solvers.base import PartsSolver, Solution, SolveReport, add_reports
 
 _NEWCOMERS = 4
 """People who may arrive in one part of a window; doubled as long as all of them do."""
@@ -31,7 +31,7 @@ class ProgramSolution:
     report: SolveReport
 
 
-def solve_program(costs: ProgramCosts, frames: Sequence[Places], solver: Solver) -> ProgramSolution:
+def solve_program(costs: ProgramCosts, frames: Sequence[Places], solver: PartsSolver) -> ProgramSolution:
     """Return the optimum of a program, with as many newcomers as it takes.
 
     The parts share the solver's budget.
@@ -41,7 +41,7 @@ def solve_program(costs: ProgramCosts, frames: Sequence[Places], solver: Solver)
     return join_parts(unseen, parts, solve_parts(parts, solver), solver.name)
 
 
-def solve_parts(parts: Sequence[Part], solver: Solver) -> list[Solution]:
+def solve_parts(parts: Sequence[Part], solver: PartsSolver) -> list[Solution]:
     """Return the solution of each part, with more newcomers as long as all of them arrive."""
     newcomers = [min(_NEWCOMERS, part.arrivals) for part in parts]
     solutions: dict[int, Solution] = {}

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.camera import BoxSizes
-from tracking.ground_plane.gaussians import fuse, negative_log_densities
-from tracking.ground_plane.places.hypotheses import agglomerate, find_places, group_cost
+from tracking.ground_plane.gaussians import FusedPlaces, fuse, negative_log_densities
+from tracking.ground_plane.places.agglomeration import agglomerate
+from tracking.ground_plane.places.hypotheses import find_places, group_costs
 from tracking.ground_plane.places.measurements import Measurements, covered_by_better, measure
 from tracking.ground_plane.places.place_noise import PlaceNoise
 from tracking.ground_plane.places.visibility import detection_probabilities
@@ -34,6 +35,9 @@ def test_the_cost_of_a_group_is_the_integral_over_its_place(seed: int) -> None:
     measurements = measurements_of([[4.0, 6.0]], FloorNoise(deviation=0.02), seed)
     group = tuple(range(len(measurements)))
     mean, covariance = fuse(measurements.places, measurements.covariances)
+    fused = FusedPlaces.of(measurements.places, measurements.covariances, [group])
+    assert fused.means[0] == pytest.approx(mean)
+    assert fused.covariances[0] == pytest.approx(covariance)
     axis = np.arange(-2.0, 2.0, 0.02)
     grid = mean + np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     log_densities = sum(
@@ -42,7 +46,8 @@ def test_the_cost_of_a_group_is_the_integral_over_its_place(seed: int) -> None:
     )
     integral = np.log(np.exp(log_densities).sum() * 0.02**2)
     expected = -integral + measurements.log_clutter.sum() - len(group) * np.log(0.9)
-    assert group_cost(measurements, group, mean, covariance, 0.9) == pytest.approx(expected, abs=0.02)
+    (cost,) = group_costs(measurements, np.ones((1, len(group)), dtype=np.bool_), fused, 0.9)
+    assert cost == pytest.approx(expected, abs=0.02)
 
 
 @few
