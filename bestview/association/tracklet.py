@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -66,6 +66,7 @@ class Tracklet:
         person_id: the assigned person; 0: none yet.
         settled_id: the person id, if settled while the tracklet continues; 0: not settled.
         confirmed_continuation: an operator confirmed that it is the same person as the predecessor.
+        is_forgotten: its person was forgotten; nobody gets its frames.
     """
 
     key: TrackletKey
@@ -83,6 +84,7 @@ class Tracklet:
     person_id: int = 0
     settled_id: int = 0
     confirmed_continuation: bool = False
+    is_forgotten: bool = False
 
     @property
     def frames_since_predecessor(self) -> int:
@@ -129,6 +131,19 @@ class Tracklet:
         }
         self.person_id = ids.get(self.person_id, self.person_id)
         self.settled_id = ids.get(self.settled_id, self.settled_id)
+
+    def forget_ids(self, people: Collection[int]) -> None:
+        """Forget people: as whom it was published, and, if it is one of them, all that it has shown."""
+        if (self.settled_id or self.person_id or self.main_id) in people:
+            self.is_forgotten = True
+            self.person_id = self.settled_id = 0
+            self.appearance, self.detections = PersonAppearance(), {}
+            self.unpublished_frames, self.predecessor = [], None
+        self.published_frames = {
+            person_id: frames
+            for person_id, frames in self.published_frames.items()
+            if person_id not in people
+        }
 
     def merge_ids(self, lost: int, kept: int) -> None:
         """Count frames published with the id `lost` as `kept`: both are one person."""

@@ -204,6 +204,26 @@ class TrackletSplitter:
             track: ids.get(person_id, person_id) for track, person_id in self._recalled_ids.items()
         }
 
+    def forget(self, people: Collection[int]) -> None:
+        """Forget people: their tracks start anew with the next observation, without a past and without looks.
+
+        Their active tracklets stay as rows until they are settled, but say nothing about anybody.
+        """
+        for tracklet in chain(self.active, self._current.values()):
+            tracklet.forget_ids(people)
+        self._current = {
+            key: tracklet for key, tracklet in self._current.items() if not tracklet.is_forgotten
+        }
+        for tracklet in self.active:
+            if tracklet.predecessor is not None and tracklet.predecessor.is_forgotten:
+                tracklet.predecessor = None
+        self._pending_splits = {
+            key: split for key, split in self._pending_splits.items() if key in self._current
+        }
+        self._recalled_ids = {
+            key: person_id for key, person_id in self._recalled_ids.items() if person_id not in people
+        }
+
     def settleable_rows(self, last_frame: int) -> list[int]:
         """Return the rows of tracklets that are old enough to be settled, in order.
 

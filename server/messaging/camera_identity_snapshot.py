@@ -19,6 +19,8 @@ SNAPSHOT_BYTES_MAX = 1 << 20
 """Size limit of a snapshot in bytes."""
 ALIASES_MAX = 64
 """Former numbers of one person, at most; the newest."""
+FORGOTTEN_MAX = 256
+"""Numbers of deleted people in a snapshot, at most; the newest."""
 NAME_LENGTH_MAX = 40
 """Characters of a name, at most."""
 
@@ -51,3 +53,5 @@ class CameraIdentitySnapshot(msgspec.Struct, frozen=True, kw_only=True):
     numbered_since: UnixTime
     """When numbering began: no number was assigned twice since."""
     people: list[PersonSnapshot]
+    forgotten: Annotated[list[PersonNumber], msgspec.Meta(max_length=FORGOTTEN_MAX)] = []
+    """Numbers of people whose data were deleted: they are restored from no snapshot, however old."""

@@ -116,6 +116,14 @@ class RuleEvaluator:
         for each in self._zone_states.values():
             each.split(kept, new)
 
+    def forget(self, person: int) -> None:
+        """Forget someone, without an event; a crowd lasts without them."""
+        for each in self._zone_states.values():
+            each.forget(person)
+        self._spells = {key: spell for key, spell in self._spells.items() if person not in key[1]}
+        for spell in self._spells.values():
+            spell.people = tuple(each for each in spell.people if each != person)
+
     def step(self, frame: PeopleOfFrame, circumstances: Circumstances) -> list[RuleEvent]:
         """Process the next frame; return events in the order of the rules."""
         changes: dict[str | None, list[Change]] = {}

@@ -132,6 +132,10 @@ class AreaPresence:
             visit.since = min(visit.since, other.since) if visit.inside else other.since
         visit.inside, visit.changing_since = visit.inside or other.inside, None
 
+    def forget(self, person: int) -> None:
+        """Forget someone, without an event."""
+        self._visits.pop(person, None)
+
     def split(self, kept: int, new: int) -> None:
         """A number stood for two people: the new one begins where the other is, without an event."""
         visit = self._visits.get(kept)
@@ -177,6 +181,10 @@ class LineCrossings:
         other = self._sides.pop(lost, None)
         if other is not None and (kept not in self._sides or self._sides[kept].last_seen < other.last_seen):
             self._sides[kept] = other
+
+    def forget(self, person: int) -> None:
+        """Forget someone."""
+        self._sides.pop(person, None)
 
     def split(self, kept: int, new: int) -> None:
         """A number stood for two people: the new one's side is found anew."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from bestview import Merge, Split
@@ -89,6 +90,16 @@ class DecisionState:
         self._occupied.append(_OccupiedGop(decision.first, dict(decision.occupied)))
         while not 0 <= decision.first - self._occupied[0].first <= self._occupied_frames:
             self._occupied.popleft()
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Forget people."""
+        self.selected_views = {
+            number: view for number, view in self.selected_views.items() if number not in numbers
+        }
+        self.merged = {
+            old: kept for old, kept in self.merged.items() if old not in numbers and kept not in numbers
+        }
+        self._reasons.forget(numbers)
 
     def explain(self, number: int, pulse: int | None = None) -> SelectionReason | None:
         """Explain an object's newest view, or that at a pulse of the last minute.

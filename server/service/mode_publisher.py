@@ -36,6 +36,10 @@ class ModePublisher:
         self._choices.put(choices)
         self.meter.decided(DelayMode.BALANCED, choices.first)
 
+    def replace_usual(self, change: Callable[[GopChoices], GopChoices]) -> None:
+        """Replace every usual decision that is kept for later ones by a changed one."""
+        self._choices.replace(change)
+
     def publish(
         self,
         decisions: Sequence[ModeDecision],

@@ -20,6 +20,7 @@ from server.service.bus_connection import BusConnection
 from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.decision_state import DecisionState
+from server.service.deletion.recording_deletion import RecordingDeletion
 from server.service.identity.state_replication import SNAPSHOT_WAIT_S, StateReplication
 from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch, EpochAligner
@@ -96,18 +97,20 @@ class BestViewPipeline:
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
         )
+        self.recorder = Recorder(
+            config, self.frame_buffers, self.stream_format, lengths.frames, self.audio_buffer
+        )
+        self.recording_deletion = RecordingDeletion(self.recorder)
         self.state_replication = StateReplication(
             self.decider.people,
             cameras,
             fps,
             partial(self.bus.send_to_camera, "identities"),
             sends=lambda: self.replication.leads,
+            deleted=self.recording_deletion.forgotten,
         )
         self.replication = ServiceReplication(config, self.decider.people, self.state_replication, self.bus)
         self.walk_session = WalkSession(config)
-        self.recorder = Recorder(
-            config, self.frame_buffers, self.stream_format, lengths.frames, self.audio_buffer
-        )
         self._last_decided = -1
         """The last pulse of the last epoch; later frames have no tracks."""
         self.loss_recorder = LossRecorder(self.frame_buffers, self.ingest.states, stride)
@@ -118,7 +121,8 @@ class BestViewPipeline:
         self.on_config: list[Callable[[], None]] = []
         """Called after a changed configuration has been applied."""
         self._out = out
-        self._decision_writer: LiveDecisionWriter | None = None
+        self.decision_writer: LiveDecisionWriter | None = None
+        """Writes files of decisions, once the pipeline runs; None: there are none."""
         self._changed = asyncio.Event()
         self._runs_without_pulses = False
         """Whether waiting for the first pulse has timed out."""
@@ -147,10 +151,11 @@ class BestViewPipeline:
             UserError: the output folder cannot be written.
         """
         if self._out is not None:  # once all ports are open: a failed start leaves no files
-            self._decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
+            self.decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
         await self._joint.start()
         await self.replication.take_over()
         self.recorder.open()
+        await self.recording_deletion.complete_interrupted()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
@@ -265,8 +270,8 @@ class BestViewPipeline:
         """End all streams, and close the bus and the files."""
         with contextlib.ExitStack() as closing:  # all of them, even if one raises; in reverse order
             closing.callback(self.bus.close)
-            if self._decision_writer is not None:
-                closing.callback(self._decision_writer.close)
+            if self.decision_writer is not None:
+                closing.callback(self.decision_writer.close)
             closing.callback(self.recorder.close)
             closing.callback(self.splicer.close)
 
@@ -303,7 +308,7 @@ class BestViewPipeline:
 
     def _publish_modes(self, decisions: Sequence[ModeDecision], *, live: bool) -> None:
         merged = self.decider.people.registry.merged
-        self.mode_publisher.publish(decisions, merged, self._decision_writer, live=live)
+        self.mode_publisher.publish(decisions, merged, self.decision_writer, live=live)
 
     def _publish(self, decision: GopDecision) -> None:
         """Publish a GOP's choices, then its frames."""
@@ -320,8 +325,9 @@ class BestViewPipeline:
         self.splicer.publish_decision(decision)
         self.splicer.forget(self.decider.people.known, decision.merged)
         self.bus.publish_choices(choices)
-        if self._decision_writer is not None:
-            self._decision_writer.write_or_skip(decision, events)
+        if self.decision_writer is not None:
+            self.decision_writer.set_numbers_since(self.state_replication.numbers_since)
+            self.decision_writer.write_or_skip(decision, events)
         self.loss_recorder.record_gop(decision)
         self.ingest.forget_thumbnails_before(decision.first - self.decider.people.forget_after)
 

@@ -10,6 +10,7 @@ from server.config.site_config import Config
 from server.service.facade.assist import AssistService
 from server.service.facade.calibration import CalibrationService
 from server.service.facade.cameras import CameraService
+from server.service.facade.deletion import DeletionService
 from server.service.facade.operations import OperationsService
 from server.service.facade.past_search import PastSearchService
 from server.service.facade.people import PeopleService
@@ -30,6 +31,7 @@ class BestViewService:
         cameras: state and diagnostics of the cameras.
         streams: live streams.
         recordings: recorded streams.
+        deletion: deletion of people's data.
         past_search: search of recorded decisions.
         rendering: JPEG pictures, and video with boxes burnt in.
         assist: flags for the operator, and position corrections.
@@ -44,6 +46,7 @@ class BestViewService:
         self.cameras = CameraService(pipeline)
         self.streams = StreamService(pipeline)
         self.recordings = RecordingService(pipeline)
+        self.deletion = DeletionService(pipeline, self.people, self.rules)
         self.past_search = PastSearchService(pipeline)
         self.rendering = RenderPool(pipeline)
         self.assist = AssistService(pipeline)

@@ -79,6 +79,10 @@ class IdCorrections:
         """Replace ids by others, one to one; these are no splits."""
         self._last = {key: ids.get(person_id, person_id) for key, person_id in self._last.items()}
 
+    def forget(self, people: Collection[int]) -> None:
+        """Forget what was published as these people: who comes after them is no split."""
+        self._last = {key: person_id for key, person_id in self._last.items() if person_id not in people}
+
     def split_off(self, keys: Iterable[TrackletKey], person_id: int) -> None:
         """Store ids that an operator assigned, so that they are not reported as splits."""
         self._last.update((key, person_id) for key in keys if key in self._last)

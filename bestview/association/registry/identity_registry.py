@@ -128,7 +128,9 @@ class IdentityRegistry:
             }
         returned, departed = self._people.update_presence(tracklets, last_frame)
         split = self._corrections.update(published, merged)
-        person_ids = {tracklet.key: tracklet.person_id for tracklet in tracklets}
+        person_ids = {
+            tracklet.key: 0 if tracklet.is_forgotten else tracklet.person_id for tracklet in tracklets
+        }
         if clusters_now:
             self._settle(last_frame)
         return IdentityUpdate(person_ids, created, returned, departed, merged, split)
@@ -223,6 +225,15 @@ class IdentityRegistry:
         self._corrections.renumber(ids)
         renumbered = [ids.get(person_id, person_id) for person_id in self._visible_settled_ids.tolist()]
         self._visible_settled_ids = np.array(sorted(renumbered), dtype=np.int64)
+
+    def forget(self, people: Collection[int]) -> None:
+        """Forget people: looks, sightings and tracks. Who is visible is confirmed anew, with another id."""
+        self._people.forget(people)
+        self._splitter.forget(people)
+        self._corrections.forget(people)
+        self._visible_settled_ids = self._visible_settled_ids[
+            ~np.isin(self._visible_settled_ids, sorted(people))
+        ]
 
     def _gate(self) -> float:
         """Return the ground distance at which two foot points are as likely of one person as of two."""

@@ -216,6 +216,12 @@ class PersonStore:
                 person.departed = is_absent
         return tuple(returned), tuple(departed)
 
+    def forget(self, people: Iterable[int]) -> None:
+        """Forget people; their ids are not assigned again."""
+        for person_id in people:
+            self.reserve_below(person_id + 1)
+            self._by_id.pop(person_id, None)
+
     def forget_departed(self, frame: int) -> None:
         """Forget people who departed too long ago."""
         settings = self._settings

@@ -121,6 +121,20 @@
  * @property {Record<string, number>} merged kept number by merged number
  * @property {number | null} new_object number of the person just split off
  * @property {string} unavailable why people cannot be edited; empty: they can
+ *
+ * @typedef {object} PersonDeletionPlan /api/operator/deletion
+ * @property {number} object
+ * @property {string} state planned, running or done
+ * @property {number[]} objects all numbers of the person
+ * @property {string | null} name
+ * @property {boolean} visible
+ * @property {number} events
+ * @property {number} decisions recorded GOPs that mention them
+ * @property {number} seen_s
+ * @property {{camera: string, seen_s: number, deleted_s: number}[]} cameras
+ * @property {number} sound_s
+ * @property {{object: number, name: string | null, deleted_s: number}[]} others
+ * @property {string[]} mentions
  */
 
 export {};

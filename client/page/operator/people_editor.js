@@ -2,6 +2,7 @@
 
 import { relative, requestOperator } from '../shared/requests.js';
 import { shortLabel } from '../people/names.js';
+import { PersonDeletion } from './person_deletion.js';
 import { element, make, setText } from '../shared/dom.js';
 
 /** @import {Person, Site} from '../shared/api_types.js' */
@@ -33,6 +34,7 @@ export class PeopleEditor {
    */
   constructor(site, showError) {
     this.showError = showError;
+    new PersonDeletion(showError);
     const cameras = site.cameras.map((camera) => /** @type {Option} */ ([camera, camera]));
     setOptions(this.#splitCamera, [[ALL_CAMERAS, 'every camera'], ...cameras]);
     element('merge-form').addEventListener('submit', (event) => {

@@ -27,6 +27,7 @@ from server.service.facade.view_selection import ViewSelection
 routes = web.RouteTableDef()
 
 _SEARCH = "/api/past/search"
+_DELETION = "/api/operator/deletion"
 
 _JSON: dict[str, type[msgspec.Struct]] = {
     "/api/site": SiteInfo,
@@ -87,11 +88,16 @@ _UNAVAILABLE = {
     for path in _MEDIA_TYPES
     if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
-_MAY_BE_UNAVAILABLE_FOR_OPERATORS = {"/api/operator/people", "/api/operator/position_corrections"}
+_MAY_BE_UNAVAILABLE_FOR_OPERATORS = {
+    "/api/operator/people",
+    "/api/operator/position_corrections",
+    _DELETION,
+}
 _NO_FILE = "The site has no configuration file, or refuses the change."
 _CONFLICTS = {
     "/api/operator/site_cameras": _NO_FILE,
     "/api/operator/zones": _NO_FILE,
+    _DELETION: "Another deletion is not complete yet.",
     _SEARCH: "The zone is on the floor, and no camera is calibrated.",
 }
 _FROM_REQUIRED = {"/api/past", _SEARCH, *OPERATOR_FILES}
@@ -184,7 +190,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
     error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     responses: dict[str, Any] = _success(path, content, error)
     names = re.findall(r"\{(\w+)\}", path)
-    if names or path in OPERATOR_RESULTS or path == _SEARCH:
+    if names or path in OPERATOR_RESULTS or path in {_SEARCH, _DELETION}:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
     if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | DELAY | _RECORDED_SPANS or path.endswith("/choice"):
         responses["400"] = {"description": "Invalid query.", "content": error}

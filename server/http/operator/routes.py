@@ -8,6 +8,7 @@ from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
 from server.http.json_responses import json_response
 from server.http.operator import (
+    deletion,
     downloads,
     people,
     position_corrections,
@@ -51,6 +52,7 @@ routes = [
     *_status_routes,
     *settings.routes,
     *people.routes,
+    *deletion.routes,
     *position_corrections.routes,
     *downloads.routes,
     *walk.routes,

@@ -6,6 +6,7 @@ import msgspec
 
 from server.service.facade.calibration import WalkStatus
 from server.service.facade.cameras import CameraDiagnostics, Floor
+from server.service.facade.deletion import PersonDeletion
 from server.service.facade.operations import PulseClients
 
 
@@ -155,6 +156,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/floor": Floor,
     "/api/operator/walk": WalkStatus,
     "/api/operator/people": IdentityOverrides,
+    "/api/operator/deletion": PersonDeletion,
     "/api/operator/position_corrections": CorrectionStatus,
     "/api/operator/config": Settings,
     "/api/operator/restart": RestartStatus,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from io import FileIO
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 from bestview import Merge, Split
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
+from server.service.decision_files.row_removal import rows_without
 from server.service.rules.engine import SiteEvent
 from server.service.view_selection.decider import GopDecision
 from server.service.view_selection.delay_modes import DelayMode, ModeDecision
@@ -121,6 +123,19 @@ class DecisionWriter:
         """
         self._files.append({self._late: "".join(rows)})
 
+    @property
+    def sizes(self) -> dict[Path, int]:
+        """The files, and how many bytes have been written to each: whole rows."""
+        return self._files.sizes
+
+    def replace(self, path: Path, draft: Path, size: int, numbers: Collection[int]) -> None:
+        """Replace a file by a draft that stands for its first `size` bytes, and the rest without some people.
+
+        Raises:
+            OSError: writing fails; the file is unchanged.
+        """
+        self._files.replace(path, draft, size, lambda rest: rows_without(path.name, rest, numbers))
+
     def close(self) -> None:
         """Close the files."""
         self._files.close()
@@ -176,6 +191,29 @@ class AtomicFiles:
                     self._files[path].truncate(length)
                     self._files[path].seek(length)
             raise
+
+    @property
+    def sizes(self) -> dict[Path, int]:
+        """The length of each file, bytes."""
+        return {path: file.tell() for path, file in self._files.items()}
+
+    def replace(self, path: Path, draft: Path, size: int, change: Callable[[bytes], bytes]) -> None:
+        """Replace a file by a draft that stands for its first `size` bytes, and the changed rest.
+
+        Raises:
+            OSError: writing fails; the file is unchanged.
+        """
+        with path.open("rb") as file:
+            file.seek(size)
+            rest = change(file.read())
+        with contextlib.ExitStack() as on_error:
+            new = on_error.enter_context(FileIO(draft, "r+"))
+            new.seek(0, os.SEEK_END)
+            _write(new, rest)
+            draft.replace(path)
+            on_error.pop_all()
+        self._files[path].close()
+        self._files[path] = self._opened.enter_context(new)
 
     def close(self) -> None:
         """Close all files."""

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from server.media.letterbox import Letterbox
 from server.service.decision_files.decision_writer import DecisionWriter
+from server.service.decision_files.row_removal import (
+    INTENT_FILE,
+    complete_earlier,
+    copy_without,
+    remove_from_earlier,
+    set_numbers_since,
+    write_intent,
+)
+from server.service.recording.media_files import run_in_reader_thread
 from server.service.rules.engine import SiteEvent
 from server.service.view_selection.decider import GopDecision
 from server.service.view_selection.delay_modes import ModeDecision
@@ -46,12 +55,25 @@ class LiveDecisionWriter:
         self._folder = folder
         self._writer = DecisionWriter(folder, cameras, letterboxes, private=True)
         self._late: list[_LateFrame] = []
+        self._numbers_since = 0.0
+        try:
+            if complete_earlier(folder):
+                log.info("%s: completed the deletion of a person that was interrupted", folder)
+        except (OSError, ValueError) as error:
+            log.error("%s: an interrupted deletion cannot be completed: %s", folder, error)  # noqa: TRY400
         self._missing = range(0)
         """Pulses of skipped decisions that ``late.csv`` does not list yet."""
 
     def add_late(self, camera: str, pulses: Sequence[int], reason: str) -> None:
         """Add late frames; they are written with the next decision."""
         self._late += (_LateFrame(pulse, camera, reason) for pulse in pulses)
+
+    def set_numbers_since(self, since: float) -> None:
+        """Write when person numbers began, unix seconds; it may become known after the start."""
+        if since != self._numbers_since:
+            with contextlib.suppress(OSError):  # tried again with the next decision
+                set_numbers_since(self._folder, since)
+                self._numbers_since = since
 
     def write_or_skip(self, decision: GopDecision, events: Sequence[SiteEvent] = ()) -> None:
         """Write a decision and the events that it has led to; skip them if writing fails."""
@@ -69,6 +91,20 @@ class LiveDecisionWriter:
         """Write the choices for viewers with another delay; skip them if writing fails."""
         with contextlib.suppress(OSError):  # the usual decisions report it
             self._writer.write_views(decision)
+
+    async def forget(self, numbers: Collection[int]) -> None:
+        """Remove people's rows from the files; decisions that are made later must not have them.
+
+        Raises:
+            OSError: writing fails; the rest is removed when a service starts here again.
+        """
+        await run_in_reader_thread(write_intent, self._folder, numbers)
+        await run_in_reader_thread(remove_from_earlier, self._folder, numbers)
+        for path, size in self._writer.sizes.items():
+            draft = path.with_suffix(".new")
+            await run_in_reader_thread(copy_without, path, draft, size, numbers)
+            self._writer.replace(path, draft, size, numbers)
+        (self._folder / INTENT_FILE).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Write the pending late frames, and close the files."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import msgspec
@@ -74,6 +74,33 @@ class PicturedEvent:
     jpeg: bytes | None
 
 
+def event_without(event: PicturedEvent, numbers: Collection[int]) -> PicturedEvent | None:
+    """Return an event without some people; None: it is about nobody else.
+
+    Picture and clip are of the first of an event's people, and go with them.
+    """
+    record = event.record
+    people = [
+        (number, name)
+        for number, name in zip(record.objects, record.names, strict=True)
+        if number not in numbers
+    ]
+    if len(people) == len(record.objects):
+        return event
+    if not people:
+        return None
+    is_first = record.objects[0] in numbers
+    changed = msgspec.structs.replace(
+        record,
+        objects=[number for number, _ in people],
+        names=[name for _, name in people],
+        camera=None if is_first else record.camera,
+        picture=None if is_first else record.picture,
+        clip=None if is_first else record.clip,
+    )
+    return PicturedEvent(changed, None if is_first else event.jpeg)
+
+
 class RulesService:
     """Queries about zones, rules and events."""
 
@@ -82,6 +109,7 @@ class RulesService:
         self._events: deque[PicturedEvent] = deque(maxlen=_KEPT)
         self._count = 0
         self._callbacks: list[Callable[[PicturedEvent], None]] = []
+        self._on_forget: list[Callable[[Collection[int]], None]] = []
         pipeline.on_event.append(self._add)
 
     def subscribe_events(self, callback: Callable[[PicturedEvent], None]) -> None:
@@ -106,6 +134,21 @@ class RulesService:
     def picture_of(self, event: str) -> bytes | None:
         """Return an event's picture, JPEG; None: there is no such event, or no picture of it."""
         return next((each.jpeg for each in self._events if each.record.id == event), None)
+
+    def count_about(self, numbers: Collection[int]) -> int:
+        """Return how many of the newest events are about one of these people."""
+        return sum(not set(numbers).isdisjoint(event.record.objects) for event in self._events)
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Remove people from the events, and events about nobody else; subscribers must do so, too."""
+        kept = (event_without(event, numbers) for event in self._events)
+        self._events = deque((event for event in kept if event is not None), maxlen=_KEPT)
+        for callback in self._on_forget:
+            callback(numbers)
+
+    def subscribe_forget(self, callback: Callable[[Collection[int]], None]) -> None:
+        """Call back with the numbers of people who must be removed from events that are kept."""
+        self._on_forget.append(callback)
 
     def _add(self, event: SiteEvent) -> None:
         self._count += 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -67,6 +67,10 @@ class IdSwitchRepair:
             key: TrackPart(part.first, merged.get(part.number, part.number))
             for key, part in self._switches.items()
         }
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Drop the switches of people who are forgotten."""
+        self._switches = {key: since for key, since in self._switches.items() if since.number not in numbers}
 
     def keep_only(self, parts: Parts, needed_from: int) -> None:
         """Drop switches before the frames that are still needed."""

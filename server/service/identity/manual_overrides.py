@@ -12,6 +12,13 @@ from dataclasses import replace
 from bestview import IdentityUpdate, Merge, Split
 
 
+def numbers_of_correction(correction: Merge | Split) -> tuple[int, int]:
+    """Return the two people that a correction is about."""
+    if isinstance(correction, Merge):
+        return correction.kept, correction.lost
+    return correction.published_id, correction.corrected_id
+
+
 class ManualOverrides:
     """Numbers that an operator has merged."""
 
@@ -48,6 +55,13 @@ class ManualOverrides:
             numbers.get(raw, raw): numbers.get(kept, kept) for raw, kept in self._person_of.items()
         }
         self._departed = {numbers.get(number, number) for number in self._departed}
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Forget numbers, and what was merged into them."""
+        self._person_of = {
+            raw: kept for raw, kept in self._person_of.items() if raw not in numbers and kept not in numbers
+        }
+        self._departed -= set(numbers)
 
     def apply(self, update: IdentityUpdate) -> IdentityUpdate:
         """Return an update with all numbers mapped by the manual merges."""

@@ -16,7 +16,7 @@ from server.service.identity.camera_window import CameraWindow, WindowReader
 from server.service.identity.common_ground import CommonGround
 from server.service.identity.id_switch_repair import IdSwitchRepair
 from server.service.identity.local_numbers import TrackName
-from server.service.identity.manual_overrides import ManualOverrides
+from server.service.identity.manual_overrides import ManualOverrides, numbers_of_correction
 from server.service.identity.numbered_boxes import numbered_boxes
 from server.service.identity.person_registry import PersonRegistry
 from server.service.identity.published_tracks import PublishedTracks
@@ -194,6 +194,31 @@ class PersonTracker:
             Split(number, new, camera) for camera in sorted({track.camera for track in tracks})
         ]
         return new
+
+    def forget(self, numbers: Collection[int]) -> set[TrackName]:
+        """Forget people whole; return the tracks that have shown them.
+
+        Who is visible is confirmed anew under another number, by tracks without a past.
+        """
+        self._registry.forget(
+            {raw for number in numbers for raw in self._overrides.automatic_numbers(number)}
+        )
+        shown: set[TrackName] = set()
+        for key, parts in self._parts.items():
+            if any(part.number in numbers for part in parts):
+                shown.update(self._ground.own_tracks(key))
+                self._parts[key] = [
+                    TrackPart(part.first, UNCONFIRMED) if part.number in numbers else part for part in parts
+                ]
+        self._overrides.forget(numbers)
+        self._id_switch_repair.forget(numbers)
+        self.published.forget(numbers)
+        self.registry.forget(numbers)
+        self._expected = {track: of for track, of in self._expected.items() if of[0] not in numbers}
+        self._corrections = [
+            each for each in self._corrections if not (set(numbers_of_correction(each)) & set(numbers))
+        ]
+        return shown
 
     @property
     def newest(self) -> int:

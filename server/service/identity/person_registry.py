@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from server.service.identity.track_parts import UNCONFIRMED, TrackPart
 
@@ -95,6 +95,17 @@ class PersonRegistry:
         self.last_seen.setdefault(number, last_seen)
         if departed:
             self.departed.add(number)
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Forget people, their names, and the numbers that were merged into theirs."""
+        for number in numbers:
+            self.first_seen.pop(number, None)
+            self.last_seen.pop(number, None)
+            self.names.pop(number, None)
+            self.departed.discard(number)
+        self.merged = {
+            old: new for old, new in self.merged.items() if old not in numbers and new not in numbers
+        }
 
     def forget_unseen_since(self, frame: int) -> None:
         """Forget people who were last seen before this frame."""

@@ -38,6 +38,13 @@ class PublishedTracks:
         while self._published[0][1] < span.last - self.frames:
             self._oldest = self._published.popleft()[1] + 1
 
+    def forget(self, numbers: Collection[int]) -> None:
+        """Forget the tracks behind these people's boxes."""
+        self._published = deque(
+            (first, last, {key: track for key, track in tracks.items() if key[1] not in numbers})
+            for first, last, tracks in self._published
+        )
+
     def covers(self, pulse: int) -> bool:
         """Return whether a frame is still covered."""
         return self._oldest is not None and self._oldest <= pulse

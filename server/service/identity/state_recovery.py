@@ -9,6 +9,7 @@ from math import inf
 
 from server.messaging.camera_identity_snapshot import (
     ALIASES_MAX,
+    FORGOTTEN_MAX,
     PERSON_NUMBER_MAX,
     CameraIdentitySnapshot,
     PersonSnapshot,
@@ -27,9 +28,18 @@ MAX_DOWNTIME_S = 30.0
 
 
 def state_for_cameras(
-    people: PersonTracker, cameras: Iterable[str], pulse: int, recent: int, since: float
+    people: PersonTracker,
+    cameras: Iterable[str],
+    pulse: int,
+    recent: int,
+    since: float,
+    forgotten: Iterable[int] = (),
 ) -> dict[str, CameraIdentitySnapshot]:
-    """Build the snapshot for each camera: the people it tracked recently, and the first free number."""
+    """Build the snapshot for each camera: the people it tracked recently, and the first free number.
+
+    ``forgotten`` are the numbers of people whose data were deleted, the newest last.
+    """
+    gone = [number for number in forgotten if number <= PERSON_NUMBER_MAX][-FORGOTTEN_MAX:]
     tracks_by_number = people.tracks_of(people.registry.all_numbers, pulse - recent)
     boots: dict[str, int] = {}
     for track in chain.from_iterable(tracks_by_number.values()):
@@ -65,6 +75,7 @@ def state_for_cameras(
             next_number=next_number,
             numbered_since=since,
             people=people_of_camera,
+            forgotten=gone,
         )
         for camera, people_of_camera in known.items()
     }
@@ -126,6 +137,14 @@ class StateRecovery:
     def numbers(self) -> Collection[int]:
         """The numbers of the people still to be recovered, merged ones included."""
         return {number for person in self._pending for number in (person.number, *person.former)}
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Recover these people no longer."""
+        gone = set(numbers)
+        self._pending = [
+            person for person in self._pending if gone.isdisjoint([person.number, *person.former])
+        ]
+        self._tracks = {track: number for track, number in self._tracks.items() if number not in gone}
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
         """Assign the pending tracks to their people before any of them is reported."""

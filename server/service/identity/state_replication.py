@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import msgspec
 
@@ -41,6 +41,8 @@ class StateReplication:
         fps: frames a second.
         send: sends a camera its snapshot.
         sends: returns whether this service sends snapshots; of several services one is enough.
+        deleted: returns the numbers of the people whose data an earlier run has deleted, of the numbers that
+            began at a time, unix seconds.
         clock: monotonic seconds.
     """
 
@@ -52,10 +54,14 @@ class StateReplication:
         send: Callable[[str, bytes], None],
         *,
         sends: Callable[[], bool] = lambda: True,
+        deleted: Callable[[float], Iterable[int]] = lambda _: (),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._people, self._cameras, self._fps = people, cameras, fps
         self._send, self._sends, self._clock = send, sends, clock
+        self._deleted = deleted
+        self.forgotten: list[int] = []
+        """Numbers of people whose data were deleted, in order."""
         self._connected_at: dict[str, float] = {}
         """When each camera without a received snapshot first connected."""
         self._present: set[str] = set()
@@ -162,6 +168,7 @@ class StateReplication:
             log.warning("camera %s: snapshot ignored: it alone has person numbers beyond %d", camera, most)
             del self._snapshots[camera]
         snapshot = {camera: _below(self._free, snapshot) for camera, snapshot in self._snapshots.items()}
+        snapshot = self._without_forgotten(snapshot)
         if self._took_over and self._started_at is None:  # the other service may be ahead
             snapshot = {
                 camera: msgspec.structs.replace(known, pulse=max(0, min(known.pulse, pulse - 1)))
@@ -187,9 +194,43 @@ class StateReplication:
         if self._started_at is not None and self._sends():
             self._send_state(pulse)
 
+    def forget(self, numbers: Iterable[int]) -> None:
+        """Restore these people from no snapshot any more, and tell the cameras at once."""
+        self.forgotten += [number for number in numbers if number not in self.forgotten]
+        for recovery in self._recoveries:
+            recovery.forget(self.forgotten)
+        if self._started_at is not None and self._sends():
+            self._send_state(self._people.newest)
+
+    def _without_forgotten(
+        self, snapshots: Mapping[str, CameraIdentitySnapshot]
+    ) -> dict[str, CameraIdentitySnapshot]:
+        """Remove deleted people: whom this run, an earlier one or a snapshot of the same numbers knows of."""
+        gone: dict[float, set[int]] = {}
+        for snapshot in snapshots.values():
+            since = snapshot.numbered_since
+            if since not in gone:
+                gone[since] = {*self.forgotten, *self._deleted(since)}
+            gone[since].update(snapshot.forgotten)
+        if gone:
+            newest = gone[max(gone)]
+            self.forgotten += sorted(newest.difference(self.forgotten))
+        return {
+            camera: msgspec.structs.replace(
+                snapshot,
+                people=[
+                    person
+                    for person in snapshot.people
+                    if gone[snapshot.numbered_since].isdisjoint([person.number, *person.aliases])
+                ],
+            )
+            for camera, snapshot in snapshots.items()
+        }
+
     def _send_state(self, pulse: int) -> None:
         recent = round(RECENT_S * self._fps)
-        for camera, now in state_for_cameras(self._people, self._cameras, pulse, recent, self._since).items():
+        states = state_for_cameras(self._people, self._cameras, pulse, recent, self._since, self.forgotten)
+        for camera, now in states.items():
             if camera not in self._reported:
                 continue
             before = self._sent.get(camera)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
@@ -290,6 +290,12 @@ class Ingest:
         for thumbnails in self._thumbnails.values():
             for key in [key for key, thumbnail in thumbnails.items() if thumbnail.pulse < pulse]:
                 del thumbnails[key]
+
+    def forget_thumbnails(self, tracks: Iterable[tuple[str, int, int]]) -> None:
+        """Drop the thumbnails of tracks: camera, boot and track."""
+        for camera, boot, track in tracks:
+            if camera in self._thumbnails:
+                self._thumbnails[camera].pop((boot, track), None)
 
     def _is_far_ahead(self, state: CameraState, pulse: int) -> bool:
         """Return whether a pulse is too far in the future to be real; if so, count a bad message."""

@@ -118,6 +118,16 @@ class FlagQueue:
             self._end(flag, "answered" if is_answered else "expired")
         self._publish()
 
+    def forget(self, numbers: Collection[int]) -> None:
+        """End and drop the flags about these people."""
+        gone = set(numbers)
+        for flag in [flag for flag in self._open.values() if gone.intersection(flag.objects)]:
+            self._end(flag, "expired")
+        self._publish()
+        self._ended = deque(
+            (flag for flag in self._ended if gone.isdisjoint(flag.objects)), maxlen=_MAX_ENDED
+        )
+
     def pointed(self, number: int, camera: str, pulses: Collection[int]) -> list[int]:
         """Record that the operator pointed at a person; return the flags that this responds to."""
         flags = [flag for flag in self._open.values() if number in flag.objects and camera in flag.cameras]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from server.messaging.messages import GopChoices
 from server.service.recording.media_files import RecordedGop
@@ -24,6 +24,10 @@ class RecentGops:
         self._choices.append(choices)
         while self._choices[0].first < choices.first - self._frames:
             self._choices.popleft()
+
+    def replace(self, change: Callable[[GopChoices], GopChoices]) -> None:
+        """Replace every decision by a changed one about the same frames."""
+        self._choices = deque(map(change, self._choices))
 
     @property
     def end(self) -> int:

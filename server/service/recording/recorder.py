@@ -106,11 +106,15 @@ class Recorder:
         while self._pending and self._is_settled(self._pending[0]):
             self._queue_oldest(self.writer)
 
+    def flush(self) -> None:
+        """Queue all decided GOPs for the disk, with the frames that have arrived."""
+        while self.writer is not None and self._pending:
+            self._queue_oldest(self.writer)
+
     def close(self) -> None:
         """End the recording."""
         if self.writer is not None:
-            while self._pending:
-                self._queue_oldest(self.writer)
+            self.flush()
             self.writer.close()
 
     def _is_settled(self, choices: GopChoices) -> bool:

@@ -115,6 +115,20 @@ class RecordingFolder:
                 self.session = None
                 session.remove_files()
 
+    def end_segment(self) -> None:
+        """End the open segment: the next GOP begins another, and no file is written to until then.
+
+        Raises:
+            OSError: writing fails.
+        """
+        self._close_segment()
+
+    @property
+    def sessions(self) -> list[RecordingSession]:
+        """All sessions, the oldest first, this service's last; any thread may read it."""
+        current = self.session
+        return [*self.earlier, *([] if current is None else [current])]
+
     def close(self) -> None:
         """End the session, rewrite its playlists, save the age clock, and unlock the folder."""
         try:
@@ -266,7 +280,7 @@ class RecordingFolder:
         What cannot be deleted is tried again each time, and does not stop the recording.
         """
         self._update_age_clock()
-        sessions = [*self.earlier, *([self.session] if self.session else [])]
+        sessions = self.sessions
         self._retention.delete_expired(sessions)
         for session in self.earlier:
             if not session.segments:
@@ -278,7 +292,7 @@ class RecordingFolder:
         """Count the time that the machine was off, once it is known; newer sessions do not age by it."""
         anchored = self._clock.anchored
         if (off_s := self._clock.add_off_time()) > 0:
-            for session in (*self.earlier, *([self.session] if self.session else [])):
+            for session in self.sessions:
                 if session is self.session or session.age_clock_at_start >= anchored:
                     session.make_younger(off_s)
         with contextlib.suppress(OSError):  # a restart continues from what was written last

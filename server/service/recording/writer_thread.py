@@ -7,6 +7,8 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
+from typing import TypeVar
 
 from logthrottle import LogThrottle
 from server.service.recording.recording_folder import GopRecord
@@ -18,6 +20,9 @@ _SILENT_S = 10.0
 """A disk that takes longer for one GOP counts as not responding."""
 _CLOSE_WAIT_S = 1.0
 """Seconds that the shutdown of the service waits for the disk."""
+
+
+Result = TypeVar("Result")
 
 
 class WriterThread:
@@ -41,7 +46,7 @@ class WriterThread:
         self._where = where and f" ({where})"
         self._writing_since: float | None = None
         """When the present write began; None: nothing is being written."""
-        self._queue: deque[GopRecord] = deque()
+        self._queue: deque[GopRecord | Callable[[], None]] = deque()
         self._condition = threading.Condition()
         self._closing = False
         self._failing = LogThrottle(quiet_s=0.0)
@@ -79,6 +84,23 @@ class WriterThread:
             self._queue.append(record)
             self._condition.notify()
 
+    def run(self, work: Callable[[], Result]) -> Future[Result]:
+        """Run work in the thread, after all that was put before; the result has its errors, too."""
+        future: Future[Result] = Future()
+
+        def run() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                future.set_result(work())
+            except Exception as error:  # noqa: BLE001 — whoever waits handles it
+                future.set_exception(error)
+
+        with self._condition:
+            self._queue.append(run)
+            self._condition.notify()
+        return future
+
     def close(self) -> None:
         """Write what is queued and end; a disk that takes longer than a second is not waited for."""
         with self._condition:
@@ -90,7 +112,9 @@ class WriterThread:
     def _run(self) -> None:
         retry_at = 0.0
         while (record := self._next()) is not None:
-            if self.error_text and time.monotonic() < retry_at:
+            if not isinstance(record, GopRecord):
+                record()
+            elif self.error_text and time.monotonic() < retry_at:
                 self._count_lost()
             elif not self._try(record):
                 retry_at = time.monotonic() + self._retry_s
@@ -99,7 +123,7 @@ class WriterThread:
         except OSError as error:
             log.warning("recording: cannot close the session: %s", error.strerror)
 
-    def _next(self) -> GopRecord | None:
+    def _next(self) -> GopRecord | Callable[[], None] | None:
         with self._condition:
             while not self._queue and not self._closing:
                 self._condition.wait()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import msgspec
 
@@ -74,6 +74,11 @@ class RuleEngine:
     def lasting(self) -> frozenset[str]:
         """The ids of rules of which something has begun and not ended."""
         return self._evaluator.lasting
+
+    def forget(self, numbers: Iterable[int]) -> None:
+        """Forget people, without an event."""
+        for number in numbers:
+            self._evaluator.forget(number)
 
     def put(
         self, decision: GopDecision, names: Mapping[int, str], pulse0: float | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 
 import msgspec
 
@@ -24,6 +25,10 @@ class ModeChoices:
         self._usual[choices.first] = choices
         while len(self._usual) > _KEPT:
             self._usual.popitem(last=False)
+
+    def replace(self, change: Callable[[GopChoices], GopChoices]) -> None:
+        """Replace every usual decision by a changed one about the same frames."""
+        self._usual = OrderedDict((first, change(choices)) for first, choices in self._usual.items())
 
     def choices(self, decision: ModeDecision) -> GopChoices:
         """Return a decision as an event; live, nothing is known about its frames yet: it has no boxes."""

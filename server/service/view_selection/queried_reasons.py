@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from server.service.view_selection.decider import ObjectChoice
@@ -76,6 +76,12 @@ class QueriedReasons:
         if self._newest_reasons is None:
             raise KeyError(number)
         return self._keep(view, self._newest_reasons)
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Forget objects. The costs of the newest GOP stay until the next one is decided."""
+        for number in numbers:
+            self._queried.pop(number, None)
+            self._reasons.pop(number, None)
 
     def at(self, number: int, pulse: int) -> SelectionReason | None:
         """Explain the view of an object at a pulse; None: its reasons are not kept."""

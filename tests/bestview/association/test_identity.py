@@ -106,6 +106,30 @@ def test_a_returning_person_with_the_same_appearance_gets_the_id_back(settings: 
     assert numbers(seen[-1]) == {("south", 10): 2, ("south", 11): 4}
 
 
+@OPEN_TRACKLET_LIMITS
+def test_a_forgotten_person_is_not_recognized_whether_visible_or_gone(maximum_open: int) -> None:
+    stays = [StraightTrack("south", coat, 0, 150, (coat - 3.0, 0), coat=coat) for coat in (1, 3)]
+    stays += [StraightTrack(view, 5, 0, 999, (2, 2), coat=5) for view in ("south", "west")]
+    stays += [StraightTrack("south", coat, 450, 999, (coat - 3.0, 3), coat=coat - 10) for coat in (11, 13)]
+    identities = registry(maximum_open_tracklets=maximum_open)
+    seen: list[IdentityUpdate] = []
+    before: dict[tuple[str, int], int] = {}
+    for update in updates(identities, stays, 600):
+        seen.append(update)
+        if len(seen) == 300 // STRIDE:
+            before = persons_by_track(seen)
+            identities.forget({before["south", 3], before["south", 5]})
+    later = seen[300 // STRIDE :]
+    end = persons_by_track(later)
+    assert before["west", 5] == before["south", 5]
+    assert end["west", 5] == end["south", 5]
+    assert end["south", 11] == before["south", 1], "others are recognized"
+    assert len({*before.values(), *end.values()}) == 5, "who was forgotten has a new number"
+    assert not any(update.split or update.merged for update in later)
+    forgotten = {before["south", 3], before["south", 5]}
+    assert all(forgotten.isdisjoint(update.person_ids.values()) for update in later)
+
+
 def test_similar_people_do_not_get_each_others_ids_back() -> None:
     stays = [StraightTrack("south", local, 0, 150, (local - 3.0, 0), coat=3) for local in (1, 2, 3)]
     stays += [StraightTrack("south", 10, 400, 999, (4, 2), coat=3)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -174,6 +174,15 @@ class TrackNumbers:
     """An identity registry for which a track's number is the person's, in every camera."""
 
     next_id = 1
+    again = 100
+    """Added to a track's number when its person was forgotten."""
+
+    def __init__(self) -> None:
+        self._forgotten: set[int] = set()
+
+    def forget(self, people: Collection[int]) -> None:
+        """Forget people: their tracks are somebody else from now on."""
+        self._forgotten.update(people)
 
     def reserve_below(self, person_id: int) -> None:
         """Ignore the reservation: numbers are the tracks' own."""
@@ -184,8 +193,18 @@ class TrackNumbers:
         """Return each track's number as the person's."""
         del last_frame, pictures
         return IdentityUpdate(
-            {TrackletKey(*track.key, 0): track.local_id for track in tracks}, (), (), (), (), ()
+            {TrackletKey(*track.key, 0): self._number(track.local_id) for track in tracks},
+            (),
+            (),
+            (),
+            (),
+            (),
         )
+
+    def _number(self, number: int) -> int:
+        while number in self._forgotten:
+            number += self.again
+        return number
 
 
 class FedService(BestViewPipeline):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 import yaml
-from playwright.async_api import Browser, Route, expect
+from playwright.async_api import Browser, Page, Route, expect
 
 from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
@@ -225,9 +225,34 @@ async def test_people_are_renamed_merged_and_split_on_both_pages(browser: Browse
         await page.get_by_role("button", name="Split off as new person").click()
         await expect(page.locator("#people-message")).to_have_text(re.compile(r"Split off as person \d+\."))
         assert people.number(A, 1, 19) != shown
+        await check_deletion(page, first)
+        assert first not in people.known
+        first = people.known[0]
+        await page.get_by_label(f"Name of person {first}").fill("Ann")
+        await page.keyboard.press("Enter")
+        await expect(page.locator("#people-message")).to_have_text(f"{first} is called Ann.")
         await page.goto(f"http://127.0.0.1:{served.port}/?object={first}")
         await expect(page.locator("#people .number").first).to_have_text(f"{first} Ann")
         await expect(page).to_have_title(f"Person {first}, Ann · MyView")
+
+
+async def check_deletion(page: Page, number: int) -> None:
+    """Delete a person who is called Ann: first what would be deleted is shown, then it must be confirmed."""
+    await page.get_by_label("Number", exact=True).fill("999")
+    await page.get_by_role("button", name="What would be deleted").click()
+    await expect(page.locator("#error-message")).to_have_text("there is no object 999")
+    await page.get_by_label("Number", exact=True).fill(str(number))
+    await page.get_by_role("button", name="What would be deleted").click()
+    await expect(page.locator("#delete-plan li").first).to_contain_text("Ann: numbers ")
+    await page.get_by_role("button", name="Cancel").click()
+    await expect(page.locator("#delete-confirmation")).to_be_hidden()
+    await page.get_by_role("button", name="What would be deleted").click()
+    await page.get_by_role("button", name="Delete for good").click()
+    await expect(page.locator("#delete-state")).to_be_empty()  # nothing is chosen
+    await page.get_by_label("Keep recorded video and sound").check()
+    await page.get_by_role("button", name="Delete for good").click()
+    await expect(page.locator("#delete-state")).to_have_text(f"The data of person {number} are deleted.")
+    await expect(page.locator("#delete-confirmation")).to_be_hidden()
 
 
 async def test_a_tile_says_what_is_wrong_with_the_picture(browser: Browser) -> None:

@@ -34,6 +34,7 @@ from server.messaging.camera_identity_snapshot import (
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
+from server.service.deletion.memory import forget_people
 from server.service.identity.state_recovery import (
     MAX_DOWNTIME_S,
     SINGLE_CAMERA_NUMBER_MAX,
@@ -119,6 +120,37 @@ def test_a_person_tracked_through_a_restart_keeps_number_and_name() -> None:
     assert site.person_of(A, 9, 8) > max(before), "no number is used twice"
     assert site.service.decider.people.registry.names == {before[1]: "Ann"}
     assert site.service.decider.people.manual_merges == {}
+
+
+@pytest.mark.parametrize("cut_off", [False, True])
+def test_a_deleted_person_is_restored_from_no_camera(cut_off: bool) -> None:
+    site = tracked_site()
+    ann, other = site.person_of(A, 2, 5), site.person_of(A, 1, 5)
+    stale = site.cameras[A]
+    if cut_off:  # camera A does not hear of it, and keeps Ann
+        site.cameras[A] = RetainedIdentitySnapshot(lambda _: None)
+    forget_people(site.service, [ann])
+    site.track_epochs(range(6, 8))
+    site.cameras[A] = stale
+    site.start()
+    site.track_epochs(range(9, 12))
+    people = site.service.decider.people
+    assert people.registry.names == {}
+    assert ann not in people.known
+    assert {site.person_of(A, 2, 11), site.person_of(B, 3, 11)}.isdisjoint({ann})
+    assert site.person_of(A, 1, 11) == other
+    assert site.service.state_replication.forgotten == [ann]
+
+
+def test_a_person_who_is_deleted_before_their_track_reappears_stays_deleted() -> None:
+    site = tracked_site()
+    ann = site.person_of(A, 2, 5)
+    site.start()
+    site.track_epochs(range(7, 8), {A: {1: SMALL}, B: {}})
+    forget_people(site.service, [ann])
+    site.track_epochs(range(8, 11))
+    assert site.service.decider.people.registry.names == {}
+    assert site.person_of(A, 2, 10) != ann
 
 
 def test_numbers_survive_any_number_of_restarts() -> None:

@@ -1,0 +1,101 @@
+"""Deletions that have begun, on the disk: one that is interrupted is completed at the next start."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+
+from server.messaging.camera_identity_snapshot import PersonNumber, UnixTime
+from server.messaging.messages import DECODE_ERRORS
+from server.service.recording.person_removal import SegmentFile
+from server.system.private_files import write_private
+
+JOURNAL_FILE = "deletions.json"
+"""In the folder that the deletions are from."""
+_KEPT = 1000
+"""Completed deletions that are kept, the newest: no more people can be restored from cameras."""
+_FILES_MAX = 1_000_000
+
+
+class Deletion(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The deletion of one person."""
+
+    numbers: list[PersonNumber]
+    """All of their numbers."""
+    numbers_since: UnixTime | None
+    """When the numbers began that these are of; null: those of `sessions` alone."""
+    sessions: list[str] = []
+    """The folders of the sessions, where no time is known."""
+    deletes_media: bool
+    """Whether files of video and sound in which they were visible are deleted, too."""
+    files: Annotated[dict[str, list[SegmentFile]], msgspec.Meta(max_length=_FILES_MAX)] | None = None
+    """By session, these files; null: not found yet."""
+    is_done: bool = False
+
+
+class DeletionJournal:
+    """The file of deletions in a folder, read once, and replaced at each change; not before the first."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / JOURNAL_FILE
+        self._deletions: list[Deletion] = []
+
+    def read(self) -> None:
+        """Read the file.
+
+        Raises:
+            OSError, ValueError: it cannot be read, or is damaged.
+        """
+        try:
+            data = self._path.read_bytes()
+        except FileNotFoundError:
+            return
+        try:
+            self._deletions = msgspec.json.decode(data, type=list[Deletion])
+        except DECODE_ERRORS as error:
+            raise ValueError(f"{self._path}: {error}") from error
+
+    @property
+    def pending(self) -> list[Deletion]:
+        """Deletions that are not complete."""
+        return [deletion for deletion in self._deletions if not deletion.is_done]
+
+    def forgotten(self, numbers_since: float) -> set[int]:
+        """Return the numbers of the people deleted, of those that began then."""
+        return {
+            number
+            for deletion in self._deletions
+            if deletion.numbers_since == numbers_since
+            for number in deletion.numbers
+        }
+
+    def put(self, deletion: Deletion, before: Deletion | None = None) -> None:
+        """Write a deletion, instead of an earlier state of it.
+
+        Raises:
+            OSError: writing fails; nothing has changed.
+        """
+        others = [each for each in self._deletions if each is not before]
+        done = [each for each in others if each.is_done][-_KEPT:]
+        deletions = [*done, *(each for each in others if not each.is_done), deletion]
+        self._write(deletions)
+        self._deletions = deletions
+
+    def _write(self, deletions: list[Deletion]) -> None:
+        draft = self._path.with_name(f".{JOURNAL_FILE}")
+        try:
+            write_private(draft, msgspec.json.format(msgspec.json.encode(deletions)) + b"\n")
+            handle = os.open(draft, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+            draft.replace(self._path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise

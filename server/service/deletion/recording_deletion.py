@@ -1,0 +1,124 @@
+"""Deletes people from the recording: first written to the journal, so that it is completed after a crash."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Collection, Iterable
+
+import msgspec
+
+from server.service.deletion.decision_rows import remove_rows
+from server.service.deletion.journal import Deletion, DeletionJournal
+from server.service.deletion.recorded_traces import RecordedTraces, decision_files, find_traces
+from server.service.recording.media_files import run_in_reader_thread
+from server.service.recording.person_removal import remove_from_session
+from server.service.recording.recorder import Recorder
+from server.service.recording.recording_folder import RecordingFolder
+from server.service.recording.recording_session import RecordingSession
+from server.service.recording.writer_thread import WriterThread
+
+log = logging.getLogger(__name__)
+
+
+class RecordingDeletion:
+    """Finds and deletes people in the recording; without a recording folder there are none.
+
+    One deletion at a time: callers see to it.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        folder, writer = recorder.folder, recorder.writer
+        self._disk: tuple[RecordingFolder, WriterThread, DeletionJournal] | None = (
+            None if folder is None or writer is None else (folder, writer, DeletionJournal(folder.folder))
+        )
+
+    async def complete_interrupted(self) -> None:
+        """Complete what a crash has interrupted, once the recording folder is open.
+
+        What fails is logged, and tried again at the next start.
+        """
+        if self._disk is None:
+            return
+        _, _, journal = self._disk
+        try:
+            await run_in_reader_thread(journal.read)
+        except (OSError, ValueError) as error:
+            log.error("record.folder: interrupted deletions cannot be completed: %s", error)  # noqa: TRY400
+            return
+        for deletion in journal.pending:
+            try:
+                await self.execute(deletion)
+            except OSError as error:
+                log.error("deletion of a person: %s; tried again at the next start", error)  # noqa: TRY400
+            else:
+                log.info("completed the deletion of a person that was interrupted")
+
+    def forgotten(self, numbers_since: float) -> Collection[int]:
+        """Return the numbers of the people deleted, of those that began at a time, unix seconds."""
+        return set() if self._disk is None else self._disk[2].forgotten(numbers_since)
+
+    def sessions_of(self, numbers_since: float | None, names: Iterable[str] = ()) -> list[RecordingSession]:
+        """Return the sessions whose person numbers began then, and those of these names."""
+        wanted = set(names)
+        return [
+            session
+            for session in ([] if self._disk is None else self._disk[0].sessions)
+            if session.folder.name in wanted
+            or (numbers_since is not None and session.info.person_numbers_since == numbers_since)
+        ]
+
+    async def find(self, sessions: list[RecordingSession], numbers: Collection[int]) -> RecordedTraces:
+        """Find a person's traces on the disk."""
+        return await run_in_reader_thread(find_traces, sessions, numbers)
+
+    async def begin(self, deletion: Deletion) -> None:
+        """Write a deletion to the journal: from then on it will be completed.
+
+        Raises:
+            OSError: writing fails; nothing has changed.
+        """
+        if self._disk is not None:
+            await run_in_reader_thread(self._disk[2].put, deletion)
+
+    async def execute(self, deletion: Deletion) -> RecordedTraces | None:
+        """Delete what is recorded until now, after `begin`; return what was there, if it was not known.
+
+        Decisions that are made later must not mention the person any more.
+
+        Raises:
+            OSError: the disk fails; the deletion stays in the journal.
+        """
+        if self._disk is None:
+            return None
+        folder, writer, journal = self._disk
+        self._recorder.flush()
+        await asyncio.wrap_future(writer.run(folder.end_segment))
+        sessions = self.sessions_of(deletion.numbers_since, deletion.sessions)
+        traces = None
+        if deletion.files is None:
+            traces = await self.find(sessions, deletion.numbers)
+            found = msgspec.structs.replace(
+                deletion,
+                numbers=sorted(traces.numbers),
+                files={
+                    each.session.folder.name: sorted(each.files) if deletion.deletes_media else []
+                    for each in traces.sessions
+                },
+            )
+            await run_in_reader_thread(journal.put, found, deletion)
+            deletion = found
+        numbers, files = frozenset(deletion.numbers), deletion.files or {}
+        for session in sessions:
+            for path in decision_files(session):
+                await run_in_reader_thread(remove_rows, path, numbers)
+
+        def remove_the_rest() -> None:
+            for session in sessions:
+                remove_from_session(session, numbers, files.get(session.folder.name, ()))
+
+        await asyncio.wrap_future(writer.run(remove_the_rest))
+        done = msgspec.structs.replace(deletion, sessions=[], files=None, is_done=True)
+        await run_in_reader_thread(journal.put, done, deletion)
+        return traces

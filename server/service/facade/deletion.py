@@ -1,0 +1,284 @@
+"""Deletion of a person's data: what would be deleted, and the deletion."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+
+from server.config.tokens_file import read_tokens
+from server.service.deletion.journal import Deletion
+from server.service.deletion.memory import forget_people
+from server.service.deletion.recorded_traces import RecordedTraces
+from server.service.facade.errors import BusyError, ConflictError, InvalidCommandError, UnknownObjectError
+from server.service.facade.people import PeopleService
+from server.service.facade.rules import RulesService
+from server.service.pipeline import BestViewPipeline
+from server.service.recording.person_removal import frames_in
+from server.system.errors import UserError
+
+log = logging.getLogger(__name__)
+
+_WAIT_S = 60.0
+"""How long a deletion is waited for; it goes on in any case."""
+
+__all__ = ["DeletePerson", "DeletionService", "PersonDeletion", "Recordings"]
+
+Recordings = Literal["keep", "delete"]
+"""What is done with the recorded video and sound of the times in which the person was visible."""
+
+
+class CameraLoss(msgspec.Struct, frozen=True):
+    """What one camera's recording has of a person, and loses with the recordings."""
+
+    camera: str
+    seen_s: float
+    """Seconds in which it saw them."""
+    deleted_s: float
+    """Seconds of its recording in the files that hold these: whole files are deleted."""
+
+
+class OtherLoss(msgspec.Struct, frozen=True):
+    """What goes of the recorded best view of another person with the recordings."""
+
+    object: int
+    run: str | None
+    """The folder of an earlier session with other numbers; null: they are today's."""
+    name: str | None
+    deleted_s: float
+
+
+class PersonDeletion(msgspec.Struct, frozen=True):
+    """What is deleted of a person, or would be."""
+
+    object: int
+    run: str | None
+    state: str
+    """planned, running (it goes on) or done."""
+    recordings: str | None
+    """keep or delete: what was asked for; null while it is planned."""
+    objects: list[int]
+    """All numbers of this person."""
+    name: str | None
+    visible: bool
+    """Whether a camera sees them now: who goes on being visible gets another number."""
+    events: int
+    """Events of rules that mention them."""
+    decisions: int
+    """Recorded GOPs whose rows lose them."""
+    seen_s: float
+    """Seconds of the recording in which any camera saw them."""
+    cameras: list[CameraLoss]
+    """Deleted only with the recordings."""
+    sound_s: float
+    """Seconds of recorded sound that go with the recordings."""
+    others: list[OtherLoss]
+    """Other people whose recorded best views become shorter with the recordings."""
+    mentions: list[str]
+    """Where files that only you can change mention the person."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeletePerson:
+    """Command: delete a person's data; ``run`` names a recorded session with other numbers than today's."""
+
+    number: int
+    recordings: Recordings
+    run: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Person:
+    """Who is to be deleted: numbers, and where these mean the person."""
+
+    numbers: frozenset[int]
+    numbers_since: float | None
+    sessions: tuple[str, ...] = ()
+    """Names of sessions, where it is not known when their numbers began."""
+    is_of_today: bool = True
+
+
+class DeletionService:
+    """Plans and carries out deletions, one at a time."""
+
+    def __init__(self, pipeline: BestViewPipeline, people: PeopleService, rules: RulesService) -> None:
+        self._pipeline, self._people, self._rules = pipeline, people, rules
+        self._is_busy = False
+
+    async def plan(self, number: int, run: str | None = None) -> PersonDeletion:
+        """Return what would be deleted of a person.
+
+        Raises:
+            UnknownObjectError: neither memory nor recording know the number.
+            InvalidCommandError: there is no such session.
+        """
+        person = self._find(number, run)
+        return self._describe(number, run, person, await self._traces(number, person))
+
+    async def delete(self, command: DeletePerson) -> PersonDeletion:
+        """Delete a person's data; return what is deleted.
+
+        Raises:
+            ConflictError: another deletion is not complete yet.
+            UnknownObjectError, InvalidCommandError: as `plan`.
+            BusyError: the disk fails; the text says what that means.
+        """
+        if self._is_busy:
+            raise ConflictError("another deletion is not complete yet: try again later")
+        self._is_busy = True
+        try:
+            planned, deletion = await self._begin(command)
+        except BaseException:
+            self._is_busy = False
+            raise
+        completing = asyncio.create_task(self._complete(deletion), name="deletion")
+        await asyncio.wait({completing}, timeout=_WAIT_S)
+        if not completing.done():
+            return msgspec.structs.replace(planned, state="running", recordings=command.recordings)
+        try:
+            completing.result()
+        except OSError as error:
+            raise BusyError(
+                f"object {command.number}: {error.strerror or error}; the rest is deleted at the next start"
+            ) from error
+        return msgspec.structs.replace(planned, state="done", recordings=command.recordings)
+
+    async def _begin(self, command: DeletePerson) -> tuple[PersonDeletion, Deletion]:
+        """Write the deletion down, then forget the person in memory; so a crash loses neither."""
+        person = self._find(command.number, command.run)
+        traces = await self._traces(command.number, person)
+        planned = self._describe(command.number, command.run, person, traces)
+        deletion = Deletion(
+            numbers=sorted(traces.numbers),
+            numbers_since=person.numbers_since,
+            sessions=list(person.sessions),
+            deletes_media=command.recordings == "delete",
+        )
+        try:
+            await self._pipeline.recording_deletion.begin(deletion)
+        except OSError as error:
+            raise BusyError(
+                f"object {command.number}: nothing is deleted: {error.strerror or error}"
+            ) from error
+        if person.is_of_today:
+            forget_people(self._pipeline, traces.numbers)
+            self._rules.forget(traces.numbers)
+        return planned, deletion
+
+    async def _complete(self, deletion: Deletion) -> None:
+        pipeline = self._pipeline
+        try:
+            if deletion.numbers_since == _since(pipeline) and pipeline.decision_writer is not None:
+                await pipeline.decision_writer.forget(deletion.numbers)
+            await pipeline.recording_deletion.execute(deletion)
+        except OSError as error:
+            log.error("deletion of a person: %s; completed at the next start", error)  # noqa: TRY400
+            raise
+        finally:
+            self._is_busy = False
+        log.info("a person's data were deleted on an operator's request")
+
+    def _find(self, number: int, run: str | None) -> _Person:
+        registry, since = self._pipeline.decider.people.registry, _since(self._pipeline)
+        if run is not None:
+            folder = self._pipeline.recorder.folder
+            sessions = [] if folder is None else folder.sessions
+            found = next((session for session in sessions if session.folder.name == run), None)
+            if found is None:
+                raise InvalidCommandError(f"run: there is no recorded session {run[:40]!r}")
+            numbered = found.info.person_numbers_since
+            if numbered is None or numbered != since:
+                return _Person(frozenset({number}), numbered, () if numbered else (run,), is_of_today=False)
+        current = registry.current(number)
+        return _Person(frozenset({number, current, *registry.aliases(current)}), since)
+
+    async def _traces(self, number: int, person: _Person) -> RecordedTraces:
+        deletion = self._pipeline.recording_deletion
+        traces = await deletion.find(
+            deletion.sessions_of(person.numbers_since, person.sessions), person.numbers
+        )
+        known = self._pipeline.decider.people.registry.first_seen if person.is_of_today else {}
+        if not traces.sessions and traces.numbers.isdisjoint(known):
+            raise self._people.unknown(number) if person.is_of_today else UnknownObjectError(number)
+        return traces
+
+    def _describe(
+        self, number: int, run: str | None, person: _Person, traces: RecordedTraces
+    ) -> PersonDeletion:
+        names = self._pipeline.decider.people.registry.names if person.is_of_today else {}
+        name = next((names[each] for each in sorted(traces.numbers) if each in names), None)
+        views = self._pipeline.decision_state.selected_views if person.is_of_today else {}
+        return PersonDeletion(
+            object=number,
+            run=run,
+            state="planned",
+            recordings=None,
+            objects=sorted(traces.numbers),
+            name=name,
+            visible=any(views[each].cameras for each in traces.numbers if each in views),
+            events=self._rules.count_about(traces.numbers) if person.is_of_today else 0,
+            decisions=sum(each.gops for each in traces.sessions),
+            seen_s=_round(sum(each.seconds for each in traces.sessions)),
+            cameras=_camera_losses(traces),
+            sound_s=_round(
+                sum(
+                    frames_in(each.session.audio, each.files) / each.session.info.fps
+                    for each in traces.sessions
+                )
+            ),
+            others=_other_losses(traces, run if not person.is_of_today else None, names),
+            mentions=self._mentions(traces.numbers, name) if person.is_of_today else [],
+        )
+
+    def _mentions(self, numbers: Collection[int], name: str | None) -> list[str]:
+        config = self._pipeline.config
+        found = [
+            f"rules: {rule.id} names them"
+            for rule in config.rules
+            if any(each in numbers or (name is not None and each == name) for each in rule.people)
+        ]
+        if config.access.tokens is not None:
+            with contextlib.suppress(UserError):  # an invalid file is reported elsewhere
+                found += [
+                    f"access.tokens: the token {token.name!r} is for object {token.object}"
+                    for token in read_tokens(config.access.tokens)
+                    if token.object in numbers
+                ]
+        return found
+
+
+def _since(pipeline: BestViewPipeline) -> float | None:
+    """Return when today's numbers began, unix seconds; None: nobody has one yet."""
+    return pipeline.state_replication.numbers_since or None
+
+
+def _camera_losses(traces: RecordedTraces) -> list[CameraLoss]:
+    seen: dict[str, float] = {}
+    deleted: dict[str, float] = {}
+    for each in traces.sessions:
+        fps = each.session.info.fps
+        for camera, spans in each.visible.items():
+            seen[camera] = seen.get(camera, 0.0) + sum(span.end - span.first for span in spans) / fps
+            files = [file for file in each.files if file.camera == camera]
+            deleted[camera] = deleted.get(camera, 0.0) + frames_in(each.session.cameras[camera], files) / fps
+    return [CameraLoss(camera, _round(seen[camera]), _round(deleted[camera])) for camera in sorted(seen)]
+
+
+def _other_losses(traces: RecordedTraces, run: str | None, names: Mapping[int, str]) -> list[OtherLoss]:
+    lost: dict[int, float] = {}
+    for each in traces.sessions:
+        for number, playlist in each.session.objects.items():
+            if number not in traces.numbers and (frames := frames_in(playlist, each.files)):
+                lost[number] = lost.get(number, 0.0) + frames / each.session.info.fps
+    return [
+        OtherLoss(number, run, names.get(number), _round(seconds)) for number, seconds in sorted(lost.items())
+    ]
+
+
+def _round(seconds: float) -> float:
+    return round(seconds, 3)

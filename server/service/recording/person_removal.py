@@ -1,0 +1,63 @@
+"""Removes a person from one recorded session: playlists, and files of video and sound."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection
+from pathlib import Path
+
+import msgspec
+
+from server.service.recording.playlist_file import RecordingPlaylist
+from server.service.recording.recording_session import RecordingSession
+from server.service.recording.session_files import AUDIO, MISSING, CameraName
+
+
+class SegmentFile(msgspec.Struct, frozen=True, array_like=True, order=True):
+    """One file of a session: of a camera, or of the sound."""
+
+    camera: CameraName
+    """A camera, or `AUDIO`."""
+    first: int
+    """The first pulse of the segment."""
+
+
+def remove_from_session(
+    session: RecordingSession, numbers: Collection[int], files: Collection[SegmentFile]
+) -> None:
+    """Remove people's playlists, and files; others' playlists lose what was in these. In the writer thread.
+
+    Repeating it is harmless.
+
+    Raises:
+        OSError: a file cannot be deleted.
+    """
+    gone = {(file.camera, file.first) for file in files}
+    for playlist in _playlists(session):
+        playlist.drop_files(gone)
+    removed = [session.folder / "objects" / f"{number}.m3u8" for number in numbers]
+    session.objects = {
+        number: playlist for number, playlist in session.objects.items() if number not in numbers
+    }
+    for path in (*removed, *(path_of(session, file) for file in files)):
+        with contextlib.suppress(*MISSING):
+            path.unlink()
+    session.rewrite_stale_playlists()
+    session.recount()
+
+
+def path_of(session: RecordingSession, file: SegmentFile) -> Path:
+    """Return where a file of a session is."""
+    if file.camera == AUDIO:
+        return session.paths.audio_file(file.first)
+    return session.paths.camera_file(file.camera, file.first)
+
+
+def frames_in(playlist: RecordingPlaylist, files: Collection[SegmentFile]) -> int:
+    """Return how many frames of a playlist are in some files."""
+    gone = {(file.camera, file.first) for file in files}
+    return sum(entry.frames for entry in playlist.index.all if (entry.camera, entry.file) in gone)
+
+
+def _playlists(session: RecordingSession) -> list[RecordingPlaylist]:
+    return [*session.cameras.values(), session.audio, *session.objects.values()]

@@ -1,0 +1,241 @@
+"""Deletion of a person's data through the API: a plan first, then nothing of them is left."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.http.tokens import TOKEN_ENTRIES, bearer, serve_with_tokens
+from fakes.service.fed_site import ServedSite
+from fakes.service.scripted_cameras import CAMERAS, FPS, LARGE
+from server.http.access.csrf import CSRF_HEADER
+from server.messaging.messages import Box
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter
+from server.service.deletion import recording_deletion
+from server.service.deletion.journal import JOURNAL_FILE
+from server.service.facade import past_search
+from server.service.past_search.search import search
+from server.service.past_search.worker import SearchResult, SearchTask
+
+DELETION = "/api/operator/deletion"
+A, B = CAMERAS
+FEET: Box = (22.0, 10.0, 28.0, 28.0)
+EPOCHS = 16
+ZONES = [{"id": "all", "camera": "c0", "area": [[0, 0], [64, 0], [64, 48], [0, 48]]}]
+RULES = [
+    {"id": "in", "kind": "entered", "zone": "all"},
+    {"id": "ann", "kind": "left", "zone": "all", "people": ["Ann"]},
+]
+
+
+async def search_here(task: SearchTask) -> SearchResult:
+    return search(task)
+
+
+@pytest.fixture
+async def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[ServedSite]:
+    """Serve a recording site: person 1 is in both cameras for 8 epochs, person 2 in c1 all the time."""
+    monkeypatch.setattr(past_search, "run_search", search_here)
+    record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
+    async with serve_with_tokens(tmp_path, record=record, zones=ZONES, rules=RULES) as served:
+        service = served.service
+        service.frames = (EPOCHS + 8) * 5
+        service.recorder.open()
+        service.decision_writer = LiveDecisionWriter(
+            tmp_path / "out", service.config.camera_ids, service.decider.people.letterboxes
+        )
+        service.connect_cameras(*CAMERAS)
+        for epoch in range(EPOCHS):
+            show(served, epoch, ann=FEET if epoch < 8 else None)
+        service.decider.people.registry.names = {1: "Ann"}
+        assert service.recorder.writer is not None
+        await asyncio.wrap_future(service.recorder.writer.run(lambda: None))  # all is on the disk
+        yield served
+
+
+def show(site: ServedSite, epoch: int, ann: Box | None) -> None:
+    site.service.feed(epoch, {A: {1: ann}, B: {1: ann, 2: LARGE}})
+
+
+async def plan(site: ServedSite, query: str, token: str = "lead") -> tuple[int, Any]:  # noqa: S107
+    async with site.session.get(f"{DELETION}?{query}", headers=bearer(token)) as answer:
+        return answer.status, await answer.json()
+
+
+async def delete(site: ServedSite, token: str = "lead", **content: Any) -> tuple[int, Any]:  # noqa: S107
+    headers = {CSRF_HEADER: "1", **bearer(token)}
+    async with site.session.post(DELETION, headers=headers, json=content) as answer:
+        return answer.status, await answer.json()
+
+
+async def get(site: ServedSite, path: str) -> tuple[int, Any]:
+    async with site.session.get(path, headers=bearer("lead")) as answer:
+        return answer.status, await answer.json()
+
+
+def texts(folder: Path) -> Iterator[str]:
+    """Yield the decisions, playlists and files of decisions in a folder."""
+    for path in sorted(folder.rglob("*")):
+        if path.suffix in {".jsonl", ".m3u8", ".csv", ".txt"}:
+            yield path.read_text(encoding="utf-8")
+
+
+def mentioned(folder: Path) -> list[int]:
+    """Return all people in the decisions of a recording."""
+    lines = [json.loads(line) for path in folder.rglob("*.jsonl") for line in path.read_text().splitlines()]
+    boxes = [box[0] for gop in lines for frames in gop["boxes"].values() for frame in frames for box in frame]
+    return sorted({*boxes, *(int(number) for gop in lines for number in gop["choices"])})
+
+
+async def test_the_plan_says_what_goes_and_changes_nothing(site: ServedSite, tmp_path: Path) -> None:
+    before = list(texts(tmp_path))
+    status, planned = await plan(site, "object=1")
+    assert status == 200
+    assert (planned["state"], planned["objects"], planned["name"], planned["visible"]) == (
+        "planned",
+        [1],
+        "Ann",
+        False,
+    )
+    assert planned["events"] >= 1
+    assert planned["decisions"] >= 8
+    lost = {camera["camera"]: camera for camera in planned["cameras"]}
+    assert lost.keys() == {A, B}
+    assert all(0 < each["seen_s"] <= each["deleted_s"] for each in lost.values())
+    assert [each["object"] for each in planned["others"]] == [2]
+    assert 0 < planned["others"][0]["deleted_s"] <= lost[B]["deleted_s"]
+    assert planned["mentions"] == [
+        "rules: ann names them",
+        "access.tokens: the token 'family' is for object 1",
+        "access.tokens: the token 'carer' is for object 1",
+    ]
+    assert list(texts(tmp_path)) == before
+
+
+async def test_nothing_of_a_person_is_left_and_others_are_whole(site: ServedSite, tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    status, done = await delete(site, object=1, recordings="keep")
+    assert (status, done["state"], done["recordings"]) == (200, "done", "keep")
+    assert mentioned(kept) == [2]
+    assert sorted(path.stem for path in kept.glob("*/objects/*")) == ["2"]
+    assert not any("Ann" in text or "1.m3u8" in text for text in texts(tmp_path))
+    rows = (tmp_path / "out" / "tracks" / f"{B}.txt").read_text().splitlines()
+    assert {row.split(",")[1] for row in rows} == {"2"}
+    assert (await get(site, "/api/objects/1/choice"))[0] == 404
+    assert (await get(site, "/api/operator/people"))[1]["names"] == {}
+    _, found = await get(site, "/api/past/search?from=p0")
+    assert {stay["object"] for stay in found["stays"]} == {2}
+    assert all(1 not in event["objects"] for event in (await get(site, "/api/rules"))[1]["events"])
+    _, past = await get(site, "/api/cameras/c1/past")
+    assert len(past["spans"]) == 1, "no picture is deleted"
+    assert (await delete(site, object=1, recordings="keep"))[0] == 404
+    assert (await plan(site, "object=1"))[0] == 404
+
+
+async def test_with_the_recordings_go_the_files_of_the_cameras_that_saw_them(
+    site: ServedSite, tmp_path: Path
+) -> None:
+    _, planned = await plan(site, "object=1")
+    files = set((tmp_path / "kept").rglob("cameras/*/*.mp4"))
+    status, done = await delete(site, object=1, recordings="delete")
+    assert (status, done["cameras"]) == (200, planned["cameras"])
+    left = set((tmp_path / "kept").rglob("cameras/*/*.mp4"))
+    assert left < files
+    gone = range(8 * 5 + FPS + 10)  # a second after they left, and two segments' ends
+    for camera in (A, B):
+        firsts = [int(path.stem) for path in sorted(left) if path.parent.name == camera]
+        assert firsts[0] >= 8 * 5
+        assert firsts[0] in gone
+        lines = [path.read_text() for path in (tmp_path / "kept").glob(f"*/cameras/{camera}.m3u8")]
+        assert f"{camera}/{firsts[0]:012}.mp4" in lines[0]
+        assert f"{camera}/{0:012}.mp4" not in lines[0]
+
+
+async def test_who_is_visible_goes_on_with_another_number_that_nothing_links(
+    site: ServedSite, tmp_path: Path
+) -> None:
+    decisions: list[Any] = []
+    show(site, EPOCHS, ann=FEET)
+    show(site, EPOCHS + 1, ann=FEET)
+    show(site, EPOCHS + 2, ann=FEET)
+    assert (await plan(site, "object=1"))[1]["visible"]
+    site.service.on_decision.append(decisions.append)
+    assert (await delete(site, object=1, recordings="keep"))[0] == 200
+    for epoch in range(EPOCHS + 3, EPOCHS + 8):
+        show(site, epoch, ann=FEET)
+    numbers = {
+        box[0] for gop in decisions for frames in gop.boxes.values() for frame in frames for box in frame
+    }
+    assert numbers == {2, 101}
+    assert not any(gop.merged or gop.split or gop.cuts for gop in decisions)
+    assert [person["name"] for person in (await get(site, "/api/objects"))[1]["objects"]] == [None, None]
+    site.service.recorder.close()
+    assert mentioned(tmp_path / "kept") == [2, 101]
+
+
+async def test_merged_numbers_are_one_person(site: ServedSite, tmp_path: Path) -> None:
+    site.service.decider.people.merge(2, 1)
+    for epoch in range(EPOCHS, EPOCHS + 4):
+        show(site, epoch, ann=None)
+    site.service.decider.people.registry.merged.clear()  # it keeps the newest only
+    status, done = await delete(site, object=1, recordings="keep")
+    assert (status, done["objects"]) == (200, [1, 2])
+    assert mentioned(tmp_path / "kept") == []
+
+
+async def test_a_deletion_that_was_interrupted_is_completed_at_the_next_start(
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, _: object) -> None:
+        raise OSError(5, "Input/output error", str(path))
+
+    with monkeypatch.context() as broken:
+        broken.setattr(recording_deletion, "remove_rows", fail)
+        status, error = await delete(site, object=1, recordings="delete")
+    assert status == 503
+    assert error["error"] == "object 1: Input/output error; the rest is deleted at the next start"
+    kept = tmp_path / "kept"
+    assert mentioned(kept) == [1, 2]
+    files = set(kept.rglob("cameras/*/*.mp4"))
+    await site.service.recording_deletion.complete_interrupted()
+    assert mentioned(kept) == [2]
+    assert set(kept.rglob("cameras/*/*.mp4")) < files
+    since = site.service.state_replication.numbers_since
+    assert site.service.recording_deletion.forgotten(since) == {1}
+    assert '"files":' not in (kept / JOURNAL_FILE).read_text()
+
+
+async def test_two_deletions_at_once_are_one(site: ServedSite) -> None:
+    answers = await asyncio.gather(
+        delete(site, object=1, recordings="keep"), delete(site, object=1, recordings="keep")
+    )
+    assert sorted(status for status, _ in answers) in ([200, 404], [200, 409])
+
+
+INVALID: list[tuple[dict[str, Any], int, str]] = [
+    ({"object": 9, "recordings": "keep"}, 404, "there is no object 9"),
+    ({"object": 1}, 400, "the request's JSON: Object missing required field `recordings`"),
+    ({"object": 1, "recordings": "blur"}, 400, "the request's JSON: Invalid enum value 'blur'"),
+    ({"object": 0, "recordings": "keep"}, 400, "the request's JSON: Expected `int` >= 1"),
+    ({"object": 1, "recordings": "keep", "run": "x"}, 400, "run: there is no recorded session 'x'"),
+]
+
+
+async def test_what_is_invalid_or_not_an_operators_deletes_nothing(site: ServedSite, tmp_path: Path) -> None:
+    before = list(texts(tmp_path))
+    for content, status, error in INVALID:
+        code, answer = await delete(site, **content)
+        assert (code, answer["error"][: len(error)]) == (status, error)
+    for query in ("", "object=x", "object=0", "object=1&run=" + 65 * "x"):
+        assert (await plan(site, query))[0] == 400
+    for viewer in sorted(TOKEN_ENTRIES.keys() - {"lead"}):
+        assert (await plan(site, "object=1", viewer))[0] == 403
+        assert (await delete(site, viewer, object=1, recordings="keep"))[0] == 403
+    async with site.session.post(DELETION, headers=bearer("lead"), json={}) as answer:
+        assert answer.status == 403, "without the header that other sites cannot send"
+    assert list(texts(tmp_path)) == before
