@@ -17,6 +17,7 @@ from server.messaging.camera_identity_snapshot import (
     NAME_LENGTH_MAX,
     CameraIdentitySnapshot,
     PersonNumber,
+    UnixTime,
 )
 from server.messaging.number_types import Number, Pulse
 from server.messaging.packed_arrays import HISTOGRAM_BINS_MAX
@@ -25,10 +26,24 @@ SERVICES_MAX = 64
 """Best-view services of a site, at most."""
 RECORD_BYTES_MAX = 1 << 24
 """Size limit of a record, and of a state, in bytes."""
+DELETIONS_MAX = 64
+"""Deletions in a record, at most."""
+_NUMBERS_MAX = 1000
 _CAMERAS_MAX = 1024
 _PEOPLE_MAX = 100_000
 
 Sum = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
+
+
+class DeletedPerson(msgspec.Struct, frozen=True, kw_only=True):
+    """A person whose data an operator has deleted."""
+
+    numbers: Annotated[list[PersonNumber], msgspec.Meta(min_length=1, max_length=_NUMBERS_MAX)]
+    """All of their numbers, rising."""
+    numbers_since: UnixTime
+    """When these numbers began."""
+    deletes_media: bool
+    """Whether the recorded video and sound of the times in which they were visible are deleted, too."""
 
 
 class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,6 +57,8 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
     lowest leads; of equal ones, that with the lowest index. One that was stopped follows the others."""
     cameras: Annotated[dict[str, CameraIdentitySnapshot], msgspec.Meta(max_length=_CAMERAS_MAX)]
     """What each camera tracks."""
+    deletions: Annotated[list[DeletedPerson], msgspec.Meta(max_length=DELETIONS_MAX)] = []
+    """The newest deletions, its own and others', in order: every service carries them out."""
 
     @property
     def rank(self) -> tuple[int, int]:

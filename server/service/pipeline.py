@@ -153,9 +153,10 @@ class BestViewPipeline:
         if self._out is not None:  # once all ports are open: a failed start leaves no files
             self.decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
         await self._joint.start()
-        await self.replication.take_over()
         self.recorder.open()
-        await self.recording_deletion.complete_interrupted()
+        for deleted in await self.recording_deletion.complete_interrupted():
+            self.replication.add_deletion(deleted)
+        await self.replication.take_over()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable
 
 import msgspec
 
+from server.messaging.service_record import DeletedPerson
 from server.service.deletion.decision_rows import remove_rows
 from server.service.deletion.journal import Deletion, DeletionJournal
 from server.service.deletion.recorded_traces import RecordedTraces, decision_files, find_traces
@@ -34,26 +35,36 @@ class RecordingDeletion:
             None if folder is None or writer is None else (folder, writer, DeletionJournal(folder.folder))
         )
 
-    async def complete_interrupted(self) -> None:
-        """Complete what a crash has interrupted, once the recording folder is open.
+    async def complete_interrupted(self) -> list[DeletedPerson]:
+        """Complete what a crash has interrupted, once the recording folder is open; return it.
 
         What fails is logged, and tried again at the next start.
         """
         if self._disk is None:
-            return
+            return []
         _, _, journal = self._disk
         try:
             await run_in_reader_thread(journal.read)
         except (OSError, ValueError) as error:
             log.error("record.folder: interrupted deletions cannot be completed: %s", error)  # noqa: TRY400
-            return
-        for deletion in journal.pending:
+            return []
+        pending = journal.pending
+        for deletion in pending:
             try:
                 await self.execute(deletion)
             except OSError as error:
                 log.error("deletion of a person: %s; tried again at the next start", error)  # noqa: TRY400
             else:
                 log.info("completed the deletion of a person that was interrupted")
+        return [
+            DeletedPerson(
+                numbers=deletion.numbers,
+                numbers_since=deletion.numbers_since,
+                deletes_media=deletion.deletes_media,
+            )
+            for deletion in pending
+            if deletion.numbers_since is not None
+        ]
 
     def forgotten(self, numbers_since: float) -> Collection[int]:
         """Return the numbers of the people deleted, of those that began at a time, unix seconds."""

@@ -12,6 +12,7 @@ from typing import Literal
 import msgspec
 
 from server.config.tokens_file import read_tokens
+from server.messaging.service_record import DeletedPerson
 from server.service.deletion.journal import Deletion
 from server.service.deletion.memory import forget_people
 from server.service.deletion.recorded_traces import RecordedTraces
@@ -108,7 +109,9 @@ class DeletionService:
 
     def __init__(self, pipeline: BestViewPipeline, people: PeopleService, rules: RulesService) -> None:
         self._pipeline, self._people, self._rules = pipeline, people, rules
-        self._is_busy = False
+        self._turn = asyncio.Lock()
+        self._following: set[asyncio.Task[None]] = set()
+        pipeline.replication.on_deletion.append(self._follow)
 
     async def plan(self, number: int, run: str | None = None) -> PersonDeletion:
         """Return what would be deleted of a person.
@@ -128,13 +131,13 @@ class DeletionService:
             UnknownObjectError, InvalidCommandError: as `plan`.
             BusyError: the disk fails; the text says what that means.
         """
-        if self._is_busy:
+        if self._turn.locked():
             raise ConflictError("another deletion is not complete yet: try again later")
-        self._is_busy = True
+        await self._turn.acquire()
         try:
             planned, deletion = await self._begin(command)
         except BaseException:
-            self._is_busy = False
+            self._turn.release()
             raise
         completing = asyncio.create_task(self._complete(deletion), name="deletion")
         await asyncio.wait({completing}, timeout=_WAIT_S)
@@ -166,11 +169,47 @@ class DeletionService:
                 f"object {command.number}: nothing is deleted: {error.strerror or error}"
             ) from error
         if person.is_of_today:
-            forget_people(self._pipeline, traces.numbers)
-            self._rules.forget(traces.numbers)
+            self._forget(traces.numbers)
+        if person.numbers_since is not None:
+            self._pipeline.replication.add_deletion(
+                DeletedPerson(
+                    numbers=deletion.numbers,
+                    numbers_since=person.numbers_since,
+                    deletes_media=deletion.deletes_media,
+                )
+            )
         return planned, deletion
 
+    def _forget(self, numbers: Collection[int]) -> None:
+        forget_people(self._pipeline, numbers)
+        self._rules.forget(numbers)
+
+    def _follow(self, deleted: DeletedPerson) -> None:
+        """Carry out a deletion of another service."""
+        if deleted.numbers_since == _since(self._pipeline):
+            self._forget(deleted.numbers)
+        task = asyncio.get_running_loop().create_task(self._complete_followed(deleted), name="deletion")
+        self._following.add(task)
+        task.add_done_callback(self._following.discard)
+
+    async def _complete_followed(self, deleted: DeletedPerson) -> None:
+        deletion = Deletion(
+            numbers=deleted.numbers,
+            numbers_since=deleted.numbers_since,
+            deletes_media=deleted.deletes_media,
+        )
+        await self._turn.acquire()
+        try:
+            await self._pipeline.recording_deletion.begin(deletion)
+        except OSError as error:
+            self._turn.release()
+            log.error("deletion of a person by another service: %s", error)  # noqa: TRY400
+            return
+        with contextlib.suppress(OSError):  # it has been logged
+            await self._complete(deletion)
+
     async def _complete(self, deletion: Deletion) -> None:
+        """Delete what is on the disk, and release the turn."""
         pipeline = self._pipeline
         try:
             if deletion.numbers_since == _since(pipeline) and pipeline.decision_writer is not None:
@@ -180,7 +219,7 @@ class DeletionService:
             log.error("deletion of a person: %s; completed at the next start", error)  # noqa: TRY400
             raise
         finally:
-            self._is_busy = False
+            self._turn.release()
         log.info("a person's data were deleted on an operator's request")
 
     def _find(self, number: int, run: str | None) -> _Person:

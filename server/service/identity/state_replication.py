@@ -194,6 +194,15 @@ class StateReplication:
         if self._started_at is not None and self._sends():
             self._send_state(pulse)
 
+    def follow_numbering(self, since: float) -> None:
+        """Count the numbers from when those of the leading service began: they are the same."""
+        if self._started_at is not None:
+            self._since = since
+
+    def deleted(self, since: float) -> set[int]:
+        """Return the numbers of deleted people, of those that began at a time, unix seconds."""
+        return {*self.forgotten, *self._deleted(since)}
+
     def forget(self, numbers: Iterable[int]) -> None:
         """Restore these people from no snapshot any more, and tell the cameras at once."""
         self.forgotten += [number for number in numbers if number not in self.forgotten]
@@ -210,7 +219,7 @@ class StateReplication:
         for snapshot in snapshots.values():
             since = snapshot.numbered_since
             if since not in gone:
-                gone[since] = {*self.forgotten, *self._deleted(since)}
+                gone[since] = self.deleted(since)
             gone[since].update(snapshot.forgotten)
         if gone:
             newest = gone[max(gone)]

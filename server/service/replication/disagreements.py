@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+
+import msgspec
 
 from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot
 from server.service.identity.local_numbers import TrackName
@@ -40,6 +42,16 @@ def numbers_of_tracks(snapshots: Snapshots) -> dict[TrackName, int]:
         for camera, snapshot in snapshots.items()
         for person in snapshot.people
         for track in person.tracks
+    }
+
+
+def without_people(snapshots: Snapshots, numbers: Collection[int]) -> Snapshots:
+    """Return a record without some people."""
+    return {
+        camera: msgspec.structs.replace(
+            snapshot, people=[person for person in snapshot.people if person.number not in numbers]
+        )
+        for camera, snapshot in snapshots.items()
     }
 
 

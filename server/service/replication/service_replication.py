@@ -20,13 +20,24 @@ import msgspec
 from server.config.site_config import Config
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
-from server.messaging.service_record import RECORD_BYTES_MAX, ServiceRecord, ServiceState
+from server.messaging.service_record import (
+    DELETIONS_MAX,
+    RECORD_BYTES_MAX,
+    DeletedPerson,
+    ServiceRecord,
+    ServiceState,
+)
 from server.service.bus_connection import BusConnection
 from server.service.identity.people import PersonTracker
 from server.service.identity.state_recovery import RECENT_S, state_for_cameras
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.replication.disagreements import Disagreements, find_disagreements, follow
+from server.service.replication.disagreements import (
+    Disagreements,
+    find_disagreements,
+    follow,
+    without_people,
+)
 from server.service.replication.state import restore_people, state_of
 
 log = logging.getLogger(__name__)
@@ -89,6 +100,9 @@ class ServiceReplication:
         """Records of the leading service whose numbers replaced own ones."""
         self.bad_messages = 0
         """Records and states that could not be parsed."""
+        self._deletions: list[DeletedPerson] = []
+        self.on_deletion: list[Callable[[DeletedPerson], None]] = []
+        """Called with each deletion of another service."""
         self._changed = asyncio.Event()
 
     @property
@@ -118,7 +132,10 @@ class ServiceReplication:
 
     def restore(self, state: ServiceState) -> None:
         """Take over a state, before the first epoch."""
-        restore_people(self._people, state)
+        since = max((snapshot.numbered_since for snapshot in state.record.cameras.values()), default=0.0)
+        gone = self._of_cameras.deleted(since)
+        kept = [person for person in state.people if gone.isdisjoint([person.number, *person.aliases])]
+        restore_people(self._people, msgspec.structs.replace(state, people=kept))
         self._of_cameras.take_over(state.record.cameras)
         text = "took over the state of best-view service %d: %d people"
         log.info(text, state.record.service, len(state.people))
@@ -134,6 +151,18 @@ class ServiceReplication:
             return
         if record.service < self._services and record.service != self._index:
             self._received[record.service] = _Received(record, self._clock())
+            self._follow_deletions(record)
+
+    def add_deletion(self, deletion: DeletedPerson) -> None:
+        """Tell the other services of a deletion, with every record from the next on."""
+        self._deletions = [*self._deletions, deletion][-DELETIONS_MAX:]
+
+    def _follow_deletions(self, record: ServiceRecord) -> None:
+        for deletion in record.deletions:
+            if deletion not in self._deletions:
+                self.add_deletion(deletion)
+                for callback in self.on_deletion:
+                    callback(deletion)
 
     def step(self, epoch: Epoch) -> None:
         """Publish a record where one is due, and follow the leading service, after an epoch was decided."""
@@ -167,7 +196,15 @@ class ServiceReplication:
             del self._own[record.pulse]
             self._reserve(own, record)
             if record is leader:
-                self._follow(find_disagreements(own.cameras, record.cameras))
+                if record.cameras:
+                    since = max(snapshot.numbered_since for snapshot in record.cameras.values())
+                    self._of_cameras.follow_numbering(since)
+                gone = set(self._of_cameras.forgotten)
+                self._follow(
+                    find_disagreements(
+                        without_people(own.cameras, gone), without_people(record.cameras, gone)
+                    )
+                )
 
     def _follow(self, found: Disagreements) -> None:
         """Follow the leading service where two records in a row differ in the same way."""
@@ -212,10 +249,19 @@ class ServiceReplication:
         assert self._unbroken_since is not None  # noqa: S101 — set by the first epoch
         newest = self._people.newest
         snapshots = state_for_cameras(
-            self._people, self._cameras, newest, round(RECENT_S * self._fps), self._of_cameras.numbers_since
+            self._people,
+            self._cameras,
+            newest,
+            round(RECENT_S * self._fps),
+            self._of_cameras.numbers_since,
+            self._of_cameras.forgotten,
         )
         return ServiceRecord(
-            service=self._index, pulse=newest, unbroken_since=self._unbroken_since, cameras=snapshots
+            service=self._index,
+            pulse=newest,
+            unbroken_since=self._unbroken_since,
+            cameras=snapshots,
+            deletions=self._deletions,
         )
 
     def _encoded_state(self) -> bytes:

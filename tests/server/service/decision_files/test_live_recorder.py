@@ -68,7 +68,7 @@ def test_a_full_disk_at_the_end_is_logged_and_all_files_are_intact(
 async def test_a_service_decides_and_closes_despite_a_full_disk(tmp_path: Path) -> None:
     service = service_with_backlog()
     decided = collect_decisions(service)
-    service._decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
+    service.decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
     with files_of_at_most(0):
         service.decide()
         service.close()

@@ -66,7 +66,7 @@ def run_epochs(service: FedService, epochs: range) -> None:
 def service(tmp_path: Path) -> FedService:
     """A service that records and writes decisions."""
     service = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
-    service._decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
+    service.decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
     service.recorder.open()
     service.connect_cameras(*CAMERAS)
     return service

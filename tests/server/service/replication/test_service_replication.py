@@ -22,7 +22,8 @@ from fakes.service.scripted_cameras import (
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
-from server.messaging.service_record import ServiceRecord, ServiceState
+from server.messaging.service_record import DeletedPerson, ServiceRecord, ServiceState
+from server.service.deletion.memory import forget_people
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.metrics.service_collector import ServiceCollector
 from server.service.replication.service_replication import LEASE_S
@@ -118,6 +119,14 @@ class Services:
         }
         return {track: number for track, number in named.items() if number is not None}
 
+    def delete(self, index: int, number: int) -> None:
+        """Delete a person's data on one service."""
+        service = self.running[index]
+        forget_people(service, [number])
+        since = service.state_replication.numbers_since
+        deletion = DeletedPerson(numbers=[number], numbers_since=since, deletes_media=False)
+        service.replication.add_deletion(deletion)
+
 
 @pytest.fixture
 def services() -> Iterator[Services]:
@@ -169,6 +178,37 @@ async def test_a_service_that_numbered_people_otherwise_follows_the_leading_one(
     assert [services.running[index].replication.followed for index in (0, 1)] == [0, 1]
     services.feed(range(30, 40), {A: {1: SMALL, 2: LARGE}, B: {3: SMALL}})
     assert services.numbers(1, 39) == services.numbers(0, 39)
+
+
+@pytest.mark.parametrize("asked", [0, 1])
+async def test_a_person_deleted_on_one_service_is_deleted_on_all(services: Services, asked: int) -> None:
+    seen: Seen = {A: {1: SMALL, 2: LARGE}, B: {3: LARGE}}
+    for index in (0, 1):
+        service = services.start(index)
+        service.replication.on_deletion.append(
+            lambda deletion, service=service: forget_people(service, deletion.numbers)
+        )
+    services.feed(range(20), seen)
+    ann = services.numbers(0, 19)[A, 1]
+    assert ann is not None
+    assert services.numbers(1, 19)[A, 1] == ann
+    services.running[1 - asked].decider.people.registry.set_name(ann, "Ann")
+    services.delete(asked, ann)
+    services.feed(range(20, 60), seen)
+    for index in (0, 1):
+        people = services.running[index].decider.people
+        assert ann not in people.registry.all_numbers
+        assert ann not in people.registry.merged
+        assert people.registry.names == {}
+    assert services.numbers(0, 59) == services.numbers(1, 59)
+    assert ann not in services.numbers(0, 59).values()
+    services.stop(asked)
+    later = services.start(asked, takes_over_from=1 - asked)
+    deleted: list[DeletedPerson] = []
+    later.replication.on_deletion.append(deleted.append)
+    services.feed(range(60, 70), seen)
+    assert [each.numbers for each in deleted] == [[ann]], "a service that was off is told"
+    assert ann not in later.decider.people.registry.all_numbers
 
 
 async def test_the_service_that_has_decided_every_epoch_for_longest_leads(services: Services) -> None:
