@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.media.letterbox import Letterbox
+from server.messaging.messages import RawDetections
 from server.messaging.observations import FrameObservations
 from server.messaging.packed_arrays import (
     FRAME_DETECTIONS_MAX,
@@ -37,6 +38,24 @@ def packed_detections(
     """Return the chosen detections as a message has them."""
     boxes = calibrated_camera_boxes(detections.boxes[chosen], letterbox, motion)
     return pack_detections(boxes, detections.scores[chosen])
+
+
+class RawDetectionCollector:
+    """Collects the detections of the frames of an epoch, to hide also whom no track follows."""
+
+    def __init__(self) -> None:
+        self._frames: list[RawDetections] = []
+
+    def add(self, pulse: int, detections: Detections) -> None:
+        """Add the detections of a frame that was searched."""
+        chosen = most_confident(detections)
+        boxes = pack_detections(detections.boxes[chosen], detections.scores[chosen])
+        self._frames.append(RawDetections(pulse=pulse, boxes=boxes))
+
+    def take(self) -> list[RawDetections]:
+        """Return the frames since the last call."""
+        frames, self._frames = self._frames, []
+        return frames
 
 
 class ObservationCollector:

@@ -18,7 +18,7 @@ from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
 from server.camera.knocks import motion_message, noticeable
 from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
-from server.camera.observations import ObservationCollector
+from server.camera.observations import ObservationCollector, RawDetectionCollector
 from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
@@ -142,6 +142,7 @@ class CameraPipeline:
         self._observations = (
             ObservationCollector(self._letterbox) if camera_id in config.joint_cameras else None
         )
+        self._raw_detections = RawDetectionCollector() if config.access.may_blur else None
         self.first_pulse = camera.first_pulse(site.fps) if self.source.recorded else 0
         """The pulse of the first frame."""
         self._last: int | None = None
@@ -233,6 +234,8 @@ class CameraPipeline:
             self._messages.add_without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
             self._messages.add_without_image([pulse])
+        if self._raw_detections is not None and frame.has_detection:
+            self._raw_detections.add(pulse, detections)
         if self._observations is not None and frame.has_detection and frame.shows_its_place:
             self._observations.add(pulse, detections, frame.motion)
         if self.cross_view is not None and frame.depends_on_peers:
@@ -271,6 +274,7 @@ class CameraPipeline:
             condition=self.picture.condition,
             motion=motion_message(self.motion),
             observations=observations,
+            detections=[] if self._raw_detections is None else self._raw_detections.take(),
         )
         return tracks if self._sharpness is None else self._sharpness.measure(tracks, image)
 

@@ -122,6 +122,22 @@ TRACKS_MAX = 1000
 """Tracks of one window, at most: more than people fit into any image."""
 
 
+class RawDetections(msgspec.Struct, frozen=True, kw_only=True):
+    """Whom a camera's detector has found in a frame, whether a track follows them or not."""
+
+    pulse: Pulse
+    boxes: PackedDetections
+    """In pixels of the site's image."""
+
+    def __post_init__(self) -> None:
+        """Check the boxes.
+
+        Raises:
+            ValueError: these are no detections; decoders then raise a `ValidationError`.
+        """
+        check_detections(self.boxes)
+
+
 class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """Tracks of one camera after solving one window."""
 
@@ -164,6 +180,8 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """The first final frame that an operator's correction has changed; null: none."""
     observations: list[FrameObservations] = []
     """The searched frames of this epoch, where cameras of a common ground are tracked jointly."""
+    detections: list[RawDetections] = []
+    """The searched frames of this epoch, where viewers may see people pixelated."""
 
 
 class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):

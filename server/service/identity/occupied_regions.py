@@ -1,7 +1,8 @@
 """Where people are in a camera's frames, for viewers who must not recognize them.
 
-More than the published boxes: also tracks that are not a confirmed person yet, people whom a camera does not
-detect for a moment, and a margin, since boxes are cut short and may be a little old.
+More than the published boxes: also tracks that are not a confirmed person yet, detections that no track
+follows, people whom a camera does not detect for a moment, and a margin, since boxes are cut short and may be
+a little old.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from bestview import TrackKey
 from server.messaging.messages import NumberedBox
-from server.messaging.packed_arrays import unpack_boxes
+from server.messaging.packed_arrays import unpack_boxes, unpack_detections
 from server.service.identity.camera_window import CameraWindow
 from server.service.identity.people import PersonTracker
 from server.service.identity.track_parts import UNCONFIRMED
@@ -39,6 +40,13 @@ _GROWTH = 0.4
 """How much further it reaches `HOLD_S` away from the next box: people move on."""
 _MARGIN_MIN = 4.0
 """Pixels of the margin at least."""
+GLIMPSE_S = 0.5
+"""Seconds before and after a detection that no track follows for which its region stays."""
+_FOLLOWED_SHARE = 0.3
+"""Part of a detection in another region from which on it is of that person, or of several who are close: it
+would hide the chosen one."""
+_COVERED_SHARE = 0.95
+"""Part of a detection in the region of another from which on it needs none of its own."""
 _SAME_PERSON_IOU = 0.5
 """Overlap of two regions from which they are of one person."""
 
@@ -66,6 +74,9 @@ class OccupiedRegions:
         """By camera: frames whose newest window has no tracks because they were late."""
         self._own: dict[str, dict[int, NDArray[np.float64]]] = {camera: {} for camera in cameras}
         """By camera that is tracked jointly, and frame: the boxes of its own tracks, (N, 4)."""
+        self._glimpse = frames_in(GLIMPSE_S, fps)
+        self._detected: dict[str, dict[int, NDArray[np.float64]]] = {camera: {} for camera in cameras}
+        """By camera and frame: all detections, (N, 4)."""
         self._searched: dict[str, int] = {}
         """By camera: the last frame before the next GOP in which it looked for people."""
 
@@ -84,6 +95,12 @@ class OccupiedRegions:
             )
             for at in range(count):
                 self._own[camera][message.first + at] = boxes[~np.isnan(boxes[:, at, 0]), at]
+
+        messages = dict(epoch.tracks) | ({} if epoch.joint is None else dict(epoch.joint.own))
+        for camera, message in messages.items():
+            for found in message.detections:
+                if message.first <= found.pulse <= message.last:
+                    self._detected[camera][found.pulse] = unpack_detections(found.boxes)[0]
 
     def next(self, camera: str, first: int, frames: int) -> Regions:
         """Return the regions of the next GOP, the frames from ``first`` on."""
@@ -106,6 +123,7 @@ class OccupiedRegions:
         for pulse, frame in enumerate(regions, start=first):
             if frame is not None:
                 self._add_own(frame, self._own[camera].pop(pulse, np.empty((0, 4))))
+                self._add_unfollowed(frame, camera, pulse)
         self._remember(camera, end, tracks, [row[-1] for row in numbers], searched)
         return regions
 
@@ -118,6 +136,21 @@ class OccupiedRegions:
         is_new = iou(widened[:, None], known).max(axis=1, initial=0.0) < _SAME_PERSON_IOU
         for left, top, right, bottom in widened[is_new].tolist():
             frame.append((UNCONFIRMED, left, top, right, bottom))
+
+    def _add_unfollowed(self, frame: list[NumberedBox], camera: str, pulse: int) -> None:
+        """Add detections near a frame that are far from everybody whom a track follows."""
+        detected = self._detected[camera]
+        near = sorted(
+            (at for at in detected if abs(at - pulse) <= self._glimpse), key=lambda at: (abs(at - pulse), at)
+        )
+        boxes = np.concatenate([np.empty((0, 4)), *(detected[at] for at in near)])
+        known = np.array([region[1:] for region in frame]).reshape(-1, 4)
+        boxes = boxes[_share_in(boxes, known) < _FOLLOWED_SHARE]
+        while len(boxes):  # the nearest in time first; most of the others are of the same people
+            region = _with_margin(boxes[:1], MARGIN + _GROWTH)
+            left, top, right, bottom = region[0].tolist()
+            frame.append((UNCONFIRMED, left, top, right, bottom))
+            boxes = boxes[_share_in(boxes, region) < _COVERED_SHARE]
 
     def _tracks(
         self, camera: str, first: int, end: int, spans: Sequence[HistorySpan[CameraWindow]]
@@ -187,10 +220,22 @@ class OccupiedRegions:
                     max(track.pulses[last], track.followed_to),
                     track.number if number == UNCONFIRMED else number,
                 )
+        self._detected[camera] = {
+            pulse: boxes for pulse, boxes in self._detected[camera].items() if pulse >= end - self._glimpse
+        }
         self._own[camera] = {pulse: own for pulse, own in self._own[camera].items() if pulse >= end}
         self._trackless[camera] = {pulse for pulse in self._trackless[camera] if pulse >= end}
         if (before := searched[searched < end]).size:
             self._searched[camera] = int(before[-1])
+
+
+def _share_in(boxes: NDArray[np.float64], regions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest part of each box (N, 4) that is in one of the regions (R, 4)."""
+    low = np.maximum(boxes[:, None, :2], regions[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], regions[None, :, 2:])
+    inside = np.prod(np.maximum(high - low, 0.0), axis=2).max(axis=1, initial=0.0)
+    area = np.prod(np.maximum(boxes[:, 2:] - boxes[:, :2], 0.0), axis=1)
+    return np.asarray(np.where(area > 0, inside / np.maximum(area, 1e-9), 1.0))
 
 
 def _with_margin(boxes: NDArray[np.float64], reach: float | NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,10 +18,10 @@ from server.camera.pipeline import CameraPipeline
 from server.camera.sources import Image, SourceEndedError
 from server.cli.render.camera_workers import EpochBatch, run_camera
 from server.config.loader import build_config
-from server.config.sections import SiteSettings
+from server.config.sections import AccessSettings, SiteSettings
 from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks
-from server.messaging.packed_arrays import unpack_boxes
+from server.messaging.packed_arrays import unpack_boxes, unpack_detections
 from server.system.errors import UserError
 from synthetic import Scene, write_recording
 
@@ -193,6 +193,22 @@ def test_detections_of_a_file_are_tracked_in_the_sites_pixels(recording: Path) -
         left, top, right, bottom = box  # scaled to a half, letterboxed by 13 rows
         original = (2 * left, 2 * (top - 13), 2 * (right - left), 2 * (bottom - top))
         assert np.isclose(rows[rows[:, 0] == pulse + 1, 2:6], original).all(axis=1).any()
+
+
+def test_detections_are_sent_where_viewers_may_see_people_pixelated(recording: Path) -> None:
+    config = config_of(recording, detections="gt/c0.txt")
+    plain = [batch.tracks for batch in offline(config) if batch.tracks is not None]
+    assert not any(message.detections for message in plain)
+    blurred = config.model_copy(update={"access": AccessSettings(blur="others")})
+    messages = [batch.tracks for batch in offline(blurred) if batch.tracks is not None]
+    assert [message.tracks for message in messages] == [message.tracks for message in plain]
+    found = {
+        each.pulse: unpack_detections(each.boxes)[0] for message in messages for each in message.detections
+    }
+    rows = np.loadtxt(recording / "gt" / "c0.txt", delimiter=",", ndmin=2)
+    assert set(found) == set(range(FRAMES))
+    for pulse, boxes in found.items():
+        assert len(boxes) == np.sum(rows[:, 0] == pulse + 1), "tracked or not"
 
 
 def test_the_detections_of_a_looped_recording_repeat_with_it(recording: Path) -> None:

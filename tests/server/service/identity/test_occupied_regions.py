@@ -21,8 +21,8 @@ from fakes.service.scripted_cameras import (
     tracks,
 )
 from server.messaging.epochs import end_of_epoch
-from server.messaging.messages import Box, TrackMessage
-from server.messaging.packed_arrays import pack_boxes
+from server.messaging.messages import Box, RawDetections, TrackMessage
+from server.messaging.packed_arrays import pack_boxes, pack_detections
 from server.service.identity.occupied_regions import Regions
 from server.service.ingest.epoch_aligner import Epoch, JointEpoch
 from server.service.joint_tracking.epochs import without_tracks
@@ -127,6 +127,36 @@ def test_a_track_without_a_number_is_hidden() -> None:
         site.feed({1: [SMALL] * STRIDE})
     assert all(frame and frame[0][0] == -1 and covers(frame[0], SMALL) for frame in site.regions())
     site.service.close()
+
+
+def raw(epoch: int, *boxes: Box) -> list[RawDetections]:
+    """Return the same detections in all frames of an epoch."""
+    packed = pack_detections(np.array(boxes), np.full(len(boxes), 0.5))
+    return [RawDetections(pulse=epoch * STRIDE + at, boxes=packed) for at in range(STRIDE)]
+
+
+def test_whom_no_track_follows_is_hidden_around_the_time_of_the_detection() -> None:
+    alone: Box = (40.0, 5.0, 50.0, 35.0)
+    site = Site()
+    for epoch in range(14):
+        site.feed({1: [SMALL] * STRIDE}, detections=raw(epoch, SMALL, alone) if epoch == 6 else [])
+    seen = {
+        pulse: [region for region in frame or [] if region[0] < 0]
+        for pulse, frame in enumerate(site.regions())
+    }
+    hidden = [pulse for pulse, regions in seen.items() if regions]
+    assert hidden == [*range(hidden[0], 7 * STRIDE + UNSEARCHED)]
+    assert hidden[0] < 6 * STRIDE, "as far ahead as is known"
+    assert all(covers(region, alone) for pulse in hidden for region in seen[pulse])
+    assert all(len(seen[pulse]) == 1 for pulse in hidden)
+
+
+def test_detections_of_those_whom_tracks_follow_and_of_people_who_are_close_hide_nobody_else() -> None:
+    both: Box = (SMALL[0] - 2, SMALL[1] - 2, SMALL[2] + 6, SMALL[3])
+    site = Site()
+    for epoch in range(8):
+        site.feed({1: [SMALL] * STRIDE}, detections=raw(epoch, SMALL, both))
+    assert all(len(frame or []) == 1 for frame in site.regions())
 
 
 def test_nothing_is_known_where_the_camera_has_not_looked_for_long() -> None:
