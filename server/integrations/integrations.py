@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
 
 from server.integrations.mqtt.publisher import MqttPublisher
@@ -25,6 +25,7 @@ class Integrations:
         self._running: list[tuple[MqttPublisher | Webhook, asyncio.Task[None]]] = []
         self._settings: tuple[object, ...] = ()
         service.rules.subscribe_events(self._put_event)
+        service.rules.subscribe_forget(self._forget)
         service.operations.subscribe_config(self.apply)
 
     def apply(self) -> None:
@@ -52,6 +53,10 @@ class Integrations:
             task.cancel()
         self._running = []
         return tasks
+
+    def _forget(self, numbers: Collection[int]) -> None:
+        for each, _ in self._running:
+            each.forget(numbers)
 
     def _put_event(self, event: PicturedEvent) -> None:
         for each, _ in self._running:

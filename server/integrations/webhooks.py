@@ -14,6 +14,7 @@ import hmac
 import logging
 import time
 from collections import deque
+from collections.abc import Collection
 
 import aiohttp
 import msgspec
@@ -29,7 +30,7 @@ from tenacity import (
 from logthrottle import LogThrottle
 from server.config.sections import WebhookSettings
 from server.integrations.secret_files import read_webhook_key
-from server.service.facade.rules import PicturedEvent
+from server.service.facade.rules import PicturedEvent, event_without
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
@@ -90,6 +91,11 @@ class Webhook:
             log.warning("%s: too many events wait; the oldest are lost%s", self._where, more)
         self._waiting.append(event)
         self._has_waiting.set()
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Remove people from events that wait, and events about nobody else."""
+        kept = (event_without(event, numbers) for event in self._waiting)
+        self._waiting = deque((event for event in kept if event is not None), maxlen=_QUEUE_MAX)
 
     async def run(self) -> None:
         """Post events as they come."""

@@ -7,7 +7,7 @@ import contextlib
 import logging
 import ssl
 from collections import deque
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Collection, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -21,7 +21,7 @@ from server.integrations.mqtt.discovery import discovery_messages, without_remov
 from server.integrations.mqtt.site_reader import SiteReader
 from server.integrations.mqtt.site_state import PersonState, Topics, state_messages
 from server.integrations.secret_files import read_secret
-from server.service.facade.rules import PicturedEvent
+from server.service.facade.rules import PicturedEvent, event_without
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -53,6 +53,11 @@ class MqttPublisher:
         """States of people of an earlier run who are not known now, by topic."""
         self._failures = LogThrottle()
         self._is_ending = False
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Remove people from events that wait, and events about nobody else."""
+        kept = (event_without(event, numbers) for event in self._events)
+        self._events = deque((event for event in kept if event is not None), maxlen=_EVENTS_MAX)
 
     def put_event(self, event: PicturedEvent) -> None:
         """Publish an event as soon as there is a connection."""

@@ -12,6 +12,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
 import pytest
 from aiohttp import web
 
@@ -168,6 +169,20 @@ async def test_only_events_of_its_rules_are_posted(receiver: Receiver) -> None:
         webhook.put_event(event(2, "queue"))
         await receiver.until(1)
     assert [head["webhook-id"] for head in receiver.heads] == ["19abc-110-2"]
+
+
+def test_a_deleted_person_is_in_no_event_that_waits() -> None:
+    webhook = Webhook(WebhookSettings(url="http://127.0.0.1:9/hook"), None)
+    alone = event(1, jpeg=b"picture")
+    both = msgspec.structs.replace(alone.record, objects=[3, 5], names=["Ann", None])
+    webhook.put_event(alone)
+    webhook.put_event(PicturedEvent(both, alone.jpeg))
+    webhook.forget([4])
+    assert len(webhook._waiting) == 2
+    webhook.forget([3])
+    (left,) = webhook._waiting
+    assert (left.record.objects, left.record.names) == ([5], [None])
+    assert (left.record.picture, left.record.clip, left.record.camera, left.jpeg) == (None, None, None, None)
 
 
 async def test_waiting_events_are_bounded_and_the_oldest_are_lost(caplog: pytest.LogCaptureFixture) -> None:
