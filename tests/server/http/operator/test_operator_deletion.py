@@ -17,7 +17,8 @@ from server.http.access.csrf import CSRF_HEADER
 from server.messaging.messages import Box
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.deletion import recording_deletion
-from server.service.deletion.journal import JOURNAL_FILE
+from server.service.deletion.journal import JOURNAL_FILE, DeletionJournal
+from server.service.deletion.recorded_traces import RecordedTraces, find_traces
 from server.service.facade import past_search
 from server.service.past_search.search import search
 from server.service.past_search.worker import SearchResult, SearchTask
@@ -56,6 +57,7 @@ async def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
         assert service.recorder.writer is not None
         await asyncio.wrap_future(service.recorder.writer.run(lambda: None))  # all is on the disk
         yield served
+        service.decision_writer.close()
 
 
 def show(site: ServedSite, epoch: int, ann: Box | None) -> None:
@@ -188,26 +190,59 @@ async def test_merged_numbers_are_one_person(site: ServedSite, tmp_path: Path) -
     assert mentioned(tmp_path / "kept") == []
 
 
+@pytest.mark.parametrize("step", ["find_traces", "remove_rows", "remove_from_session"])
 async def test_a_deletion_that_was_interrupted_is_completed_at_the_next_start(
-    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
-    def fail(path: Path, _: object) -> None:
-        raise OSError(5, "Input/output error", str(path))
+    calls = 0
+
+    def fail(*arguments: object) -> RecordedTraces:
+        nonlocal calls
+        calls += 1
+        if step == "find_traces" and calls == 1:  # before anything is deleted, to say what there is
+            return find_traces(*arguments)  # type: ignore[arg-type]
+        raise OSError(5, "Input/output error", "disk")
 
     with monkeypatch.context() as broken:
-        broken.setattr(recording_deletion, "remove_rows", fail)
+        broken.setattr(recording_deletion, step, fail)
         status, error = await delete(site, object=1, recordings="delete")
     assert status == 503
     assert error["error"] == "object 1: Input/output error; the rest is deleted at the next start"
     kept = tmp_path / "kept"
-    assert mentioned(kept) == [1, 2]
     files = set(kept.rglob("cameras/*/*.mp4"))
-    await site.service.recording_deletion.complete_interrupted()
+    later = recording_deletion.RecordingDeletion(site.service.recorder)  # as after a start
+    completed = await later.complete_interrupted()
+    assert [each.numbers for each in completed] == [[1]]
     assert mentioned(kept) == [2]
     assert set(kept.rglob("cameras/*/*.mp4")) < files
-    since = site.service.state_replication.numbers_since
-    assert site.service.recording_deletion.forgotten(since) == {1}
+    assert later.forgotten(site.service.state_replication.numbers_since) == {1}
     assert '"files":' not in (kept / JOURNAL_FILE).read_text()
+    assert await later.complete_interrupted() == []
+
+
+async def test_what_cannot_be_written_down_is_not_begun(
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(DeletionJournal, "put", fail)
+    before = list(texts(tmp_path))
+    assert await delete(site, object=1, recordings="delete") == (
+        503,
+        {"error": "object 1: nothing is deleted: No space left on device"},
+    )
+    assert list(texts(tmp_path)) == before
+    assert (await get(site, "/api/operator/people"))[1]["names"] == {"1": "Ann"}
+
+
+async def test_a_damaged_journal_is_one_line_in_the_log(
+    site: ServedSite, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "kept" / JOURNAL_FILE).write_text("[{]")
+    assert await site.service.recording_deletion.complete_interrupted() == []
+    assert "interrupted deletions cannot be completed: " in caplog.text
+    assert "Traceback" not in caplog.text
 
 
 async def test_two_deletions_at_once_are_one(site: ServedSite) -> None:
