@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Collection, Iterable
+from pathlib import Path
 
 import msgspec
 
@@ -104,9 +105,16 @@ class RecordingDeletion:
         if self._disk is None:
             return None
         folder, writer, journal = self._disk
+        sessions: list[RecordingSession] = []
+        ended: list[Path] = []
+
+        def end_segment() -> None:
+            folder.end_segment()
+            sessions.extend(self.sessions_of(deletion.numbers_since, deletion.sessions))
+            ended.extend(path for session in sessions for path in decision_files(session))
+
         self._recorder.flush()
-        await asyncio.wrap_future(writer.run(folder.end_segment))
-        sessions = self.sessions_of(deletion.numbers_since, deletion.sessions)
+        await asyncio.wrap_future(writer.run(end_segment))
         traces = None
         if deletion.files is None:
             traces = await self.find(sessions, deletion.numbers)
@@ -121,11 +129,11 @@ class RecordingDeletion:
             await run_in_reader_thread(journal.put, found, deletion)
             deletion = found
         numbers, files = frozenset(deletion.numbers), deletion.files or {}
-        for session in sessions:
-            for path in decision_files(session):
-                await run_in_reader_thread(remove_rows, path, numbers)
+        for path in ended:  # a later segment is being written, and does not mention the person
+            await run_in_reader_thread(remove_rows, path, numbers)
 
         def remove_the_rest() -> None:
+            folder.end_segment()  # the margin may reach into it
             for session in sessions:
                 remove_from_session(session, numbers, files.get(session.folder.name, ()))
 

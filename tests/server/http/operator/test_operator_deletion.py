@@ -22,6 +22,7 @@ from server.service.deletion.recorded_traces import RecordedTraces, find_traces
 from server.service.facade import past_search
 from server.service.past_search.search import search
 from server.service.past_search.worker import SearchResult, SearchTask
+from server.service.recording.recording_session import RecordingSession
 
 DELETION = "/api/operator/deletion"
 A, B = CAMERAS
@@ -177,6 +178,30 @@ async def test_who_is_visible_goes_on_with_another_number_that_nothing_links(
     assert not any(gop.merged or gop.split or gop.cuts for gop in decisions)
     assert [person["name"] for person in (await get(site, "/api/objects"))[1]["objects"]] == [None, None]
     site.service.recorder.close()
+    assert mentioned(tmp_path / "kept") == [2, 101]
+
+
+async def test_recording_goes_on_while_somebody_is_deleted(
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find, epochs = recording_deletion.RecordingDeletion.find, iter(range(EPOCHS, EPOCHS + 8))
+
+    async def find_late(
+        deletion: recording_deletion.RecordingDeletion, sessions: list[RecordingSession], numbers: set[int]
+    ) -> RecordedTraces:
+        for _ in range(4):
+            show(site, next(epochs), ann=FEET)
+        writer = site.service.recorder.writer
+        assert writer is not None
+        await asyncio.wrap_future(writer.run(lambda: None))
+        return await find(deletion, sessions, numbers)
+
+    monkeypatch.setattr(recording_deletion.RecordingDeletion, "find", find_late)
+    assert (await delete(site, object=1, recordings="delete"))[0] == 200
+    site.service.recorder.close()
+    assert len(list((tmp_path / "kept").glob("*/session.json"))) == 1
+    assert site.service.recorder.writer is not None
+    assert site.service.recorder.writer.lost == 0
     assert mentioned(tmp_path / "kept") == [2, 101]
 
 
