@@ -154,7 +154,7 @@ class ServiceReplication:
             self._follow_deletions(record)
 
     def add_deletion(self, deletion: DeletedPerson) -> None:
-        """Tell the other services of a deletion, with every record from the next on."""
+        """Send a deletion to the other services, with every record from the next on."""
         self._deletions = [*self._deletions, deletion][-DELETIONS_MAX:]
 
     def _follow_deletions(self, record: ServiceRecord) -> None:

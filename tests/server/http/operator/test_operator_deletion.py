@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ async def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator
     record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
     async with serve_with_tokens(tmp_path, record=record, zones=ZONES, rules=RULES) as served:
         service = served.service
-        service.frames = (EPOCHS + 8) * 5
+        service.frames = (EPOCHS + 16) * 5
         service.recorder.open()
         service.decision_writer = LiveDecisionWriter(
             tmp_path / "out", service.config.camera_ids, service.decider.people.letterboxes
@@ -184,7 +185,7 @@ async def test_who_is_visible_goes_on_with_another_number_that_nothing_links(
 async def test_recording_goes_on_while_somebody_is_deleted(
     site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    find, epochs = recording_deletion.RecordingDeletion.find, iter(range(EPOCHS, EPOCHS + 8))
+    find, epochs = recording_deletion.RecordingDeletion.find, iter(range(EPOCHS, EPOCHS + 16))
 
     async def find_late(
         deletion: recording_deletion.RecordingDeletion, sessions: list[RecordingSession], numbers: set[int]
@@ -197,7 +198,12 @@ async def test_recording_goes_on_while_somebody_is_deleted(
         return await find(deletion, sessions, numbers)
 
     monkeypatch.setattr(recording_deletion.RecordingDeletion, "find", find_late)
+    folder = site.service.recorder.folder
+    assert folder is not None
+    monkeypatch.setattr(folder, "_limits", replace(folder._limits, segment_s=60.0))  # none ends by itself
     assert (await delete(site, object=1, recordings="delete"))[0] == 200
+    for epoch in epochs:
+        show(site, epoch, ann=FEET)
     site.service.recorder.close()
     assert len(list((tmp_path / "kept").glob("*/session.json"))) == 1
     assert site.service.recorder.writer is not None
