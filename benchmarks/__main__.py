@@ -56,6 +56,9 @@ BENCHMARKS = (
         "one program over all cameras on a floor beside a tracker in each; 30 minutes",
         ("--scene", "wildtrack true", "--scene", "wildtrack mild", "--scene", "wildtrack strong"),
     ),
+    Benchmark(
+        "ground_plane.growth", "time of joint tracking by stage up to 16 cameras of 60 people; 4 minutes"
+    ),
     Benchmark("bestview", "identities and views beside simpler methods and ground truth; 20 minutes"),
     Benchmark(
         "operator_assist",
