@@ -46,6 +46,12 @@ class GroundCamera:
         scale = np.diag([1.0, 1.0, units_per_metre])
         return GroundCamera(scale @ self.homography, self.width, self.height)
 
+    def shifted(self, offset: Floats) -> GroundCamera:
+        """Return the camera with all places moved by an offset (2,)."""
+        move = np.eye(3)
+        move[:2, 2] = offset
+        return GroundCamera(move @ self.homography, self.width, self.height)
+
     def to_ground(self, points: Floats) -> Floats:
         """Map image points (K, 2) to the ground plane, (K, 2)."""
         mapped = _homogeneous(points) @ self.homography.T

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracking.boxes import Floats
 
@@ -57,6 +58,10 @@ class OffsetDensities:
         """
         distance = 0.5 * self.distances
         return np.asarray(distance + weight * (self.costs - distance))
+
+    def at(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> OffsetDensities:
+        """Return those (E,) of some pairs, of all pairs (K, L)."""
+        return OffsetDensities(self.distances[row, column], self.costs[row, column])
 
     @classmethod
     def of(cls, offsets: Floats, covariances: Floats) -> OffsetDensities:

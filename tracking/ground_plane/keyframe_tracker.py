@@ -22,7 +22,7 @@ from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.places.hypotheses import find_places
 from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_metre, measure
-from tracking.ground_plane.places.place_noise import PlaceNoise
+from tracking.ground_plane.places.place_errors import PlaceErrors
 from tracking.ground_plane.predicted_boxes import predict_boxes, usual_boxes
 from tracking.ground_plane.program.costs import program_costs
 from tracking.ground_plane.program.solution import solve_program
@@ -60,9 +60,9 @@ class KeyframeTracker:
         self._lag = frames_in(settings.lag_s, fps)
         self._stride = frames_in(settings.stride_s, fps)
         self._units_per_metre = units_per_metre
-        self._cameras = self._in_metres()
+        self._errors = PlaceErrors(len(cameras))
+        self._cameras = self._corrected()
         self._sizes = [BoxSizes() for _ in cameras]
-        self._noise = PlaceNoise(len(cameras))
         self._first_detected: int | None = None
         self._candidates = Candidates(self._seconds)
         self._people: list[GroundPerson] = []
@@ -83,11 +83,11 @@ class KeyframeTracker:
             )
             if self._units_per_metre is None:
                 return [GroundFrame(number, (), None)]
-            self._cameras = self._in_metres()
+            self._cameras = self._corrected()
         for sizes, part in zip(self._sizes, found, strict=True):
             if part is not None:
                 sizes.update(part.boxes)
-        measurements = measure(self._cameras, found, self._noise.factors, self._settings)
+        measurements = measure(self._cameras, found, self._errors.noise, self._settings)
         predictions = predict_places(
             self._people, self._states.tolist(), self._window, self._seconds, self._settings
         )
@@ -110,12 +110,20 @@ class KeyframeTracker:
         """
         index = dict(zip(self._names, range(len(self._names)), strict=True))[name]
         self._given = (*self._given[:index], camera, *self._given[index + 1 :])
-        self._cameras = self._in_metres()
+        self._cameras = self._corrected()
 
-    def _in_metres(self) -> tuple[GroundCamera, ...]:
-        """Return the cameras over a plane in metres; none while the unit of the plane is not known."""
+    def _corrected(self) -> tuple[GroundCamera, ...]:
+        """Return the cameras over a plane in metres, without what is known of their offsets.
+
+        There are none while the unit of the plane is not known.
+        """
         units = self._units_per_metre
-        return () if units is None else tuple(camera.scaled(units) for camera in self._given)
+        if units is None:
+            return ()
+        return tuple(
+            camera.scaled(units).shifted(-offset)
+            for camera, offset in zip(self._given, self._errors.offsets, strict=True)
+        )
 
     @property
     def _settings(self) -> GroundSettings:
@@ -211,7 +219,8 @@ class KeyframeTracker:
                 ahead = person.ahead(frame.number, self._settings)
                 found.append(_Located(person, state, ahead.place, ahead.place_covariance))
         chosen = [int(state) for state in self._states[:, 0] if state >= 0] if len(self._states) else []
-        self._noise.update(frame.places, chosen)
+        self._errors.update(frame.places, chosen)
+        self._cameras = self._corrected()
         missed = missed_costs(
             self._candidates.places, frame.places.measurements, self._cameras, self._sizes, self._settings
         )

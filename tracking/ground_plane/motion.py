@@ -1,8 +1,10 @@
-"""How people move on the plane: they walk on, or start, stop and turn.
+"""How people move on the plane: they walk on, or start, stop and turn; or only their feet seem to move.
 
 A walking person's velocity changes by a random acceleration (a Kalman filter of constant velocity). Now and
-then people do anything else: then any velocity is possible. Costs are negative log densities of the mixture
-of both, so that a turn costs more than walking on, but less than leaving and arriving again.
+then people do anything else: then any velocity is possible. And whom a single camera locates may be elsewhere
+along its line of sight, for as long as it sees the feet in the wrong place. Costs are negative log densities
+of the mixture of all three, so that a turn or a jump costs more than walking on, but less than leaving and
+arriving again.
 """
 
 from __future__ import annotations
@@ -100,6 +102,25 @@ def move_costs(walked: OffsetDensities, turned: OffsetDensities, turns: float | 
     return np.where(is_possible(walked) | is_possible(turned), -np.logaddexp(walking, turning), np.inf)
 
 
+def with_misplaced_feet(costs: Floats, jumps: OffsetDensities, probability: float | Floats) -> Floats:
+    """Return the costs of moves if feet may have begun or ended to be in the wrong place, with a probability.
+
+    `jumps`: the densities of the offsets then.
+    """
+    jumping = np.where(is_possible(jumps), np.log(probability) - jumps.costs, -np.inf)
+    return np.asarray(-np.logaddexp(-costs, jumping))
+
+
+def jump_densities(offsets: Floats, covariances: Floats, misplacements: Floats) -> OffsetDensities:
+    """Return the densities of offsets (..., 2) between places of which one at least may be wrong.
+
+    `misplacements` (..., 2, 2): covariances of the errors; where they are 0 no jump is possible.
+    """
+    jumps = OffsetDensities.of(offsets, covariances + misplacements)
+    none = np.trace(misplacements, axis1=-2, axis2=-1) == 0.0
+    return OffsetDensities(np.where(none, np.inf, jumps.distances), jumps.costs)
+
+
 def is_possible(moves: OffsetDensities) -> NDArray[np.bool_]:
     """Return which moves are not too far."""
     return np.asarray(moves.distances < _MOTION_GATE)
@@ -116,35 +137,55 @@ def may_walk(places: Floats, spreads: Floats, means: Floats, covariances: Floats
 
 
 def reach_costs(
-    state: MotionState, seconds: float | Floats, means: Floats, covariances: Floats, settings: GroundSettings
+    state: MotionState,
+    seconds: float | Floats,
+    means: Floats,
+    covariances: Floats,
+    misplacements: Floats,
+    settings: GroundSettings,
 ) -> Floats:
-    """Return the costs of people being at places (K, 2) after so many seconds, (...,), (..., K)."""
+    """Return the costs of people being at places (K, 2) after so many seconds, (...,), (..., K).
+
+    `misplacements`: (..., K, 2, 2) covariances of the errors of both places if feet are wrong.
+    """
     time = np.asarray(seconds)[..., None]
     ahead = state.predict(seconds, settings.acceleration)
     spread = (settings.speed * np.minimum(time, _MAX_TURN_S)[..., None]) ** 2 * np.eye(2)
-    near = state.place_covariance + spread
-
-    def densities(places: Floats, spreads: Floats) -> OffsetDensities:
-        return OffsetDensities.of(means - places[..., None, :], covariances + spreads[..., None, :, :])
-
-    return move_costs(
-        densities(ahead.place, ahead.place_covariance),
-        densities(state.place, near),
-        settings.turn_probability(time),
+    offsets = means - state.place[..., None, :]
+    around = covariances + (state.place_covariance + spread)[..., None, :, :]
+    walked = OffsetDensities.of(
+        means - ahead.place[..., None, :], covariances + ahead.place_covariance[..., None, :, :]
     )
+    costs = move_costs(walked, OffsetDensities.of(offsets, around), settings.turn_probability(time))
+    jumps = jump_densities(offsets, around, misplacements)
+    return with_misplaced_feet(costs, jumps, settings.misplacing_probability(time))
 
 
 def follow(
-    state: MotionState, seconds: float, place: Floats, covariance: Floats, settings: GroundSettings
+    state: MotionState,
+    seconds: float,
+    place: Floats,
+    covariance: Floats,
+    misplacement: Floats,
+    settings: GroundSettings,
 ) -> MotionState:
-    """Return the state of a person who was found at a place; after a turn the velocity is unknown again."""
+    """Return the state of a person who was found at a place.
+
+    After a turn the velocity is unknown again; so it is after a jump, and the place before says nothing.
+    `misplacement`: (2, 2) as in `reach_costs`.
+    """
     ahead = state.predict(seconds, settings.acceleration)
     spread = (settings.speed * seconds) ** 2 * np.eye(2)
+    offset, around = place - state.place, covariance + state.place_covariance + spread
     walking, turning = _log_densities(
         OffsetDensities.of(place - ahead.place, covariance + ahead.place_covariance),
-        OffsetDensities.of(place - state.place, covariance + state.place_covariance + spread),
+        OffsetDensities.of(offset, around),
         settings.turn_probability(seconds),
     )
+    jumps = jump_densities(offset, around, misplacement)
+    jumping = np.log(settings.misplacing_probability(seconds)) - jumps.costs
+    if is_possible(jumps) and jumping > max(walking, turning):
+        return MotionState.at(place, covariance, settings.speed)
     if turning > walking:
         turned = MotionState.at(state.place, _TURN_NOISE_M**2 * np.eye(2), settings.speed)
         ahead = turned.predict(seconds, settings.acceleration)

@@ -22,6 +22,7 @@ _MAX_COST = 12.0
 """A move costs at most this, so that people who are mixed up do no harm."""
 _PRIOR = 6.0
 """Log likelihood ratio by which another factor must be better than 1."""
+_NONE_MISPLACED = np.zeros((2, 2))
 _PENALTIES = np.where(_FACTORS > 1.0, _PRIOR, 0.0)
 
 
@@ -46,7 +47,9 @@ class MotionScale:
         P people, last in `states`, were found at `places` (P, 2) after so many `seconds` (P,).
         """
         found = [
-            reach_costs(states, seconds, places[:, None], covariances[:, None], settings)[:, 0]
+            reach_costs(states, seconds, places[:, None], covariances[:, None], _NONE_MISPLACED, settings)[
+                :, 0
+            ]
             for settings in self._candidates
         ]
         return np.minimum(np.stack(found, axis=1), _MAX_COST)

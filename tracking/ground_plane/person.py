@@ -26,9 +26,10 @@ class GroundPerson:
         state: place and velocity in the frame in which they were seen last.
         seen: that frame.
         boxes: their size.
+        misplacement: (2, 2) covariance of the place's error if the feet were wrong.
     """
 
-    __slots__ = ("_histograms", "_seconds", "_update_rate", "boxes", "id", "seen", "state")
+    __slots__ = ("_histograms", "_seconds", "_update_rate", "boxes", "id", "misplacement", "seen", "state")
 
     def __init__(
         self, number: int, frame: int, places: Places, k: int, seconds: float, settings: GroundSettings
@@ -38,6 +39,7 @@ class GroundPerson:
         self.seen = frame
         self.state = MotionState.at(places.means[k], places.covariances[k], settings.speed)
         self.boxes = PersonBoxes()
+        self.misplacement = places.misplacements[k]
         self._seconds = seconds
         self._update_rate = min(seconds / _TEMPLATE_MEMORY_S, 1.0)
         self._histograms: dict[int, Floats] = {}
@@ -52,10 +54,10 @@ class GroundPerson:
 
     def move(self, frame: int, places: Places, k: int, settings: GroundSettings) -> None:
         """Move to place `k` of a frame."""
-        seconds = self.seconds_unseen(frame)
+        seconds, misplacement = self.seconds_unseen(frame), places.misplacements[k]
         mean, covariance = places.means[k], places.covariances[k]
-        self.state = follow(self.state, seconds, mean, covariance, settings)
-        self.seen = frame
+        self.state = follow(self.state, seconds, mean, covariance, self.misplacement + misplacement, settings)
+        self.seen, self.misplacement = frame, misplacement
 
     def template(self, camera: int) -> Floats:
         """Return the mean histogram in a camera, (B,); B = 0: not known."""

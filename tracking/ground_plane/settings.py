@@ -57,6 +57,10 @@ class GroundSettings:
         """Return the probability that somebody starts, stops or turns within so many seconds."""
         return np.asarray(-np.expm1(-self.turn_rate * np.asarray(seconds)))
 
+    def misplacing_probability(self, seconds: float | Floats) -> Floats:
+        """Return the probability that feet begin or end to be in the wrong place within so many seconds."""
+        return np.asarray(-np.expm1(-self.misplaced_probability / self.correlation_s * np.asarray(seconds)))
+
     def detection_weight(self, seconds: float) -> float:
         """Return for how much a frame's detections and misses count beside those that err on their own.
 

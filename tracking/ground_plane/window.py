@@ -81,7 +81,8 @@ def known_people(
         ahead = states.predict(unseen + m * seconds_per_frame, settings.acceleration)
         hidden.append(weight * missed_costs(ahead.place, frame.places.measurements, cameras, sizes, settings))
     appearance = [appearance_costs(people, frame.places, settings) for frame in window]
-    return KnownPeople(states, unseen, np.stack(hidden, axis=1), appearance)
+    misplacements = np.array([person.misplacement for person in people]).reshape(-1, 2, 2)
+    return KnownPeople(states, misplacements, unseen, np.stack(hidden, axis=1), appearance)
 
 
 def missed_costs(

@@ -11,7 +11,14 @@ import numpy as np
 from tracking.boxes import BOX_SIDES
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.gaussians import OffsetDensities
-from tracking.ground_plane.motion import MotionState, is_possible, move_costs, reach_costs
+from tracking.ground_plane.motion import (
+    MotionState,
+    is_possible,
+    jump_densities,
+    move_costs,
+    reach_costs,
+    with_misplaced_feet,
+)
 from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.places.measurements import Measurements
 from tracking.ground_plane.program.costs import KnownPeople, ProgramCosts, program_costs
@@ -49,6 +56,7 @@ def random_window(seed: int, people: int, frames: int, places: int, width: float
     states = MotionState(means, deviations[:, :, None] ** 2 * np.eye(4))
     known = KnownPeople(
         states,
+        _random_misplacements(rng, people),
         rng.choice([SECONDS, 3 * SECONDS], people),
         rng.uniform(0.0, 4.0, (people, length)),
         [rng.normal(0.0, 0.5, (people, len(each))) for each in found],
@@ -56,6 +64,12 @@ def random_window(seed: int, people: int, frames: int, places: int, width: float
     arrival = float(rng.uniform(1.0, 6.0))
     first = arrival - rng.uniform(0.0, 1.0, len(found[0])) * arrival * rng.integers(0, 2)
     return Window(known, found, arrival, first)
+
+
+def _random_misplacements(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Return covariances (N, 2, 2) of errors along lines of sight, some of which are 0."""
+    along = rng.normal(0.0, 0.7, (count, 2)) * rng.integers(0, 2, (count, 1))
+    return along[:, :, None] * along[:, None, :]
 
 
 def _random_places(rng: np.random.Generator, count: int, size: np.ndarray) -> Places:
@@ -71,6 +85,7 @@ def _random_places(rng: np.random.Generator, count: int, size: np.ndarray) -> Pl
         covariances=np.tile(np.eye(2), (count, 1, 1)),
         log_odds=rng.choice([-3.0, 2.0], count),
         log_clutter=np.zeros(count),
+        misplacements=_random_misplacements(rng, count),
     )
     return Places(
         measurements,
@@ -114,12 +129,15 @@ def undivided_network(window: Window, newcomers: int) -> Network:
     for n, state in enumerate(states):
         for m, places in enumerate(frames):
             unseen = float(people.seconds[n]) + m * SECONDS
-            reach = reach_costs(state, unseen, places.means, places.covariances, SETTINGS)
+            misplacements = people.misplacements[n] + places.misplacements
+            reach = reach_costs(state, unseen, places.means, places.covariances, misplacements, SETTINGS)
             (source[n] if m == 0 else pair[n, m - 1, hidden])[: len(places)] = reach
     for m, (before, after) in enumerate(pairwise(frames)):
         offsets = after.means[None] - before.means[:, None]
         spread = before.covariances[:, None] + after.covariances[None]
-        turned = OffsetDensities.of(offsets, spread + (SETTINGS.speed * SECONDS) ** 2 * np.eye(2))
+        around = spread + (SETTINGS.speed * SECONDS) ** 2 * np.eye(2)
+        misplacements = before.misplacements[:, None] + after.misplacements[None]
+        turned, jumped = OffsetDensities.of(offsets, around), jump_densities(offsets, around, misplacements)
         possible = np.where(is_possible(turned), turned.correlated(weight), np.inf)
         pair[known:, m, hidden, : len(after)] = window.arrival_cost
         pair[known:, m, : len(before), : len(after)] = possible
@@ -129,6 +147,7 @@ def undivided_network(window: Window, newcomers: int) -> Network:
             uncertain = uncertain + (0.5 * SETTINGS.acceleration * SECONDS**2) ** 2 * np.eye(2)
             walked = OffsetDensities.of(offsets - SECONDS * ahead.velocity, spread + uncertain)
             costs = move_costs(walked, turned, SETTINGS.turn_probability(SECONDS))
+            costs = with_misplaced_feet(costs, jumped, SETTINGS.misplacing_probability(SECONDS))
             pair[n, m, : len(before), : len(after)] = costs
     conflicts = np.zeros((length, gone + 1, gone + 1), dtype=np.bool_)
     present = np.zeros((1, length, gone + 1), dtype=np.bool_)

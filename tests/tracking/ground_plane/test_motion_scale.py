@@ -12,7 +12,7 @@ from tracking.ground_plane.motion_scale import MotionScale
 
 ASSUMED = GroundSettings()
 SECONDS, NOISE_M = 0.12, 0.1
-COVARIANCE = NOISE_M**2 * np.eye(2)
+COVARIANCE, NONE = NOISE_M**2 * np.eye(2), np.zeros((2, 2))
 
 
 def walk(acceleration: float, seed: int, moves: int = 400) -> Floats:
@@ -34,7 +34,7 @@ def learned(places: Floats, scale: MotionScale | None = None) -> MotionScale:
     for place in places[1:]:
         moved = MotionState.stack([state]), np.array([SECONDS]), place[None], COVARIANCE[None]
         scale.learn(scale.move_costs(*moved)[0])
-        state = follow(state, SECONDS, place, COVARIANCE, scale.settings)
+        state = follow(state, SECONDS, place, COVARIANCE, NONE, scale.settings)
     return scale
 
 

@@ -62,6 +62,16 @@ class Places:
         return [d for d in self.groups[k] if not self.misplaced[k, d]]
 
     @cached_property
+    def misplacements(self) -> Floats:
+        """Covariances of the places' errors if the feet are wrong, (K, 2, 2) m²; 0 where cameras agree."""
+        found = np.zeros((len(self), 2, 2))
+        for k in range(len(self)):
+            locating = self.locating(k)
+            if len(locating) == 1:
+                found[k] = self.measurements.misplacements[locating[0]]
+        return found
+
+    @cached_property
     def arrival_costs(self) -> Floats:
         """The costs for somebody who is not known yet, (K,): places that nobody sees clearly gain nothing."""
         odds = self.measurements.log_odds

@@ -24,6 +24,8 @@ _NOT_COVERED, _COVERED = 0.3, 0.95
 
 In between it loses linearly more, as scores of true and false detections in pictures do.
 """
+MISPLACED_FOOT_NOISE = 0.15
+"""Standard deviation of feet that are wrong: hidden, in a shadow or cut off; box heights."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +44,8 @@ class Measurements:
         log_odds: (D,) of the scores.
         log_clutter: (D,) log of the expected false detections per m² there, less the log odds of the score,
             which counts for less within better boxes of the camera: those are parts of a person more often.
+        misplacements: (D, 2, 2) covariances of the places' errors if the feet are wrong, m²: along the line
+            of sight.
     """
 
     looked: NDArray[np.bool_]
@@ -53,6 +57,7 @@ class Measurements:
     covariances: Floats
     log_odds: Floats
     log_clutter: Floats
+    misplacements: Floats
 
     def __len__(self) -> int:
         return len(self.camera)
@@ -84,6 +89,7 @@ def measure(
         np.concatenate([part.covariances for part in parts]),
         np.concatenate([part.log_odds for part in parts]),
         np.concatenate([part.log_clutter for part in parts]),
+        np.concatenate([part.misplacements for part in parts]),
     )
 
 
@@ -95,14 +101,15 @@ class _Located:
     covariances: Floats
     log_odds: Floats
     log_clutter: Floats
+    misplacements: Floats
 
 
 def _measure_camera(
     camera: GroundCamera, found: Detections, factor: float, settings: GroundSettings
 ) -> _Located:
-    points = feet(found.boxes)
-    jacobians = camera.jacobians(points)
-    deviations = settings.foot_noise * np.maximum(heights(found.boxes), 1.0)
+    points, tall = feet(found.boxes), np.maximum(heights(found.boxes), 1.0)
+    places, jacobians = camera.to_ground(points), camera.jacobians(points)
+    deviations = settings.foot_noise * tall
     covariances = deviations[:, None, None] ** 2 * jacobians @ np.swapaxes(jacobians, 1, 2)
     covariances = factor**2 * (covariances + settings.calibration_noise**2 * np.eye(2))
     per_pixel = settings.false_per_frame / (camera.width * camera.height)
@@ -110,7 +117,10 @@ def _measure_camera(
     odds = np.clip(np.log(scores / (1.0 - scores)), _MIN_LOG_ODDS, _MAX_LOG_ODDS)
     counted = odds - settings.covered_log_odds * covered_by_better(found.boxes, odds)
     log_clutter = np.log(per_pixel) - np.log(np.abs(determinants(jacobians))) - counted
-    return _Located(camera.to_ground(points), covariances, odds, log_clutter)
+    # Feet that are hidden are lower: above them the horizon may be near.
+    hidden = np.stack([points[:, 0], points[:, 1] + MISPLACED_FOOT_NOISE * tall], axis=1)
+    nearer = camera.to_ground(hidden) - places
+    return _Located(places, covariances, odds, log_clutter, nearer[:, :, None] * nearer[:, None, :])
 
 
 def covered_by_better(boxes: Floats, log_odds: Floats) -> Floats:

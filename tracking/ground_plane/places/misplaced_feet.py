@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from tracking.boxes import Floats, heights
 from tracking.ground_plane.camera import BoxSizes, GroundCamera, feet
 from tracking.ground_plane.gaussians import LOG_2PI, determinants
-from tracking.ground_plane.places.measurements import Measurements
+from tracking.ground_plane.places.measurements import MISPLACED_FOOT_NOISE, Measurements
 from tracking.ground_plane.settings import GroundSettings
 
-_TOP_NOISE, _SIDE_NOISE, _FOOT_NOISE = 0.07, 0.05, 0.15
-"""Standard deviations of such a box's edges from the usual one's at the place, box heights. The first is that
-of how tall people are."""
+_TOP_NOISE, _SIDE_NOISE = 0.07, 0.05
+"""Standard deviations of such a box's other edges from the usual one's at the place, box heights. The first
+is that of how tall people are."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +86,7 @@ def _costs(
     deviations = np.stack(
         [
             (boxes[..., 1] - shown[..., 1]) / tall / _TOP_NOISE,
-            (boxes[..., 3] - shown[..., 3]) / tall / _FOOT_NOISE,
+            (boxes[..., 3] - shown[..., 3]) / tall / MISPLACED_FOOT_NOISE,
             (boxes[..., [0, 2]] - shown[..., [0, 2]]).mean(axis=2) / tall / _SIDE_NOISE,
         ]
     )
@@ -95,7 +95,7 @@ def _costs(
     costs = (
         0.5 * (deviations**2).sum(axis=0)
         + LOG_2PI
-        + np.log(_FOOT_NOISE * _SIDE_NOISE * tall**2 * square_metres)
+        + np.log(MISPLACED_FOOT_NOISE * _SIDE_NOISE * tall**2 * square_metres)
         + measurements.log_clutter[seen]
         - np.log(settings.misplaced_probability * settings.detection_probability)
     )

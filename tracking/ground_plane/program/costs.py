@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 
 from tracking.boxes import Floats
 from tracking.ground_plane.gaussians import OffsetDensities
-from tracking.ground_plane.motion import MotionState, is_possible, may_walk, move_costs, reach_costs
+from tracking.ground_plane.motion import (
+    MotionState,
+    is_possible,
+    jump_densities,
+    may_walk,
+    move_costs,
+    reach_costs,
+    with_misplaced_feet,
+)
 from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.settings import GroundSettings
 
@@ -32,12 +40,14 @@ class KnownPeople:
 
     Attributes:
         states: (P,) in the frame in which each was seen last.
+        misplacements: (P, 2, 2) covariances of the errors of those places if the feet were wrong.
         seconds: (P,) from that frame to the window's first one.
         hidden: (P, M) costs of being missed by all cameras in each frame.
         appearance: (P, K) costs of the places of each frame, by appearance.
     """
 
     states: MotionState
+    misplacements: Floats
     seconds: Floats
     hidden: Floats
     appearance: Sequence[Floats]
@@ -115,7 +125,12 @@ def program_costs(
     reach = []
     for m, places in enumerate(frames):
         known = reach_costs(
-            people.states, people.seconds + m * seconds, places.means, places.covariances, settings
+            people.states,
+            people.seconds + m * seconds,
+            places.means,
+            places.covariances,
+            people.misplacements[:, None] + places.misplacements,
+            settings,
         )
         arriving = first_arrival_costs if m == 0 else np.full(len(places), arrival_cost)
         reach.append(np.concatenate([known, arriving[None]]))
@@ -147,8 +162,9 @@ def _step_arcs(
     """Return the arcs from places of one frame to the next for P people, `there` (P, K), and newcomers."""
     offsets = after.means[None] - before.means[:, None]
     spread = before.covariances[:, None] + after.covariances[None]
-    anywhere = (settings.speed * seconds) ** 2 * np.eye(2)
-    turned = OffsetDensities.of(offsets, spread + anywhere)
+    around = spread + (settings.speed * seconds) ** 2 * np.eye(2)
+    turned = OffsetDensities.of(offsets, around)
+    jumped = jump_densities(offsets, around, before.misplacements[:, None] + after.misplacements[None])
     can_turn = is_possible(turned)
     new_origin, new_target = np.nonzero(can_turn)
     weight = settings.detection_weight(seconds)
@@ -161,16 +177,14 @@ def _step_arcs(
     reachable = may_walk(
         walked_to, before.covariances[place] + uncertain[row], after.means, after.covariances
     )
-    at, target = np.nonzero(reachable | can_turn[place])
+    at, target = np.nonzero(reachable | (can_turn | is_possible(jumped))[place])
     row, origin = row[at], place[at]
     walked = OffsetDensities.of(
         offsets[origin, target] - seconds * people.velocity[row], spread[origin, target] + uncertain[row]
     )
-    costs = move_costs(
-        walked,
-        OffsetDensities(turned.distances[origin, target], turned.costs[origin, target]),
-        settings.turn_probability(seconds),
-    )
+    costs = move_costs(walked, turned.at(origin, target), settings.turn_probability(seconds))
+    jumps = jumped.at(origin, target)
+    costs = with_misplaced_feet(costs, jumps, settings.misplacing_probability(seconds))
     known = MoveArcs(row, origin, target, costs).select(np.isfinite(costs))
     newcomers = np.full(len(new_origin), len(there))
     return MoveArcs(

@@ -14,7 +14,6 @@ from tracking.ground_plane.gaussians import FusedPlaces, fuse, negative_log_dens
 from tracking.ground_plane.places.agglomeration import agglomerate
 from tracking.ground_plane.places.hypotheses import find_places, group_costs
 from tracking.ground_plane.places.measurements import Measurements, covered_by_better, measure
-from tracking.ground_plane.places.place_noise import PlaceNoise
 from tracking.ground_plane.places.visibility import detection_probabilities
 
 VIEWS = floor_views()
@@ -111,23 +110,3 @@ def test_a_score_counts_for_less_within_a_better_box() -> None:
 def test_turns_are_as_frequent_at_any_frame_rate(fps: float) -> None:
     straight = (1.0 - SETTINGS.turn_probability(1.0 / fps)) ** fps
     assert straight == pytest.approx(1.0 - SETTINGS.turn_probability(1.0))
-
-
-@pytest.mark.parametrize(("deviation", "low", "high"), [(0.002, 1.0, 1.2), (0.04, 1.5, 2.5)])
-def test_the_noise_of_the_places_is_learned(deviation: float, low: float, high: float) -> None:
-    noise = PlaceNoise(3)
-    assert noise.factors.min() > 2.0, "wide, as long as nothing is known"
-    random = np.random.default_rng(1)
-    for seed in range(60):
-        people = random.uniform(2.0, 8.0, (3, 2)).tolist()
-        found = detect_walkers(np.array([people]), VIEWS, FloorNoise(deviation=deviation), seed)[0]
-        measurements = measure(CAMERAS, list(found.values()), noise.factors, SETTINGS)
-        places = find_places(measurements, [], CAMERAS, [BoxSizes()] * 3, SETTINGS, 1.0)
-        order = np.argsort(places.costs)
-        free, chosen = np.ones(len(places), dtype=bool), []
-        for k in order:
-            if free[k]:
-                chosen.append(int(k))
-                free &= ~places.conflicts[k]
-        noise.update(places, chosen)
-    assert low <= noise.factors.mean() < high

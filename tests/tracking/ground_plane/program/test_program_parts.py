@@ -113,7 +113,7 @@ def test_parts_have_nothing_in_common(window: Window) -> None:
 
 
 def test_people_far_apart_are_parts_of_their_own() -> None:
-    divided = [random_window(seed, people=3, frames=3, places=4, width=60.0) for seed in range(50)]
+    divided = [random_window(seed, people=3, frames=3, places=4, width=120.0) for seed in range(50)]
     sizes = []
     for window in divided:
         costs = window.costs()
