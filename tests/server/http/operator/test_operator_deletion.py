@@ -182,6 +182,20 @@ async def test_who_is_visible_goes_on_with_another_number_that_nothing_links(
     assert mentioned(tmp_path / "kept") == [2, 101]
 
 
+async def test_an_earlier_session_has_people_of_its_own(site: ServedSite, tmp_path: Path) -> None:
+    recorder = site.service.recorder
+    assert recorder.folder is not None
+    (session,) = recorder.folder.sessions
+    session.set_person_numbers_since(1000.0)
+    run = session.folder.name
+    assert (await plan(site, f"object=9&run={run}"))[0] == 404
+    status, planned = await plan(site, f"object=2&run={run}")
+    assert (status, planned["run"], planned["name"], planned["visible"]) == (200, run, None, False)
+    assert (await delete(site, object=2, recordings="keep", run=run))[0] == 200
+    assert mentioned(tmp_path / "kept") == [1]
+    assert 2 in [person["object"] for person in (await get(site, "/api/objects"))[1]["objects"]]
+
+
 async def test_recording_goes_on_while_somebody_is_deleted(
     site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
