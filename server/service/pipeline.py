@@ -92,7 +92,7 @@ class BestViewPipeline:
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
-        self._joint = JointWorker(config)
+        self.joint = JointWorker(config)
         self.decision_state = DecisionState(fps)
         self.assist = OperatorAssist(
             config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
@@ -152,7 +152,7 @@ class BestViewPipeline:
         """
         if self._out is not None:  # once all ports are open: a failed start leaves no files
             self.decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
-        await self._joint.start()
+        await self.joint.start()
         self.recorder.open()
         for deleted in await self.recording_deletion.complete_interrupted():
             self.replication.add_deletion(deleted)
@@ -177,7 +177,7 @@ class BestViewPipeline:
             first_pulse_timeout.cancel()
             follow.cancel()
             await asyncio.gather(follow, return_exceptions=True)
-            await self._joint.close()
+            await self.joint.close()
 
     def finish(self) -> list[GopDecision]:
         """Decide the remaining GOPs after the end of every recording."""
@@ -202,7 +202,7 @@ class BestViewPipeline:
         while (epoch := self._next_epoch()) is not None:
             if self.config.joint_cameras:
                 with self.stage_timers.tracking():
-                    epoch = await self._joint.step(epoch)
+                    epoch = await self.joint.step(epoch)
             self._step(epoch)
             await asyncio.sleep(0)
             for _ in range(_INBOX_TURNS):

@@ -135,6 +135,12 @@ class KeyframeTracker:
         """How tall people are, in the unit of the plane; None before the first detections."""
         return None if self._units_per_metre is None else PERSON_M * self._units_per_metre
 
+    @property
+    def offsets(self) -> dict[str, float]:
+        """By camera, metres by which it disagrees with the others about where people stand."""
+        lengths = np.linalg.norm(self._errors.offsets, axis=1)
+        return dict(zip(self._names, lengths.tolist(), strict=True))
+
     def provisional(self) -> list[GroundFrame]:
         """Return the frames that are not final yet, as the last solution has them.
 

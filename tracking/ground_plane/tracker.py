@@ -89,6 +89,11 @@ class GroundPlaneTracker:
         return self._keyframes.person_height
 
     @property
+    def offsets(self) -> dict[str, float]:
+        """By camera, metres by which it disagrees with the others about where people stand."""
+        return self._keyframes.offsets
+
+    @property
     def first_open(self) -> int | None:
         """The first frame that is not final; None: all are."""
         return self._first_open

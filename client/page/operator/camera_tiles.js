@@ -25,6 +25,7 @@ const ROWS = [
   ['Clock', "The pulse server's clock minus the camera's", (camera) => formatSeconds(camera.clock_offset)],
   ['Tracking', 'From a pulse to its tracks: median, worst', (camera) => formatSpread(camera.tracking_delay)],
   ['Optimal', 'Windows whose solution is proven optimal', formatOptimal],
+  ['Floor', 'How far from where the others see people it sees them; corrected', formatOffset],
   ['Missed', 'Pulses without a frame, since the start', ({ missed }) => String(missed)],
   ['Not searched', 'Frames not searched for people, since the start', ({ shed }) => String(shed)],
   ['Late', 'Windows that came after their views were decided', ({ late }) => String(late)],
@@ -140,6 +141,11 @@ function formatSeconds(seconds) {
 function formatOptimal({ optimal, solved_windows: windows }) {
   if (optimal === null) return NO_VALUE;
   return `${Math.floor(optimal * 1000) / 10} % of ${windows}`; // rounded down: 100 % only if all are
+}
+
+/** @param {CameraDiagnostics} camera */
+function formatOffset({ floor_offset: metres }) {
+  return metres === null ? NO_VALUE : `${metres.toFixed(2)} m`;
 }
 
 /** @param {PulseClients} pulses */

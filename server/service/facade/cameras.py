@@ -62,6 +62,9 @@ class CameraDiagnostics(CameraInfo, frozen=True):
     """Share of the windows whose solution is proven optimal."""
     solved_windows: int
     """The number of windows behind ``optimal``."""
+    floor_offset: float | None
+    """Metres by which it disagrees with the others about where people stand, and is corrected; null: tracked
+    alone."""
     last_error: CameraProblem | None
     """The last problem; it stays when the camera has recovered."""
     picture: ImagePlacement | None
@@ -158,6 +161,7 @@ class CameraService:
             tracking_delay=metrics.tracking_delay,
             optimal=metrics.optimal,
             solved_windows=metrics.recent_solved_windows,
+            floor_offset=self._pipeline.joint.offsets.get(camera),
             last_error=metrics.last_error,
             picture=None if metrics.size is None else self._placement(metrics.size),
         )

@@ -71,6 +71,8 @@ class JointTracks(msgspec.Struct, frozen=True, kw_only=True):
     final_to: int
     person_height: float
     """In ground units; 0: nobody was seen yet."""
+    offsets: dict[str, float]
+    """By camera, metres by which it disagrees with the others about where people stand; it is corrected."""
     paths: list[GroundPath]
     cameras: dict[str, list[TrackMessage]]
     """The boxes in each camera that overlaps another, in pixels of the site's image; ids as in `paths`."""

@@ -75,6 +75,9 @@ class JointTracker:
             last=last,
             final_to=self._final_to,
             person_height=self._tracker.person_height or 0.0,
+            offsets={
+                camera: offset for camera, offset in self._tracker.offsets.items() if camera in self._joint
+            },
             paths=_paths(final),
             cameras=cameras,
             solve=solver_report(final[-1].report if final else None),

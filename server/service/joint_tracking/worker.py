@@ -24,6 +24,8 @@ _ANSWER_S = 10.0
 """A process that takes longer for an epoch hangs: it is replaced."""
 _LATE_S, _LATE_MAX_S = 0.6, 5.0
 """Limits of the seconds after which an epoch is decided without joint tracks."""
+_DISAGREEING_M = 0.5
+"""Metres of a camera's offset from which on it should be calibrated again."""
 _LATE_FACTOR, _SLOWEST_KEPT = 2.0, 0.95
 """An answer is late that takes so many times as long as the slowest one, of which this share counts for the
 next: on a busy machine answers take longer, and nobody is to vanish there."""
@@ -43,6 +45,9 @@ class JointWorker:
         self._joint = set(self._cameras)
         """The cameras that overlap, as far as is known: all, until the process says."""
         self._logged: set[str] = set()
+        self.offsets: dict[str, float] = {}
+        """By camera, metres by which it disagrees with the others about where people stand,
+        which is corrected."""
         self._runs = count()
         self._worker: WorkerProcess[JointTracks] | None = None
         self._answer: asyncio.Task[JointTracks] | None = None
@@ -50,7 +55,7 @@ class JointWorker:
         self._least_patience_s = max(_LATE_S, config.track.cross_view_wait_s)
         self._slowest_s = 0.0
         """The slowest of the last answers, seconds."""
-        self._failures, self._late = LogThrottle(), LogThrottle()
+        self._failures, self._late, self._disagreements = LogThrottle(), LogThrottle(), LogThrottle()
         self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
         self._retry_at = 0.0
         """When to start a process at the earliest, by the loop's clock."""
@@ -83,6 +88,7 @@ class JointWorker:
             return without_tracks(epoch, self._joint)
         self._joint = self._joint - task.cameras.keys() | joint.cameras.keys()
         self._log_joint_cameras(joint.cameras)
+        self._take_offsets(joint.offsets)
         return with_joint_tracks(epoch, joint)
 
     async def _is_idle(self) -> bool:
@@ -124,6 +130,20 @@ class JointWorker:
             self._logged |= set(cameras)
             names = [camera for camera in self._cameras if camera in self._logged]
             log.info("cameras %s are tracked jointly on their common ground", ", ".join(names))
+
+    def _take_offsets(self, offsets: dict[str, float]) -> None:
+        """Log the camera that disagrees most with the others, if it does so by too much."""
+        self.offsets = offsets
+        worst = max(offsets, key=lambda camera: offsets[camera], default="")
+        if (
+            worst
+            and offsets[worst] >= _DISAGREEING_M
+            and (more := self._disagreements.record(worst)) is not None
+        ):
+            text = (
+                "camera %s sees people %.1f m from where the others see them%s: calibrate the cameras again"
+            )
+            log.warning(text, worst, offsets[worst], more)
 
     async def _replace(self, error: WorkerDiedError) -> None:
         """End the process; the next one starts at once, and later if that fails, too."""

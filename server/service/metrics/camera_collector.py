@@ -33,6 +33,12 @@ class CameraCollector(Collector):
             "Pulses come from the server; otherwise the camera counts by itself.",
             _of_status(lambda status: float(status.synchronized)),
         )
+        offsets = self._pipeline.joint.offsets
+        yield self._gauge(
+            "floor_offset_metres",
+            "Metres by which the camera disagrees with the others about where people stand.",
+            lambda camera, _: offsets.get(camera),
+        )
         yield self._gauge(
             "waiting_frames", "Frames that wait for detection.", _of_status(lambda status: status.waiting)
         )

@@ -227,6 +227,7 @@ async def test_metrics_are_served(site_with_people: ServedSite) -> None:
     site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
     site_with_people.service.ingest.tracks(tracks(camera_tracks(A, 3, {}, without_peers=[15, 17])))
     site_with_people.service.ingest.tracks(tracks(camera_tracks(B, 3, {})))
+    site_with_people.service.joint.offsets = {A: 0.12}
     site_with_people.service.decide()
     async with site_with_people.session.get("/metrics") as answer:
         lines = (await answer.text()).splitlines()
@@ -238,3 +239,4 @@ async def test_metrics_are_served(site_with_people: ServedSite) -> None:
     assert 'myview_camera_without_peers_total{camera="c0"} 2.0' in lines
     assert 'myview_camera_without_peers_total{camera="c1"} 0.0' in lines
     assert 'myview_camera_clock_offset_seconds{camera="c0"} 0.25' in lines
+    assert 'myview_camera_floor_offset_metres{camera="c0"} 0.12' in lines

@@ -15,6 +15,7 @@ from server.messaging.messages import ZenohKeys
 
 async def test_every_camera_is_listed_with_its_measurements(site_with_people: ServedSite) -> None:
     site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    site_with_people.service.joint.offsets = {A: 0.12}
     answer = (await site_with_people.get_json("/api/operator/cameras"))["cameras"]
     plain = (await site_with_people.get_json("/api/cameras"))["cameras"]
     assert [camera["camera"] for camera in answer] == [A, B]
@@ -22,6 +23,7 @@ async def test_every_camera_is_listed_with_its_measurements(site_with_people: Se
         assert diagnostics.items() >= plain_info.items()
     first = answer[0]
     assert (first["clock_offset"], answer[1]["clock_offset"]) == (0.25, None)
+    assert (first["floor_offset"], answer[1]["floor_offset"]) == (0.12, None)
     assert first["sync_error"] == {"median": 0.0, "worst": 0.0}
     assert first["picture"] == {"width": 64, "height": 48, "scale": 1.0, "left": 0.0, "top": 0.0}
     assert (first["optimal"], first["solved_windows"], first["last_error"]) == (None, 0, None)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 from fakes.service.joint_floor import joint_config, walk_past, walked_epochs
@@ -120,3 +122,42 @@ async def test_a_process_that_dies_again_and_again_is_replaced_less_often(
     for epoch in walked_epochs(walk_past()):
         assert (await worker.step(epoch)).tracks["c0"].tracks == []
     assert starts == 2, "once more at once, and then later"
+
+
+@pytest.mark.usefixtures("patient")
+async def test_a_camera_that_disagrees_with_the_others_is_corrected_and_named(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    config = joint_config()
+    cameras = [
+        {
+            "id": camera.id,
+            "source": camera.source,
+            "ground": shifted_ground(camera.ground, 1.0 if camera.id == "c0" else 0.0),
+            "ground_unit": "m",
+        }
+        for camera in config.cameras
+    ]
+    worker = JointWorker(joint_config(cameras=cameras))
+    assert worker.offsets == {}
+    try:
+        async with asyncio.timeout(PATIENCE):
+            for epoch in walked_epochs(walk_past(300)):
+                await worker.step(epoch)
+    finally:
+        await worker.close()
+    assert set(worker.offsets) == {"c0", "c1", "c2"}
+    assert max(worker.offsets, key=lambda camera: worker.offsets[camera]) == "c0"
+    assert worker.offsets["c0"] == pytest.approx(0.67, abs=0.15)
+    said = [text for text in caplog.messages if "calibrate the cameras again" in text]
+    assert len(said) == 1
+    assert said[0].startswith("camera c0 sees people 0.5 m from where the others see them")
+
+
+def shifted_ground(ground: Sequence[Sequence[float]] | None, metres: float) -> list[list[float]]:
+    """Return the homography with all places moved along x."""
+    assert ground is not None
+    move = np.eye(3)
+    move[0, 2] = metres
+    moved: list[list[float]] = (move @ np.array(ground)).tolist()
+    return moved
