@@ -22,6 +22,7 @@ SEVERITIES = {"critical", "warning", "info"}
 
 async def printed(served: ServedSite) -> ExportedMetrics:
     """Return the metrics of a site in which all of them have values."""
+    served.service.joint.offsets = dict.fromkeys(CAMERAS, 0.1)
     for camera in CAMERAS:
         served.service.ingest.status(status(camera))
         served.service.ingest.tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
