@@ -77,6 +77,17 @@ class GroundPerson:
                 self.boxes.update(measurements.boxes[index], usual[index])
 
 
+def _light_change(distances: Floats, log_odds: Floats) -> float:
+    """Return by how much a camera's picture makes everybody look different from before.
+
+    `distances` (P, D): of people's appearances to the detections of a frame, with `log_odds` (D,) of being
+    people. Most detections are of somebody known: how far they are from whom they resemble most is due to the
+    light, and says nothing about who they are.
+    """
+    clear = log_odds > 0.0
+    return float(np.median(distances.min(axis=0)[clear])) if clear.any() else 0.0
+
+
 def appearance_costs(people: Sequence[GroundPerson], places: Places, settings: GroundSettings) -> Floats:
     """Return the costs of the K places by people's appearance in the cameras that see them, (P, K)."""
     measurements = places.measurements
@@ -90,8 +101,9 @@ def appearance_costs(people: Sequence[GroundPerson], places: Places, settings: G
         known = np.flatnonzero([len(template) == looks.shape[1] > 0 for template in templates])
         if len(known):
             chosen = np.stack([templates[n] for n in known.tolist()])
-            distances = appearance_distance_matrix(chosen, looks) - settings.unknown_appearance
-            costs[np.ix_(known, seen)] = settings.appearance * distances
+            distances = appearance_distance_matrix(chosen, looks)
+            unknown = max(settings.unknown_appearance, _light_change(distances, measurements.log_odds[seen]))
+            costs[np.ix_(known, seen)] = settings.appearance * (distances - unknown)
     members = np.concatenate([np.array(group) for group in places.groups])
     begins = np.cumsum([0, *(len(group) for group in places.groups[:-1])])
     return np.asarray(np.add.reduceat(costs[:, members], begins, axis=1))

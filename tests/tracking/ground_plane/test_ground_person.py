@@ -50,19 +50,53 @@ def test_appearance_costs_are_the_sum_over_the_detections_of_a_place(seed: int, 
         person.learn(before, k, usual_boxes(before.measurements, SIZES))
     costs = appearance_costs(known, places, SETTINGS)
     assert costs.shape == (people, len(places))
-    measurements = places.measurements
     for person, row in zip(known, costs, strict=True):
         for group, cost in zip(places.groups, row, strict=True):
             expected = 0.0
             for index in group:
-                template, look = (
-                    person.template(int(measurements.camera[index])),
-                    measurements.histograms[index],
-                )
-                if len(template) and len(look):
-                    (distance,) = appearance_distance_matrix(template[None], look[None])[0]
-                    expected += SETTINGS.appearance * (distance - SETTINGS.unknown_appearance)
+                distance = look_distance(person, places, index)
+                if distance is not None:
+                    unknown = max(SETTINGS.unknown_appearance, light_change(known, places, index))
+                    expected += SETTINGS.appearance * (distance - unknown)
             assert cost == pytest.approx(expected)
+
+
+def look_distance(person: GroundPerson, places: Places, index: int) -> float | None:
+    """Return the distance of a detection's look to a person's in its camera; None: not known."""
+    measurements = places.measurements
+    template, look = person.template(int(measurements.camera[index])), measurements.histograms[index]
+    if not len(template) or not len(look):
+        return None
+    return float(appearance_distance_matrix(template[None], look[None])[0, 0])
+
+
+def light_change(known: list[GroundPerson], places: Places, index: int) -> float:
+    """Return the median distance of the detections in a camera to whom they resemble most."""
+    camera = places.measurements.camera
+    found = [
+        [look_distance(person, places, int(other)) for person in known]
+        for other in np.flatnonzero(camera == camera[index])
+    ]
+    nearest = [min(each for each in row if each is not None) for row in found]
+    return float(np.median(nearest))
+
+
+def test_a_change_of_light_makes_nobody_unlike_themselves() -> None:
+    random = np.random.default_rng(4)
+    places = places_with_looks(random, 3)
+    looks = places.measurements.histograms
+    # What was seen in some colors is then seen in others that nobody had.
+    bright = tuple(np.concatenate([each, np.zeros(len(each))]) for each in looks)
+    dark = tuple(np.concatenate([np.zeros(len(each)), each]) for each in looks)
+    before, after = (
+        replace(places, measurements=replace(places.measurements, histograms=found))
+        for found in (bright, dark)
+    )
+    known = [GroundPerson(k, 0, before, k, 0.04, SETTINGS) for k in range(3)]
+    for k, person in enumerate(known):
+        person.learn(before, k, usual_boxes(before.measurements, SIZES))
+    assert appearance_costs(known, after, SETTINGS) == pytest.approx(0.0)
+    assert (np.diag(appearance_costs(known, before, SETTINGS)[:, :3]) < 0.0).all()
 
 
 def test_nobody_and_nothing_have_no_costs() -> None:
