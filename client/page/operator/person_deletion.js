@@ -16,7 +16,10 @@ export class PersonDeletion {
   /** @type {HTMLButtonElement} */
   #button = element('delete-now');
   #state = element('delete-state');
+  /** What is shown is of this person. */
   #object = 0;
+  /** Raised with each plan, and when one is closed: what is answered to earlier requests is not shown. */
+  #newest = 0;
 
   /** @param {ShowError} showError */
   constructor(showError) {
@@ -34,15 +37,18 @@ export class PersonDeletion {
   }
 
   #close() {
+    this.#newest += 1;
     this.#confirmation.hidden = true;
     setText(this.#state, '');
   }
 
   async #plan() {
     this.#close();
+    const request = this.#newest;
     try {
       /** @type {PersonDeletionPlan} */
       const plan = await requestOperator(`deletion?object=${Number(this.#number.value)}`, 'GET', undefined, TIMEOUT_MS);
+      if (request !== this.#newest) return;
       this.#object = plan.object;
       setLines(element('delete-plan'), describe(plan));
       setText(element('delete-losses'), describeLosses(plan));
@@ -51,23 +57,27 @@ export class PersonDeletion {
       this.#button.disabled = false;
       this.showError(null);
     } catch (error) {
-      this.showError(error);
+      if (request === this.#newest) this.showError(error);
     }
   }
 
   async #delete() {
+    const object = this.#object;
+    const request = this.#newest;
     const recordings = new FormData(this.#confirmation).get('recordings');
     this.#button.disabled = true;
     setText(this.#state, 'Deleting…');
     try {
       /** @type {PersonDeletionPlan} */
-      const { state } = await requestOperator('deletion', 'POST', { object: this.#object, recordings }, TIMEOUT_MS);
-      this.#close();
-      this.#number.value = '';
-      setText(this.#state, state === 'done' ? `The data of person ${this.#object} are deleted.` : 'The deletion goes on.');
+      const { state } = await requestOperator('deletion', 'POST', { object, recordings }, TIMEOUT_MS);
+      if (request === this.#newest) {
+        this.#close();
+        this.#number.value = '';
+      }
+      setText(this.#state, state === 'done' ? `The data of person ${object} are deleted.` : 'The deletion goes on.');
       this.showError(null);
     } catch (error) {
-      this.#close();
+      if (request === this.#newest) this.#close();
       this.showError(error);
     }
   }

@@ -85,14 +85,14 @@ class RecordingDeletion:
         """Find a person's traces on the disk."""
         return await run_in_reader_thread(find_traces, sessions, numbers)
 
-    async def begin(self, deletion: Deletion) -> None:
-        """Write a deletion to the journal: from then on it will be completed.
+    async def begin(self, deletion: Deletion, before: Deletion | None = None) -> None:
+        """Write a deletion to the journal, instead of an earlier state: from then on it will be completed.
 
         Raises:
             OSError: writing fails; nothing has changed.
         """
         if self._disk is not None:
-            await run_in_reader_thread(self._disk[2].put, deletion)
+            await run_in_reader_thread(self._disk[2].put, deletion, before)
 
     async def execute(self, deletion: Deletion) -> RecordedTraces | None:
         """Delete what is recorded until now, after `begin`; return what was there, if it was not known.

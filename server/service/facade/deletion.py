@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import msgspec
@@ -154,20 +154,27 @@ class DeletionService:
     async def _begin(self, command: DeletePerson) -> tuple[PersonDeletion, Deletion]:
         """Write the deletion down, then forget the person in memory; so a crash loses neither."""
         person = self._find(command.number, command.run)
-        traces = await self._traces(command.number, person)
-        planned = self._describe(command.number, command.run, person, traces)
-        deletion = Deletion(
-            numbers=sorted(traces.numbers),
-            numbers_since=person.numbers_since,
-            sessions=list(person.sessions),
-            deletes_media=command.recordings == "delete",
-        )
-        try:
-            await self._pipeline.recording_deletion.begin(deletion)
-        except OSError as error:
-            raise BusyError(
-                f"object {command.number}: nothing is deleted: {error.strerror or error}"
-            ) from error
+        deletion: Deletion | None = None
+        while True:  # people are merged while the disk is waited for
+            traces = await self._traces(command.number, person)
+            planned = self._describe(command.number, command.run, person, traces)
+            before, deletion = (
+                deletion,
+                Deletion(
+                    numbers=sorted(traces.numbers),
+                    numbers_since=person.numbers_since,
+                    sessions=list(person.sessions),
+                    deletes_media=command.recordings == "delete",
+                ),
+            )
+            try:
+                await self._pipeline.recording_deletion.begin(deletion, before)
+            except OSError as error:
+                what = "nothing is deleted" if before is None else "deleted at the next start only"
+                raise BusyError(f"object {command.number}: {what}: {error.strerror or error}") from error
+            if not person.is_of_today or (numbers := self._with_merged(traces.numbers)) == traces.numbers:
+                break
+            person = replace(person, numbers=numbers)
         if person.is_of_today:
             self._forget(traces.numbers)
         if person.numbers_since is not None:
@@ -223,7 +230,7 @@ class DeletionService:
         log.info("a person's data were deleted on an operator's request")
 
     def _find(self, number: int, run: str | None) -> _Person:
-        registry, since = self._pipeline.decider.people.registry, _since(self._pipeline)
+        since = _since(self._pipeline)
         if run is not None:
             folder = self._pipeline.recorder.folder
             sessions = [] if folder is None else folder.sessions
@@ -233,8 +240,13 @@ class DeletionService:
             numbered = found.info.person_numbers_since
             if numbered is None or numbered != since:
                 return _Person(frozenset({number}), numbered, () if numbered else (run,), is_of_today=False)
-        current = registry.current(number)
-        return _Person(frozenset({number, current, *registry.aliases(current)}), since)
+        return _Person(self._with_merged({number}), since)
+
+    def _with_merged(self, numbers: Collection[int]) -> frozenset[int]:
+        """Return these numbers, and all that are now merged with them."""
+        registry = self._pipeline.decider.people.registry
+        current = {registry.current(number) for number in numbers}
+        return frozenset(numbers).union(current, *map(registry.aliases, current))
 
     async def _traces(self, number: int, person: _Person) -> RecordedTraces:
         deletion = self._pipeline.recording_deletion

@@ -18,7 +18,7 @@ from server.http.access.csrf import CSRF_HEADER
 from server.messaging.messages import Box
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.deletion import recording_deletion
-from server.service.deletion.journal import JOURNAL_FILE, DeletionJournal
+from server.service.deletion.journal import JOURNAL_FILE, Deletion, DeletionJournal
 from server.service.deletion.recorded_traces import RecordedTraces, find_traces
 from server.service.facade import past_search
 from server.service.past_search.search import search
@@ -233,6 +233,27 @@ async def test_merged_numbers_are_one_person(site: ServedSite, tmp_path: Path) -
     status, done = await delete(site, object=1, recordings="keep")
     assert (status, done["objects"]) == (200, [1, 2])
     assert mentioned(tmp_path / "kept") == []
+
+
+async def test_who_is_merged_while_the_disk_is_waited_for_is_deleted_everywhere(
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin, people = recording_deletion.RecordingDeletion.begin, site.service.decider.people
+
+    async def merge_and_begin(
+        deletion: recording_deletion.RecordingDeletion, begun: Deletion, before: Deletion | None = None
+    ) -> None:
+        if 2 not in people.registry.merged:
+            people.merge(1, 2)
+        await begin(deletion, begun, before)
+
+    monkeypatch.setattr(recording_deletion.RecordingDeletion, "begin", merge_and_begin)
+    status, done = await delete(site, object=2, recordings="keep")
+    told = site.service.replication._deletions
+    assert (status, done["objects"], [each.numbers for each in told]) == (200, [1, 2], [[1, 2]])
+    assert not {1, 2} & {*people.registry.all_numbers, *people.registry.merged}
+    assert mentioned(tmp_path / "kept") == []
+    assert len(json.loads((tmp_path / "kept" / JOURNAL_FILE).read_text())) == 1
 
 
 @pytest.mark.parametrize("step", ["find_traces", "remove_rows", "remove_from_session"])
