@@ -20,10 +20,14 @@ def mention(numbers: Collection[int]) -> re.Pattern[bytes]:
 
 
 def decisions_in(path: Path, pattern: re.Pattern[bytes]) -> Iterator[GopChoices]:
-    """Yield the decisions of a file that have a pattern; none of a file that is gone."""
+    """Yield the decisions of a file that have a pattern; none of a file that is gone.
+
+    Raises:
+        OSError: it cannot be read.
+    """
     try:
         data = path.read_bytes()
-    except OSError:  # deleted by retention
+    except FileNotFoundError:  # deleted by retention
         return
     if pattern.search(data) is None:
         return

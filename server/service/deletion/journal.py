@@ -38,26 +38,33 @@ class Deletion(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class DeletionJournal:
-    """The file of deletions in a folder, read once, and replaced at each change; not before the first."""
+    """The file of deletions in a folder, read once, and replaced at each change; not before the first.
+
+    One that cannot be read is not replaced: it says what is not deleted yet.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / JOURNAL_FILE
         self._deletions: list[Deletion] = []
+        self._is_read = False
 
     def read(self) -> None:
-        """Read the file.
+        """Read the file, unless it has been read.
 
         Raises:
-            OSError, ValueError: it cannot be read, or is damaged.
+            OSError: it cannot be read, or is damaged; the text says what to do.
         """
-        try:
-            data = self._path.read_bytes()
-        except FileNotFoundError:
+        if self._is_read:
             return
         try:
-            self._deletions = msgspec.json.decode(data, type=list[Deletion])
-        except DECODE_ERRORS as error:
-            raise ValueError(f"{self._path}: {error}") from error
+            self._deletions = msgspec.json.decode(self._path.read_bytes(), type=list[Deletion])
+        except FileNotFoundError:
+            pass
+        except (OSError, *DECODE_ERRORS) as error:
+            reason = (error.strerror if isinstance(error, OSError) else None) or error
+            text = f"{self._path}: cannot be read ({reason}): repair it, or move it away and delete again"
+            raise OSError(text) from error
+        self._is_read = True
 
     @property
     def pending(self) -> list[Deletion]:
@@ -77,8 +84,9 @@ class DeletionJournal:
         """Write a deletion, instead of an earlier state of it.
 
         Raises:
-            OSError: writing fails; nothing has changed.
+            OSError: writing fails, or what is there cannot be read; nothing has changed.
         """
+        self.read()
         others = [each for each in self._deletions if each is not before]
         done = [each for each in others if each.is_done][-_KEPT:]
         deletions = [*done, *(each for each in others if not each.is_done), deletion]

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from server.service.deletion.decision_rows import decisions_in, is_about, mention
-from server.service.recording.person_removal import SegmentFile
+from server.service.recording.person_removal import SegmentFile, check_in_place
+from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.segment_index import PulseRange, merge_pulse_ranges
 from server.service.recording.session_files import AUDIO
@@ -29,23 +30,12 @@ class SessionTraces:
     """Decisions that mention them."""
     visible: dict[str, list[PulseRange]] = field(default_factory=dict)
     """By camera, when it saw them, with a margin."""
-
-    @property
-    def files(self) -> set[SegmentFile]:
-        """The files of video and sound that hold these times."""
-        found = {
-            SegmentFile(camera, entry.file)
-            for camera, ranges in self.visible.items()
-            for span in ranges
-            for entry in self.session.cameras[camera].index.between(span.first, span.end)
-        }
-        sound = self.session.audio.index
-        return found | {
-            SegmentFile(AUDIO, entry.file)
-            for ranges in self.visible.values()
-            for span in ranges
-            for entry in sound.between(span.first, span.end)
-        }
+    files: frozenset[SegmentFile] = frozenset()
+    """The files of video and sound that hold these times."""
+    lost: dict[str, int] = field(default_factory=dict)
+    """Frames in these files: by camera, and of the sound (`AUDIO`)."""
+    lost_by_others: dict[int, int] = field(default_factory=dict)
+    """Frames in these files that are in the best views of other people."""
 
     @property
     def seconds(self) -> float:
@@ -65,12 +55,18 @@ class RecordedTraces:
 
 
 def find_traces(sessions: Sequence[RecordingSession], numbers: Collection[int]) -> RecordedTraces:
-    """Find a person's traces in sessions that share person numbers; blocks on the disk."""
+    """Find a person's traces in sessions that share person numbers; blocks on the disk.
+
+    Raises:
+        OSError: a file cannot be read, or a session's folder is not in its place.
+    """
     everyone = frozenset(_with_merged(sessions, numbers))
     found = [_traces(session, everyone) for session in sessions]
+    for session in sessions:
+        check_in_place(session)  # else nothing was found
     return RecordedTraces(
         everyone,
-        [traces for traces in found if traces.gops or not everyone.isdisjoint(traces.session.objects)],
+        [traces for traces in found if traces.gops or not everyone.isdisjoint(traces.session.objects.copy())],
     )
 
 
@@ -114,7 +110,29 @@ def _traces(session: RecordingSession, numbers: Collection[int]) -> SessionTrace
         ]
         for camera, spans in seen.items()
     }
+    _find_losses(traces, numbers)
     return traces
+
+
+def _find_losses(traces: SessionTraces, numbers: Collection[int]) -> None:
+    session = traces.session
+    sound = session.audio.index
+    found: set[tuple[str, int]] = set()
+    for camera, ranges in traces.visible.items():
+        for span in ranges:
+            entries = session.cameras[camera].index.between(span.first, span.end)
+            found.update((camera, entry.file) for entry in entries)
+            found.update((AUDIO, entry.file) for entry in sound.between(span.first, span.end))
+    traces.files = frozenset(SegmentFile(*file) for file in found)
+    traces.lost = {camera: _frames_in(session.cameras[camera], found) for camera in traces.visible}
+    traces.lost[AUDIO] = _frames_in(session.audio, found)
+    for number, playlist in session.objects.copy().items():  # the writer adds people
+        if number not in numbers and (frames := _frames_in(playlist, found)):
+            traces.lost_by_others[number] = frames
+
+
+def _frames_in(playlist: RecordingPlaylist, files: Collection[tuple[str, int]]) -> int:
+    return sum(entry.frames for entry in playlist.index.all if (entry.camera, entry.file) in files)
 
 
 def decision_files(session: RecordingSession) -> Iterable[Path]:

@@ -46,7 +46,7 @@ class RecordingDeletion:
         _, _, journal = self._disk
         try:
             await run_in_reader_thread(journal.read)
-        except (OSError, ValueError) as error:
+        except OSError as error:
             log.error("record.folder: interrupted deletions cannot be completed: %s", error)  # noqa: TRY400
             return []
         pending = journal.pending

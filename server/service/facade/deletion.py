@@ -20,7 +20,7 @@ from server.service.facade.errors import BusyError, ConflictError, InvalidComman
 from server.service.facade.people import PeopleService
 from server.service.facade.rules import RulesService
 from server.service.pipeline import BestViewPipeline
-from server.service.recording.person_removal import frames_in
+from server.service.recording.session_files import AUDIO
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -119,6 +119,7 @@ class DeletionService:
         Raises:
             UnknownObjectError: neither memory nor recording know the number.
             InvalidCommandError: there is no such session.
+            BusyError: the recording cannot be read.
         """
         person = self._find(number, run)
         return self._describe(number, run, person, await self._traces(number, person))
@@ -147,7 +148,7 @@ class DeletionService:
             completing.result()
         except OSError as error:
             raise BusyError(
-                f"object {command.number}: {error.strerror or error}; the rest is deleted at the next start"
+                f"object {command.number}: {_text(error)}; the rest is deleted at the next start"
             ) from error
         return msgspec.structs.replace(planned, state="done", recordings=command.recordings)
 
@@ -171,7 +172,7 @@ class DeletionService:
                 await self._pipeline.recording_deletion.begin(deletion, before)
             except OSError as error:
                 what = "nothing is deleted" if before is None else "deleted at the next start only"
-                raise BusyError(f"object {command.number}: {what}: {error.strerror or error}") from error
+                raise BusyError(f"object {command.number}: {what}: {_text(error)}") from error
             if not person.is_of_today or (numbers := self._with_merged(traces.numbers)) == traces.numbers:
                 break
             person = replace(person, numbers=numbers)
@@ -250,9 +251,11 @@ class DeletionService:
 
     async def _traces(self, number: int, person: _Person) -> RecordedTraces:
         deletion = self._pipeline.recording_deletion
-        traces = await deletion.find(
-            deletion.sessions_of(person.numbers_since, person.sessions), person.numbers
-        )
+        sessions = deletion.sessions_of(person.numbers_since, person.sessions)
+        try:
+            traces = await deletion.find(sessions, person.numbers)
+        except OSError as error:
+            raise BusyError(f"object {number}: nothing is deleted: {_text(error)}") from error
         known = self._pipeline.decider.people.registry.first_seen if person.is_of_today else {}
         if not traces.sessions and traces.numbers.isdisjoint(known):
             raise self._people.unknown(number) if person.is_of_today else UnknownObjectError(number)
@@ -276,12 +279,7 @@ class DeletionService:
             decisions=sum(each.gops for each in traces.sessions),
             seen_s=_round(sum(each.seconds for each in traces.sessions)),
             cameras=_camera_losses(traces),
-            sound_s=_round(
-                sum(
-                    frames_in(each.session.audio, each.files) / each.session.info.fps
-                    for each in traces.sessions
-                )
-            ),
+            sound_s=_round(sum(each.lost[AUDIO] / each.session.info.fps for each in traces.sessions)),
             others=_other_losses(traces, run if not person.is_of_today else None, names),
             mentions=self._mentions(traces.numbers, name) if person.is_of_today else [],
         )
@@ -308,6 +306,12 @@ def _since(pipeline: BestViewPipeline) -> float | None:
     return pipeline.state_replication.numbers_since or None
 
 
+def _text(error: OSError) -> str:
+    """Return what failed, and where."""
+    where = "" if error.filename is None else f"{error.filename}: "
+    return f"{where}{error.strerror or error}"
+
+
 def _camera_losses(traces: RecordedTraces) -> list[CameraLoss]:
     seen: dict[str, float] = {}
     deleted: dict[str, float] = {}
@@ -315,17 +319,15 @@ def _camera_losses(traces: RecordedTraces) -> list[CameraLoss]:
         fps = each.session.info.fps
         for camera, spans in each.visible.items():
             seen[camera] = seen.get(camera, 0.0) + sum(span.end - span.first for span in spans) / fps
-            files = [file for file in each.files if file.camera == camera]
-            deleted[camera] = deleted.get(camera, 0.0) + frames_in(each.session.cameras[camera], files) / fps
+            deleted[camera] = deleted.get(camera, 0.0) + each.lost[camera] / fps
     return [CameraLoss(camera, _round(seen[camera]), _round(deleted[camera])) for camera in sorted(seen)]
 
 
 def _other_losses(traces: RecordedTraces, run: str | None, names: Mapping[int, str]) -> list[OtherLoss]:
     lost: dict[int, float] = {}
     for each in traces.sessions:
-        for number, playlist in each.session.objects.items():
-            if number not in traces.numbers and (frames := frames_in(playlist, each.files)):
-                lost[number] = lost.get(number, 0.0) + frames / each.session.info.fps
+        for number, frames in each.lost_by_others.items():
+            lost[number] = lost.get(number, 0.0) + frames / each.session.info.fps
     return [
         OtherLoss(number, run, names.get(number), _round(seconds)) for number, seconds in sorted(lost.items())
     ]

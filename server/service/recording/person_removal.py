@@ -30,8 +30,9 @@ def remove_from_session(
     Repeating it is harmless.
 
     Raises:
-        OSError: a file cannot be deleted.
+        OSError: a file cannot be deleted, or the folder is not in its place.
     """
+    check_in_place(session)
     gone = {(file.camera, file.first) for file in files}
     for playlist in _playlists(session):
         playlist.drop_files(gone)
@@ -53,10 +54,16 @@ def path_of(session: RecordingSession, file: SegmentFile) -> Path:
     return session.paths.camera_file(file.camera, file.first)
 
 
-def frames_in(playlist: RecordingPlaylist, files: Collection[SegmentFile]) -> int:
-    """Return how many frames of a playlist are in some files."""
-    gone = {(file.camera, file.first) for file in files}
-    return sum(entry.frames for entry in playlist.index.all if (entry.camera, entry.file) in gone)
+def check_in_place(session: RecordingSession) -> None:
+    """Check that a session's folder is still the same one: files may be missing for no other reason.
+
+    Raises:
+        FileNotFoundError: it is not; the text says what to do.
+    """
+    if not session.is_in_place:
+        raise FileNotFoundError(
+            f"{session.folder}: not there any more: mount its disk, or restart without it"
+        )
 
 
 def _playlists(session: RecordingSession) -> list[RecordingPlaylist]:

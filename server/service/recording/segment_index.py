@@ -103,7 +103,8 @@ class SegmentIndex:
         """Return the entries that hold any of the pulses ``start … end - 1``, in order."""
         with self._lock:
             place = bisect_right(self._entries, start, key=lambda entry: entry.end)
-            return [entry for entry in self._entries[place:] if entry.first < end]
+            after = bisect_left(self._entries, end, lo=place, key=lambda entry: entry.first)
+            return self._entries[place:after]
 
     @property
     def all(self) -> tuple[IndexEntry, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from server.service.facade import past_search
 from server.service.past_search.search import search
 from server.service.past_search.worker import SearchResult, SearchTask
 from server.service.recording.recording_session import RecordingSession
+from server.service.recording.segment_index import IndexEntry, SegmentIndex
 
 DELETION = "/api/operator/deletion"
 A, B = CAMERAS
@@ -273,7 +275,7 @@ async def test_a_deletion_that_was_interrupted_is_completed_at_the_next_start(
         broken.setattr(recording_deletion, step, fail)
         status, error = await delete(site, object=1, recordings="delete")
     assert status == 503
-    assert error["error"] == "object 1: Input/output error; the rest is deleted at the next start"
+    assert error["error"] == "object 1: disk: Input/output error; the rest is deleted at the next start"
     kept = tmp_path / "kept"
     files = set(kept.rglob("cameras/*/*.mp4"))
     later = recording_deletion.RecordingDeletion(site.service.recorder)  # as after a start
@@ -302,13 +304,80 @@ async def test_what_cannot_be_written_down_is_not_begun(
     assert (await get(site, "/api/operator/people"))[1]["names"] == {"1": "Ann"}
 
 
-async def test_a_damaged_journal_is_one_line_in_the_log(
+async def test_a_damaged_journal_is_one_line_and_nothing_is_deleted_until_it_is_mended(
     site: ServedSite, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    (tmp_path / "kept" / JOURNAL_FILE).write_text("[{]")
+    journal = tmp_path / "kept" / JOURNAL_FILE
+    journal.write_text("[{]")
     assert await site.service.recording_deletion.complete_interrupted() == []
     assert "interrupted deletions cannot be completed: " in caplog.text
     assert "Traceback" not in caplog.text
+    before = list(texts(tmp_path))
+    status, error = await delete(site, object=1, recordings="keep")
+    assert status == 503
+    assert error["error"].startswith(f"object 1: nothing is deleted: {journal}: cannot be read (")
+    assert error["error"].endswith("): repair it, or move it away and delete again")
+    assert journal.read_text() == "[{]"
+    assert list(texts(tmp_path)) == before
+    journal.rename(tmp_path / "moved")
+    assert (await delete(site, object=1, recordings="keep"))[0] == 200
+
+
+async def test_a_disk_that_is_gone_completes_no_deletion(
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remove = recording_deletion.remove_rows
+    (folder,) = [path.parent for path in (tmp_path / "kept").glob("*/session.json")]
+    away = tmp_path / "away"
+
+    def unmount(path: Path, numbers: frozenset[int]) -> None:
+        if folder.exists():
+            folder.rename(away)
+        remove(path, numbers)
+
+    with monkeypatch.context() as unmounted:
+        unmounted.setattr(recording_deletion, "remove_rows", unmount)
+        status, error = await delete(site, object=1, recordings="keep")
+    text = f"object 1: {folder}: not there: mount its disk, or restart without it"
+    assert (status, error["error"]) == (503, f"{text}; the rest is deleted at the next start")
+    assert (await plan(site, "object=2"))[0] == 503
+    away.rename(folder)
+    later = recording_deletion.RecordingDeletion(site.service.recorder)
+    assert [each.numbers for each in await later.complete_interrupted()] == [[1]]
+    assert mentioned(tmp_path / "kept") == [2]
+
+
+async def test_decisions_that_cannot_be_read_are_one_clear_error(
+    site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = next((tmp_path / "kept").glob("*/index/*.jsonl"))
+    read = Path.read_bytes
+
+    def fail(file: Path) -> bytes:
+        if file == path:
+            raise OSError(5, "Input/output error", str(file))
+        return read(file)
+
+    monkeypatch.setattr(Path, "read_bytes", fail)
+    error = {"error": f"object 1: nothing is deleted: {path}: Input/output error"}
+    assert await plan(site, "object=1") == (503, error)
+    assert await delete(site, object=1, recordings="keep") == (503, error)
+    assert not (tmp_path / "kept" / JOURNAL_FILE).exists()
+
+
+async def test_a_plan_reads_the_index_in_a_reader_thread(
+    site: ServedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads: set[str] = set()
+    between = SegmentIndex.between
+
+    def noted(index: SegmentIndex, start: int, end: int) -> list[IndexEntry]:
+        threads.add(threading.current_thread().name.partition("_")[0])
+        return between(index, start, end)
+
+    monkeypatch.setattr(SegmentIndex, "between", noted)
+    assert (await plan(site, "object=1"))[0] == 200
+    assert threads == {"recording-reader"}
 
 
 async def test_two_deletions_at_once_are_one(site: ServedSite) -> None:
