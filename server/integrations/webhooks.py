@@ -79,6 +79,8 @@ class Webhook:
     def __init__(self, settings: WebhookSettings, url: str | None, first_s: float = _FIRST_S) -> None:
         self._settings, self._url, self._first_s = settings, url, first_s
         self._waiting: deque[PicturedEvent] = deque(maxlen=_QUEUE_MAX)
+        self._current: PicturedEvent | None = None
+        """The event that is being posted; None: there is none, or it is not to be posted any more."""
         self._has_waiting = asyncio.Event()
         self._failures, self._losses = LogThrottle(), LogThrottle()
         self._where = f"webhook {redact_to_host(settings.url)}"
@@ -96,6 +98,7 @@ class Webhook:
         """Remove people from events that wait, and events about nobody else."""
         kept = (event_without(event, numbers) for event in self._waiting)
         self._waiting = deque((event for event in kept if event is not None), maxlen=_QUEUE_MAX)
+        self._current = self._current and event_without(self._current, numbers)
 
     async def run(self) -> None:
         """Post events as they come."""
@@ -103,11 +106,12 @@ class Webhook:
             while True:
                 await self._has_waiting.wait()
                 while self._waiting:
-                    await self._deliver(session, self._waiting.popleft())
+                    self._current = self._waiting.popleft()
+                    await self._deliver(session, self._current.record.id)
                 self._has_waiting.clear()
 
-    async def _deliver(self, session: aiohttp.ClientSession, event: PicturedEvent) -> None:
-        """Post one event until it is taken, or given up."""
+    async def _deliver(self, session: aiohttp.ClientSession, event_id: str) -> None:
+        """Post the current event until it is taken, or given up."""
         attempts = AsyncRetrying(
             stop=stop_after_attempt(_ATTEMPTS),
             wait=wait_exponential(multiplier=self._first_s, max=_MAX_S) + wait_random(0.0, self._first_s),
@@ -116,9 +120,10 @@ class Webhook:
         try:
             async for attempt in attempts:
                 with attempt:
-                    await self._post(session, event)
+                    if self._current is not None:
+                        await self._post(session, self._current)
         except RetryError:
-            log.warning("%s: event %s was not taken, and is given up", self._where, event.record.id)
+            log.warning("%s: event %s was not taken, and is given up", self._where, event_id)
 
     async def _post(self, session: aiohttp.ClientSession, event: PicturedEvent) -> None:
         body = encode_event(event, self._url, with_picture=self._settings.pictures)

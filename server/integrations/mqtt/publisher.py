@@ -7,7 +7,7 @@ import contextlib
 import logging
 import ssl
 from collections import deque
-from collections.abc import AsyncIterator, Collection, Mapping
+from collections.abc import AsyncIterator, Collection, Iterator, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -184,20 +184,23 @@ class MqttPublisher:
             await self._has_events.wait()
             while self._events:
                 event = self._events[0]
-                await self._publish_event(client, event)
+                for topic, payload in self._event_messages(event):
+                    await client.publish(topic, payload, _QOS)
+                    if not self._events or self._events[0] is not event:
+                        break  # somebody of it was deleted, or too many wait
                 if self._events and self._events[0] is event:
                     self._events.popleft()
             self._has_events.clear()
 
-    async def _publish_event(self, client: aiomqtt.Client, event: PicturedEvent) -> None:
+    def _event_messages(self, event: PicturedEvent) -> Iterator[tuple[str, bytes]]:
         record = event.record
         content = self._with_addresses(msgspec.to_builtins(record))
-        await client.publish(self._topics.events, msgspec.json.encode(content), _QOS)
+        yield self._topics.events, msgspec.json.encode(content)
         if event.jpeg is not None:
-            await client.publish(self._topics.rule_picture(record.rule), event.jpeg, _QOS)
+            yield self._topics.rule_picture(record.rule), event.jpeg
         if record.phase == "once":
             content = {"event_type": record.direction or record.kind, **content}
-            await client.publish(self._topics.rule_event(record.rule), msgspec.json.encode(content), _QOS)
+            yield self._topics.rule_event(record.rule), msgspec.json.encode(content)
 
     async def _publish_pictures(self, client: aiomqtt.Client) -> None:
         while not self._is_ending:

@@ -101,6 +101,9 @@ class ServiceReplication:
         self.bad_messages = 0
         """Records and states that could not be parsed."""
         self._deletions: list[DeletedPerson] = []
+        """The newest, which are sent."""
+        self._deleted: set[tuple[float, int, bool]] = set()
+        """All: since when numbers are, a number of these, and whether its media are deleted."""
         self.on_deletion: list[Callable[[DeletedPerson], None]] = []
         """Called with each deletion of another service."""
         self._changed = asyncio.Event()
@@ -156,10 +159,13 @@ class ServiceReplication:
     def add_deletion(self, deletion: DeletedPerson) -> None:
         """Send a deletion to the other services, with every record from the next on."""
         self._deletions = [*self._deletions, deletion][-DELETIONS_MAX:]
+        self._deleted |= _deleted_numbers(deletion)
+        if deletion.deletes_media:  # one without is done by it
+            self._deleted |= _deleted_numbers(msgspec.structs.replace(deletion, deletes_media=False))
 
     def _follow_deletions(self, record: ServiceRecord) -> None:
         for deletion in record.deletions:
-            if deletion not in self._deletions:
+            if not _deleted_numbers(deletion) <= self._deleted:
                 self.add_deletion(deletion)
                 for callback in self.on_deletion:
                     callback(deletion)
@@ -280,6 +286,10 @@ class ServiceReplication:
 
     def _on_service(self) -> None:
         self._changed.set()
+
+
+def _deleted_numbers(deletion: DeletedPerson) -> set[tuple[float, int, bool]]:
+    return {(deletion.numbers_since, number, deletion.deletes_media) for number in deletion.numbers}
 
 
 def _next_number(record: ServiceRecord) -> int:

@@ -185,6 +185,37 @@ def test_a_deleted_person_is_in_no_event_that_waits() -> None:
     assert (left.record.picture, left.record.clip, left.record.camera, left.jpeg) == (None, None, None, None)
 
 
+async def test_a_deleted_person_is_in_no_event_that_is_tried_again(receiver: Receiver) -> None:
+    alone = event(1)
+    both = msgspec.structs.replace(alone.record, id="19abc-110-2", objects=[3, 5], names=["Ann", None])
+    async with posting(WebhookSettings(url=receiver.url)) as webhook:
+
+        def refuse_first_of_each(count: int) -> web.Response:
+            if count == 2:
+                webhook.put_event(PicturedEvent(both, alone.jpeg))
+            if count in {1, 3}:
+                webhook.forget([4] if count == 1 else [3])
+            return web.Response(status=204 if count in {2, 4} else 503)
+
+        receiver.answer = refuse_first_of_each
+        webhook.put_event(alone)
+        await receiver.until(4)
+
+        def refuse(_: int) -> web.Response:
+            webhook.forget([3])
+            return web.Response(status=503)
+
+        receiver.answer = refuse
+        webhook.put_event(alone)
+        await receiver.until(5)
+        receiver.answer = lambda _: web.Response()
+        left = msgspec.structs.replace(both, id="19abc-110-3", objects=[5], names=[None])
+        webhook.put_event(PicturedEvent(left, None))
+        await receiver.until(6)
+    sent = [(json.loads(body)["data"]["objects"], b"picture_data" in body) for body in receiver.bodies]
+    assert sent == [([3], True), ([3], True), ([3, 5], True), ([5], False), ([3], True), ([5], False)]
+
+
 async def test_waiting_events_are_bounded_and_the_oldest_are_lost(caplog: pytest.LogCaptureFixture) -> None:
     webhook = Webhook(WebhookSettings(url="http://127.0.0.1:9/hook"), None)
     for number in range(150):

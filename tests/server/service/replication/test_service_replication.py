@@ -211,6 +211,24 @@ async def test_a_person_deleted_on_one_service_is_deleted_on_all(services: Servi
     assert ann not in later.decider.people.registry.all_numbers
 
 
+async def test_each_of_many_deletions_is_followed_once(services: Services) -> None:
+    followed: list[tuple[int, int]] = []
+    for index in (0, 1):
+        services.start(index).replication.on_deletion.append(
+            lambda deletion, index=index: followed.append((index, *deletion.numbers))
+        )
+    services.feed(range(10), {A: {1: SMALL}})
+    for turn in range(3):
+        for index in (0, 1):
+            for number in range(1000, 1030):
+                deletion = DeletedPerson(
+                    numbers=[number + 100 * turn + 1000 * index], numbers_since=1.0, deletes_media=False
+                )
+                services.running[index].replication.add_deletion(deletion)
+        services.feed(range(10 + 40 * turn, 50 + 40 * turn), {A: {1: SMALL}})
+    assert len(followed) == len(set(followed)) == 2 * 3 * 30
+
+
 async def test_the_service_that_has_decided_every_epoch_for_longest_leads(services: Services) -> None:
     services.start(0)
     services.feed(range(10), {A: {1: SMALL}})
