@@ -18,7 +18,7 @@ from fakes.service.scripted_cameras import CAMERAS, FPS, LARGE
 from server.http.access.csrf import CSRF_HEADER
 from server.messaging.messages import Box
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
-from server.service.deletion import recording_deletion
+from server.service.deletion import decision_rows, recording_deletion
 from server.service.deletion.journal import JOURNAL_FILE, Deletion, DeletionJournal
 from server.service.deletion.recorded_traces import RecordedTraces, find_traces
 from server.service.facade import past_search
@@ -326,7 +326,7 @@ async def test_a_damaged_journal_is_one_line_and_nothing_is_deleted_until_it_is_
 async def test_a_disk_that_is_gone_completes_no_deletion(
     site: ServedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    remove = recording_deletion.remove_rows
+    remove = decision_rows.remove_rows
     (folder,) = [path.parent for path in (tmp_path / "kept").glob("*/session.json")]
     away = tmp_path / "away"
 
@@ -338,7 +338,7 @@ async def test_a_disk_that_is_gone_completes_no_deletion(
     with monkeypatch.context() as unmounted:
         unmounted.setattr(recording_deletion, "remove_rows", unmount)
         status, error = await delete(site, object=1, recordings="keep")
-    text = f"object 1: {folder}: not there: mount its disk, or restart without it"
+    text = f"object 1: {folder}: not there any more: mount its disk, or restart without it"
     assert (status, error["error"]) == (503, f"{text}; the rest is deleted at the next start")
     assert (await plan(site, "object=2"))[0] == 503
     away.rename(folder)
