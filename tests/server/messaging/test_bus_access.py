@@ -178,7 +178,14 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
     ) as (bestview, c1, *unknown_clients):
         bestview.subscribe(SITE.camera("*", "*"), received)
         alive: list[str] = []
-        bestview.watch_alive(SITE.camera("*", "alive"), lambda key, _: alive.append(key))
+        is_known = asyncio.Event()
+
+        def note(key: str, _: bool) -> None:
+            alive.append(key)
+            if key == SITE.camera("c1", "alive"):
+                is_known.set()
+
+        bestview.watch_alive(SITE.camera("*", "alive"), note)
         for client in unknown_clients:
             client.subscribe("**", received_by_other)
             client.declare_alive(SITE.camera("c0", "alive"))
@@ -188,6 +195,7 @@ async def test_clients_without_a_user_can_neither_publish_nor_subscribe(
                 f"c1/video {number}", partial(_publish_from_all, [*unknown_clients, c1], number)
             )
         assert not [text for text in received.texts if text.startswith("c0")]
+        await is_known.wait()
         assert alive == [SITE.camera("c1", "alive")]
         assert not [
             text for text in received_by_other.texts if text.startswith("c1")
