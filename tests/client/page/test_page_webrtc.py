@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import aclosing, suppress
+from itertools import count
 
 import pytest
 import pytest_asyncio
@@ -24,11 +25,11 @@ async def browser() -> AsyncIterator[Browser]:
         yield running
 
 
-async def feed_until_shown(served: ServedSite, page: Page) -> None:
-    """Send GOPs until the page shows one, as cameras do: what is sent before it listens is lost."""
+async def feed_until_shown(served: ServedSite, page: Page, epochs: Iterator[int]) -> None:
+    """Send further GOPs until the page shows one, as cameras do: what is sent before it listens is lost."""
     shown = f"video.videoWidth === {WIDTH}"
     while not await page.evaluate(shown):
-        served.service.feed(1, {A: {1: LARGE}, B: {1: SMALL}})
+        served.service.feed(next(epochs), {A: {1: LARGE}, B: {1: SMALL}})
         with suppress(Error):
             await page.wait_for_function(shown, timeout=500)
 
@@ -36,14 +37,16 @@ async def feed_until_shown(served: ServedSite, page: Page) -> None:
 async def test_a_person_and_a_held_camera_are_played_by_webrtc(browser: Browser) -> None:
     async with aclosing(serve_site(patience=200)) as sites:
         served = await anext(sites)
+        served.service.frames = 1000
         show_people(served)
+        epochs = count(3)
         page = await new_page(browser, viewport={"width": 900, "height": 700}, bypass_csp=True)
         address = f"http://127.0.0.1:{served.port}/?object=1&transport=webrtc"
         for path, more in (("objects/1", ""), (f"cameras/{A}", f"&camera={A}")):
             async with page.expect_response(f"**/{path}/whep") as begun:
                 await page.goto(address + more)
             assert (await begun.value).status == 201
-            await feed_until_shown(served, page)
+            await feed_until_shown(served, page, epochs)
         async with page.expect_request(lambda request: request.method == "DELETE") as ended:
             await page.get_by_role("button", name="Automatic").click()
         assert f"/cameras/{A}/whep/" in (await ended.value).url
