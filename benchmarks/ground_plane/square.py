@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from synthetic.cameras.pinhole import PinholeCamera, Viewpoint
 from tracking import Detections
 from tracking.boxes import Floats, areas, intersections
 from tracking.ground_plane import GroundCamera
 
 FPS = 10.0
-_WIDTH, _HEIGHT, _FOCAL = 1280.0, 720.0, 640.0
+_WIDTH, _HEIGHT, _FIELD_OF_VIEW = 1280, 720, 90.0
 _SIDE = 24.0
 """Meters."""
 _EYE, _DISTANCE = 5.0, 16.0
@@ -38,25 +40,18 @@ class SimulatedSquare:
     def views(self) -> dict[str, GroundCamera]:
         """The cameras by name, over the floor in meters."""
         return {
-            f"c{index:02d}": GroundCamera(
-                np.linalg.inv(projection[:, [0, 1, 3]]).astype(np.float64), _WIDTH, _HEIGHT
-            )
-            for index, projection in enumerate(self._projections)
+            name: GroundCamera(camera.homography(), float(_WIDTH), float(_HEIGHT))
+            for name, camera in self._cameras.items()
         }
 
     @cached_property
-    def _projections(self) -> list[Floats]:
-        """Of points in space to the picture, (3, 4)."""
-        intrinsic = np.array([[_FOCAL, 0.0, _WIDTH / 2], [0.0, _FOCAL, _HEIGHT / 2], [0.0, 0.0, 1.0]])
-        found = []
-        for angle in 2 * np.pi * np.arange(self.cameras) / self.cameras:
-            position = np.array([*(_SIDE / 2 + _DISTANCE * np.array([np.cos(angle), np.sin(angle)])), _EYE])
-            forward = np.array([_SIDE / 2, _SIDE / 2, 0.0]) - position
-            forward /= np.linalg.norm(forward)
-            right = np.cross(forward, [0.0, 0.0, 1.0])
-            right /= np.linalg.norm(right)
-            rotation = np.stack([right, np.cross(forward, right), forward])
-            found.append(intrinsic @ np.concatenate([rotation, -(rotation @ position)[:, None]], axis=1))
+    def _cameras(self) -> dict[str, PinholeCamera]:
+        middle, found = _SIDE / 2, {}
+        for index in range(self.cameras):
+            angle = 2 * math.pi * index / self.cameras
+            position = (middle + _DISTANCE * math.cos(angle), middle + _DISTANCE * math.sin(angle), _EYE)
+            view = Viewpoint(position, (middle, middle, 0.0), _FIELD_OF_VIEW)
+            found[f"c{index:02d}"] = PinholeCamera.at(view, _WIDTH, _HEIGHT)
         return found
 
     def frames(self, count: int) -> Iterator[Mapping[str, Detections]]:
@@ -70,15 +65,12 @@ class SimulatedSquare:
             places = places + np.minimum(_PACE / FPS / np.maximum(distances, 1e-9), 1.0) * ahead
             arrived = distances[:, 0] < 2.0 * _PACE / FPS
             targets[arrived] = random.uniform(0.0, _SIDE, (int(arrived.sum()), 2))
-            yield {
-                name: _detect(projection, places, looks, random)
-                for name, projection in zip(self.views, self._projections, strict=True)
-            }
+            yield {name: _detect(camera, places, looks, random) for name, camera in self._cameras.items()}
 
 
-def _detect(projection: Floats, places: Floats, looks: Floats, random: np.random.Generator) -> Detections:
+def _detect(camera: PinholeCamera, places: Floats, looks: Floats, random: np.random.Generator) -> Detections:
     """Return the detections of a picture."""
-    boxes = _boxes(projection, places)
+    boxes = _boxes(camera, places)
     nearer = boxes[None, :, 3] > boxes[:, None, 3]
     shares = intersections(boxes[:, None], boxes[None]) / areas(boxes)[:, None]
     inside = (boxes[:, 0] > 0.0) & (boxes[:, 2] < _WIDTH) & (boxes[:, 3] < _HEIGHT)
@@ -86,7 +78,7 @@ def _detect(projection: Floats, places: Floats, looks: Floats, random: np.random
     seen &= random.random(len(boxes)) >= _MISSED
     tall = (boxes[seen, 3] - boxes[seen, 1])[:, None]
     found = boxes[seen] + _NOISE * tall * random.standard_normal((int(seen.sum()), 4))
-    false = _boxes(projection, random.uniform(0.0, _SIDE, (random.poisson(_FALSE), 2)))
+    false = _boxes(camera, random.uniform(0.0, _SIDE, (random.poisson(_FALSE), 2)))
     histograms = [random.dirichlet(_CONCENTRATION * look + 1e-3) for look in looks[seen]]
     histograms += [random.dirichlet(np.ones(_BINS)) for _ in false]
     return Detections(
@@ -96,13 +88,11 @@ def _detect(projection: Floats, places: Floats, looks: Floats, random: np.random
     )
 
 
-def _boxes(projection: Floats, places: Floats) -> Floats:
+def _boxes(camera: PinholeCamera, places: Floats) -> Floats:
     """Return the boxes of people at places (N, 2), (N, 4)."""
-    ones = np.ones((len(places), 1))
     feet, heads = (
-        np.concatenate([places, height * ones, ones], axis=1) @ projection.T for height in (0.0, _TALL)
+        camera.project(np.column_stack([places, np.full(len(places), height)]))[0] for height in (0.0, _TALL)
     )
-    x, bottom = feet[:, 0] / feet[:, 2], feet[:, 1] / feet[:, 2]
-    top = heads[:, 1] / heads[:, 2]
+    x, bottom, top = feet[:, 0], feet[:, 1], heads[:, 1]
     half = _ASPECT * (bottom - top) / 2.0
     return np.stack([x - half, top, x + half, bottom], axis=1)

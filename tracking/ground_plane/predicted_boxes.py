@@ -64,5 +64,6 @@ def predict_boxes(
         left, top, right, bottom = size.boxes(camera.to_image(places)).T
         half, middle = width * (right - left) / 2.0, (left + right) / 2.0
         found = np.stack([middle - half, bottom - height * (bottom - top), middle + half, bottom], axis=1)
-        boxes[in_picture(found, camera), index] = found[in_picture(found, camera)]
+        seen = in_picture(found, camera)
+        boxes[seen, index] = found[seen]
     return boxes

@@ -6,7 +6,7 @@ import msgspec
 
 from server.service.facade.calibration import WalkStatus
 from server.service.facade.cameras import CameraDiagnostics, Floor
-from server.service.facade.deletion import PersonDeletion
+from server.service.facade.deletion_plan import PersonDeletion
 from server.service.facade.operations import PulseClients
 
 

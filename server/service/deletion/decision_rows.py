@@ -25,18 +25,21 @@ def decisions_in(path: Path, pattern: re.Pattern[bytes]) -> Iterator[GopChoices]
     Raises:
         OSError: it cannot be read.
     """
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:  # deleted by retention
-        return
-    if pattern.search(data) is None:
-        return
-    for line in data.splitlines():
+    for line in _lines(path, pattern):
         if pattern.search(line) is not None:
             try:
                 yield _DECODER.decode(line)
             except DECODE_ERRORS:  # an incomplete line
                 continue
+
+
+def _lines(path: Path, pattern: re.Pattern[bytes]) -> list[bytes]:
+    """Return the lines of a file with their ends; none if the pattern is in none, or the file is gone."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:  # deleted by retention
+        return []
+    return [] if pattern.search(data) is None else data.splitlines(keepends=True)
 
 
 def remove_rows(path: Path, numbers: Collection[int]) -> None:
@@ -46,16 +49,11 @@ def remove_rows(path: Path, numbers: Collection[int]) -> None:
         OSError: the file cannot be replaced; it is unchanged.
     """
     pattern = mention(numbers)
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:  # deleted by retention
-        return
-    if pattern.search(data) is None:
-        return
     lines = [
-        line if pattern.search(line) is None else _without(line, numbers)
-        for line in data.splitlines(keepends=True)
+        line if pattern.search(line) is None else _without(line, numbers) for line in _lines(path, pattern)
     ]
+    if not lines:
+        return
     draft = path.with_suffix(".new")
     write_private(draft, b"".join(lines))
     if path.exists():

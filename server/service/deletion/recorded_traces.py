@@ -75,7 +75,7 @@ def _with_merged(sessions: Sequence[RecordingSession], numbers: Collection[int])
     merges = [
         {merge.kept, merge.lost}
         for session in sessions
-        for path in decision_files(session)
+        for path in all_decision_files(session)
         for choices in decisions_in(path, _HAS_MERGE)
         for merge in choices.merged
     ]
@@ -92,7 +92,7 @@ def _traces(session: RecordingSession, numbers: Collection[int]) -> SessionTrace
     traces, pattern, fps = SessionTraces(session), mention(numbers), session.info.fps
     margin, gap = round(MARGIN_S * fps), round(_GAP_S * fps)
     seen: dict[str, list[PulseRange]] = {}
-    for path in decision_files(session):
+    for path in all_decision_files(session):
         for choices in decisions_in(path, pattern):
             traces.gops += is_about(choices, numbers)
             for camera, frames in choices.boxes.items():
@@ -135,6 +135,6 @@ def _frames_in(playlist: RecordingPlaylist, files: Collection[tuple[str, int]]) 
     return sum(entry.frames for entry in playlist.index.all if (entry.camera, entry.file) in files)
 
 
-def decision_files(session: RecordingSession) -> Iterable[Path]:
+def all_decision_files(session: RecordingSession) -> Iterable[Path]:
     """Yield the decision files of a session, in order; any thread may call it."""
     return (session.paths.decision_file(segment.first) for segment in tuple(session.segments))

@@ -12,7 +12,7 @@ import msgspec
 from server.messaging.service_record import DeletedPerson
 from server.service.deletion.decision_rows import remove_rows
 from server.service.deletion.journal import Deletion, DeletionJournal
-from server.service.deletion.recorded_traces import RecordedTraces, decision_files, find_traces
+from server.service.deletion.recorded_traces import RecordedTraces, all_decision_files, find_traces
 from server.service.recording.media_files import run_in_reader_thread
 from server.service.recording.person_removal import remove_from_session
 from server.service.recording.recorder import Recorder
@@ -111,7 +111,7 @@ class RecordingDeletion:
         def end_segment() -> None:
             folder.end_segment()
             sessions.extend(self.sessions_of(deletion.numbers_since, deletion.sessions))
-            ended.extend(path for session in sessions for path in decision_files(session))
+            ended.extend(path for session in sessions for path in all_decision_files(session))
 
         self._recorder.flush()
         await asyncio.wrap_future(writer.run(end_segment))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,6 +16,7 @@ from server.messaging.service_record import DeletedPerson
 from server.service.deletion.journal import Deletion
 from server.service.deletion.memory import forget_people
 from server.service.deletion.recorded_traces import RecordedTraces
+from server.service.facade.deletion_plan import PersonDeletion, camera_losses, other_losses, rounded
 from server.service.facade.errors import BusyError, ConflictError, InvalidCommandError, UnknownObjectError
 from server.service.facade.people import PeopleService
 from server.service.facade.rules import RulesService
@@ -28,60 +29,8 @@ log = logging.getLogger(__name__)
 _WAIT_S = 60.0
 """How long a deletion is waited for; it goes on in any case."""
 
-__all__ = ["DeletePerson", "DeletionService", "PersonDeletion", "Recordings"]
-
 Recordings = Literal["keep", "delete"]
 """What is done with the recorded video and sound of the times in which the person was visible."""
-
-
-class CameraLoss(msgspec.Struct, frozen=True):
-    """What one camera's recording has of a person, and loses with the recordings."""
-
-    camera: str
-    seen_s: float
-    """Seconds in which it saw them."""
-    deleted_s: float
-    """Seconds of its recording in the files that hold these: whole files are deleted."""
-
-
-class OtherLoss(msgspec.Struct, frozen=True):
-    """What goes of the recorded best view of another person with the recordings."""
-
-    object: int
-    run: str | None
-    """The folder of an earlier session with other numbers; null: they are today's."""
-    name: str | None
-    deleted_s: float
-
-
-class PersonDeletion(msgspec.Struct, frozen=True):
-    """What is deleted of a person, or would be."""
-
-    object: int
-    run: str | None
-    state: str
-    """planned, running (it goes on) or done."""
-    recordings: str | None
-    """keep or delete: what was asked for; null while it is planned."""
-    objects: list[int]
-    """All numbers of this person."""
-    name: str | None
-    visible: bool
-    """Whether a camera sees them now: who goes on being visible gets another number."""
-    events: int
-    """Events of rules that mention them."""
-    decisions: int
-    """Recorded GOPs whose rows lose them."""
-    seen_s: float
-    """Seconds of the recording in which any camera saw them."""
-    cameras: list[CameraLoss]
-    """Deleted only with the recordings."""
-    sound_s: float
-    """Seconds of recorded sound that go with the recordings."""
-    others: list[OtherLoss]
-    """Other people whose recorded best views become shorter with the recordings."""
-    mentions: list[str]
-    """Where files that only you can change mention the person."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,10 +226,10 @@ class DeletionService:
             visible=any(views[each].cameras for each in traces.numbers if each in views),
             events=self._rules.count_about(traces.numbers) if person.is_of_today else 0,
             decisions=sum(each.gops for each in traces.sessions),
-            seen_s=_round(sum(each.seconds for each in traces.sessions)),
-            cameras=_camera_losses(traces),
-            sound_s=_round(sum(each.lost[AUDIO] / each.session.info.fps for each in traces.sessions)),
-            others=_other_losses(traces, run if not person.is_of_today else None, names),
+            seen_s=rounded(sum(each.seconds for each in traces.sessions)),
+            cameras=camera_losses(traces),
+            sound_s=rounded(sum(each.lost[AUDIO] / each.session.info.fps for each in traces.sessions)),
+            others=other_losses(traces, run if not person.is_of_today else None, names),
             mentions=self._mentions(traces.numbers, name) if person.is_of_today else [],
         )
 
@@ -310,28 +259,3 @@ def _text(error: OSError) -> str:
     """Return what failed, and where."""
     where = "" if error.filename is None else f"{error.filename}: "
     return f"{where}{error.strerror or error}"
-
-
-def _camera_losses(traces: RecordedTraces) -> list[CameraLoss]:
-    seen: dict[str, float] = {}
-    deleted: dict[str, float] = {}
-    for each in traces.sessions:
-        fps = each.session.info.fps
-        for camera, spans in each.visible.items():
-            seen[camera] = seen.get(camera, 0.0) + sum(span.end - span.first for span in spans) / fps
-            deleted[camera] = deleted.get(camera, 0.0) + each.lost[camera] / fps
-    return [CameraLoss(camera, _round(seen[camera]), _round(deleted[camera])) for camera in sorted(seen)]
-
-
-def _other_losses(traces: RecordedTraces, run: str | None, names: Mapping[int, str]) -> list[OtherLoss]:
-    lost: dict[int, float] = {}
-    for each in traces.sessions:
-        for number, frames in each.lost_by_others.items():
-            lost[number] = lost.get(number, 0.0) + frames / each.session.info.fps
-    return [
-        OtherLoss(number, run, names.get(number), _round(seconds)) for number, seconds in sorted(lost.items())
-    ]
-
-
-def _round(seconds: float) -> float:
-    return round(seconds, 3)

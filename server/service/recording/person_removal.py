@@ -8,7 +8,6 @@ from pathlib import Path
 
 import msgspec
 
-from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.session_files import AUDIO, MISSING, CameraName
 
@@ -34,7 +33,7 @@ def remove_from_session(
     """
     check_in_place(session)
     gone = {(file.camera, file.first) for file in files}
-    for playlist in _playlists(session):
+    for playlist in session.playlists:
         playlist.drop_files(gone)
     removed = [session.folder / "objects" / f"{number}.m3u8" for number in numbers]
     session.objects = {
@@ -64,7 +63,3 @@ def check_in_place(session: RecordingSession) -> None:
         raise FileNotFoundError(
             f"{session.folder}: not there any more: mount its disk, or restart without it"
         )
-
-
-def _playlists(session: RecordingSession) -> list[RecordingPlaylist]:
-    return [*session.cameras.values(), session.audio, *session.objects.values()]

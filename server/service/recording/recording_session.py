@@ -104,7 +104,7 @@ class RecordingSession:
         session.segments = [RecordingSegment(first, 0, 0.0) for first in sorted(starts)]
         session.recount()
         existing = {segment.first for segment in session.segments}
-        for playlist in session._playlists:  # files may have been deleted since it was written
+        for playlist in session.playlists:  # files may have been deleted since it was written
             playlist.drop_segments({entry.file for entry in playlist.index.all} - existing)
         with contextlib.suppress(OSError):  # drafts of a process that was killed
             for draft in (*folder.rglob("*.new"), folder / f".{INFO_FILE}"):
@@ -207,7 +207,7 @@ class RecordingSession:
             OSError: a folder cannot be read.
         """
         entries_of = [
-            (playlist, playlist.index.all) for playlist in self._playlists
+            (playlist, playlist.index.all) for playlist in self.playlists
         ]  # before the disk is read
         cameras = self.paths.camera_sizes()
         audio = {AUDIO: media_sizes(self.folder / AUDIO)}
@@ -224,11 +224,12 @@ class RecordingSession:
     def size(self) -> int:
         """Bytes on the disk."""
         return sum(segment.bytes for segment in self.segments) + sum(
-            playlist.bytes for playlist in self._playlists
+            playlist.bytes for playlist in self.playlists
         )
 
     @property
-    def _playlists(self) -> list[RecordingPlaylist]:
+    def playlists(self) -> list[RecordingPlaylist]:
+        """Those of cameras, of the sound, and of people."""
         return [*self.cameras.values(), self.audio, *self.objects.values()]
 
     def person(self, number: int) -> RecordingPlaylist:
@@ -258,7 +259,7 @@ class RecordingSession:
             OSError: a file cannot be deleted.
         """
         firsts = {segment.first for segment in segments}
-        for playlist in self._playlists:
+        for playlist in self.playlists:
             playlist.drop_segments(firsts)
         stuck: set[int] = set()
         failed: OSError | None = None
@@ -281,7 +282,7 @@ class RecordingSession:
 
     def rewrite_stale_playlists(self) -> None:
         """Rewrite the stale playlists; one that cannot be written stays stale."""
-        for playlist in self._playlists:
+        for playlist in self.playlists:
             if playlist.is_stale:
                 with contextlib.suppress(OSError):
                     playlist.rewrite()

@@ -45,7 +45,7 @@ def numbers_of_tracks(snapshots: Snapshots) -> dict[TrackName, int]:
     }
 
 
-def without_people(snapshots: Snapshots, numbers: Collection[int]) -> Snapshots:
+def snapshots_without(snapshots: Snapshots, numbers: Collection[int]) -> Snapshots:
     """Return a record without some people."""
     return {
         camera: msgspec.structs.replace(

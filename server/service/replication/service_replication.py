@@ -36,7 +36,7 @@ from server.service.replication.disagreements import (
     Disagreements,
     find_disagreements,
     follow,
-    without_people,
+    snapshots_without,
 )
 from server.service.replication.state import restore_people, state_of
 
@@ -208,7 +208,7 @@ class ServiceReplication:
                 gone = set(self._of_cameras.forgotten)
                 self._follow(
                     find_disagreements(
-                        without_people(own.cameras, gone), without_people(record.cameras, gone)
+                        snapshots_without(own.cameras, gone), snapshots_without(record.cameras, gone)
                     )
                 )
 

@@ -71,4 +71,4 @@ class PlaceErrors:
                     self.offsets[camera] += offsets[n] / self._counts[camera]
         self.noise = np.clip(np.sqrt(self._sums[:, 0] / self._sums[:, 1]), *_RANGE)
         lengths = np.linalg.norm(self.offsets, axis=1, keepdims=True)
-        self.offsets *= np.minimum(_MAX_OFFSET_M / np.maximum(lengths, _MAX_OFFSET_M), 1.0)
+        self.offsets *= _MAX_OFFSET_M / np.maximum(lengths, _MAX_OFFSET_M)
