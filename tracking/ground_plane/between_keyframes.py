@@ -47,6 +47,8 @@ def frames_until(
     Before it only those are tracked whom both keyframes have.
     """
     before = {} if previous is None else {track.id: track for track in previous.people.tracks}
+    former = keyframe.people.exchanged
+    before |= {number: before[old] for number, old in former.items() if old in before}
     frames = []
     for frame in range(first, keyframe.frame):
         tracks = []

@@ -17,10 +17,11 @@ from tracking.boxes import Floats
 from tracking.frame_rate import frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.candidates import Candidates
+from tracking.ground_plane.exchanges import ExchangeMonitor, Seen, clear_sightings
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.person import GroundPerson
-from tracking.ground_plane.places.hypotheses import find_places
+from tracking.ground_plane.places.hypotheses import Places, find_places
 from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_metre, measure
 from tracking.ground_plane.places.place_errors import PlaceErrors
 from tracking.ground_plane.predicted_boxes import predict_boxes, usual_boxes
@@ -66,6 +67,7 @@ class KeyframeTracker:
         self._first_detected: int | None = None
         self._candidates = Candidates(self._seconds)
         self._people: list[GroundPerson] = []
+        self._exchanges = ExchangeMonitor(self._seconds)
         self._next_id = 1
         self._window: deque[WindowFrame] = deque()
         self._states = np.zeros((0, 0), dtype=np.int64)
@@ -174,6 +176,7 @@ class KeyframeTracker:
             self._solve()
             final = [self._finish_oldest() for _ in range(len(self._window))]
         self._candidates.clear()
+        self._exchanges.clear()
         self._first_detected = None
         self._people, self._states = [], np.zeros((0, 0), dtype=np.int64)
         return final
@@ -234,7 +237,18 @@ class KeyframeTracker:
         self._candidates.update(frame.places, chosen, missed, self._settings)
         self._people = people
         self._states = self._states[rows + arriving, 1:]
-        return GroundFrame(frame.number, self._tracks(found, frame), self._report)
+        exchanged = self._exchange(frame.places, found)
+        return GroundFrame(frame.number, self._tracks(found, frame), self._report, exchanged)
+
+    def _exchange(self, places: Places, found: Sequence[_Located]) -> dict[int, int]:
+        """Exchange the ids of people who were taken for each other; return the former id by id."""
+        seen = [Seen(each.person.id, each.place, clear_sightings(places, each.state)) for each in found]
+        people = {each.person.id: each.person for each in found}
+        former: dict[int, int] = {}
+        for one, two in self._exchanges.update(seen):
+            people[one].id, people[two].id = two, one
+            former |= {one: two, two: one}
+        return former
 
     def _move_people(self, frame: WindowFrame) -> None:
         """Move the people known to their places in a frame."""

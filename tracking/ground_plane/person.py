@@ -22,7 +22,7 @@ class GroundPerson:
     """The state of a person after the last final frame. `settings` have how people move.
 
     Attributes:
-        id: from 1, never reused.
+        id: from 1, never reused; exchanged with another person's if they were taken for each other.
         state: place and velocity in the frame in which they were seen last.
         seen: that frame.
         boxes: their size.

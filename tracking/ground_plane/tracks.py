@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from tracking.boxes import Floats
 from tracking.solvers.base import SolveReport
@@ -41,8 +41,17 @@ class GroundTrack:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroundFrame:
-    """The people of a final frame, by ascending id, and what is proven about the window that decided it."""
+    """The people of a final frame.
+
+    Attributes:
+        frame: its number.
+        tracks: by ascending id.
+        report: what is proven about the window that decided it; None: nothing was decided.
+        exchanged: by id, the id under which the person was tracked until the frame before, of people who had
+            been taken for each other.
+    """
 
     frame: int
     tracks: tuple[GroundTrack, ...]
     report: SolveReport | None
+    exchanged: Mapping[int, int] = field(default_factory=dict)
