@@ -154,12 +154,13 @@ class BestViewPipeline:
             self.decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
         await self.joint.start()
         self.recorder.open()
-        for deleted in await self.recording_deletion.complete_interrupted():
+        for deleted in await self.recording_deletion.read_journal():
             self.replication.add_deletion(deleted)
         await self.replication.take_over()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
+        completing = asyncio.create_task(self.recording_deletion.complete_interrupted(), name="deletion")
         try:
             while not self.aligner.all_ended_and_decided:
                 await self._changed.wait()
@@ -176,7 +177,8 @@ class BestViewPipeline:
         finally:
             first_pulse_timeout.cancel()
             follow.cancel()
-            await asyncio.gather(follow, return_exceptions=True)
+            completing.cancel()  # the next start completes it
+            await asyncio.gather(follow, completing, return_exceptions=True)
             await self.joint.close()
 
     def finish(self) -> list[GopDecision]:

@@ -67,6 +67,11 @@ class DeletionJournal:
         self._is_read = True
 
     @property
+    def all(self) -> list[Deletion]:
+        """Deletions that are complete, as far as they are kept, then those that are not."""
+        return list(self._deletions)
+
+    @property
     def pending(self) -> list[Deletion]:
         """Deletions that are not complete."""
         return [deletion for deletion in self._deletions if not deletion.is_done]

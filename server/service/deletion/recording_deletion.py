@@ -26,21 +26,19 @@ log = logging.getLogger(__name__)
 class RecordingDeletion:
     """Finds and deletes people in the recording; without a recording folder there are none.
 
-    One deletion at a time: callers see to it.
+    One deletion at a time: who begins or executes one holds `turn`.
     """
 
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder
+        self.turn = asyncio.Lock()
         folder, writer = recorder.folder, recorder.writer
         self._disk: tuple[RecordingFolder, WriterThread, DeletionJournal] | None = (
             None if folder is None or writer is None else (folder, writer, DeletionJournal(folder.folder))
         )
 
-    async def complete_interrupted(self) -> list[DeletedPerson]:
-        """Complete what a crash has interrupted, once the recording folder is open; return it.
-
-        What fails is logged, and tried again at the next start.
-        """
+    async def read_journal(self) -> list[DeletedPerson]:
+        """Return the deletions of earlier runs, once the recording folder is open; errors are logged."""
         if self._disk is None:
             return []
         _, _, journal = self._disk
@@ -49,23 +47,29 @@ class RecordingDeletion:
         except OSError as error:
             log.error("record.folder: interrupted deletions cannot be completed: %s", error)  # noqa: TRY400
             return []
-        pending = journal.pending
-        for deletion in pending:
-            try:
-                await self.execute(deletion)
-            except OSError as error:
-                log.error("deletion of a person: %s; tried again at the next start", error)  # noqa: TRY400
-            else:
-                log.info("completed the deletion of a person that was interrupted")
         return [
             DeletedPerson(
                 numbers=deletion.numbers,
                 numbers_since=deletion.numbers_since,
                 deletes_media=deletion.deletes_media,
             )
-            for deletion in pending
+            for deletion in journal.all
             if deletion.numbers_since is not None
         ]
+
+    async def complete_interrupted(self) -> None:
+        """Complete what a crash has interrupted, one after another, after `read_journal`.
+
+        What fails is logged, and tried again at the next start.
+        """
+        async with self.turn:
+            for deletion in [] if self._disk is None else self._disk[2].pending:
+                try:
+                    await self.execute(deletion)
+                except Exception as error:  # noqa: BLE001 — nobody waits for it, and the others are completed
+                    log.error("deletion of a person: %s; tried again at the next start", error_text(error))  # noqa: TRY400
+                else:
+                    log.info("completed the deletion of a person that was interrupted")
 
     def forgotten(self, numbers_since: float) -> Collection[int]:
         """Return the numbers of the people deleted, of those that began at a time, unix seconds."""
@@ -141,3 +145,11 @@ class RecordingDeletion:
         done = msgspec.structs.replace(deletion, sessions=[], files=None, is_done=True)
         await run_in_reader_thread(journal.put, done, deletion)
         return traces
+
+
+def error_text(error: BaseException) -> str:
+    """Return what failed, and where, in one line."""
+    if not isinstance(error, OSError):
+        return repr(error)
+    where = "" if error.filename is None else f"{error.filename}: "
+    return f"{where}{error.strerror or error}"

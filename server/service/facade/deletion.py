@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Collection
+from collections.abc import Collection, Coroutine
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -16,6 +16,7 @@ from server.messaging.service_record import DeletedPerson
 from server.service.deletion.journal import Deletion
 from server.service.deletion.memory import forget_people
 from server.service.deletion.recorded_traces import RecordedTraces
+from server.service.deletion.recording_deletion import error_text
 from server.service.facade.deletion_plan import PersonDeletion, camera_losses, other_losses, rounded
 from server.service.facade.errors import BusyError, ConflictError, InvalidCommandError, UnknownObjectError
 from server.service.facade.people import PeopleService
@@ -58,8 +59,8 @@ class DeletionService:
 
     def __init__(self, pipeline: BestViewPipeline, people: PeopleService, rules: RulesService) -> None:
         self._pipeline, self._people, self._rules = pipeline, people, rules
-        self._turn = asyncio.Lock()
-        self._following: set[asyncio.Task[None]] = set()
+        self._turn = pipeline.recording_deletion.turn
+        self._running: set[asyncio.Task[None]] = set()
         pipeline.replication.on_deletion.append(self._follow)
 
     async def plan(self, number: int, run: str | None = None) -> PersonDeletion:
@@ -89,7 +90,7 @@ class DeletionService:
         except BaseException:
             self._turn.release()
             raise
-        completing = asyncio.create_task(self._complete(deletion), name="deletion")
+        completing = self._start(self._complete(deletion))
         await asyncio.wait({completing}, timeout=_WAIT_S)
         if not completing.done():
             return msgspec.structs.replace(planned, state="running", recordings=command.recordings)
@@ -97,7 +98,7 @@ class DeletionService:
             completing.result()
         except OSError as error:
             raise BusyError(
-                f"object {command.number}: {_text(error)}; the rest is deleted at the next start"
+                f"object {command.number}: {error_text(error)}; the rest is deleted at the next start"
             ) from error
         return msgspec.structs.replace(planned, state="done", recordings=command.recordings)
 
@@ -121,7 +122,7 @@ class DeletionService:
                 await self._pipeline.recording_deletion.begin(deletion, before)
             except OSError as error:
                 what = "nothing is deleted" if before is None else "deleted at the next start only"
-                raise BusyError(f"object {command.number}: {what}: {_text(error)}") from error
+                raise BusyError(f"object {command.number}: {what}: {error_text(error)}") from error
             if not person.is_of_today or (numbers := self._with_merged(traces.numbers)) == traces.numbers:
                 break
             person = replace(person, numbers=numbers)
@@ -145,9 +146,19 @@ class DeletionService:
         """Carry out a deletion of another service."""
         if deleted.numbers_since == _since(self._pipeline):
             self._forget(deleted.numbers)
-        task = asyncio.get_running_loop().create_task(self._complete_followed(deleted), name="deletion")
-        self._following.add(task)
-        task.add_done_callback(self._following.discard)
+        self._start(self._complete_followed(deleted))
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Start a deletion, whose error is logged whether or not somebody waits for it."""
+        task = asyncio.get_running_loop().create_task(work, name="deletion")
+        self._running.add(task)
+        task.add_done_callback(self._ended)
+        return task
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        self._running.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("deletion of a person: %s; completed at the next start", error_text(error))
 
     async def _complete_followed(self, deleted: DeletedPerson) -> None:
         deletion = Deletion(
@@ -160,10 +171,9 @@ class DeletionService:
             await self._pipeline.recording_deletion.begin(deletion)
         except OSError as error:
             self._turn.release()
-            log.error("deletion of a person by another service: %s", error)  # noqa: TRY400
+            log.error("deletion of a person by another service: %s", error_text(error))  # noqa: TRY400
             return
-        with contextlib.suppress(OSError):  # it has been logged
-            await self._complete(deletion)
+        await self._complete(deletion)
 
     async def _complete(self, deletion: Deletion) -> None:
         """Delete what is on the disk, and release the turn."""
@@ -172,9 +182,6 @@ class DeletionService:
             if deletion.numbers_since == _since(pipeline) and pipeline.decision_writer is not None:
                 await pipeline.decision_writer.forget(deletion.numbers)
             await pipeline.recording_deletion.execute(deletion)
-        except OSError as error:
-            log.error("deletion of a person: %s; completed at the next start", error)  # noqa: TRY400
-            raise
         finally:
             self._turn.release()
         log.info("a person's data were deleted on an operator's request")
@@ -204,7 +211,7 @@ class DeletionService:
         try:
             traces = await deletion.find(sessions, person.numbers)
         except OSError as error:
-            raise BusyError(f"object {number}: nothing is deleted: {_text(error)}") from error
+            raise BusyError(f"object {number}: nothing is deleted: {error_text(error)}") from error
         known = self._pipeline.decider.people.registry.first_seen if person.is_of_today else {}
         if not traces.sessions and traces.numbers.isdisjoint(known):
             raise self._people.unknown(number) if person.is_of_today else UnknownObjectError(number)
@@ -253,9 +260,3 @@ class DeletionService:
 def _since(pipeline: BestViewPipeline) -> float | None:
     """Return when today's numbers began, unix seconds; None: nobody has one yet."""
     return pipeline.state_replication.numbers_since or None
-
-
-def _text(error: OSError) -> str:
-    """Return what failed, and where."""
-    where = "" if error.filename is None else f"{error.filename}: "
-    return f"{where}{error.strerror or error}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import threading
 from collections.abc import AsyncIterator, Iterator
@@ -21,7 +22,7 @@ from server.service.decision_files.live_decision_writer import LiveDecisionWrite
 from server.service.deletion import decision_rows, recording_deletion
 from server.service.deletion.journal import JOURNAL_FILE, Deletion, DeletionJournal
 from server.service.deletion.recorded_traces import RecordedTraces, find_traces
-from server.service.facade import past_search
+from server.service.facade import deletion, past_search
 from server.service.past_search.search import search
 from server.service.past_search.worker import SearchResult, SearchTask
 from server.service.recording.recording_session import RecordingSession
@@ -279,13 +280,16 @@ async def test_a_deletion_that_was_interrupted_is_completed_at_the_next_start(
     kept = tmp_path / "kept"
     files = set(kept.rglob("cameras/*/*.mp4"))
     later = recording_deletion.RecordingDeletion(site.service.recorder)  # as after a start
-    completed = await later.complete_interrupted()
-    assert [each.numbers for each in completed] == [[1]]
+    assert [each.numbers for each in await later.read_journal()] == [[1]]
+    await later.complete_interrupted()
     assert mentioned(kept) == [2]
     assert set(kept.rglob("cameras/*/*.mp4")) < files
     assert later.forgotten(site.service.state_replication.numbers_since) == {1}
     assert '"files":' not in (kept / JOURNAL_FILE).read_text()
-    assert await later.complete_interrupted() == []
+    again = recording_deletion.RecordingDeletion(site.service.recorder)
+    assert [each.numbers for each in await again.read_journal()] == [[1]], "others may not have heard of it"
+    await again.complete_interrupted()
+    assert mentioned(kept) == [2]
 
 
 async def test_what_cannot_be_written_down_is_not_begun(
@@ -309,7 +313,7 @@ async def test_a_damaged_journal_is_one_line_and_nothing_is_deleted_until_it_is_
 ) -> None:
     journal = tmp_path / "kept" / JOURNAL_FILE
     journal.write_text("[{]")
-    assert await site.service.recording_deletion.complete_interrupted() == []
+    assert await site.service.recording_deletion.read_journal() == []
     assert "interrupted deletions cannot be completed: " in caplog.text
     assert "Traceback" not in caplog.text
     before = list(texts(tmp_path))
@@ -343,8 +347,71 @@ async def test_a_disk_that_is_gone_completes_no_deletion(
     assert (await plan(site, "object=2"))[0] == 503
     away.rename(folder)
     later = recording_deletion.RecordingDeletion(site.service.recorder)
-    assert [each.numbers for each in await later.complete_interrupted()] == [[1]]
+    assert [each.numbers for each in await later.read_journal()] == [[1]]
+    await later.complete_interrupted()
     assert mentioned(tmp_path / "kept") == [2]
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (OSError(5, "Input/output error", "disk"), "disk: Input/output error"),
+        (KeyError("c9"), "KeyError('c9')"),
+    ],
+)
+async def test_a_deletion_that_fails_after_its_answer_is_one_line_in_the_log(
+    site: ServedSite,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    error: Exception,
+    text: str,
+) -> None:
+    answered = asyncio.Event()
+
+    async def fail(*_: object) -> None:
+        await answered.wait()
+        raise error
+
+    monkeypatch.setattr(deletion, "_WAIT_S", 0.0)
+    monkeypatch.setattr(recording_deletion.RecordingDeletion, "execute", fail)
+    status, running = await delete(site, object=1, recordings="keep")
+    assert (status, running["state"]) == (200, "running")
+    (task,) = [each for each in asyncio.all_tasks() if each.get_name() == "deletion"]
+    answered.set()
+    await asyncio.wait({task})
+    del task
+    gc.collect()  # else an error that nobody has retrieved is not logged yet
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == [
+        f"deletion of a person: {text}; completed at the next start"
+    ]
+    assert "Traceback" not in caplog.text
+
+
+async def test_nothing_is_deleted_while_interrupted_deletions_are_completed(
+    site: ServedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    execute, begun, may_end = recording_deletion.RecordingDeletion.execute, asyncio.Event(), asyncio.Event()
+
+    async def execute_late(
+        within: recording_deletion.RecordingDeletion, interrupted: Deletion
+    ) -> RecordedTraces | None:
+        begun.set()
+        await may_end.wait()
+        return await execute(within, interrupted)
+
+    monkeypatch.setattr(recording_deletion.RecordingDeletion, "execute", execute_late)
+    interrupted = site.service.recording_deletion
+    await interrupted.begin(Deletion(numbers=[9], numbers_since=1000.0, deletes_media=False))
+    completing = asyncio.create_task(interrupted.complete_interrupted())
+    await begun.wait()
+    assert await delete(site, object=1, recordings="keep") == (
+        409,
+        {"error": "another deletion is not complete yet: try again later"},
+    )
+    assert (await plan(site, "object=1"))[0] == 200
+    may_end.set()
+    await completing
+    assert (await delete(site, object=1, recordings="keep"))[0] == 200
 
 
 async def test_decisions_that_cannot_be_read_are_one_clear_error(

@@ -3,55 +3,31 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fakes.media.decoding import decodes_without_errors
 from fakes.service.decisions import collect_decisions
+from fakes.service.running_service import ENCODED, RunningService, send_epoch
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
     GOP,
-    LARGE,
-    SMALL,
     STRIDE,
     FedService,
-    camera_tracks,
-    encoded,
     small_config,
-    tracks,
-    video,
 )
 from fakes.service.scripted_recordings import playable_files
-from server.config.site_config import Config
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
-from server.service.pulse_follower import PulseFollower
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.media_chunk import MediaChunk
 
 HOUR = 3600 * FPS // STRIDE
 """Epochs per hour."""
-ENCODED = 40 // STRIDE
-"""Epochs of encoded pictures; then they repeat, from a keyframe on."""
 BEFORE = 6
-
-
-def send_epoch(service: FedService, epoch: int, *cameras: str) -> None:
-    """Send an epoch's frames and track messages of some cameras."""
-    for seed, camera in enumerate(CAMERAS):
-        if camera not in cameras:
-            continue
-        encoded_epoch = epoch % ENCODED
-        for unit in encoded(seed)[encoded_epoch * STRIDE : (encoded_epoch + 1) * STRIDE]:
-            service.ingest.video(
-                video(camera, replace(unit, pulse=unit.pulse + (epoch - encoded_epoch) * STRIDE))
-            )
-        service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: LARGE if seed else SMALL})))
 
 
 def run_epochs(service: FedService, epochs: range) -> None:
@@ -128,41 +104,6 @@ def test_a_backlog_of_a_minute_is_decided_epoch_by_epoch(service: FedService) ->
         "no epoch is skipped"
     )
     service.close()
-
-
-class PulsesOfTest(PulseFollower):
-    """Pulses that the test sends."""
-
-    def __init__(self, config: Config) -> None:
-        super().__init__(config)
-        self.sent: asyncio.Queue[int] = asyncio.Queue()
-
-    async def follow(self, on_pulse: Callable[[], None]) -> None:
-        while True:
-            self.newest = await self.sent.get()
-            on_pulse()
-
-
-class RunningService(FedService):
-    """A running service whose pulses come from the test."""
-
-    pulses: PulsesOfTest
-
-    def __init__(self) -> None:
-        super().__init__(small_config())
-        self.pulses = PulsesOfTest(self.config)
-        self.connect_cameras(*CAMERAS)
-
-    async def receive(self, epoch: int, *cameras: str) -> None:
-        """Send an epoch of some cameras, and let the service process it."""
-        send_epoch(self, epoch, *cameras)
-        self._changed.set()
-        await self.process()
-
-    async def process(self) -> None:
-        """Let the service's tasks run."""
-        for _ in range(50):
-            await asyncio.sleep(0)
 
 
 @pytest.mark.parametrize("other", [3, 3000 * HOUR], ids=["behind", "ahead"])
