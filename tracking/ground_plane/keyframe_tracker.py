@@ -212,8 +212,7 @@ class KeyframeTracker:
             state = int(row[0])
             if n < len(self._people):
                 person = self._people[n]
-                unseen = person.seconds_unseen(frame.number)
-                if state == GONE or unseen > self._settings.forget_after_s:
+                if state == GONE or person.has_left(frame.number, self._settings):
                     continue
             elif state >= 0:
                 person = self._arrive(frame, state)

@@ -25,18 +25,29 @@ class GroundPerson:
         id: from 1, never reused; exchanged with another person's if they were taken for each other.
         state: place and velocity in the frame in which they were seen last.
         seen: that frame.
+        clearly_seen: the last one in which a detection that is not unlikely showed them.
         boxes: their size.
         misplacement: (2, 2) covariance of the place's error if the feet were wrong.
     """
 
-    __slots__ = ("_histograms", "_seconds", "_update_rate", "boxes", "id", "misplacement", "seen", "state")
+    __slots__ = (
+        "_histograms",
+        "_seconds",
+        "_update_rate",
+        "boxes",
+        "clearly_seen",
+        "id",
+        "misplacement",
+        "seen",
+        "state",
+    )
 
     def __init__(
         self, number: int, frame: int, places: Places, k: int, seconds: float, settings: GroundSettings
     ) -> None:
         """Create a person who arrives at place `k` of a frame; frames are `seconds` apart."""
         self.id = number
-        self.seen = frame
+        self.seen = self.clearly_seen = frame
         self.state = MotionState.at(places.means[k], places.covariances[k], settings.speed)
         self.boxes = PersonBoxes()
         self.misplacement = places.misplacements[k]
@@ -52,12 +63,21 @@ class GroundPerson:
         """Return the seconds from the frame in which they were seen last to another."""
         return self._seconds * (frame - self.seen)
 
+    def has_left(self, frame: int, settings: GroundSettings) -> bool:
+        """Return whether nobody has seen them for long, or only by detections that are unlikely."""
+        unclear = self._seconds * (frame - self.clearly_seen)
+        return (
+            self.seconds_unseen(frame) > settings.forget_after_s or unclear > settings.forget_unclear_after_s
+        )
+
     def move(self, frame: int, places: Places, k: int, settings: GroundSettings) -> None:
         """Move to place `k` of a frame."""
         seconds, misplacement = self.seconds_unseen(frame), places.misplacements[k]
         mean, covariance = places.means[k], places.covariances[k]
         self.state = follow(self.state, seconds, mean, covariance, self.misplacement + misplacement, settings)
         self.seen, self.misplacement = frame, misplacement
+        if places.is_clear[k]:
+            self.clearly_seen = frame
 
     def template(self, camera: int) -> Floats:
         """Return the mean histogram in a camera, (B,); B = 0: not known."""

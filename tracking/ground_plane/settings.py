@@ -36,6 +36,9 @@ class GroundSettings:
     acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, metres/s²
     turn_rate: float = 0.06  # times per second that somebody starts, stops or turns
     forget_after_s: float = 2.0  # seconds unseen after which somebody has left
+    forget_unclear_after_s: float = (
+        3.0  # seconds seen by unlikely detections alone after which they have left
+    )
     appearance: float = 8.0  # weight of the distance to a person's appearance in a camera
     misplaced_probability: float = (
         0.05  # of the feet of a person's box being wrong: hidden, in a shadow, cut off

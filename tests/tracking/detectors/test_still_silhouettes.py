@@ -59,6 +59,14 @@ def test_somebody_who_passes_a_thing_confirms_it_for_a_moment_only() -> None:
     assert penalty(silhouettes) >= before
 
 
+def test_parts_of_a_doubted_thing_are_doubted_as_much() -> None:
+    silhouettes = StillSilhouettes()
+    observed(silhouettes, 10.0)
+    part, beside = np.array([10.0, 10.0, 16.0, 24.0]), np.array([15.0, 10.0, 25.0, 40.0])
+    assert penalty(silhouettes, part) == penalty(silhouettes)
+    assert penalty(silhouettes, beside) == 0.0, "somebody who stands beside it is not"
+
+
 def test_who_moves_is_new_at_every_place() -> None:
     silhouettes = StillSilhouettes()
     for step in range(100):

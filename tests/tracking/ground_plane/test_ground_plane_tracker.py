@@ -115,17 +115,25 @@ def test_furniture_that_looks_a_little_like_a_person_never_becomes_one(score: fl
     assert not any(frame.tracks for frame in frames)
 
 
-def test_a_known_person_is_followed_by_detections_that_are_hardly_one() -> None:
+@pytest.mark.parametrize("seconds", [2.6, 6.0])
+def test_a_known_person_is_followed_by_detections_that_are_hardly_one_for_some_seconds(
+    seconds: float,
+) -> None:
     walks = crossing_walks(2)
+    end = 10 + round(seconds * FPS)
     detections = [
         {
-            name: Detections(part.boxes, np.full(len(part), 0.9 if number < 10 else 0.05), part.histograms)
+            name: Detections(
+                part.boxes, np.full(len(part), 0.05 if 10 <= number < end else 0.9), part.histograms
+            )
             for name, part in found.items()
         }
         for number, found in enumerate(detect_walkers(walks, VIEWS, FloorNoise(deviation=0.006)))
     ]
-    frames = track_ground_plane(tracker(), enumerate(detections))
-    assert [len(frame.tracks) for frame in frames[10:]] == [2] * (FRAMES - 10)
+    counts = [len(frame.tracks) for frame in track_ground_plane(tracker(), enumerate(detections))]
+    left_after = 10 + round(GroundSettings().forget_unclear_after_s * FPS)
+    assert counts[10:left_after] == [2] * (left_after - 10)
+    assert counts[left_after + 2 :] == [2 if end < left_after else 0] * (FRAMES - left_after - 2)
 
 
 def test_parts_of_people_are_seldom_somebody() -> None:

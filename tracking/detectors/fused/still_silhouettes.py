@@ -13,10 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tracking.boxes import Floats, iou
+from tracking.boxes import Floats, areas, intersections, iou
 
 _SAME = 0.5
 """Least overlap (IoU) of a silhouette with where it was first."""
+_WITHIN = 0.7
+"""Least share of a silhouette within a doubted one from which it is doubted as much.
+
+The silhouettes of a thing that changes, such as a drop on the lens, are now this part of it and now that."""
 _FORGET_S = 10.0
 """Seconds unseen after which a silhouette is forgotten: what flickers, such as a screen, returns."""
 _LOG_ODDS_PER_S = 0.5
@@ -56,7 +60,7 @@ class StillSilhouettes:
         if not doubted:
             return np.zeros(len(boxes))
         seconds = np.array([known.doubt_s for known in doubted])
-        here = np.where(_are_same(boxes, doubted), seconds, 0.0).max(axis=1)
+        here = np.where(_are_within(boxes, doubted), seconds, 0.0).max(axis=1)
         return np.asarray(np.minimum(_LOG_ODDS_PER_S * here, _MOST))
 
     def update(
@@ -81,3 +85,10 @@ def _are_same(boxes: Floats, known: Sequence[_Silhouette]) -> npt.NDArray[np.boo
     """Return which boxes (K, 4) are at the places of known silhouettes, (K, N)."""
     places = np.array([silhouette.box for silhouette in known]).reshape(-1, 4)
     return np.asarray(iou(boxes[:, None], places[None]) >= _SAME)
+
+
+def _are_within(boxes: Floats, known: Sequence[_Silhouette]) -> npt.NDArray[np.bool_]:
+    """Return which boxes (K, 4) are, or are mostly inside of, known silhouettes, (K, N)."""
+    places = np.array([silhouette.box for silhouette in known]).reshape(-1, 4)
+    shares = intersections(boxes[:, None], places[None]) / np.maximum(areas(boxes), 1e-9)[:, None]
+    return np.asarray(_are_same(boxes, known) | (shares >= _WITHIN))

@@ -29,7 +29,8 @@ _PREDICTION_GATE, _GROUP_GATE = 11.0, 9.2
 _CLEAR_LOG_ODDS = -1.4
 """Log odds (a probability of .2) from which a detection may be somebody who is not known yet.
 
-Furniture that looks a little like a person does so forever: what little each frame says must not add up.
+Furniture that looks a little like a person does so forever: what little each frame says must not add up. Nor
+must it keep somebody there who was taken for a person once.
 """
 _MAX_COST = 8.0
 """Hypotheses that cost more are never chosen."""
@@ -72,13 +73,17 @@ class Places:
         return found
 
     @cached_property
-    def arrival_costs(self) -> Floats:
-        """The costs for somebody who is not known yet, (K,): places that nobody sees clearly gain nothing."""
+    def is_clear(self) -> NDArray[np.bool_]:
+        """Whether a detection of each place is not unlikely, (K,)."""
         odds = self.measurements.log_odds
-        is_clear = np.array(
+        return np.array(
             [(odds[list(group)] >= _CLEAR_LOG_ODDS).any() for group in self.groups], dtype=np.bool_
         )
-        return np.where(is_clear, self.costs, np.maximum(self.costs, 0.0))
+
+    @cached_property
+    def arrival_costs(self) -> Floats:
+        """The costs for somebody who is not known yet, (K,): places that nobody sees clearly gain nothing."""
+        return np.where(self.is_clear, self.costs, np.maximum(self.costs, 0.0))
 
     def __len__(self) -> int:
         return len(self.groups)
