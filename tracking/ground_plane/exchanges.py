@@ -8,7 +8,7 @@ how they looked before they met.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -128,17 +128,21 @@ class ExchangeMonitor:
         self._looks: dict[int, _LooksAlone] = {}
         self._meetings: dict[Pair, _Meeting] = {}
 
-    def update(self, people: Sequence[Seen]) -> list[Pair]:
+    def update(self, people: Sequence[Seen], known: Collection[int]) -> list[Pair]:
         """Add a frame; return the pairs of ids that have been exchanged, each id in one at most.
 
-        From then on, their ids are taken to have been exchanged back.
+        From then on, their ids are taken to have been exchanged back. `known`: the ids of everybody who has
+        not left, also of those who are hidden in this frame.
         """
         found = {person.id: person for person in people}
-        self._looks = {number: self._looks.get(number, _LooksAlone()) for number in found}
-        self._meetings = {pair: each for pair, each in self._meetings.items() if found.keys() >= set(pair)}
+        self._looks = {number: self._looks.get(number, _LooksAlone()) for number in known}
+        self._meetings = {
+            pair: each for pair, each in self._meetings.items() if self._looks.keys() >= set(pair)
+        }
         near = _near(people)
         exchanged, moved = list[Pair](), set[int]()
-        for pair in [pair for pair in self._meetings if pair not in near]:
+        parted = [pair for pair in self._meetings if pair not in near and found.keys() >= set(pair)]
+        for pair in parted:
             if moved.isdisjoint(pair) and self._were_exchanged(pair, found):
                 exchanged.append(pair)
                 moved.update(pair)

@@ -244,7 +244,7 @@ class KeyframeTracker:
         seen = [Seen(each.person.id, each.place, clear_sightings(places, each.state)) for each in found]
         people = {each.person.id: each.person for each in found}
         former: dict[int, int] = {}
-        for one, two in self._exchanges.update(seen):
+        for one, two in self._exchanges.update(seen, [person.id for person in self._people]):
             people[one].id, people[two].id = two, one
             former |= {one: two, two: one}
         return former

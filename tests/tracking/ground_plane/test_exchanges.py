@@ -41,7 +41,7 @@ class Meeting:
     ) -> list[tuple[int, int]]:
         """Add frames; return the exchanges found. None: nobody sees the person."""
         people = [seen(1, 0.0, first, camera), seen(2, apart, second, camera)]
-        return [pair for _ in range(round(10 * seconds)) for pair in self.monitor.update(people)]
+        return [pair for _ in range(round(10 * seconds)) for pair in self.monitor.update(people, (1, 2))]
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def test_an_exchange_begins_the_comparison_with_others_anew() -> None:
 
     def exchanges(frames: int, places: tuple[float, ...], looks: tuple[Floats, ...]) -> list[tuple[int, int]]:
         people = [seen(k + 1, *each) for k, each in enumerate(zip(places, looks, strict=True))]
-        return [pair for _ in range(frames) for pair in monitor.update(people)]
+        return [pair for _ in range(frames) for pair in monitor.update(people, (1, 2, 3))]
 
     assert exchanges(30, (0.0, 5.0, 10.0), looks) == []
     assert exchanges(5, (0.0, 0.8, 1.6), looks) == []
@@ -105,8 +105,14 @@ def test_an_exchange_begins_the_comparison_with_others_anew() -> None:
     assert exchanges(90, (5.0, 0.0, 10.0), looks) == []
 
 
+def test_somebody_who_is_hidden_after_they_met_is_compared_when_they_are_seen_again(met: Meeting) -> None:
+    for _ in range(10):
+        assert met.monitor.update([seen(2, 3.0, RED)], (1, 2)) == []
+    assert met.frames(1.5, 3.0, BLUE, RED) == [(1, 2)]
+
+
 def test_somebody_who_has_left_is_forgotten(met: Meeting) -> None:
-    met.monitor.update([])
+    met.monitor.update([], [])
     assert met.frames(9.0, 3.0, BLUE, RED) == []
 
 
