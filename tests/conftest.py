@@ -24,7 +24,7 @@ settings.register_profile(
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     derandomize=True,
-    max_examples=40,
+    max_examples=25,
 )
 settings.register_profile(
     "new examples", settings.get_profile("fixed examples"), derandomize=False, max_examples=200

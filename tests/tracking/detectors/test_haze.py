@@ -39,7 +39,7 @@ def test_people_and_exposure_noise_are_no_haze() -> None:
         assert find_haze(reduce_to_cells(noisy), reduce_to_cells(SCENE)) is None
 
 
-@pytest.mark.parametrize("density", [0.5, 0.7])
+@pytest.mark.parametrize("density", [0.5, pytest.param(0.7, marks=pytest.mark.slow)])
 def test_people_abreast_in_dark_coats_are_no_shadow_in_fog(density: float) -> None:
     detector = BackgroundDetector()
     detector.prepare([picture([], frame) for frame in range(20)], every_s=0.2)

@@ -59,7 +59,7 @@ def test_light_over_most_of_the_picture_is_the_exposure(begin: float, sign: int)
     assert light.exposure_sign == sign
 
 
-@pytest.mark.parametrize("factor", [0.6, 1.5])
+@pytest.mark.parametrize("factor", [1.5, pytest.param(0.6, marks=pytest.mark.slow)])
 def test_sun_that_comes_and_goes_makes_no_people_and_hides_none(factor: float) -> None:
     walker = Figure(10, 200, speed=2.0, begin=30)
     detector, overlaps, false = BackgroundDetector(), [], 0

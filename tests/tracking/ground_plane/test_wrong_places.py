@@ -34,7 +34,7 @@ def two_abreast(frames: int, apart: float) -> Floats:
     return 5.0 + radii[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)[:, None]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_people_side_by_side_stay_who_they_are_though_calibrations_disagree(seed: int) -> None:
     walks = two_abreast(300, apart=0.8)
     wrong = {"c0": TWO["c0"].shifted(np.array([0.35, 0.0])), "c1": TWO["c1"].shifted(np.array([-0.35, 0.0]))}
