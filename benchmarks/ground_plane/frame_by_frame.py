@@ -17,7 +17,7 @@ from tracking.ground_plane.places.measurements import measure
 from tracking.motchallenge import MotRow
 
 _GATE_M = 1.5
-"""Metres by which somebody may be away from where they were expected."""
+"""Meters by which somebody may be away from where they were expected."""
 _GATE_MPS = 3.0
 """Likewise per second."""
 _FORGET_S = 1.0
@@ -38,7 +38,7 @@ def track_frame_by_frame(
     frames: Sequence[Mapping[str, Detections]],
     fps: float,
 ) -> dict[str, list[MotRow]]:
-    """Return each camera's boxes with ids; the cameras' homographies are to metres."""
+    """Return each camera's boxes with ids; the cameras' homographies are to meters."""
     settings = GroundSettings()
     names, views = list(cameras), list(cameras.values())
     sizes = [BoxSizes() for _ in cameras]

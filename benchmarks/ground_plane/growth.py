@@ -32,7 +32,7 @@ def measure_square(cameras: int, people: int, frames: int, solver: str) -> dict[
     detections = list(square.frames(_BEFORE + frames))
     with timed_stages() as clock:
         timed = ClockedSolver(create_solver(solver), clock)
-        tracker = GroundPlaneTracker(square.views, GroundSettings(), timed, FPS, units_per_metre=1.0)
+        tracker = GroundPlaneTracker(square.views, GroundSettings(), timed, FPS, units_per_meter=1.0)
         for number, found in enumerate(detections):
             if number == _BEFORE:
                 clock.restart()

@@ -21,7 +21,7 @@ from tracking.ground_plane import (
     GroundSettings,
     track_ground_plane,
 )
-from tracking.ground_plane.places.measurements import estimate_units_per_metre
+from tracking.ground_plane.places.measurements import estimate_units_per_meter
 from tracking.motchallenge import MotRow
 
 MIN_IOU = 0.5
@@ -83,7 +83,7 @@ def run_ways(
         yield score(JOINT, joint, began, clock.seconds)
     if BY_FRAME in ways:
         began = time.process_time()
-        yield score(BY_FRAME, track_frame_by_frame(_in_metres(cameras, frames), frames, fps), began)
+        yield score(BY_FRAME, track_frame_by_frame(_in_meters(cameras, frames), frames, fps), began)
     if SERVED in ways:
         began = time.process_time()
         served = scene.config(track={"joint": True})
@@ -113,13 +113,13 @@ def rows_of(frames: list[GroundFrame], cameras: Mapping[str, GroundCamera]) -> d
     return rows
 
 
-def _in_metres(
+def _in_meters(
     cameras: Mapping[str, GroundCamera], frames: list[dict[str, Detections]]
 ) -> dict[str, GroundCamera]:
-    """Return the cameras with homographies to metres, by the heights of the first people."""
+    """Return the cameras with homographies to meters, by the heights of the first people."""
     for detections in frames:
         boxes = {index: detections[name].boxes for index, name in enumerate(cameras) if name in detections}
-        units = estimate_units_per_metre(list(cameras.values()), boxes)
+        units = estimate_units_per_meter(list(cameras.values()), boxes)
         if units is not None:
             return {name: camera.scaled(units) for name, camera in cameras.items()}
     return dict(cameras)

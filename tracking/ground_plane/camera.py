@@ -41,9 +41,9 @@ class GroundCamera:
         if np.linalg.matrix_rank(self.homography) < len(self.homography):
             raise ValueError("the homography is not invertible")
 
-    def scaled(self, units_per_metre: float) -> GroundCamera:
-        """Return the camera with a homography to metres."""
-        scale = np.diag([1.0, 1.0, units_per_metre])
+    def scaled(self, units_per_meter: float) -> GroundCamera:
+        """Return the camera with a homography to meters."""
+        scale = np.diag([1.0, 1.0, units_per_meter])
         return GroundCamera(scale @ self.homography, self.width, self.height)
 
     def shifted(self, offset: Floats) -> GroundCamera:

@@ -31,7 +31,7 @@ class Candidate:
     """Somebody who may be there.
 
     Attributes:
-        place: (2,) where they were seen last, metres.
+        place: (2,) where they were seen last, meters.
         covariance: (2, 2) of the place, m².
         unseen: seconds since.
         evidence: log likelihood ratio of being a person to being false detections, above 0.

@@ -19,7 +19,7 @@ from tracking.boxes import Floats
 from tracking.ground_plane.places.hypotheses import Places
 
 _NEAR_M = 1.7
-"""Metres between two people from which they can be taken for each other."""
+"""Meters between two people from which they can be taken for each other."""
 _JUDGED_AFTER_S, _GIVEN_UP_AFTER_S = 1.0, 4.0
 """Seconds since they parted from which they are compared, and until which."""
 _MIN_SIGHTINGS = 3
@@ -50,7 +50,7 @@ class Seen:
 
     Attributes:
         id: of the track.
-        place: (2,) metres.
+        place: (2,) meters.
         sightings: empty if no camera sees the person clearly.
     """
 

@@ -22,7 +22,7 @@ from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.person import GroundPerson
 from tracking.ground_plane.places.hypotheses import Places, find_places
-from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_metre, measure
+from tracking.ground_plane.places.measurements import PERSON_M, estimate_units_per_meter, measure
 from tracking.ground_plane.places.place_errors import PlaceErrors
 from tracking.ground_plane.predicted_boxes import predict_boxes, usual_boxes
 from tracking.ground_plane.program.costs import program_costs
@@ -47,11 +47,11 @@ class KeyframeTracker:
         settings: GroundSettings,
         solver: PartsSolver,
         fps: float,
-        units_per_metre: float | None = None,
+        units_per_meter: float | None = None,
     ) -> None:
         """Create a tracker of frames that are 1 / `fps` seconds apart.
 
-        `units_per_metre`: of the plane; None: estimated from the heights of the first boxes.
+        `units_per_meter`: of the plane; None: estimated from the heights of the first boxes.
         """
         self._names = tuple(cameras)
         self._given = tuple(cameras.values())
@@ -60,7 +60,7 @@ class KeyframeTracker:
         self._seconds = 1.0 / fps
         self._lag = frames_in(settings.lag_s, fps)
         self._stride = frames_in(settings.stride_s, fps)
-        self._units_per_metre = units_per_metre
+        self._units_per_meter = units_per_meter
         self._errors = PlaceErrors(len(cameras))
         self._cameras = self._corrected()
         self._sizes = [BoxSizes() for _ in cameras]
@@ -79,11 +79,11 @@ class KeyframeTracker:
         Numbers are successive, except after `flush`. Cameras that are left out have not searched the frame.
         """
         found = [detections.get(name) for name in self._names]
-        if self._units_per_metre is None:
-            self._units_per_metre = estimate_units_per_metre(
+        if self._units_per_meter is None:
+            self._units_per_meter = estimate_units_per_meter(
                 self._given, {k: part.boxes for k, part in enumerate(found) if part is not None}
             )
-            if self._units_per_metre is None:
+            if self._units_per_meter is None:
                 return [GroundFrame(number, (), None)]
             self._cameras = self._corrected()
         for sizes, part in zip(self._sizes, found, strict=True):
@@ -115,11 +115,11 @@ class KeyframeTracker:
         self._cameras = self._corrected()
 
     def _corrected(self) -> tuple[GroundCamera, ...]:
-        """Return the cameras over a plane in metres, without what is known of their offsets.
+        """Return the cameras over a plane in meters, without what is known of their offsets.
 
         There are none while the unit of the plane is not known.
         """
-        units = self._units_per_metre
+        units = self._units_per_meter
         if units is None:
             return ()
         return tuple(
@@ -135,11 +135,11 @@ class KeyframeTracker:
     @property
     def person_height(self) -> float | None:
         """How tall people are, in the unit of the plane; None before the first detections."""
-        return None if self._units_per_metre is None else PERSON_M * self._units_per_metre
+        return None if self._units_per_meter is None else PERSON_M * self._units_per_meter
 
     @property
     def offsets(self) -> dict[str, float]:
-        """By camera, metres by which it disagrees with the others about where people stand."""
+        """By camera, meters by which it disagrees with the others about where people stand."""
         lengths = np.linalg.norm(self._errors.offsets, axis=1)
         return dict(zip(self._names, lengths.tolist(), strict=True))
 
@@ -279,7 +279,7 @@ class KeyframeTracker:
         places = np.array([each.place for each in found]).reshape(-1, 2)
         predicted = predict_boxes([each.person.boxes for each in found], places, self._cameras, self._sizes)
         known = np.asarray(np.isfinite(predicted).all(axis=2))
-        units, measurements = self._units_per_metre or 1.0, frame.places.measurements
+        units, measurements = self._units_per_meter or 1.0, frame.places.measurements
         tracks = []
         for n, each in enumerate(found):
             boxes = {}

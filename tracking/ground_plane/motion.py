@@ -24,7 +24,7 @@ _MOTION_GATE = 16.0
 _MAX_TURN_S = 1.5
 """Seconds after which the place of somebody who may have turned is not searched further away."""
 _TURN_NOISE_M = 0.1
-"""Standard deviation of the place from which somebody has turned, metres."""
+"""Standard deviation of the place from which somebody has turned, meters."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class MotionState:
     """Place and velocity of a person, or of each of several, along leading axes of all arrays.
 
     Attributes:
-        mean: (..., 4) x, y in metres, and velocities in metres per second.
+        mean: (..., 4) x, y in meters, and velocities in meters per second.
         covariance: (..., 4, 4).
     """
 

@@ -1,4 +1,4 @@
-"""Settings of joint tracking on a ground plane, in metres and seconds whatever the unit of the plane is."""
+"""Settings of joint tracking on a ground plane, in meters and seconds whatever the unit of the plane is."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class GroundSettings:
     detection_probability: float = 0.9  # of a person that nothing hides, in one camera and frame
     false_per_frame: float = 0.5  # false detections per picture
     covered_log_odds: float = 2.0  # log odds lost by a detection that a better one of its camera covers
-    people_density: float = 0.05  # people per square metre who are there at the beginning
+    people_density: float = 0.05  # people per square meter who are there at the beginning
     beginning_s: float = 2.0  # seconds after the first detection in which they may still be found
-    arrival_rate: float = 0.004  # people who appear per square metre and second, later
+    arrival_rate: float = 0.004  # people who appear per square meter and second, later
     departure_rate: float = 0.1  # share of the people that leaves per second
     foot_noise: float = 0.012  # standard deviation of a foot, box heights, before it is known per camera
-    calibration_noise: float = 0.1  # standard deviation by which cameras disagree about a place, metres
-    speed: float = 1.3  # standard deviation of the velocity of people who start, stop and turn, metres/s
-    acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, metres/s²
+    calibration_noise: float = 0.1  # standard deviation by which cameras disagree about a place, meters
+    speed: float = 1.3  # standard deviation of the velocity of people who start, stop and turn, meters/s
+    acceleration: float = 0.8  # standard deviation of the acceleration of those who walk on, meters/s²
     turn_rate: float = 0.06  # times per second that somebody starts, stops or turns
     forget_after_s: float = 2.0  # seconds unseen after which somebody has left
     forget_unclear_after_s: float = (

@@ -31,16 +31,16 @@ class GroundPlaneTracker:
         settings: GroundSettings,
         solver: PartsSolver,
         fps: float = DEFAULT_FPS,
-        units_per_metre: float | None = None,
+        units_per_meter: float | None = None,
     ) -> None:
         """Create a tracker of frames that are 1 / `fps` seconds apart.
 
-        `units_per_metre`: of the plane; None: estimated from the heights of the first boxes.
+        `units_per_meter`: of the plane; None: estimated from the heights of the first boxes.
         """
         self._names = tuple(cameras)
         self._interval = frames_in(settings.frame_s, fps)
         self._most_skipped = settings.forget_after_s * fps
-        self._keyframes = KeyframeTracker(cameras, settings, solver, fps / self._interval, units_per_metre)
+        self._keyframes = KeyframeTracker(cameras, settings, solver, fps / self._interval, units_per_meter)
         self._searched: dict[int, Mapping[str, Detections]] = {}
         """By frame, from the last final keyframe on."""
         self._open: dict[int, dict[str, int]] = {}
@@ -90,7 +90,7 @@ class GroundPlaneTracker:
 
     @property
     def offsets(self) -> dict[str, float]:
-        """By camera, metres by which it disagrees with the others about where people stand."""
+        """By camera, meters by which it disagrees with the others about where people stand."""
         return self._keyframes.offsets
 
     @property

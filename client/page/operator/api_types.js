@@ -29,7 +29,7 @@
  * @property {Spread | null} tracking_delay
  * @property {number | null} optimal share of the windows
  * @property {number} solved_windows
- * @property {number | null} floor_offset metres; null: tracked alone
+ * @property {number | null} floor_offset meters; null: tracked alone
  * @property {{text: string, at: number} | null} last_error
  * @property {CameraPicture | null} picture
  *

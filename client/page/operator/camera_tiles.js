@@ -144,8 +144,8 @@ function formatOptimal({ optimal, solved_windows: windows }) {
 }
 
 /** @param {CameraDiagnostics} camera */
-function formatOffset({ floor_offset: metres }) {
-  return metres === null ? NO_VALUE : `${metres.toFixed(2)} m`;
+function formatOffset({ floor_offset: meters }) {
+  return meters === null ? NO_VALUE : `${meters.toFixed(2)} m`;
 }
 
 /** @param {PulseClients} pulses */

@@ -7,12 +7,13 @@ After https://www.home-assistant.io/integrations/mqtt/#discovery-messages: one r
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import Any
+from typing import Any, get_args
 
 from server.integrations.mqtt.site_state import PersonState, RuleState, SiteState, Topics
+from tracking.types import PictureCondition
 
 _CAMERA_STATES = ["starting", "live", "gone", "ended", "refused"]
-_CONDITIONS = ["clear", "covered", "turned", "blurred", "noisy", "frozen"]
+_CONDITIONS = list(get_args(PictureCondition))
 _EVENT_TYPES = ["entered", "left", "inward", "outward"]
 _HOME = "https://github.com/myview/myview"
 

@@ -63,7 +63,7 @@ class CameraDiagnostics(CameraInfo, frozen=True):
     solved_windows: int
     """The number of windows behind ``optimal``."""
     floor_offset: float | None
-    """Metres by which it disagrees with the others about where people stand, and is corrected; null: tracked
+    """Meters by which it disagrees with the others about where people stand, and is corrected; null: tracked
     alone."""
     last_error: CameraProblem | None
     """The last problem; it stays when the camera has recovered."""

@@ -33,7 +33,7 @@ def joint_setup(config: Config) -> JointSetup:
         fps=fps,
         stride_s=stride_s,
         lag_s=max(track.final_lag(fps), 1) / fps,
-        units_per_metre=units.pop() if len(units) == 1 else None,
+        units_per_meter=units.pop() if len(units) == 1 else None,
         solver=track.solver,
         # The process does nothing else, so that it may work all the time.
         solver_work_s=None if budget.work_s is None else stride_s,

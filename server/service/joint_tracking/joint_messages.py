@@ -22,7 +22,7 @@ class JointSetup(msgspec.Struct, frozen=True, kw_only=True):
     fps: float
     stride_s: float
     lag_s: float
-    units_per_metre: float | None
+    units_per_meter: float | None
     """Of the ground plane; None: unknown."""
     solver: str
     solver_work_s: float | None
@@ -72,7 +72,7 @@ class JointTracks(msgspec.Struct, frozen=True, kw_only=True):
     person_height: float
     """In ground units; 0: nobody was seen yet."""
     offsets: dict[str, float]
-    """By camera, metres by which it disagrees with the others about where people stand; it is corrected."""
+    """By camera, meters by which it disagrees with the others about where people stand; it is corrected."""
     paths: list[GroundPath]
     cameras: dict[str, list[TrackMessage]]
     """The boxes in each camera that overlaps another, in pixels of the site's image; ids as in `paths`."""

@@ -41,7 +41,7 @@ class JointTracker:
             GroundSettings(lag_s=setup.lag_s, stride_s=setup.stride_s),
             create_solver(setup.solver, SolverBudget(setup.solver_work_s, setup.solver_time_s)),
             setup.fps,
-            setup.units_per_metre,
+            setup.units_per_meter,
         )
         self._builders = {camera: CameraTrackBuilder(camera, setup.fps) for camera in setup.homographies}
         self._detections: dict[str, dict[int, Detections]] = {camera: {} for camera in setup.homographies}

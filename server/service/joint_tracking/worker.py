@@ -25,7 +25,7 @@ _ANSWER_S = 10.0
 _LATE_S, _LATE_MAX_S = 0.6, 5.0
 """Limits of the seconds after which an epoch is decided without joint tracks."""
 _DISAGREEING_M = 0.5
-"""Metres of a camera's offset from which on it should be calibrated again."""
+"""Meters of a camera's offset from which on it should be calibrated again."""
 _LATE_FACTOR, _SLOWEST_KEPT = 2.0, 0.95
 """An answer is late that takes so many times as long as the slowest one, of which this share counts for the
 next: on a busy machine answers take longer, and nobody is to vanish there."""
@@ -46,7 +46,7 @@ class JointWorker:
         """The cameras that overlap, as far as is known: all, until the process says."""
         self._logged: set[str] = set()
         self.offsets: dict[str, float] = {}
-        """By camera, metres by which it disagrees with the others about where people stand,
+        """By camera, meters by which it disagrees with the others about where people stand,
         which is corrected."""
         self._runs = count()
         self._worker: WorkerProcess[JointTracks] | None = None

@@ -35,8 +35,8 @@ class CameraCollector(Collector):
         )
         offsets = self._pipeline.joint.offsets
         yield self._gauge(
-            "floor_offset_metres",
-            "Metres by which the camera disagrees with the others about where people stand.",
+            "floor_offset_meters",
+            "Meters by which the camera disagrees with the others about where people stand.",
             lambda camera, _: offsets.get(camera),
         )
         yield self._gauge(

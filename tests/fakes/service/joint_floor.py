@@ -51,7 +51,7 @@ def joint_config(**changes: Any) -> Config:
 
 
 def walk_past(frames: int = 40) -> Floats:
-    """Return two people who walk past each other, (F, 2, 2) metres."""
+    """Return two people who walk past each other, (F, 2, 2) meters."""
     along = np.linspace(2.0, 8.0, frames)
     return np.stack(
         [

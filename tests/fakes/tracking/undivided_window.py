@@ -46,7 +46,7 @@ class Window:
 
 
 def random_window(seed: int, people: int, frames: int, places: int, width: float) -> Window:
-    """Return a window of at most so many people, frames and places on a floor `width` metres wide, 2 deep."""
+    """Return a window of at most so many people, frames and places on a floor `width` meters wide, 2 deep."""
     rng = np.random.default_rng(seed)
     people, length = int(rng.integers(0, people + 1)), int(rng.integers(1, frames + 1))
     size = np.array([width, 2.0])

@@ -1,4 +1,4 @@
-"""People who walk on a floor of 10 by 10 metres, as the boxes of three cameras around it."""
+"""People who walk on a floor of 10 by 10 meters, as the boxes of three cameras around it."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def detect_walkers(
 ) -> list[dict[str, Detections]]:
     """Return the detections of every frame by camera.
 
-    `walks` (F, N, 2) are places in metres, NaN where a person is not there.
+    `walks` (F, N, 2) are places in meters, NaN where a person is not there.
     """
     random = np.random.default_rng(seed)
     return [{name: _detect(places, view, noise, random) for name, view in views.items()} for places in walks]
@@ -86,7 +86,7 @@ def _detect(places: Floats, view: FloorView, noise: FloorNoise, random: np.rando
 
 
 def true_ids(frames: list[GroundFrame], walks: Floats, radius: float = 0.6) -> list[set[int]]:
-    """Return the ids of the tracks nearest to each person over all frames; within `radius` metres."""
+    """Return the ids of the tracks nearest to each person over all frames; within `radius` meters."""
     ids: list[set[int]] = [set() for _ in range(walks.shape[1])]
     for frame in frames:
         for track in frame.tracks:

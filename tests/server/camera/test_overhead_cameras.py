@@ -120,7 +120,7 @@ def test_upright_and_overhead_cameras_are_not_peers() -> None:
 
 
 def test_the_room_width_covers_the_letterboxed_picture() -> None:
-    # Six metres across a picture of 4 by 3, which has black columns at its sides in a site of 16 by 9.
+    # Six meters across a picture of 4 by 3, which has black columns at its sides in a site of 16 by 9.
     config = _config("overhead", ground=np.diag([0.0125, 0.0125, 1.0]).tolist(), ground_unit="m")
     across = [
         _with_room_width(TemporalSettings(), config.cameras[0], Letterbox((480, 360), site)).room_m

@@ -239,4 +239,4 @@ async def test_metrics_are_served(site_with_people: ServedSite) -> None:
     assert 'myview_camera_without_peers_total{camera="c0"} 2.0' in lines
     assert 'myview_camera_without_peers_total{camera="c1"} 0.0' in lines
     assert 'myview_camera_clock_offset_seconds{camera="c0"} 0.25' in lines
-    assert 'myview_camera_floor_offset_metres{camera="c0"} 0.12' in lines
+    assert 'myview_camera_floor_offset_meters{camera="c0"} 0.12' in lines

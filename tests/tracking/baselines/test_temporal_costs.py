@@ -41,11 +41,11 @@ def test_a_blob_within_another_has_distance_zero() -> None:
     assert stepped_distance_m(inner, outer, PIXELS_PER_METER, SETTINGS) == 0.0
 
 
-def test_blobs_that_overlap_in_part_are_six_centimetres_apart() -> None:
+def test_blobs_that_overlap_in_part_are_six_centimeters_apart() -> None:
     assert stepped_distance_m(_blob(0, 0, 40, 40), _blob(20, 20, 60, 60), PIXELS_PER_METER, SETTINGS) == 0.06
 
 
-def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimetres() -> None:
+def test_blobs_apart_have_the_gap_between_their_edges_and_sixteen_centimeters() -> None:
     left, right = _blob(0, 0, 20, 20), _blob(70, 0, 100, 20)
     assert blob_gap(left, right) == pytest.approx(50.0, abs=1.5)
     assert stepped_distance_m(left, right, PIXELS_PER_METER, SETTINGS) == pytest.approx(0.16 + 1.0, abs=0.03)

@@ -11,7 +11,7 @@ from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
 from tracking.boxes import heights
 from tracking.ground_plane import GroundCamera
 from tracking.ground_plane.camera import BoxSizes, feet
-from tracking.ground_plane.places.measurements import estimate_units_per_metre
+from tracking.ground_plane.places.measurements import estimate_units_per_meter
 
 VIEWS = floor_views()
 CAMERA = VIEWS["c0"].camera
@@ -57,12 +57,12 @@ def test_the_height_of_people_is_learned_from_boxes() -> None:
     assert heights(sizes.boxes(feet(true))) == pytest.approx(heights(true), rel=0.1)
 
 
-def test_a_metre_is_found_from_the_heights_of_people() -> None:
+def test_a_meter_is_found_from_the_heights_of_people() -> None:
     frame = detect_walkers(np.random.default_rng(0).uniform(1.0, 9.0, (1, 12, 2)), VIEWS, FloorNoise())[0]
     boxes = {index: found.boxes for index, found in enumerate(frame.values())}
     cameras = [view.camera for view in VIEWS.values()]
-    assert estimate_units_per_metre(cameras, boxes) == pytest.approx(1.0, rel=0.25)
-    assert estimate_units_per_metre([camera.scaled(0.01) for camera in cameras], boxes) == pytest.approx(
+    assert estimate_units_per_meter(cameras, boxes) == pytest.approx(1.0, rel=0.25)
+    assert estimate_units_per_meter([camera.scaled(0.01) for camera in cameras], boxes) == pytest.approx(
         100.0, rel=0.25
     )
-    assert estimate_units_per_metre(cameras, {}) is None
+    assert estimate_units_per_meter(cameras, {}) is None

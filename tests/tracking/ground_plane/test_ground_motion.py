@@ -15,7 +15,7 @@ from tracking.ground_plane.motion import MotionState, follow, reach_costs
 SETTINGS = GroundSettings()
 NONE = np.zeros((2, 2))
 ALONG_X = np.diag([1.0, 0.0])
-"""A camera that looks along the x axis has the feet wrong by a metre."""
+"""A camera that looks along the x axis has the feet wrong by a meter."""
 NOISE = 0.05**2 * np.eye(2)
 SECONDS = 0.12
 

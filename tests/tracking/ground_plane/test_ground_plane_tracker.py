@@ -173,12 +173,12 @@ def test_nobody_is_shown_long_after_they_left() -> None:
 
 def test_the_unit_of_the_plane_is_found_from_the_heights_of_people() -> None:
     walks = crossing_walks()
-    centimetres = {
+    centimeters = {
         name: GroundCamera(np.diag([100.0, 100.0, 1.0]) @ camera.homography, camera.width, camera.height)
         for name, camera in CAMERAS.items()
     }
     detections = detect_walkers(walks, VIEWS, FloorNoise(missed=0.1, deviation=0.006))
-    frames = track_ground_plane(tracker(centimetres), enumerate(detections))
+    frames = track_ground_plane(tracker(centimeters), enumerate(detections))
     assert all(len(found) == 1 for found in true_ids(frames, 100.0 * walks, 60.0))
 
 

@@ -43,7 +43,7 @@ class Places:
     Attributes:
         measurements: the frame's detections.
         groups: indices of the detections of each place, ascending.
-        means: (K, 2) metres.
+        means: (K, 2) meters.
         covariances: (K, 2, 2) m².
         costs: (K,) of the place being a person, against its detections being false.
         conflicts: (K, K) bool, places that share a detection.

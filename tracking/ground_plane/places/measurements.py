@@ -15,7 +15,7 @@ from tracking.ground_plane.settings import GroundSettings
 from tracking.types import Detections
 
 PERSON_M = 1.7
-"""Height of a person in metres, from which the unit of a ground plane follows."""
+"""Height of a person in meters, from which the unit of a ground plane follows."""
 _MIN_LOG_ODDS, _MAX_LOG_ODDS = -4.0, 3.0
 """Scores are not certain: log odds for which they count at least and at most. Detectors that suppress boxes
 beside a better one give them a score of 0, though many are of people."""
@@ -38,7 +38,7 @@ class Measurements:
         index: (D,) of the detection among those of its camera.
         boxes: (D, 4) pixels.
         histograms: appearance of each, (B,); B = 0: unknown.
-        places: (D, 2) of the feet, metres.
+        places: (D, 2) of the feet, meters.
         covariances: (D, 2, 2) of the places, m²: the noise of a foot carried through the homography, so that
             distant feet are long ellipses, and that of the calibration.
         log_odds: (D,) of the scores.
@@ -137,8 +137,8 @@ def covered_by_better(boxes: Floats, log_odds: Floats) -> Floats:
     return np.asarray((covers * better).max(axis=1))
 
 
-def estimate_units_per_metre(cameras: Sequence[GroundCamera], boxes: Mapping[int, Floats]) -> float | None:
-    """Return how many units of the plane a metre has, by the heights of people's boxes; None without boxes.
+def estimate_units_per_meter(cameras: Sequence[GroundCamera], boxes: Mapping[int, Floats]) -> float | None:
+    """Return how many units of the plane a meter has, by the heights of people's boxes; None without boxes.
 
     `boxes` (K, 4) by the index of the camera. Where somebody stands, a pixel to the side is as long as one
     upward.

@@ -50,9 +50,9 @@ def find_misplaced(
     Args:
         measurements: the D detections of the frame.
         members: (K, D) the detections that each place has.
-        places: (K, 2) metres.
+        places: (K, 2) meters.
         misses: (K, C) costs of each camera not detecting the person at each place.
-        cameras: the C cameras, over a plane in metres.
+        cameras: the C cameras, over a plane in meters.
         sizes: of people's boxes in each.
         settings: how often feet are misplaced.
     """
@@ -91,11 +91,11 @@ def _costs(
         ]
     )
     # The density is per m², like that of false detections.
-    square_metres = np.abs(determinants(camera.jacobians(feet(boxes[0]))))
+    square_meters = np.abs(determinants(camera.jacobians(feet(boxes[0]))))
     costs = (
         0.5 * (deviations**2).sum(axis=0)
         + LOG_2PI
-        + np.log(MISPLACED_FOOT_NOISE * _SIDE_NOISE * tall**2 * square_metres)
+        + np.log(MISPLACED_FOOT_NOISE * _SIDE_NOISE * tall**2 * square_meters)
         + measurements.log_clutter[seen]
         - np.log(settings.misplaced_probability * settings.detection_probability)
     )

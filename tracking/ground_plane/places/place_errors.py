@@ -27,7 +27,7 @@ _MAX_DISTANCE = 9.2
 _RANGE = (1.0, 5.0)
 """Factors of the assumed noise between which it is learned: too small a noise loses people."""
 _MAX_OFFSET_M = 1.0
-"""Metres of the longest offset: cameras that disagree by more are not calibrated."""
+"""Meters of the longest offset: cameras that disagree by more are not calibrated."""
 
 
 class PlaceErrors:
@@ -35,7 +35,7 @@ class PlaceErrors:
 
     Attributes:
         noise: (C,) factors of the standard deviations that are assumed for feet and calibration.
-        offsets: (C, 2) metres by which places are wrong on average. What all cameras have in common does not
+        offsets: (C, 2) meters by which places are wrong on average. What all cameras have in common does not
             show, and is left.
     """
 

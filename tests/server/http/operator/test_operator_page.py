@@ -452,7 +452,7 @@ async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browse
         await expect(state).to_have_text("No walk yet.")
         await expect(page.locator("#walk-result")).to_be_hidden()
     matrices = json.loads((tmp_path / "ground.json").read_text())["homography"]
-    assert np.median(errors_on_floor([np.array(matrices[camera]) for camera in CAMERAS])) < 0.15  # metres
+    assert np.median(errors_on_floor([np.array(matrices[camera]) for camera in CAMERAS])) < 0.15  # meters
 
 
 async def test_trial_settings_apply_and_can_be_reset_to_the_file(browser: Browser) -> None:

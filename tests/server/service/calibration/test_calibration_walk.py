@@ -84,7 +84,7 @@ async def test_a_walk_yields_the_scenes_homographies(wide: ServedSite, tmp_path:
     assert content["configuration"].startswith("ground: ground.json\n")
     config = build_config({"cameras": cameras, "ground": "ground.json"}, where="walk", folder=tmp_path)
     errors = errors_on_floor([np.array(camera.ground) for camera in config.cameras])
-    assert np.median(errors) < 0.15  # metres
+    assert np.median(errors) < 0.15  # meters
     assert wide.service.config == before  # the active configuration is unchanged
     async with wide.session.delete(WALK, headers=MINE) as answer:
         assert (await answer.json())["state"] == "none"

@@ -154,10 +154,10 @@ async def test_a_camera_that_disagrees_with_the_others_is_corrected_and_named(
     assert said[0].startswith("camera c0 sees people 0.5 m from where the others see them")
 
 
-def shifted_ground(ground: Sequence[Sequence[float]] | None, metres: float) -> list[list[float]]:
+def shifted_ground(ground: Sequence[Sequence[float]] | None, meters: float) -> list[list[float]]:
     """Return the homography with all places moved along x."""
     assert ground is not None
     move = np.eye(3)
-    move[0, 2] = metres
+    move[0, 2] = meters
     moved: list[list[float]] = (move @ np.array(ground)).tolist()
     return moved
