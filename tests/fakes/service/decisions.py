@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bestview import Merge, Split
+from fakes.service.running_service import send_epoch
 from fakes.service.scripted_cameras import (
     CAMERAS,
     GOP,
@@ -11,11 +12,7 @@ from fakes.service.scripted_cameras import (
     SMALL,
     STRIDE,
     FedService,
-    camera_tracks,
-    encoded,
     small_config,
-    tracks,
-    video,
 )
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import NumberedBox
@@ -29,11 +26,8 @@ def service_with_backlog() -> FedService:
     service = FedService(small_config())
     service.connect_cameras(*CAMERAS)
     for epoch in range(EPOCHS):
-        for seed, camera in enumerate(CAMERAS):
-            for unit in encoded(seed)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                service.ingest.video(video(camera, unit))
-            boxes = {1: LARGE if (epoch + seed) % 4 < 2 else SMALL}
-            service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
+        boxes = {camera: LARGE if (epoch + seed) % 4 < 2 else SMALL for seed, camera in enumerate(CAMERAS)}
+        send_epoch(service, epoch, *CAMERAS, boxes=boxes)
     service.pulses.newest = end_of_epoch(EPOCHS - 1, STRIDE)
     return service
 

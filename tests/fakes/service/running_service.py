@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,14 +20,18 @@ from fakes.service.scripted_cameras import (
     video,
 )
 from server.config.site_config import Config
+from server.messaging.messages import Box
 from server.service.pulse_follower import PulseFollower
 
 ENCODED = 40 // STRIDE
 """Epochs of encoded pictures; then they repeat, from a keyframe on."""
 
 
-def send_epoch(service: FedService, epoch: int, *cameras: str) -> None:
-    """Send an epoch's frames and track messages of some cameras."""
+_BOXES = dict(zip(CAMERAS, (SMALL, LARGE), strict=True))
+
+
+def send_epoch(service: FedService, epoch: int, *cameras: str, boxes: Mapping[str, Box] = _BOXES) -> None:
+    """Send an epoch's frames and track messages of some cameras; ``boxes`` of person 1 by camera."""
     for seed, camera in enumerate(CAMERAS):
         if camera not in cameras:
             continue
@@ -36,7 +40,7 @@ def send_epoch(service: FedService, epoch: int, *cameras: str) -> None:
             service.ingest.video(
                 video(camera, replace(unit, pulse=unit.pulse + (epoch - encoded_epoch) * STRIDE))
             )
-        service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: LARGE if seed else SMALL})))
+        service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: boxes[camera]})))
 
 
 class PulsesOfTest(PulseFollower):
