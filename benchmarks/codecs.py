@@ -42,7 +42,7 @@ class StreamVariant:
 
     name: str
     encode: dict[str, Any]
-    h264: str = "encode"
+    passthrough: str = "off"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _config(variant: StreamVariant, recording: Path, site: SiteSettings) -> Conf
     content = {
         "site": site.model_dump(),
         "encode": variant.encode,
-        "cameras": [{"id": "c0", "source": str(recording), "h264": variant.h264}],
+        "cameras": [{"id": "c0", "source": str(recording), "passthrough": variant.passthrough}],
     }
     return build_config(content, where="codecs", folder=recording.parent)
 

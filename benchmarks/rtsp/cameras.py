@@ -88,7 +88,7 @@ def site_of(camera: SimulatedCamera, port: int, folder: Path) -> Config:
             {
                 "id": "c0",
                 "source": f"{scheme}://{login}127.0.0.1:{port}/live",
-                "h264": "auto",
+                "passthrough": "auto",
                 "options": dict(camera.options),
                 **settings,
             }

@@ -181,8 +181,10 @@ class Config(BaseSettings):
         if self.encode.codec == "vp8" and self.rtsp.enabled:
             raise ValueError("rtsp.enabled: a site whose encode.codec is vp8 has no RTSP; use h264")
         for camera in self.cameras:
-            if self.encode.codec == "vp8" and camera.h264 != "encode":
-                raise ValueError(f"cameras: {camera.id}: h264: {camera.h264}: encode.codec is vp8")
+            if self.encode.codec == "vp8" and camera.passthrough != "off":
+                raise ValueError(
+                    f"cameras: {camera.id}: passthrough: {camera.passthrough}: encode.codec is vp8"
+                )
         return self
 
     @property

@@ -11,7 +11,7 @@ from server.config.site_config import Config
 
 _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """Settings that the best view applies at the next GOP."""
-_CAMERA_KEYS = ("source", "password", "offset_s", "at_end", "h264", "options", "ignore", "detections")
+_CAMERA_KEYS = ("source", "password", "offset_s", "at_end", "passthrough", "options", "ignore", "detections")
 """Settings that only the camera's own process uses."""
 _TRACK = tuple(name for name in TrackSettings.model_fields if name not in {"backlog_s", "joint"})
 _SHARED_KEYS = ("detect", *(f"track.{name}" for name in _TRACK))
@@ -89,8 +89,8 @@ def plan_reload(running: Config, wanted: Config) -> ReloadPlan:
     shared = tuple(
         key for key in _of(keys, _SHARED_KEYS) if not _of((key,), [f"track.{name}" for name in unchanged])
     )
-    # Pass-through depends on the site's codec: if that changes, h264 needs a restart, too.
-    camera_keys = tuple(key for key in _CAMERA_KEYS if not (key == "h264" and "encode.codec" in keys))
+    # Pass-through depends on the site's codec: if that changes, it needs a restart, too.
+    camera_keys = tuple(key for key in _CAMERA_KEYS if not (key == "passthrough" and "encode.codec" in keys))
     camera_changes = {
         camera: _of(keys, [f"cameras.{camera}.{name}" for name in camera_keys])
         for camera in running.camera_ids

@@ -37,7 +37,7 @@ def required_format(config: Config) -> RequiredFormat:
     """Return the format that a site requires."""
     site = config.site
     parameters = None
-    encoding = any(camera.h264 != "pass" for camera in config.cameras)
+    encoding = any(camera.passthrough != "pass" for camera in config.cameras)
     if encoding and config.encode.parameters == "equal":
         black = np.zeros((site.height, site.width, 3), dtype=np.uint8)
         first = Encoder(site, config.encode).encode(0, black)

@@ -34,14 +34,14 @@ def open_passthrough(
         UserError: it cannot be opened, or does not fit though the configuration demands it.
         UnavailableError: the same, of a network camera that may become available.
     """
-    if camera.h264 == "encode":
+    if camera.passthrough == "off":
         return PassthroughOpening(None, "")
     try:
         return PassthroughOpening(_open(config, camera, listener), "")
     except IncompatibleStreamError as error:
-        if camera.h264 == "pass":
-            hint = "change the camera's settings, or let it be encoded (h264: auto)"
-            raise UserError(f"camera {camera.id}: h264: pass: {error}; {hint}") from error
+        if camera.passthrough == "pass":
+            hint = "change the camera's settings, or let it be encoded (passthrough: auto)"
+            raise UserError(f"camera {camera.id}: passthrough: pass: {error}; {hint}") from error
         return PassthroughOpening(None, str(error))
     except UserError as error:
         is_stream = source_kind(camera.source) is SourceKind.STREAM

@@ -163,7 +163,7 @@ def _quality_findings(config: Config, check: str, probe: CameraProbe) -> list[Fi
             warning(
                 check,
                 f"is re-encoded: {probe.why_encoded}",
-                "change the camera's settings, or set h264: encode",
+                "change the camera's settings, or set passthrough: off",
             )
         )
     return findings

@@ -88,11 +88,11 @@ def _kbps(config: Config, camera: str, probe: CameraProbe) -> float | None:
     """Return a camera's bit rate: `encode.max_kbps`, or as probed.
 
     Returns:
-        None: the probe failed, and the rate has no limit or the camera may pass its own H.264 through.
+        None: the probe failed, and the rate has no limit or the camera may be passed through.
     """
     cap = config.encode.max_kbps
     if probe.problem:
-        return cap if config.camera(camera).h264 == "encode" else None
+        return cap if config.camera(camera).passthrough == "off" else None
     return probe.kbps if cap is None or probe.passes else cap
 
 

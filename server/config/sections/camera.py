@@ -5,7 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    NonNegativeFloat,
+    PositiveFloat,
+    ValidationInfo,
+    field_validator,
+)
 
 from bestview import CrossViewSettings, validate_homography
 from server.config.ground_unit import check_unit_spelling
@@ -15,6 +22,11 @@ from tracking import DEFAULT_SOLVER, CostSettings, Solver, SolverBudget, WindowS
 from tracking.baselines.temporal_consistency import TemporalSettings
 from tracking.interactive import InteractiveSettings
 from tracking.registry import DEFAULT_TRACKER, OFFLINE_TRACKERS, TEMPORAL_TRACKER, tracker_names
+
+
+def _spell_off(value: object) -> object:
+    """Return YAML's ``off``, which is a boolean, as text."""
+    return "off" if value is False else value
 
 
 class CameraSettings(Section):
@@ -31,8 +43,8 @@ class CameraSettings(Section):
     """A recording shows at pulse n its moment n / fps - offset_s, to the next frame."""
     at_end: Literal["stop", "loop"] = "stop"
     """What a recording does after its last frame."""
-    h264: Literal["encode", "auto", "pass"] = "encode"
-    """The source's own H.264: re-encode it, pass it through if it fits, or refuse what does not fit."""
+    passthrough: Annotated[Literal["off", "auto", "pass"], BeforeValidator(_spell_off)] = "off"
+    """The source's own video: re-encode it, pass it through if it fits, or refuse what does not fit."""
     options: dict[str, str] = {}
     """Options for FFmpeg's opener, e.g. rtsp_transport: tcp."""
     ignore: list[Polygon] = []

@@ -228,3 +228,11 @@ def test_the_demo_configuration_is_that_of_the_demo_command() -> None:
     example = load_config(ROOT / "configs" / "demo.yaml")
     embedded = build_config(DEMO, where="demo", folder=Path())
     assert example == embedded
+
+
+@pytest.mark.parametrize("word", ["off", "'off'", "auto", "pass"])
+def test_passthrough_may_be_off_without_quotes(word: str, tmp_path: Path) -> None:
+    """YAML reads a bare off as a boolean."""
+    path = tmp_path / "site.yaml"
+    path.write_text(f"cameras: [{{id: c0, source: c0.mp4, passthrough: {word}}}]")
+    assert load_config(path).camera("c0").passthrough == word.strip("'")

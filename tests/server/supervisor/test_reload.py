@@ -56,6 +56,7 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "rtsp.enabled": (SITE, True),
     "cameras.c1.source": (CAMERA, "rtsp://elsewhere/1"),
     "cameras.c1.offset_s": (CAMERA, 0.12),
+    "cameras.c1.passthrough": (CAMERA, "auto"),
     "cameras.c1.options": (CAMERA, {"rtsp_transport": "tcp"}),
     "cameras.c1.ground": (SITE, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
     "detect.box_filter.min_height": (ALL_CAMERAS, 0.3),

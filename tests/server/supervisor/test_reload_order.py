@@ -14,11 +14,11 @@ from server.supervisor.reload import plan_reload
 
 
 def test_passthrough_waits_for_a_pending_codec_change() -> None:
-    passing = [{"id": "c0", "source": "scene:room", "h264": "pass"}, "c1"]
+    passing = [{"id": "c0", "source": "scene:room", "passthrough": "pass"}, "c1"]
     running = small_config(encode={"codec": "vp8"})
     reload = plan_reload(running, small_config(passing))
     assert (reload.cameras, reload.now) == ((), running)
-    assert reload.site == ("encode.codec", "cameras.c0.h264")
+    assert reload.site == ("encode.codec", "cameras.c0.passthrough")
     reload = plan_reload(small_config(), small_config(passing))
     assert (reload.cameras, reload.site) == (("c0",), ())
 

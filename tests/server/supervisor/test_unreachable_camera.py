@@ -53,7 +53,7 @@ class Site:
 
 @pytest.fixture
 async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
-    """Start a camera process with the site's width and the setting ``h264``."""
+    """Start a camera process with the site's width and the setting ``passthrough``."""
     write_video(tmp_path / "c0.mp4", 25)
     log_lines, log = LogLines(), logging.getLogger("server")
     log.addHandler(log_lines)
@@ -63,14 +63,16 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
     runner = web.AppRunner(app)
     running_tasks: list[asyncio.Task[None]] = []
 
-    def begin(width: int = 64, h264: str = "encode") -> Site:
+    def begin(width: int = 64, passthrough: str = "off") -> Site:
         port, bus = free_port(), f"tcp/127.0.0.1:{free_port()}"
         path = tmp_path / "site.yaml"
         content = {
             "site": {"name": "hall", "width": width, "height": 48},
             "sync": {"port": free_port(), "start_timeout_s": 0.1},
             "zenoh": {"connect": bus, "listen": bus},
-            "cameras": [{"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "h264": h264}],
+            "cameras": [
+                {"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "passthrough": passthrough}
+            ],
         }
         path.write_text(yaml.safe_dump(content))
         running_tasks.append(asyncio.create_task(camera_process(ActiveConfig(path), "c0")))
@@ -110,5 +112,5 @@ async def test_an_error_of_a_camera_that_answers_late_does_not_end_others(
     site = begin(128, "pass")
     await site.log_lines.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
-    with pytest.raises(UnavailableError, match=r"^camera c0: h264: pass: its frames are 64x48"):
+    with pytest.raises(UnavailableError, match=r"^camera c0: passthrough: pass: its frames are 64x48"):
         await asyncio.wait_for(site.process, PATIENCE)

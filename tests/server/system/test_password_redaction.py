@@ -166,7 +166,7 @@ def test_yaml_errors_do_not_repeat_the_content(
 @pytest.mark.parametrize("password", NAIVE)
 def test_errors_of_opening_a_camera_do_not_have_its_password(source: str, password: str) -> None:
     address = source.format(password)
-    config = built(cameras=[door(address, h264="auto")], sound={"source": address})
+    config = built(cameras=[door(address, passthrough="auto")], sound={"source": address})
     for attempt in (
         lambda: open_source(CameraSettings(id="door", source=address), SiteSettings()),
         lambda: open_passthrough(config, config.camera("door"), None),

@@ -46,8 +46,8 @@ from server.system.errors import UnavailableError, UserError
 FRAMES = 20
 
 
-def site(source: Path | str, h264: str = "pass", **changes: Any) -> Config:
-    camera = {"id": "c0", "source": str(source), "h264": h264, **changes.pop("camera", {})}
+def site(source: Path | str, passthrough: str = "pass", **changes: Any) -> Config:
+    camera = {"id": "c0", "source": str(source), "passthrough": passthrough, **changes.pop("camera", {})}
     other = {"id": "c1", "source": "scene:room"}
     return small_config(cameras=[camera, other], **changes)
 
@@ -168,7 +168,7 @@ def test_incompatible_video_is_encoded_or_refused_with_the_reason(
     tmp_path: Path, changes: dict[str, Any], reason: str
 ) -> None:
     path = write_h264(tmp_path, "mp4")
-    with pytest.raises(UserError, match=f"camera c0: h264: pass: {reason}") as refused:
+    with pytest.raises(UserError, match=f"camera c0: passthrough: pass: {reason}") as refused:
         CameraPipeline(site(path, **changes), "c0")
     assert "\n" not in str(refused.value)
     pipeline = CameraPipeline(site(path, "auto", **changes), "c0")
@@ -192,18 +192,18 @@ def test_other_codecs_and_b_frames_are_encoded(
 
 
 @pytest.mark.parametrize(
-    ("h264", "gop", "text"),
+    ("passthrough", "gop", "text"),
     [
         ("auto", GOP, "camera c0: its own H.264 is passed through"),
         ("auto", 4, "camera c0 is re-encoded: its own H.264: frame 4 does not begin a GOP"),
-        ("encode", GOP, ""),
+        ("off", GOP, ""),
     ],
 )
 def test_the_process_logs_once_whether_video_is_passed_through(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, h264: str, gop: int, text: str
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, passthrough: str, gop: int, text: str
 ) -> None:
     caplog.set_level("INFO", "server.camera.process")
-    process = CameraProcess(site(write_h264(tmp_path, "mp4"), h264, encode={"gop_s": gop / FPS}), "c0")
+    process = CameraProcess(site(write_h264(tmp_path, "mp4"), passthrough, encode={"gop_s": gop / FPS}), "c0")
     process._pipeline.close()
     assert caplog.text.count("own H.264") == bool(text)
     assert text in caplog.text
@@ -218,7 +218,7 @@ def test_a_looped_recording_must_have_whole_gops(tmp_path: Path) -> None:
 
 def test_sites_of_passthrough_cameras_accept_other_parameter_sets(tmp_path: Path) -> None:
     path = write_h264(tmp_path, "mp4")
-    camera = {"source": str(path), "h264": "pass"}
+    camera = {"source": str(path), "passthrough": "pass"}
     config = small_config(cameras=[{"id": "c0", **camera}, {"id": "c1", **camera}], encode={"crf": 30})
     pipeline = CameraPipeline(config, "c0")
     assert pipeline.is_passthrough
@@ -236,7 +236,7 @@ def test_images_are_encoded_and_vp8_sites_have_no_passthrough(tmp_path: Path) ->
     pipeline = CameraPipeline(site("scene:room", "auto"), "c0")
     assert "image files contain no H.264" in pipeline.why_encoded
     pipeline.close()
-    with pytest.raises(UserError, match=r"c0: h264: auto: encode\.codec is vp8"):
+    with pytest.raises(UserError, match=r"c0: passthrough: auto: encode\.codec is vp8"):
         site(tmp_path / "own.mp4", "auto", encode={"codec": "vp8"})
 
 
@@ -416,16 +416,16 @@ def test_a_camera_may_begin_a_gop_out_of_turn_for_a_new_client(
         camera.close()
 
 
-@pytest.mark.parametrize("h264", ["pass", "auto"])
+@pytest.mark.parametrize("passthrough", ["pass", "auto"])
 def test_a_network_camera_that_stops_during_the_check_is_unavailable(
-    network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, h264: str
+    network: NetworkCamera, monkeypatch: pytest.MonkeyPatch, passthrough: str
 ) -> None:
     """Its format is unknown: it is neither refused nor encoded for good."""
     monkeypatch.setattr("server.camera.passthrough.stream_source.READ_S", 0.5)
     network.gop_limit = 2
     camera = {"options": {"probesize": "2000", "analyzeduration": "1000"}}
     with pytest.raises(UnavailableError, match=r"stopped during the check: no answer within 0\.5 s$"):
-        CameraPipeline(site(network.url, h264, camera=camera), "c0")
+        CameraPipeline(site(network.url, passthrough, camera=camera), "c0")
 
 
 def test_audio_is_delayed_as_much_as_the_video(network: NetworkCamera) -> None:

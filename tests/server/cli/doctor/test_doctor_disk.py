@@ -27,9 +27,13 @@ GOOD = CameraProbe(size=(64, 48), kbps=1000.0)
 AWAY = CameraProbe("Connection refused")
 
 
-def site(folder: Path, cameras: tuple[str, ...] = ("c0",), h264: str = "encode", **changes: Any) -> Config:
+def site(
+    folder: Path, cameras: tuple[str, ...] = ("c0",), passthrough: str = "off", **changes: Any
+) -> Config:
     content: dict[str, Any] = {
-        "cameras": [{"id": camera, "source": f"{camera}.mp4", "h264": h264} for camera in cameras],
+        "cameras": [
+            {"id": camera, "source": f"{camera}.mp4", "passthrough": passthrough} for camera in cameras
+        ],
         "record": {"folder": "kept", "keep_s": HOUR_S},
         **changes,
     }
@@ -84,7 +88,7 @@ def test_the_encoders_limit_is_assumed_for_cameras_that_were_not_probed(tmp_path
 
 
 def test_the_encoders_limit_is_not_assumed_for_passthrough_cameras(tmp_path: Path) -> None:
-    tests_folder = site(tmp_path, h264="auto", encode={"max_kbps": 500})
+    tests_folder = site(tmp_path, passthrough="auto", encode={"max_kbps": 500})
     passing = CameraProbe(size=(64, 48), kbps=4000.0, passes=True)
     assert needed_mb(tests_folder, {"c0": passing}) == pytest.approx((4000 + INDEX_KBPS) * HOUR_S / 8000)
     assert needed_mb(tests_folder, {"c0": GOOD}) == pytest.approx((500 + INDEX_KBPS) * HOUR_S / 8000)
