@@ -34,7 +34,8 @@ from server.cli.generated_config import config_for_videos
 from server.cli.render.renderer import render
 from server.cli.track.command import track_one
 from server.service.calibration.calibration_report import ground_file_text, walk_settings
-from server.service.calibration.floor_plan import floor_plan_cameras, plot_floor_plan
+from server.service.calibration.floor_plan import plot_floor_plan
+from server.service.calibration.floor_plan_camera import floor_plan_cameras
 from synthetic import Scene, write_recording
 from tracking.motchallenge import write_rows
 

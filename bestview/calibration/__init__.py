@@ -2,7 +2,7 @@
 
 from bestview.calibration.homography import Floats, fit_homography
 from bestview.calibration.marked_points import CalibrationError, MarkedPoints, PointSettings
-from bestview.calibration.point_calibration import PointFit, fit_cameras, fit_points
+from bestview.calibration.point_calibration import PointFit, agrees_with, fit_cameras, fit_points
 from bestview.calibration.walk_calibration import (
     CameraCalibration,
     ErrorSummary,
@@ -26,6 +26,7 @@ __all__ = [
     "WalkCalibration",
     "WalkSettings",
     "WalkTrack",
+    "agrees_with",
     "boxes_at_edge",
     "build_walk",
     "calibrate_from_walks",

@@ -51,11 +51,17 @@ class MarkedPoints:
         camera: its name, for messages.
         image: (N, 2) pixels of the camera's own picture.
         floor: (N, 2) the same places on the floor, in the user's unit.
+        names: what messages call the N pairs; empty: by their numbers, from 1.
     """
 
     camera: str
     image: Floats
     floor: Floats
+    names: tuple[str, ...] = ()
+
+    def label(self, pair: int) -> str:
+        """Return what messages call a pair."""
+        return self.names[pair] if self.names else f"pair {pair + 1}"
 
 
 def image_errors(backwards: Floats, points: MarkedPoints) -> Floats:
@@ -70,7 +76,7 @@ def describe_inconsistency(
     """Return an error message that names the inconsistent pairs, if they can be identified."""
     count = len(points.image)
     fits = _consensus(points, allowed) if count >= _MIN_POINTS_TO_NAME else np.ones(count, dtype=bool)
-    wrong = np.flatnonzero(~fits)
+    wrong = np.flatnonzero(~fits).tolist()
     if not 0 < len(wrong) <= settings.maximum_inconsistent_share * count or count - len(wrong) <= MIN_POINTS:
         return (
             f"camera {points.camera}: the pairs contradict each other, by up to {errors.max():.0f} pixels; "
@@ -78,15 +84,15 @@ def describe_inconsistency(
         )
     backwards = fit_homography(points.floor[fits], points.image[fits])
     off = image_errors(backwards, points)
-    named = ", ".join(
-        f"{number + 1} (image {_point_text(points.image[number])}, floor {_point_text(points.floor[number])})"
-        for number in wrong
+    places = (
+        f"image {_point_text(points.image[pair])}, floor {_point_text(points.floor[pair])}" for pair in wrong
     )
+    named = ", ".join(f"{points.label(pair)} ({place})" for pair, place in zip(wrong, places, strict=True))
     one = len(wrong) == 1
     far = f"{off[wrong].min():.0f} pixels" if np.isfinite(off[wrong]).all() else "beyond the horizon"
     return (
-        f"camera {points.camera}: {'pair' if one else 'pairs'} {named} "
-        f"{'contradicts' if one else 'contradict'} the others: {far} off, where the others are within "
+        f"camera {points.camera}: {named} {'contradicts' if one else 'contradict'} the others: {far} off, "
+        f"where the others are within "
         f"{off[fits].max():.1f}; correct or remove {'it' if one else 'them'}"
     )
 

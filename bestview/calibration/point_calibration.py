@@ -54,9 +54,9 @@ def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> P
     homography = homography / np.abs(homography).max()
     floor = to_ground(homography, points.image)
     if not np.isfinite(floor).all():
-        pair = int(np.flatnonzero(~np.isfinite(floor).all(axis=1))[0]) + 1
+        pair = points.label(int(np.flatnonzero(~np.isfinite(floor).all(axis=1))[0]))
         raise CalibrationError(
-            f"camera {points.camera}: pair {pair} would be above the horizon; the points go round in another "
+            f"camera {points.camera}: {pair} would be above the horizon; the points go round in another "
             "order on the floor than in the picture, or the picture is upside down"
         )
     return PointFit(homography, np.hypot(*(floor - points.floor).T), errors)
@@ -80,6 +80,18 @@ def fit_cameras(
             "floor must be the same way round in all cameras; are its floor's two coordinates exchanged?"
         )
     return fits
+
+
+def agrees_with(homography: Floats, points: MarkedPoints, settings: PointSettings | None = None) -> bool:
+    """Return whether most marked pairs fit a homography, image to floor, of the same camera.
+
+    At least four pairs do not fit one by chance: then both are in the same coordinates of the floor.
+    """
+    settings = settings or PointSettings()
+    if len(points.image) < MIN_POINTS:
+        return False
+    errors = image_errors(np.asarray(np.linalg.inv(homography)), points)
+    return bool(np.median(errors) <= settings.tolerance * _extent(points.image))
 
 
 def is_mirrored(fit: PointFit, points: MarkedPoints) -> bool:
@@ -107,9 +119,8 @@ def _check(points: MarkedPoints) -> None:
         for second, point in enumerate(source):
             first = first_index.setdefault(point, second)
             if target[first] != target[second]:
-                raise CalibrationError(
-                    f"camera {points.camera}: pairs {first + 1} and {second + 1} are one point {words}"
-                )
+                both = f"{points.label(first)} and {points.label(second)}"
+                raise CalibrationError(f"camera {points.camera}: {both} are one point {words}")
 
 
 def _fit(source: Floats, target: Floats, camera: str) -> Floats:

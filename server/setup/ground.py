@@ -2,13 +2,37 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from server.config.loader import read_content
 from server.setup.site_file import check_text, replace_file
 from server.setup.yaml_edit import changed_text
 from server.system.errors import UserError
+
+
+@dataclass(frozen=True, slots=True)
+class GroundFile:
+    """The file that a configuration names as its ground, and its checked content."""
+
+    file: Path
+    content: dict[str, Any]
+
+
+def read_ground(path: Path) -> GroundFile | None:
+    """Return the ground file of a configuration; None: it names none.
+
+    Raises:
+        UserError: the configuration or the ground file is invalid.
+    """
+    named = read_content(path).get("ground")
+    if not isinstance(named, str):
+        return None
+    check_text(path.read_text(encoding="utf-8"), path)
+    file = path.parent / named
+    return GroundFile(file, json.loads(file.read_text(encoding="utf-8")))
 
 
 @dataclass(frozen=True, slots=True)

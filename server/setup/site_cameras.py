@@ -10,6 +10,7 @@ from typing import Any
 
 from server.config.loader import read_content
 from server.setup.camera_address import check_name, free_name
+from server.setup.ground import read_ground
 from server.setup.session import TriedCamera
 from server.setup.site_file import camera_entry, check_text, password_file, replace_file, write_passwords
 from server.setup.yaml_edit import changed_text
@@ -52,7 +53,7 @@ def add_camera(path: Path, tried: TriedCamera) -> None:
         raise UserError(f"{tried.address.shown}: this camera is in the configuration already")
     folder = (path.parent / password_file(path, "any")).parent
     taken = {str(camera.get("id")) for camera in cameras} | {file.name for file in folder.glob("*")}
-    ground = _read_ground(path)
+    ground = read_ground(path)
     if ground is not None:
         taken |= ground.content["homography"].keys()
     camera = tried.as_new(free_name(tried.name, taken))
@@ -119,36 +120,20 @@ def _checked_text(path: Path, cameras: list[_Entry]) -> str:
     return text
 
 
-@dataclass(frozen=True, slots=True)
-class _Ground:
-    """The file that a configuration names as its ground."""
-
-    file: Path
-    content: dict[str, Any]
-
-
-def _read_ground(path: Path) -> _Ground | None:
-    """Return the ground file of a configuration; None: it names none.
-
-    Raises:
-        UserError: the configuration or the ground file is invalid.
-    """
-    named = read_content(path).get("ground")
-    if not isinstance(named, str):
-        return None
-    check_text(path.read_text(encoding="utf-8"), path)
-    file = path.parent / named
-    return _Ground(file, json.loads(file.read_text(encoding="utf-8")))
-
-
 def _copy_homography(path: Path, camera_id: str, name: str) -> None:
-    """Make a new name's homography in the ground file, if there is one, that of a camera."""
-    ground = _read_ground(path)
+    """Make a new name's homography and marked points in the ground file, if there are, those of a camera."""
+    ground = read_ground(path)
     if ground is None:
         return
-    matrices = ground.content["homography"]
-    copied = {known: matrix for known, matrix in matrices.items() if known != name}
-    if camera_id in matrices:
-        copied[name] = matrices[camera_id]
-    if copied != matrices:
-        replace_file(json.dumps({**ground.content, "homography": copied}), ground.file)
+    changed = {
+        key: _copied(ground.content[key], camera_id, name)
+        for key in ("homography", "points")
+        if isinstance(ground.content.get(key), dict)
+    }
+    if any(entries != ground.content[key] for key, entries in changed.items()):
+        replace_file(json.dumps({**ground.content, **changed}), ground.file)
+
+
+def _copied(entries: dict[str, Any], camera_id: str, name: str) -> dict[str, Any]:
+    copied = {known: entry for known, entry in entries.items() if known != name}
+    return {**copied, name: entries[camera_id]} if camera_id in entries else copied

@@ -18,7 +18,6 @@ from client.media_stream import MediaStreamError
 from client.remux import remux
 from client.webm import ElementReader, cluster_time
 from server.camera.peers.detection_exchange import PeerDetectionExchange
-from server.cli.calibrate.points_file import read_points
 from server.config.loader import build_config, change_view_settings, load_config
 from server.config.sections import ViewSettings
 from server.config.tokens_file import read_tokens
@@ -29,6 +28,7 @@ from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
 from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
 from server.media.stream_format import StreamFormat
 from server.messaging.inbox import Message
+from server.service.calibration.points_file import read_points
 from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession

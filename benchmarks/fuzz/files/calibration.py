@@ -18,11 +18,11 @@ from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.engine.target import Target, folder, refused
 from bestview.calibration import CalibrationError, fit_cameras
 from server.cli.calibrate import calibration
-from server.cli.calibrate.points_file import COLUMNS, read_points
 from server.config.loader import build_config, resolve_ground_and_paths
 from server.service.calibration import floor_plan
 from server.service.calibration.floor_map import floor_coverage
-from server.service.calibration.floor_plan import FloorPlanCamera
+from server.service.calibration.floor_plan_camera import FloorPlanCamera
+from server.service.calibration.points_file import COLUMNS, read_points
 from server.system.errors import UserError
 
 WORDS = (

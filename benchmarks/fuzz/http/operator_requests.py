@@ -9,6 +9,7 @@ from benchmarks.fuzz.engine.mutations import as_json, mutate_bytes, mutate_value
 from benchmarks.fuzz.http.served_site import OpenSiteTarget
 from server.http.access.csrf import CSRF_HEADER
 
+_PAIR = {"image": [1, 2.5], "floor": [3, 4], "name": "pillar"}
 _REQUESTS: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/people", {"object": 1, "name": "Ada"}),
     ("POST", "/api/operator/people", {"object": 1, "merge": 2}),
@@ -29,6 +30,11 @@ _REQUESTS: tuple[tuple[str, str, Any], ...] = (
     ("POST", "/api/operator/walk", {"action": "resume", "person": 1.75}),
     ("POST", "/api/operator/walk", {"action": "apply"}),
     ("DELETE", "/api/operator/walk", None),
+    (
+        "POST",
+        "/api/operator/marked_points",
+        {"action": "apply", "points": {"unit": "m", "cameras": {"c0": [_PAIR] * 4}}, "digest": ""},
+    ),
     ("POST", "/api/operator/restart", {}),
     (
         "PUT",

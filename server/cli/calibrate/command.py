@@ -42,10 +42,10 @@ def calibrate(
 ) -> None:
     """Calibrate cameras to the floor: from marked points, or from people who walk about."""
     from server.cli.calibrate.calibration import calibrate_from_walks, calibrate_points
-    from server.cli.calibrate.points_file import ENDINGS
     from server.cli.calibrate.walk_input import VideoFormat, read_walks
     from server.cli.render.video_info import parse_size
     from server.service.calibration.calibration_report import walk_settings
+    from server.service.calibration.points_file import ENDINGS
 
     for path in inputs:
         if not path.exists():

@@ -10,6 +10,7 @@ from server.http.json_responses import json_response
 from server.http.operator import (
     deletion,
     downloads,
+    marked_points,
     people,
     position_corrections,
     restart,
@@ -56,6 +57,7 @@ routes = [
     *position_corrections.routes,
     *downloads.routes,
     *walk.routes,
+    *marked_points.routes,
     *restart.routes,
     *site_cameras.routes,
     *zones.routes,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 
 from server.service.facade.calibration import WalkStatus
@@ -106,6 +108,44 @@ class SiteZones(msgspec.Struct, frozen=True):
     zones: list[SiteZone]
 
 
+class PointError(msgspec.Struct, frozen=True):
+    """How far a calibration is off at a marked point."""
+
+    floor: float
+    """In the floor's unit."""
+    image: float
+    """In pixels of the camera's own picture."""
+
+
+class PointsResult(msgspec.Struct, frozen=True):
+    """A calibration from marked points."""
+
+    lines: list[str]
+    """The report."""
+    errors: dict[str, list[PointError]]
+    """By camera, of each of its points."""
+    ground: str
+    """The text of the ground file."""
+    configuration: str
+    """Lines for the configuration."""
+    plan: bytes
+    """The floor plan: PNG, in base64; empty: it could not be drawn."""
+
+
+class MarkedPointsStatus(msgspec.Struct, frozen=True):
+    """The calibration that the configuration file names, and one that was just computed from points."""
+
+    unit: str | None
+    """Of the floor; null: it is not given, or there is no calibration."""
+    points: dict[str, list[dict[str, Any]]]
+    """By camera, the points that it was computed from, as in a file of points; empty: it was from none."""
+    homographies: dict[str, list[list[float]]]
+    """By camera, 3x3, from pixels of its own picture to the floor."""
+    digest: str
+    """Tells whether it has changed; empty: there is none."""
+    result: PointsResult | None
+
+
 class SelectionSettings(msgspec.Struct, frozen=True):
     """View-selection settings by key, such as switch_cost_s and quality.size."""
 
@@ -155,6 +195,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/pulses": PulseClients,
     "/api/operator/floor": Floor,
     "/api/operator/walk": WalkStatus,
+    "/api/operator/marked_points": MarkedPointsStatus,
     "/api/operator/people": IdentityOverrides,
     "/api/operator/deletion": PersonDeletion,
     "/api/operator/position_corrections": CorrectionStatus,

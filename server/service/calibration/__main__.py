@@ -19,7 +19,8 @@ from server.service.calibration.calibration_report import (
     comparison_step,
     walk_settings,
 )
-from server.service.calibration.floor_plan import floor_plan_cameras, plot_floor_plan
+from server.service.calibration.floor_plan import plot_floor_plan
+from server.service.calibration.floor_plan_camera import floor_plan_cameras
 from server.service.calibration.worker import CalibrationResult, CalibrationTask, CameraBoxes
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,39 +15,13 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from bestview import to_ground
-from bestview.calibration import Floats, WalkCalibration
+from bestview.calibration import Floats
+from server.service.calibration.floor_plan_camera import FloorPlanCamera
 
 _COLORS = ("#1b7f5c", "#c8501e", "#4a5fc1", "#a8327d", "#8a7a10", "#2b8fb3", "#7b4a2b", "#555555")
 _INCHES = 9.0
 _MARGIN = 0.08
 _MAX_POINTS = 4000
-
-
-@dataclass(frozen=True, slots=True)
-class FloorPlanCamera:
-    """One camera on the plan.
-
-    Attributes:
-        camera: its name.
-        homography: its pixels to the floor, (3, 3).
-        image_points: the points in its picture, (N, 2) pixels.
-        floor_points: their positions on the floor, (N, 2): marked, or estimated from all cameras.
-        floor: cameras of one number share a floor; each floor has a plan of its own.
-    """
-
-    camera: str
-    homography: Floats
-    image_points: Floats
-    floor_points: Floats
-    floor: int = 0
-
-
-def floor_plan_cameras(calibration: WalkCalibration) -> list[FloorPlanCamera]:
-    """Return the cameras of a calibration for the floor plan."""
-    return [
-        FloorPlanCamera(camera.camera, camera.homography, camera.image, camera.position, camera.floor)
-        for camera in calibration.cameras
-    ]
 
 
 def plot_floor_plan(views: Sequence[FloorPlanCamera], unit: str, out: Path | BinaryIO) -> None:

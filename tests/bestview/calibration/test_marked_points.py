@@ -109,7 +109,9 @@ def test_one_image_point_with_two_floor_points_is_refused() -> None:
     points, _ = marked(np.random.default_rng(1), 6)
     image = points.image.copy()
     image[4] = image[1]
-    with pytest.raises(CalibrationError, match="pairs 2 and 5 are one point in the picture and two on the"):
+    with pytest.raises(
+        CalibrationError, match="pair 2 and pair 5 are one point in the picture and two on the"
+    ):
         fit_points(MarkedPoints("c0", image, points.floor))
 
 

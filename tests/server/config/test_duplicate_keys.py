@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.cli.calibrate.points_file import read_points
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
 from server.config.loader import build_config, load_config
 from server.config.tokens_file import read_tokens
 from server.config.yaml_file import read_yaml
+from server.service.calibration.points_file import read_points
 from server.system.errors import UserError
 
 SITE = """\

@@ -38,12 +38,12 @@ from fakes.service.scripted_cameras import (
     tracks,
 )
 from fakes.timeouts import PATIENCE
-from server.cli.calibrate.points_file import read_points
 from server.config.loader import load_config
 from server.config.running_config import ConfigFileState
 from server.http.app_keys import SiteControl
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
+from server.service.calibration.points_file import read_points
 
 SECTIONS = ["cameras", "floor", "people", "flags", "downloads"]
 SECTIONS += ["zones", "ignored-areas", "calibration", "view-selection", "configuration"]

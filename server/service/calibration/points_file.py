@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,7 @@ class _Pair:
 
     camera: str
     numbers: tuple[float, float, float, float]
+    name: str | None = None
 
 
 def read_points(path: Path) -> PointFile:
@@ -54,19 +55,50 @@ def read_points(path: Path) -> PointFile:
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: is not a text file") from error
     if path.suffix.lower() == ".csv":
-        unit, pairs = None, list(_from_csv(text, str(path)))
-    else:
-        content = _json(text, str(path))
-        unit, pairs = _unit(content, str(path)), list(_from_json(content, str(path)))
-    if not pairs:
-        raise UserError(f"{path}: has no pairs of points")
-    names = dict.fromkeys(pair.camera for pair in pairs)
-    return PointFile(unit, tuple(_camera(name, pairs) for name in names))
+        return _point_file(None, _from_csv(text, str(path)), str(path))
+    return parse_points(_json(text, str(path)), str(path))
+
+
+def parse_points(content: Mapping[str, Any], where: str) -> PointFile:
+    """Read the content of a JSON file of marked points.
+
+    Raises:
+        UserError: it is invalid; the error begins with ``where``, and names the pair.
+    """
+    if not isinstance(content.get("cameras"), dict):
+        raise UserError(
+            f'{where}: has no {{"cameras": {{camera: [{{"image": [x, y], "floor": [x, y]}}, …]}}}}'
+        )
+    return _point_file(_unit(content, where), _from_json(content, where), where)
+
+
+def points_content(points: PointFile) -> dict[str, Any]:
+    """Return marked points as the content of a JSON file, for `parse_points`."""
+    return {
+        camera.camera: [
+            {"image": image, "floor": floor} | ({"name": camera.names[at]} if camera.names else {})
+            for at, (image, floor) in enumerate(
+                zip(camera.image.tolist(), camera.floor.tolist(), strict=True)
+            )
+        ]
+        for camera in points.cameras
+    }
+
+
+def _point_file(unit: str | None, pairs: Iterable[_Pair], where: str) -> PointFile:
+    by_camera: dict[str, list[_Pair]] = {}
+    for pair in pairs:
+        by_camera.setdefault(pair.camera, []).append(pair)
+    if not by_camera:
+        raise UserError(f"{where}: has no pairs of points")
+    return PointFile(unit, tuple(_camera(name, pairs) for name, pairs in by_camera.items()))
 
 
 def _camera(name: str, pairs: Sequence[_Pair]) -> MarkedPoints:
-    numbers = np.array([pair.numbers for pair in pairs if pair.camera == name], dtype=np.float64)
-    return MarkedPoints(name, numbers[:, :2], numbers[:, 2:])
+    numbers = np.array([pair.numbers for pair in pairs], dtype=np.float64)
+    labels = tuple(pair.name or f"pair {number}" for number, pair in enumerate(pairs, start=1))
+    names = labels if any(pair.name for pair in pairs) else ()
+    return MarkedPoints(name, numbers[:, :2], numbers[:, 2:], names)
 
 
 def _from_csv(text: str, name: str) -> Iterator[_Pair]:
@@ -103,21 +135,17 @@ def _json(text: str, name: str) -> dict[str, Any]:
         raise UserError(f"{name}: {error}") from error
     except (ValueError, RecursionError) as error:  # a number with thousands of digits, or deep nesting
         raise UserError(f"{name}: is not readable JSON: {error}") from error
-    if not isinstance(content, dict) or not isinstance(content.get("cameras"), dict):
-        raise UserError(
-            f'{name}: has no {{"cameras": {{camera: [{{"image": [x, y], "floor": [x, y]}}, …]}}}}'
-        )
-    return content
+    return content if isinstance(content, dict) else {}
 
 
-def _unit(content: dict[str, Any], name: str) -> str | None:
+def _unit(content: Mapping[str, Any], name: str) -> str | None:
     unit = content.get("unit")
     if unit is not None and not (isinstance(unit, str) and unit.isprintable() and len(unit) <= _SHOWN):
         raise UserError(f'{name}: unit: is a word, such as "m"')
     return unit
 
 
-def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
+def _from_json(content: Mapping[str, Any], name: str) -> Iterator[_Pair]:
     for camera, pairs in content["cameras"].items():
         check_printable_name(camera, name)
         if not isinstance(pairs, list):
@@ -128,7 +156,13 @@ def _from_json(content: dict[str, Any], name: str) -> Iterator[_Pair]:
                 (x, y), (floor_x, floor_y) = pair["image"], pair["floor"]
             except (KeyError, TypeError, ValueError):
                 raise UserError(f'{where}: is not {{"image": [x, y], "floor": [x, y]}}') from None
-            yield _Pair(camera, _four([x, y, floor_x, floor_y], where))
+            yield _Pair(camera, _four([x, y, floor_x, floor_y], where), _name(pair.get("name"), where))
+
+
+def _name(name: Any, where: str) -> str | None:
+    if name is not None and not (isinstance(name, str) and name.isprintable() and len(name) <= _SHOWN):
+        raise UserError(f"{where}: name: is a text of at most {_SHOWN} letters")
+    return name or None
 
 
 def _four(values: Sequence[Any], where: str) -> tuple[float, float, float, float]:
