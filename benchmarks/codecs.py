@@ -94,17 +94,18 @@ def measure(variant: StreamVariant, recording: Path, site: SiteSettings, frames:
     decoder.thread_count = 1
     for pulse in range(frames):
         times = [time.process_time()]
-        image = pipeline.take(pulse)
-        assert image is not None  # noqa: S101 — the recording is long enough
+        frame = pipeline.take(pulse)
+        assert frame is not None  # noqa: S101 — the recording is long enough
+        assert frame.image is not None  # noqa: S101 — it is encoded
         times.append(time.process_time())
-        unit = pipeline.encode(pulse, image)
+        unit = pipeline.encode(pulse, frame)
         times.append(time.process_time())
-        pipeline.track(pulse, image)
+        pipeline.track(pulse, frame)
         times.append(time.process_time())
         spent += np.diff(times)
         size += len(unit.data)
         (picture,) = decoder.decode(av.Packet(unit.data))
-        error += _mean_squared_error(picture.to_ndarray(format="bgr24"), image)
+        error += _mean_squared_error(picture.to_ndarray(format="bgr24"), frame.image)
     pipeline.close()
     capture_ms, encode_ms, track_ms = _MS * spent / frames
     quality = 10 * np.log10(_PEAK**2 * frames / error) if error else float("inf")

@@ -72,10 +72,10 @@ def run_pipeline(frames: int) -> EnduranceRun:
     run = EnduranceRun("camera pipeline", MemorySamples())
 
     def step(number: int) -> None:
-        image = pipeline.take(number)
-        if image is not None:
-            pipeline.encode(number, image)
-        tracks = pipeline.track(number, image)
+        frame = pipeline.take(number)
+        if frame is not None:
+            pipeline.encode(number, frame)
+        tracks = pipeline.track(number, frame)
         if tracks is not None:
             run.objects = max([run.objects, *(track.id for track in tracks.tracks)])
 

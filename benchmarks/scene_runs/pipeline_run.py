@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from benchmarks.bestview.service_decisions import Rendering, decide
 from benchmarks.detectors.compared_detectors import rows_of
+from server.camera.captured_frame import CapturedFrame
 from server.camera.encoder import AccessUnit
 from server.camera.pipeline import CameraPipeline, DetectedFrame
 from server.camera.sources import FrameSource, Image, SourceEndedError, open_source
@@ -69,19 +70,19 @@ class _ObservedPipeline(CameraPipeline):
         self.detections: list[MotRow] = []
         self.frames = 0
 
-    def encode(self, pulse: int, image: Image) -> AccessUnit:
+    def encode(self, pulse: int, frame: CapturedFrame) -> AccessUnit:
         """Return no data."""
-        del image
+        del frame
         return AccessUnit(pulse, key=True, data=b"")
 
     def detect(
-        self, pulse: int, image: Image | None, *, skipped: bool = False, network_factor: int = 1
+        self, pulse: int, frame: CapturedFrame | None, *, skipped: bool = False, network_factor: int = 1
     ) -> DetectedFrame:
         """Detect people in a frame, and keep them."""
-        frame = super().detect(pulse, image, skipped=skipped, network_factor=network_factor)
-        self.detections += rows_of(pulse, frame.detections)
+        detected = super().detect(pulse, frame, skipped=skipped, network_factor=network_factor)
+        self.detections += rows_of(pulse, detected.detections)
         self.frames += 1
-        return frame
+        return detected
 
 
 def open_frames(config: Config, camera: str, frames: int | None = None) -> FrameSource:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Protocol
@@ -77,11 +77,16 @@ def make_detector(config: Config, camera: CameraSettings, letterbox: Letterbox) 
 
 
 def make_prescanned_detector(
-    config: Config, camera: CameraSettings, source: FrameSource, letterbox: Letterbox
+    config: Config,
+    camera: CameraSettings,
+    source: FrameSource,
+    letterbox: Letterbox,
+    tracked_images: Callable[[Sequence[int]], Iterator[Image]] | None = None,
 ) -> CameraDetector:
     """Return a camera's detector; for a recording it has learned the background by a prescan.
 
-    The detector of a live camera learns the background while it runs.
+    The detector of a live camera learns the background while it runs. ``tracked_images`` returns the pictures
+    of some frames as they will be searched, if those are not the source's.
 
     Raises:
         UserError: the detector's files or the recording cannot be read.
@@ -92,7 +97,11 @@ def make_prescanned_detector(
         detector.number_frames_by(source.pulse_by_frame_count)
     if isinstance(detector, BackgroundDetector | FusedDetector):
         indices = settings.prescan_frames(config.site.fps)
-        images = (letterbox.image(image) for image in source.prescan_images(indices))
+        images = (
+            (letterbox.image(image) for image in source.prescan_images(indices))
+            if tracked_images is None
+            else tracked_images(indices)
+        )
         detector.prepare(images, indices.step / config.site.fps)
     return detector
 

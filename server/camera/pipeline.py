@@ -14,6 +14,7 @@ import numpy as np
 
 from bestview import shows_ground
 from server.camera.audio import LiveAudioSource
+from server.camera.captured_frame import CapturedFrame
 from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
 from server.camera.knocks import motion_message, noticeable
@@ -24,6 +25,8 @@ from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
 from server.camera.sharpness import SharpnessMemory
 from server.camera.sources import FrameSource, Image, open_source
+from server.camera.sources.live_stream import LiveStream
+from server.camera.substream import open_tracked_pictures
 from server.camera.track_messages import TrackMessageBuilder
 from server.camera.tracker_setup import set_up_tracker
 from server.config.sections import CameraSettings
@@ -49,13 +52,14 @@ class DetectedFrame:
 
     Attributes:
         pulse: its pulse.
-        image: None: there was none.
+        image: in which people were detected, at the scale of the tracked pictures; None: there was none.
         detections: empty where detection did not run.
         has_detection: whether detection ran.
         shows_its_place: whether detections are where the homography says: the camera is not turned away.
         message: the detections as sent to the peer cameras; None without peers.
         motion: how the picture has moved since the camera was calibrated, pixels of the site's image.
         skipped: whether load shedding left the frame out.
+        waited_s: how long its image was waited for, seconds.
     """
 
     pulse: int
@@ -66,6 +70,7 @@ class DetectedFrame:
     message: FrameDetections | None
     motion: Motion = STILL
     skipped: bool = False
+    waited_s: float = 0.0
 
     @property
     def depends_on_peers(self) -> bool:
@@ -114,10 +119,18 @@ class CameraPipeline:
         self._encoder = (
             PassthroughEncoder(passthrough.source) if passthrough.source else Encoder(site, config.encode)
         )
+        self._passthrough = passthrough.source
+        self.tracked = open_tracked_pictures(config, camera, self.source, self._letterbox, passthrough.source)
+        """The pictures in which people are detected, at a scale of their own."""
+        scale = self.tracked.scale
+        detector_config = scale.config(config)
+        detector_letterbox = Letterbox(self.source.size, scale.tracked)
         self._detector = (
-            make_prescanned_detector(config, camera, self.source, self._letterbox)
+            make_prescanned_detector(
+                detector_config, camera, self.source, detector_letterbox, self.tracked.prescan_images
+            )
             if warm_up
-            else make_detector(config, camera, self._letterbox)
+            else make_detector(detector_config, camera, detector_letterbox)
         )
         track = config.track
         tracker = set_up_tracker(
@@ -128,6 +141,7 @@ class CameraPipeline:
             lambda: track.create_solver(site.fps),
             self._letterbox,
             prescan=warm_up,
+            tracked_images=self.tracked.prescan_images,
         )
         self._tracker = SkippedFrameInterpolator(
             tracker, self._detector.appearance_bins, config.window.stride
@@ -151,18 +165,20 @@ class CameraPipeline:
         """Pulses since the last frame."""
         self._away_after = round(_AWAY_AFTER_S * site.fps) + config.gop
 
-    def take(self, pulse: int) -> Image | None:
-        """Return the site-sized image of a pulse; None where the source has none (yet).
+    def take(self, pulse: int) -> CapturedFrame | None:
+        """Return the frame of a pulse; None where the source has none (yet).
 
         Raises:
             SourceEndedError: the recording is over.
         """
         image = self.source.take(pulse)
-        if image is None:
+        if image is None and (self._passthrough is None or self._passthrough.current is None):
             self._missing += 1
             return None
         self._missing = 0
-        return self._letterbox.image(image)
+        captured = self.source.captured if isinstance(self.source, LiveStream) else None
+        site_image = None if image is None else self._letterbox.image(image)
+        return CapturedFrame(pulse, site_image, captured)
 
     @property
     def away(self) -> bool:
@@ -172,15 +188,20 @@ class CameraPipeline:
     @property
     def motion(self) -> Motion:
         """How the picture has moved since the background was learned, pixels of the site's image."""
-        return noticeable(getattr(self._detector, "camera_motion", STILL), self._letterbox.site_size)
+        motion = self.tracked.scale.motion_to_site(getattr(self._detector, "camera_motion", STILL))
+        return noticeable(motion, self._letterbox.site_size)
 
-    def encode(self, pulse: int, image: Image) -> AccessUnit:
-        """Encode the image of a pulse, which was the last one taken."""
-        return self._encoder.encode(pulse, image)
+    def encode(self, pulse: int, frame: CapturedFrame) -> AccessUnit:
+        """Encode the frame of a pulse, which was the last one taken."""
+        if isinstance(self._encoder, PassthroughEncoder):
+            return self._encoder.encode(pulse, frame.image)
+        if frame.image is None:
+            raise ValueError("only frames that are passed through have no image")
+        return self._encoder.encode(pulse, frame.image)
 
-    def track(self, pulse: int, image: Image | None) -> CameraTracks | None:
+    def track(self, pulse: int, frame: CapturedFrame | None) -> CameraTracks | None:
         """Detect and track in a frame without the peer cameras."""
-        return self.track_detections(self.detect(pulse, image))
+        return self.track_detections(self.detect(pulse, frame))
 
     @property
     def has_network(self) -> bool:
@@ -188,20 +209,25 @@ class CameraPipeline:
         return isinstance(self._detector, FusedDetector)
 
     def detect(
-        self, pulse: int, image: Image | None, *, skipped: bool = False, network_factor: int = 1
+        self, pulse: int, frame: CapturedFrame | None, *, skipped: bool = False, network_factor: int = 1
     ) -> DetectedFrame:
-        """Detect people in a frame; ``image`` is None if it was not captured or is skipped.
+        """Detect people in a frame; it is None if it was not captured or is skipped.
 
+        Waits up to half a second for the substream, if that is later.
         ``skipped``: left out by load shedding; detections are interpolated from the frames around it.
         ``network_factor``: factor of the interval between two runs of the network. Pulses must ascend.
         """
         if isinstance(self._detector, FusedDetector):
             self._detector.run_network_less_often(network_factor)
+        image = None if frame is None else self.tracked.image(frame)
+        waited_s = 0.0 if frame is None else self.tracked.waited_s
         if image is None:
             detections, has_detection = Detections.empty(self._detector.appearance_bins), False
         else:
             self.picture.observe(image, pulse)
             detections = self._detector.detect(image, pulse)
+            boxes = self.tracked.scale.boxes_to_site(detections.boxes)
+            detections = Detections(boxes, detections.scores, detections.histograms)
             has_detection = not self._detector.warming_up
         shown, motion = self.picture.shows_its_place, self.motion
         message = (
@@ -209,7 +235,9 @@ class CameraPipeline:
             if self.cross_view
             else None
         )
-        return DetectedFrame(pulse, image, detections, has_detection, shown, message, motion, skipped)
+        return DetectedFrame(
+            pulse, image, detections, has_detection, shown, message, motion, skipped, waited_s
+        )
 
     def track_detections(
         self,
@@ -276,10 +304,13 @@ class CameraPipeline:
             observations=observations,
             detections=[] if self._raw_detections is None else self._raw_detections.take(),
         )
-        return tracks if self._sharpness is None else self._sharpness.measure(tracks, image)
+        return (
+            tracks if self._sharpness is None else self._sharpness.measure(tracks, image, self.tracked.scale)
+        )
 
     def close(self) -> None:
-        """Close the source."""
+        """Close the source and the substream."""
+        self.tracked.close()
         self.source.close()
 
 

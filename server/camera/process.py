@@ -43,6 +43,8 @@ T = TypeVar("T")
 
 _STATUS_EVERY_S = 1.0
 _END_CONFIRMED_WITHIN_S = 10.0
+_WAITED_S = 0.01
+"""Seconds of waiting for the substream from which tracking counts as not behind."""
 _FURTHER_SERVICES_S = 2.0
 """How long to wait for the other best-view services once the first is there."""
 
@@ -197,8 +199,8 @@ class CameraProcess:
             self._meter.count_missed(pulse.number, 1 + pulse.missed)
             self._backlog.put(pulse.number, None, due, skipped=True)
             return
-        image = await self._run_in(self._video, lambda: self._pipeline.take(pulse.number))
-        if image is None:
+        frame = await self._run_in(self._video, lambda: self._pipeline.take(pulse.number))
+        if frame is None:
             if self._pipeline.away:
                 self._state = "away"
             self._meter.count_missed(pulse.number, 1 + pulse.missed)
@@ -206,10 +208,10 @@ class CameraProcess:
             return
         self._state = "live"
         captured_at = self._clock()
-        unit = await self._run_in(self._video, lambda: self._pipeline.encode(pulse.number, image))
+        unit = await self._run_in(self._video, lambda: self._pipeline.encode(pulse.number, frame))
         self._publisher.publish_frame(pulse, unit, captured_at)
         self._meter.count_frame(pulse.number, pulse.missed)
-        if self._backlog.put(pulse.number, image, due):
+        if self._backlog.put(pulse.number, frame, due):
             self._meter.count_skipped_detection()
 
     async def _publish_audio(self, pulse: int) -> None:
@@ -223,18 +225,21 @@ class CameraProcess:
         stride, thumbnail_interval = self._config.window.stride, max(1, round(self._config.site.fps))
         detection_times: list[float] = []
         while (item := await self._backlog.get()) is not None:
-            pulse, image, skipped = item.pulse, item.image, item.skipped
-            if image is not None and not self._load.detects(pulse):
-                image, skipped = None, True
+            pulse, captured, skipped = item.pulse, item.frame, item.skipped
+            if captured is not None and not self._load.detects(pulse):
+                captured, skipped = None, True
                 self._meter.count_skipped_detection()
             began = time.perf_counter()
             factor = self._load.network_factor
-            detect = partial(self._pipeline.detect, pulse, image, skipped=skipped, network_factor=factor)
+            detect = partial(self._pipeline.detect, pulse, captured, skipped=skipped, network_factor=factor)
             frame = await self._run_in(self._tracking, detect)
-            if image is not None:
-                detection_times.append(time.perf_counter() - began)
+            seconds = time.perf_counter() - began - frame.waited_s
+            if frame.image is not None:
+                detection_times.append(seconds)
             now = asyncio.get_running_loop().time()
-            self._load.measure_lag(now - item.due, now)
+            # A substream that is later than the video is no load.
+            lag = seconds if frame.waited_s > _WAITED_S else now - item.due
+            self._load.measure_lag(lag, now)
             peers = await self._exchange.exchange(
                 pulse, frame.message, item.captured, needed=frame.depends_on_peers
             )
@@ -250,8 +255,8 @@ class CameraProcess:
             self._publisher.publish_tracks(
                 msgspec.structs.replace(tracks, detection_s=detection_s, solve_s=solve_s)
             )
-            if image is not None and tracks.epoch * stride % thumbnail_interval < stride:
-                await self._publish_thumbnails(image, tracks)
+            if frame.image is not None and tracks.epoch * stride % thumbnail_interval < stride:
+                await self._publish_thumbnails(frame.image, tracks)
         await self._exchange.publish_end(self._pipeline.end_message(self._end))
         tracks = await self._run_in(self._tracking, lambda: self._pipeline.finish(self._end))
         self._publisher.publish_tracks(tracks)
@@ -266,7 +271,8 @@ class CameraProcess:
             log.info("camera %s: %d windows were stopped after track.solver_time_s", self._id, ended.count)
 
     async def _publish_thumbnails(self, image: Image, tracks: CameraTracks) -> None:
-        thumbnails = await self._run_in(self._tracking, lambda: encode_thumbnails(image, tracks))
+        scale = self._pipeline.tracked.scale
+        thumbnails = await self._run_in(self._tracking, lambda: encode_thumbnails(image, tracks, scale))
         self._publisher.publish_thumbnails(thumbnails, tracks.last)
 
     async def _publish_status_periodically(self) -> None:
@@ -285,6 +291,7 @@ class CameraProcess:
                 status,
                 condition=condition,
                 condition_since=since,
+                substream=self._pipeline.tracked.state,
                 motion=motion,
                 motion_since=0.0 if motion is None else self._moved_since,
                 position_corrections=self._corrections.count,

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 
 from server.camera.sources import Image
+from server.camera.substream.picture_scale import PictureScale
 from server.messaging.messages import Box, CameraTracks
 from server.messaging.packed_arrays import last_box
 
@@ -30,11 +31,19 @@ class SharpnessMemory:
     def __init__(self) -> None:
         self._values: dict[int, float] = {}
 
-    def measure(self, message: CameraTracks, last_image: Image | None) -> CameraTracks:
-        """Return the message with its tracks' sharpness in the window's last image, if there is one."""
+    def measure(
+        self, message: CameraTracks, last_image: Image | None, scale: PictureScale | None = None
+    ) -> CameraTracks:
+        """Return the message with its tracks' sharpness in the window's last image, if there is one.
+
+        In an image of a smaller ``scale`` than the site's, people who are too small are not measured: they
+        would look blurred, and viewers see them sharp.
+        """
         for track in message.tracks:
             box = last_box(track.boxes)
-            value = None if last_image is None or box is None else sharpness(last_image, box)
+            value = None
+            if last_image is not None and box is not None:
+                value = _sharpness_at(scale, last_image, box)
             if value is not None:
                 self._values[track.id] = value
         self._values = {
@@ -44,6 +53,13 @@ class SharpnessMemory:
             msgspec.structs.replace(track, sharpness=self._values.get(track.id)) for track in message.tracks
         ]
         return msgspec.structs.replace(message, tracks=tracks)
+
+
+def _sharpness_at(scale: PictureScale | None, image: Image, box: Box) -> float | None:
+    if scale is None or scale.is_identity:
+        return sharpness(image, box)
+    tracked = scale.box_from_site(box)
+    return sharpness(image, tracked) if tracked[3] - tracked[1] >= _HEIGHT else None
 
 
 def sharpness(image: Image, box: Box) -> float | None:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from server.camera.sources import Image
+from server.camera.substream.picture_scale import PictureScale
 from server.messaging.messages import Box, CameraTracks
 from server.messaging.packed_arrays import last_box
 
@@ -16,16 +17,23 @@ _MARGIN = 0.15
 _QUALITY = 82
 
 
-def encode_thumbnails(image: Image, tracks: CameraTracks) -> dict[int, bytes]:
-    """Return by track the JPEG thumbnail of each person visible in the window's last frame, ``image``."""
+def encode_thumbnails(
+    image: Image, tracks: CameraTracks, scale: PictureScale | None = None
+) -> dict[int, bytes]:
+    """Return by track the JPEG thumbnail of each person visible in the window's last frame, ``image``.
+
+    ``scale``: of the image; None: the site's.
+    """
     thumbnails = {}
     for track in tracks.tracks:
         box = last_box(track.boxes)
+        if box is not None and scale is not None:
+            box = scale.box_from_site(box)
         crop = None if box is None else _crop(image, box)
         if crop is None:
             continue
-        scale = _HEIGHT / crop.shape[0]
-        size = (max(1, round(crop.shape[1] * scale)), _HEIGHT)
+        factor = _HEIGHT / crop.shape[0]
+        size = (max(1, round(crop.shape[1] * factor)), _HEIGHT)
         is_encoded, jpeg = cv2.imencode(
             ".jpg", cv2.resize(crop, size, interpolation=cv2.INTER_AREA), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
         )

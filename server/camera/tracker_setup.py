@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from bestview import to_ground
-from server.camera.sources import FrameSource
+from server.camera.sources import FrameSource, Image
 from server.config.ground_unit import UNITS_PER_METER
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
@@ -27,10 +27,12 @@ def set_up_tracker(
     letterbox: Letterbox | None = None,
     *,
     prescan: bool = True,
+    tracked_images: Callable[[Sequence[int]], Iterator[Image]] | None = None,
 ) -> Tracker:
     """Create the tracker of a name; with ``prescan``, one that needs it has scanned the recording.
 
-    Images are scaled by ``letterbox``, if given.
+    Images are scaled by ``letterbox``, if given. ``tracked_images`` returns the pictures of some frames, if
+    those are not the source's.
     """
     track = config.track
     letterbox = letterbox or (None if source is None else Letterbox(source.size, source.size))
@@ -41,7 +43,11 @@ def set_up_tracker(
     )
     if prescan and source is not None and letterbox is not None and isinstance(tracker, PrescanTracker):
         indices = config.detect.prescan_frames(config.site.fps)
-        tracker.prepare(letterbox.image(image) for image in source.prescan_images(indices))
+        tracker.prepare(
+            (letterbox.image(image) for image in source.prescan_images(indices))
+            if tracked_images is None
+            else tracked_images(indices)
+        )
     return tracker
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass
 
-from server.camera.sources import Image
+from server.camera.captured_frame import CapturedFrame
 
 _FRAMES_PER_IMAGE = 10
 """Frames that may wait per image that may wait; further ones count as missed."""
@@ -17,21 +17,21 @@ class QueuedFrame:
 
     Attributes:
         pulse: its pulse.
-        image: None: there was none, or it was shed.
+        frame: None: there was none, or it was shed.
         captured: when it was captured, by the loop's clock.
         due: when its pulse was due, likewise.
         skipped: whether load shedding left it out.
     """
 
     pulse: int
-    image: Image | None
+    frame: CapturedFrame | None
     captured: float
     due: float
     skipped: bool = False
 
 
 class TrackingBacklog:
-    """A queue of frames; those far ahead of tracking lose their image, and the furthest are left out.
+    """A queue of frames; those far ahead of tracking lose their picture, and the furthest are left out.
 
     Args:
         images_max: images that may wait.
@@ -46,12 +46,12 @@ class TrackingBacklog:
     def __len__(self) -> int:
         return self._frames.qsize()
 
-    def put(self, pulse: int, image: Image | None, due: float, *, skipped: bool = False) -> bool:
-        """Add a frame captured now, due at ``due`` by the loop's clock; return whether its image was shed."""
-        shed = image is not None and self._frames.qsize() >= self._images_max
+    def put(self, pulse: int, frame: CapturedFrame | None, due: float, *, skipped: bool = False) -> bool:
+        """Add a frame captured now, due at ``due`` by the loop's clock; return whether it was shed."""
+        shed = frame is not None and self._frames.qsize() >= self._images_max
         if not self._frames.full():
             now = asyncio.get_running_loop().time()
-            self._frames.put_nowait(QueuedFrame(pulse, None if shed else image, now, due, skipped))
+            self._frames.put_nowait(QueuedFrame(pulse, None if shed else frame, now, due, skipped))
         return shed
 
     async def end(self) -> None:

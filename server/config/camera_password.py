@@ -9,7 +9,7 @@ from server.config.site_config import Config
 from server.system.errors import UserError
 
 PLACEHOLDER = "{password}"
-"""Replaced by the password in a camera's source."""
+"""Replaced by the password in a camera's source and substream."""
 
 
 def fill_in_password(config: Config, camera_id: str) -> Config:
@@ -21,7 +21,10 @@ def fill_in_password(config: Config, camera_id: str) -> Config:
     camera = config.camera(camera_id)
     if camera.password is None:
         return config
-    filled = camera.model_copy(update={"source": camera.source.replace(PLACEHOLDER, _quoted(camera))})
+    password = _quoted(camera)
+    substream = None if camera.substream is None else camera.substream.replace(PLACEHOLDER, password)
+    source = camera.source.replace(PLACEHOLDER, password)
+    filled = camera.model_copy(update={"source": source, "substream": substream})
     cameras = [filled if other.id == camera_id else other for other in config.cameras]
     return config.model_copy(update={"cameras": cameras})
 

@@ -26,7 +26,7 @@ from server.config.sections import (
     ZenohSettings,
 )
 from server.config.site_config import Config
-from server.config.source_address import resolve_source
+from server.config.source_address import SourceKind, resolve_source, source_kind
 from server.config.unknown_keys import did_you_mean
 from server.config.values import (
     check_depth_and_texts,
@@ -174,19 +174,44 @@ def _merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
 def _resolved(
     camera: CameraSettings, homographies: Mapping[str, Any], unit: str | None, folder: Path
 ) -> CameraSettings:
-    """Make a camera's paths absolute and fill in its homography and unit from the file for all cameras."""
+    """Make a camera's paths absolute and fill in its homography and unit from the file for all cameras.
+
+    Raises:
+        ValueError: its substream cannot be one of its source.
+    """
     ground, ground_unit = camera.ground, camera.ground_unit
     if ground is None:
         ground, ground_unit = homographies.get(camera.id), ground_unit or unit
     detections = folder / camera.detections if camera.detections else None
+    source = resolve_source(camera.source, folder)
+    substream = None if camera.substream is None else resolve_source(camera.substream, folder)
+    _check_substream(camera.id, source, substream)
     update = {
         "ground": ground,
         "ground_unit": ground_unit,
-        "source": resolve_source(camera.source, folder),
+        "source": source,
+        "substream": substream,
         "password": folder / camera.password if camera.password else None,
         "detections": detections,
     }
     return camera.model_copy(update=update)
+
+
+def _check_substream(camera_id: str, source: str, substream: str | None) -> None:
+    """Check that a substream can show the same as the source.
+
+    Raises:
+        ValueError: it cannot.
+    """
+    if substream is None:
+        return
+    if substream == source:
+        raise ValueError(f"camera {camera_id}: substream: it is the source: leave it out")
+    kinds = source_kind(source), source_kind(substream)
+    if (kinds[0] is SourceKind.STREAM) != (kinds[1] is SourceKind.STREAM):
+        raise ValueError(
+            f"camera {camera_id}: substream: a network camera's is an address, a recording's a file"
+        )
 
 
 def _check_handedness(cameras: Sequence[CameraSettings]) -> None:

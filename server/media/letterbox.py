@@ -27,6 +27,11 @@ class Letterbox:
         self._left = (site[0] - self._inner[0]) // 2
         self._top = (site[1] - self._inner[1]) // 2
 
+    @property
+    def content(self) -> tuple[int, int, int, int]:
+        """Left, top, width and height of the camera's image in the site's."""
+        return self._left, self._top, *self._inner
+
     def image(self, image: Image) -> Image:
         """Return a camera's image at the site's size."""
         if self._is_identity and image.shape[1::-1] == self.site_size:

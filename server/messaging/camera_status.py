@@ -25,6 +25,15 @@ CameraState = Literal["starting", "live", "away", "ended"]
 """State of a camera; away: its source delivers no frames now."""
 
 
+SubstreamState = Literal["none", "live", "away"]
+"""State of the stream in which people are tracked.
+
+none: the camera has only its source; away: it delivers no pictures of the right time.
+"""
+SUBSTREAM_AWAY = "its substream delivers no pictures: people are tracked in its source"
+"""The text for people."""
+
+
 class PictureMotion(msgspec.Struct, frozen=True, kw_only=True):
     """Where a picture lies since its camera was knocked: moved, enlarged and turned at its center."""
 
@@ -62,6 +71,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """What is wrong with the picture."""
     condition_since: Time = 0.0
     """When that began, unix seconds by the camera's clock; 0: nothing is wrong."""
+    substream: SubstreamState = "none"
+    """Whether people are tracked in a substream."""
     motion: PictureMotion | None = None
     """How the picture has moved; null: not noticeably."""
     motion_since: Time = 0.0

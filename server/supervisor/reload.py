@@ -11,7 +11,17 @@ from server.config.site_config import Config
 
 _LIVE = tuple(f"view.{name}" for name in LIVE_VIEW_SETTINGS)
 """Settings that the best view applies at the next GOP."""
-_CAMERA_KEYS = ("source", "password", "offset_s", "at_end", "passthrough", "options", "ignore", "detections")
+_CAMERA_KEYS = (
+    "source",
+    "substream",
+    "password",
+    "offset_s",
+    "at_end",
+    "passthrough",
+    "options",
+    "ignore",
+    "detections",
+)
 """Settings that only the camera's own process uses."""
 _TRACK = tuple(name for name in TrackSettings.model_fields if name not in {"backlog_s", "joint"})
 _SHARED_KEYS = ("detect", *(f"track.{name}" for name in _TRACK))

@@ -21,7 +21,7 @@ import yaml
 
 from fakes.running.site import MYVIEW
 from fakes.timeouts import PATIENCE
-from server.camera.sources.live_stream import OPEN_S
+from server.camera.sources.stream_reader import OPEN_S
 from server.cli.generated_config import free_port
 
 pytestmark = [pytest.mark.live]

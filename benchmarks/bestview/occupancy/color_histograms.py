@@ -37,9 +37,10 @@ def path_histograms(
     pipeline = CameraPipeline(config, camera)
     for frame in range(len(masks.foreground)):
         try:
-            image = pipeline.take(frame)
+            captured = pipeline.take(frame)
         except SourceEndedError:
             break
+        image = None if captured is None else captured.image
         foreground = masks.foreground[frame]
         if image is None or foreground is None or frame % _EVERY:
             continue

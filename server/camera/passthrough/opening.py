@@ -49,11 +49,16 @@ def open_passthrough(
 
 
 def _open(config: Config, camera: CameraSettings, listener: LiveAudioSource | None) -> PassthroughSource:
+    decodes = camera.substream is None  # otherwise people are tracked in that
     match source_kind(camera.source):
         case SourceKind.STREAM:
-            return PassthroughStream(camera.source, camera.options, listener, required_format(config))
+            return PassthroughStream(
+                camera.source, camera.options, listener, required_format(config), decodes=decodes
+            )
         case SourceKind.FILE:
             first = camera.first_pulse(config.site.fps)
-            return PassthroughRecording(camera.source, first, camera.at_end, required_format(config))
+            return PassthroughRecording(
+                camera.source, first, camera.at_end, required_format(config), decodes=decodes
+            )
         case _:
             raise IncompatibleStreamError("image files contain no H.264")

@@ -37,12 +37,18 @@ class PassthroughRecording:
     recorded = True
 
     def __init__(
-        self, path: str, offset: int, at_end: Literal["stop", "loop"], required: RequiredFormat
+        self,
+        path: str,
+        offset: int,
+        at_end: Literal["stop", "loop"],
+        required: RequiredFormat,
+        *,
+        decodes: bool = True,
     ) -> None:
         if path_is_missing(path):
             raise UserError(f"{redact_to_host(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
-        self._fps = required.fps
+        self._fps, self.decodes = required.fps, decodes
         self._length = _check_file(path, offset, required)
         if self._loop and self._length % required.gop:
             raise IncompatibleStreamError(
@@ -53,7 +59,7 @@ class PassthroughRecording:
         self._begin()
 
     def take(self, pulse: int) -> Image | None:
-        """Return frame ``pulse - offset``; None before the recording begins."""
+        """Return frame ``pulse - offset``; None before the recording begins, and where it is not decoded."""
         index = pulse - self._offset
         if index < 0:
             return None
@@ -67,6 +73,11 @@ class PassthroughRecording:
         while self._next <= index:
             self._read()
         return None if self.current is None else self.current.image
+
+    def pulse_in_first_pass(self, pulse: int) -> int:
+        """Return the pulse at which the frame of a pulse is shown first, if it loops."""
+        index = pulse - self._offset
+        return pulse if index < 0 else self._offset + index % self._length
 
     def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Decode the frames with these indices, from a second reader of the file."""
@@ -86,11 +97,14 @@ class PassthroughRecording:
         if packet is None:  # the file is shorter than when it was checked
             raise SourceEndedError(self._path)
         data = self._packing.annex_b(bytes(packet))
+        self._next += 1
+        if not self.decodes:
+            self.current = PassthroughUnit(is_keyframe(data), data, None)
+            return
         image = decode_unit(packet)
         if image is None and self.current is not None:
             image = self.current.image  # damaged: viewers see the previous image, too
         self.current = None if image is None else PassthroughUnit(is_keyframe(data), data, image)
-        self._next += 1
 
 
 def decode_unit(packet: av.Packet[VideoStream]) -> Image | None:

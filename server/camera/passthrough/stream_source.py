@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from fractions import Fraction
+from time import monotonic
 
 import av
 from av.video.stream import VideoStream
@@ -25,9 +26,11 @@ from server.camera.passthrough.recording_source import (
     decode_without_delay,
 )
 from server.camera.sources.base import Image
-from server.camera.sources.live_stream import OPEN_S, READ_S, LiveStream
+from server.camera.sources.live_stream import LiveStream
 from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
+from server.camera.sources.stream_reader import OPEN_S, READ_S
+from server.media.h264.continuity import PictureContinuity
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
@@ -46,9 +49,17 @@ class PassthroughStream(LiveStream):
     """
 
     def __init__(
-        self, url: str, options: Mapping[str, str], listener: LiveAudioSource | None, required: RequiredFormat
+        self,
+        url: str,
+        options: Mapping[str, str],
+        listener: LiveAudioSource | None,
+        required: RequiredFormat,
+        *,
+        decodes: bool = True,
     ) -> None:
         _check(url, options, required)
+        self.decodes = self._is_decoding = decodes
+        self._continuity = PictureContinuity()
         self._required = required
         self._waiting = GopAlignmentQueue(required.gop)
         self._waiting_lock = threading.Lock()
@@ -59,9 +70,10 @@ class PassthroughStream(LiveStream):
         super().__init__(url, options, listener)
 
     def take(self, pulse: int) -> Image | None:
-        """Return the image of a pulse's access unit; None: there is none."""
+        """Return the image of a pulse's access unit; None: there is none, or it was not decoded."""
         with self._waiting_lock:
             self.current = unit = self._waiting.take(pulse)
+        self.captured = None if unit is None else unit.captured
         if unit is None:
             return None
         if self._listener is not None and unit.time is not None:
@@ -69,37 +81,43 @@ class PassthroughStream(LiveStream):
             self._listener.picture(unit.time + self._frame_s)
         return unit.image
 
-    def _read(self, opened: OpenedVideo) -> bool:
+    def _accept(self, opened: OpenedVideo) -> bool:
         try:
             CompatibilityCheck(self._required).check_video(opened)
         except IncompatibleStreamError as error:
-            opened.container.close()
             self._log_away(f"{redact_to_host(self._url)}: its stream does not fit any more: {error}")
             return False
         decode_without_delay(opened)
-        self._is_decodable = False
-        return super()._read(opened)
+        self._is_decodable, self._continuity = False, PictureContinuity()
+        return super()._accept(opened)
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
-        """Queue an access unit with its image; return whether it could be decoded."""
+        """Queue an access unit, with its image if that is wanted; return whether it can be decoded."""
         if not packet.size:
             return False
         try:
             data = parse_packing(packet.stream.codec_context.extradata).annex_b(bytes(packet))
         except ValueError:
             data = b""
-        key, image = is_keyframe(data), decode_unit(packet)
+        key = is_keyframe(data)
+        if key:  # a decoder can begin only there
+            self._is_decoding = self.decodes
+        image = decode_unit(packet) if self._is_decoding else None
         self._sized.set()  # the orientation was checked before, and may not change
-        if image is not None and image.shape[1::-1] != self._required.size:
-            image = None  # the size may not change within a connection
-        self._is_decodable = image is not None and bool(data) and (self._is_decodable or key)
-        if image is not None and self._is_decodable:
+        if self._is_decoding:
+            # The size may not change within a connection.
+            is_intact = image is not None and image.shape[1::-1] == self._required.size
+        else:
+            is_intact = self._continuity.follows(data) and not packet.is_corrupt
+        self._is_decodable = is_intact and bool(data) and (self._is_decodable or key)
+        if self._is_decodable:
             time = None
             if packet.pts is not None and packet.time_base is not None:
                 time = packet.pts * packet.time_base
+            captured = self._clock.at(None if time is None else float(time), monotonic())
             with self._waiting_lock:
-                self._waiting.put(PassthroughUnit(key, data, image, time))
-        return image is not None
+                self._waiting.put(PassthroughUnit(key, data, image, time, captured))
+        return is_intact
 
 
 def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> None:

@@ -71,6 +71,10 @@ class ImageFolder:
         index = pulse - self._offset
         return pulse if index < 0 else self._offset + index % len(self._files)
 
+    def pulse_in_first_pass(self, pulse: int) -> int:
+        """Return the pulse at which the image of a pulse is shown first, if it loops."""
+        return self.pulse_by_frame_count(pulse)
+
     def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Read some of the images; one that cannot be read is left out."""
         files = [self._files[index] for index in indices if index < len(self._files)]

@@ -7,28 +7,23 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import cast
 
 import av
 from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from expbackoff import Backoff
-from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource
 from server.camera.sources.base import Image
-from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
+from server.camera.sources.opening import OpenedVideo, open_video
 from server.camera.sources.orientation import INTERLACED, Orientation, parse_orientation, pixel_aspect
-from server.system.address_redaction import ffmpeg_reason, redact_to_host
-from server.system.errors import UnavailableError, UserError
+from server.camera.sources.stream_clock import CaptureTime
+from server.camera.sources.stream_reader import OPEN_S, READ_S, StreamChangedError, StreamReader
+from server.system.address_redaction import redact_to_host
+from server.system.errors import UnavailableError
 
 log = logging.getLogger(__name__)
 
-OPEN_S, READ_S = 10.0, 5.0
-"""Timeouts of connecting and of reading, in seconds."""
-_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
-_JOIN_S = 0.5
 _FIRST_FRAME_S = 2.0
 """Seconds to wait for the first frame, which carries the orientation."""
 _STALE_S = 1.5
@@ -38,13 +33,14 @@ _HELD_BACK = 2
 """Frames that FFmpeg holds back until the next one begins: one in the demuxer, one in the parser."""
 
 
-class LiveStream:
+class LiveStream(StreamReader):
     """Reads the camera in a thread, so that a pulse never waits for it; reconnects by itself."""
 
     recorded = False
 
     def __init__(self, url: str, options: Mapping[str, str], listener: LiveAudioSource | None = None) -> None:
-        self._url, self._options, self._listener = url, options, listener
+        super().__init__(url, options)
+        self._listener = listener
         opened = open_video(url, options, (OPEN_S, READ_S))
         self._stored = opened.size
         self._orientation = Orientation(pixel_aspect=pixel_aspect(opened.stream))
@@ -56,11 +52,11 @@ class LiveStream:
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
+        self._newest_captured: CaptureTime | None = None
+        self.captured: CaptureTime | None = None
+        """When the image that was taken last was captured."""
         self._silence = _Silence()
-        self._closing = threading.Event()
-        self._away_log = LogThrottle(quiet_s=0.0)
-        self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
-        self._thread.start()
+        self._start(opened)
         self._sized.wait(_FIRST_FRAME_S)
         self._sized.set()
 
@@ -76,80 +72,25 @@ class LiveStream:
             raise UnavailableError(f"{redact_to_host(self._url)}: {self._size_message(self._resized)}")
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
+            self.captured = self._newest_captured
         return None if picture is None else self._oriented(picture).image(picture)
 
     def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:  # noqa: ARG002 — FrameSource
         """Return nothing: a live camera has no future frames."""
         return iter(())
 
-    def close(self) -> None:
-        """Stop reading."""
-        self._closing.set()
-        self._thread.join(_JOIN_S)  # a silent camera may block the thread for longer; it ends by itself
-
-    def _run(self, opened: OpenedVideo | None) -> None:
-        backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
-        while not self._closing.is_set():
-            if opened is not None and self._read_safely(opened):
-                backoff.reset()
-            if self._closing.wait(backoff.next()):
-                return
-            try:
-                opened = open_video(self._url, self._options, (OPEN_S, READ_S))
-            except UserError as error:
-                opened = None
-                self._log_away(str(error))
-
-    def _read(self, opened: OpenedVideo) -> bool:
-        """Read until the connection ends; return whether any frame was decoded."""
+    def _accept(self, opened: OpenedVideo) -> bool:
+        """Prepare for a new connection; refuse one of another size."""
         aspect = pixel_aspect(opened.stream)
         size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
         if size != self.size:
             self._resized = size
-            opened.container.close()
             return False
-        has_frames, reason = False, "the connection has ended"
         self._silence = _Silence()
-        try:
-            for packet in opened.container.demux(opened.stream, *self._audio_streams(opened)):
-                if self._closing.is_set():
-                    break
-                if packet.stream is opened.stream:
-                    if self._decode(cast("av.Packet[VideoStream]", packet)):
-                        has_frames = True
-                        self._log_recovered()
-                elif self._listener is not None:
-                    self._listener.packet(cast("av.Packet[AudioStream]", packet))
-        except _SizeChangedError as error:
-            reason = str(error)  # damage, or a real change: the next connection tells them apart
-        except (av.error.FFmpegError, OSError) as error:
-            reason = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
-        finally:
-            opened.container.close()
-        if not self._closing.is_set():
-            self._log_away(f"{redact_to_host(self._url)}: {reason}")
-        return has_frames
+        return True
 
     def _size_message(self, size: tuple[int, int]) -> str:
         return "its images are {}x{} now, they were {}x{}".format(*size, *self.size)
-
-    def _log_away(self, reason: str, *, unexpected: bool = False) -> None:
-        """Log that the camera is away; throttled, as it may come and go."""
-        if (more := self._away_log.record(reason)) is not None:
-            log.warning("%s%s; retrying", reason, more, exc_info=unexpected)
-
-    def _log_recovered(self) -> None:
-        if ended := self._away_log.end():
-            log.info("%s: frames arrive again, after %.0f s", redact_to_host(self._url), ended.seconds)
-
-    def _read_safely(self, opened: OpenedVideo) -> bool:
-        """Read, and log unexpected errors: the thread must survive them."""
-        try:
-            return self._read(opened)
-        except Exception as error:  # noqa: BLE001 — logged with its traceback
-            self._log_away(f"{redact_to_host(self._url)}: unexpected {type(error).__name__}", unexpected=True)
-            opened.container.close()
-            return False
 
     def _audio_streams(self, opened: OpenedVideo) -> tuple[AudioStream, ...]:
         """Return the audio stream to read beside the video, if any."""
@@ -158,6 +99,10 @@ class LiveStream:
         streams = opened.container.streams.audio[:1]
         self._listener.opened(streams[0] if streams else None)
         return streams
+
+    def _hear(self, packet: av.Packet[AudioStream]) -> None:
+        if self._listener is not None:
+            self._listener.packet(packet)
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
         is_stale = self._silence.was_before(packet, time.monotonic())
@@ -169,11 +114,12 @@ class LiveStream:
             self._set_orientation(pictures[0])
         for size in map(self._size_of, pictures):
             if size != self.size:
-                raise _SizeChangedError(self._size_message(size))
+                raise StreamChangedError(self._size_message(size))
         if pictures and not is_stale:
+            newest, now = pictures[-1], time.monotonic()
             with self._lock:
-                self._newest, self._newest_at = pictures[-1], time.monotonic()
-            newest = pictures[-1]
+                self._newest, self._newest_at = newest, now
+                self._newest_captured = self._clock.at(newest.time, now)
             if self._listener is not None and newest.pts is not None and newest.time_base is not None:
                 self._listener.picture(newest.pts * newest.time_base)
         return bool(pictures)
@@ -192,10 +138,6 @@ class LiveStream:
 
     def _size_of(self, picture: VideoFrame) -> tuple[int, int]:
         return self._oriented(picture).size((picture.width, picture.height))
-
-
-class _SizeChangedError(Exception):
-    """The size of a picture differs from the first one's."""
 
 
 class _Silence:

@@ -113,6 +113,11 @@ class Recording:
         """Return the pulse of this pulse's frame if frames were counted, one per pulse, and not repeated."""
         return pulse + self._number_offsets.get(pulse, 0)
 
+    def pulse_in_first_pass(self, pulse: int) -> int:
+        """Return the pulse at which the frame of a pulse is shown first, if it loops."""
+        index = pulse - self._offset
+        return pulse if index < 0 or not self._length else self._offset + index % self._length
+
     def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
         """Decode the frames with these indices, from a second reader of the file."""
         return decode_frames(self._path, indices, self._site_fps)
@@ -133,11 +138,10 @@ class Recording:
 
     def _position(self, index: int) -> int:
         """Return the position of an index, modulo the length of a loop; rewind if needed."""
-        if self._length is None:
-            return index
-        if index >= self._length and not self._loop:
-            raise SourceEndedError(self._path)
-        index %= self._length
+        if self._length is not None:
+            if index >= self._length and not self._loop:
+                raise SourceEndedError(self._path)
+            index %= self._length
         if index < self._requested:
             self._opened.container.close()
             self._opened = open_video(self._path)

@@ -72,12 +72,12 @@ def _run_frames(
     began = time.thread_time()
     for pulse in range(pipeline.first_pulse, pipeline.first_pulse + max(1, round(_FRAMES_S * fps))):
         try:
-            image = pipeline.take(pulse)
+            frame = pipeline.take(pulse)
         except SourceEndedError:
             break
-        if image is not None:
-            frames, units = frames + 1, units + len(pipeline.encode(pulse, image).data)
-            pipeline.track(pulse, image)
+        if frame is not None:
+            frames, units = frames + 1, units + len(pipeline.encode(pulse, frame).data)
+            pipeline.track(pulse, frame)
         if time.monotonic() >= until:
             break
         if live:

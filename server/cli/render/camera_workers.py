@@ -156,13 +156,13 @@ class CameraRun:
     def detect_for_peers(self) -> FrameDetections | None:
         """Take and encode the next frame and detect people; return the detections for the peers, if any."""
         try:
-            image = self._pipeline.take(self._pulse)
+            frame = self._pipeline.take(self._pulse)
         except SourceEndedError:
             self._frame = None
             return self._pipeline.end_message(self._pulse)
-        if image is not None:
-            self._units.append(self._pipeline.encode(self._pulse, image))
-        self._frame = self._pipeline.detect(self._pulse, image)
+        if frame is not None:
+            self._units.append(self._pipeline.encode(self._pulse, frame))
+        self._frame = self._pipeline.detect(self._pulse, frame)
         return self._frame.message
 
     def track(self, peer_detections: Sequence[FrameDetections]) -> EpochBatch | None:

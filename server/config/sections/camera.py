@@ -35,8 +35,10 @@ class CameraSettings(Section):
     id: Identifier
     source: str
     """A file, a folder of images, a URL that FFmpeg opens, /dev/video0, or scene:NAME?camera=0&…"""
+    substream: str | None = None
+    """The same view in a smaller stream or file, in which people are tracked; None: in the source."""
     password: Path | None = None
-    """A file whose one line, the camera's password, replaces `{password}` in `source`."""
+    """A file whose one line, the camera's password, replaces `{password}` in `source` and `substream`."""
     kind: Literal["upright", "overhead"] = "upright"
     """People stand upright in its picture, or it looks straight down on them."""
     offset_s: OffsetSeconds = 0.0
@@ -63,7 +65,8 @@ class CameraSettings(Section):
     @field_validator("password")
     @classmethod
     def _password_has_its_place(cls, password: Path | None, info: ValidationInfo) -> Path | None:
-        if password is not None and "{password}" not in info.data.get("source", ""):
+        addresses = (info.data.get("source", ""), info.data.get("substream") or "")
+        if password is not None and not any("{password}" in address for address in addresses):
             raise ValueError("names a file, but source has no place for it: rtsp://name:{password}@…")
         return password
 

@@ -40,6 +40,7 @@ class SliceHeaderFormat:
         width_mbs, height_mbs: of a picture, in macroblocks.
         order_bits: bits of pic_order_cnt_lsb; 0: the output order is the decoding order.
         order_of_fields: bottom_field_pic_order_in_frame_present_flag.
+        may_skip_numbers: gaps_in_frame_num_value_allowed_flag.
     """
 
     pps_id: int
@@ -53,6 +54,7 @@ class SliceHeaderFormat:
     init_qp: int
     deblocking_control: bool
     redundant: bool
+    may_skip_numbers: bool = False
 
     @property
     def macroblocks(self) -> int:
@@ -152,6 +154,7 @@ class _SequenceParameters:
     width_mbs: int
     height_mbs: int
     order_bits: int
+    may_skip_numbers: bool
 
 
 def _read_sps(bits: BitReader) -> _SequenceParameters:
@@ -171,13 +174,13 @@ def _read_sps(bits: BitReader) -> _SequenceParameters:
         raise ValueError("pic_order_cnt_type 1")
     order_bits = bits.ue() + 4 if order == _ORDER_BY_NUMBERS else 0
     bits.ue()
-    bits.u(1)
+    may_skip_numbers = bool(bits.u(1))
     width_mbs, height_mbs = bits.ue() + 1, bits.ue() + 1
     if not bits.u(1):
         raise ValueError("interlaced")
     if width_mbs * height_mbs > _MAX_MACROBLOCKS or max(frame_num_bits, order_bits) > _MAX_FRAME_NUM_BITS:
         raise ValueError("beyond the highest level")
-    return _SequenceParameters(frame_num_bits, width_mbs, height_mbs, order_bits)
+    return _SequenceParameters(frame_num_bits, width_mbs, height_mbs, order_bits, may_skip_numbers)
 
 
 def _read_pps(bits: BitReader, sps: _SequenceParameters) -> SliceHeaderFormat:
@@ -209,4 +212,5 @@ def _read_pps(bits: BitReader, sps: _SequenceParameters) -> SliceHeaderFormat:
         init_qp=init_qp,
         deblocking_control=deblocking_control,
         redundant=redundant,
+        may_skip_numbers=sps.may_skip_numbers,
     )

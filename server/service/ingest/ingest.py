@@ -15,7 +15,7 @@ from camsync.lines import RateLimit
 from logthrottle import LogThrottle
 from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
-from server.messaging.camera_status import CONDITION_TEXTS, CameraStatus, motion_text
+from server.messaging.camera_status import CONDITION_TEXTS, SUBSTREAM_AWAY, CameraStatus, motion_text
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
@@ -83,7 +83,7 @@ class CameraState:
             return "its source delivers no frames; retrying"
         if not self.alive or self.status is None:
             return ""
-        texts = [self.status.load]
+        texts = [SUBSTREAM_AWAY if self.status.substream == "away" else "", self.status.load]
         if self.status.condition != "clear":
             texts.insert(0, CONDITION_TEXTS[self.status.condition])
         if self.status.motion is not None:

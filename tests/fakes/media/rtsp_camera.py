@@ -19,6 +19,8 @@ _PAYLOAD_TYPE = 96
 _MAX_BYTES = 200
 """Bytes of a NAL unit in one packet: few, so that small pictures are fragmented."""
 _FU_A = 28
+_NTP_EPOCH = 2_208_988_800
+"""Seconds from 1900 to 1970."""
 
 
 _REALM, _NONCE = "a camera", "0123456789abcdef"
@@ -28,7 +30,8 @@ class RtspCamera:
     """Serves access units at a frame rate over TCP, up to the GOP number `gop_limit`.
 
     ``login`` is a user and a password, asked for by Digest (RFC 2617). ``live``: sends in real time and
-    endlessly, to each client what a common clock says.
+    endlessly, to each client what a common clock says, `delay_s` later; with ``reports``, RTCP sender reports
+    tell that clock.
     """
 
     def __init__(
@@ -38,15 +41,25 @@ class RtspCamera:
         *,
         login: tuple[str, str] | None = None,
         live: bool = False,
+        began: float | None = None,
+        delay_s: float = 0.0,
+        reports: bool = False,
+        port: int = 0,
     ) -> None:
         self.gops, self.fps, self.gop_limit = gops, fps, 40
         self.login, self.live = login, live
-        self.began = time.monotonic()
+        self.began = time.monotonic() if began is None else began
+        self.delay_s, self.reports = delay_s, reports
         self.stop = threading.Event()
-        self._server = _Server(self)
+        self._server = _Server(self, port)
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
         self._thread.start()
         self.url = f"rtsp://127.0.0.1:{self._server.server_address[1]}/live"
+
+    @property
+    def unix_began(self) -> float:
+        """The unix time of the first access unit."""
+        return self.began + time.time() - time.monotonic()
 
     def close(self) -> None:
         """Stop the server."""
@@ -58,10 +71,10 @@ class RtspCamera:
 
 
 class _Server(socketserver.ThreadingTCPServer):
-    daemon_threads = True
+    daemon_threads = allow_reuse_address = True
 
-    def __init__(self, camera: RtspCamera) -> None:
-        super().__init__(("127.0.0.1", 0), _Handler)
+    def __init__(self, camera: RtspCamera, port: int) -> None:
+        super().__init__(("127.0.0.1", port), _Handler)
         self.camera = camera
 
 
@@ -102,11 +115,21 @@ class _Handler(socketserver.StreamRequestHandler):
         number = 0
         for time_s, unit in _live_units(camera) if camera.live else _units(camera):
             stamp = round(time_s * 90_000) % 2**32
+            if camera.reports:
+                report = _sender_report(camera.unix_began + time_s, stamp)
+                self.wfile.write(struct.pack(">cBH", b"$", 1, len(report)) + report)
             for payload, is_last in _payloads(unit):
                 kind = _PAYLOAD_TYPE | is_last << 7
                 packet = struct.pack(">BBHII", 0x80, kind, number % 2**16, stamp, 1) + payload
                 self.wfile.write(struct.pack(">cBH", b"$", 0, len(packet)) + packet)
                 number += 1
+
+
+def _sender_report(unix: float, stamp: int) -> bytes:
+    """Return a sender report (RFC 3550, 6.4.1) that a moment has a time stamp."""
+    seconds = int(unix)
+    fraction = int((unix - seconds) * 2**32)
+    return struct.pack(">BBHIIIIII", 0x80, 200, 6, 1, seconds + _NTP_EPOCH, fraction, stamp, 0, 0)
 
 
 def _units(camera: RtspCamera) -> Iterator[tuple[float, AccessUnit]]:
@@ -128,7 +151,7 @@ def _live_units(camera: RtspCamera) -> Iterator[tuple[float, AccessUnit]]:
     while True:
         for unit_place, unit in enumerate(camera.gops[place], starts[place]):
             due = (rounds * frames + unit_place) / camera.fps
-            if camera.stop.wait(max(0.0, camera.began + due - time.monotonic())):
+            if camera.stop.wait(max(0.0, camera.began + due + camera.delay_s - time.monotonic())):
                 return
             yield due, unit
         place = (place + 1) % len(camera.gops)

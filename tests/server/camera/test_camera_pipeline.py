@@ -60,15 +60,15 @@ def live(config: Config, missed: frozenset[int] = frozenset()) -> tuple[list[Acc
     while True:
         if pulse not in missed:
             try:
-                image = pipeline.take(pulse)
+                frame = pipeline.take(pulse)
             except SourceEndedError:
                 break
-            if image is not None:
-                units.append(pipeline.encode(pulse, image))
-            backlog.append((pulse, image))
+            if frame is not None:
+                units.append(pipeline.encode(pulse, frame))
+            backlog.append((pulse, frame))
         pulse += 1
-    for number, image in backlog:
-        messages.append(pipeline.track(number, image))
+    for number, frame in backlog:
+        messages.append(pipeline.track(number, frame))
     messages.append(pipeline.finish(pulse))
     pipeline.close()
     return units, [message for message in messages if message is not None]
@@ -159,8 +159,8 @@ def test_only_the_end_of_a_very_long_gap_is_reported(recording: Path) -> None:
 def test_a_frame_whose_picture_was_shed_is_reported(recording: Path) -> None:
     pipeline = CameraPipeline(config_of(recording), "c0")
     for pulse in range(STRIDE):
-        image = pipeline.take(pulse)
-        message = pipeline.track(pulse, None if pulse == 3 else image)
+        frame = pipeline.take(pulse)
+        message = pipeline.track(pulse, None if pulse == 3 else frame)
     pipeline.close()
     assert message is not None
     assert message.shed == message.without_detection == [3]

@@ -23,7 +23,7 @@ from av.video.stream import VideoStream
 from fakes.media.videos import HEIGHT, STEP, WIDTH, frame_in, write_video
 from fakes.timeouts import PATIENCE
 from server.camera.audio import LiveAudioSource
-from server.camera.sources import live_stream, open_source
+from server.camera.sources import live_stream, open_source, stream_reader
 from server.camera.sources.live_stream import LiveStream
 from server.camera.sources.opening import OpenedVideo, open_video
 from server.config.sections import CameraSettings, SiteSettings, SoundSettings
@@ -111,7 +111,7 @@ def test_a_camera_is_shown_again_after_an_absence_and_no_old_picture_meanwhile(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(live_stream, "_STALE_S", 0.2)
-    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
     source = LiveStream(f"http://127.0.0.1:{port}/", {})
     try:
@@ -128,9 +128,9 @@ def test_a_camera_is_shown_again_after_an_absence_and_no_old_picture_meanwhile(
 def test_a_long_absence_is_logged_once_and_so_is_the_return(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    caplog.set_level("INFO", "server.camera.sources.live_stream")
-    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.01)
-    monkeypatch.setattr(live_stream, "_RETRY_MAX_S", 0.01)
+    caplog.set_level("INFO", "server.camera.sources")
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.01)
+    monkeypatch.setattr(stream_reader, "_RETRY_MAX_S", 0.01)
     port = camera.plug_in()
     source = LiveStream(f"http://me:hunter2@127.0.0.1:{port}/?p=hunter2", {})
     try:
@@ -213,7 +213,7 @@ def test_a_change_of_the_picture_size_ends_the_camera(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, connected: bool
 ) -> None:
     """Positions depend on the size: the camera's process restarts with the new one."""
-    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.05)
     port = camera.plug_in()
     source = LiveStream(f"http://127.0.0.1:{port}/", {})
 
@@ -275,7 +275,7 @@ def test_an_undecodable_picture_does_not_end_the_connection(
 def test_a_read_error_ends_the_connection_but_not_the_camera(
     camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(live_stream, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.05)
 
     class FailingOnce(LiveAudioSource):
         connections = 0

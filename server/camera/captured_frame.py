@@ -1,0 +1,26 @@
+"""What a camera has captured for a pulse."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+from server.camera.sources.base import Image
+from server.camera.sources.stream_clock import CaptureTime
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CapturedFrame:
+    """A frame of a camera's video.
+
+    Attributes:
+        pulse: its pulse.
+        image: at the site's size; None: it is passed through without being decoded.
+        captured: when it was captured; None: unknown.
+        taken: when it was taken from the source, by the steady clock.
+    """
+
+    pulse: int
+    image: Image | None
+    captured: CaptureTime | None
+    taken: float = field(default_factory=time.monotonic)

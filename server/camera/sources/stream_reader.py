@@ -1,0 +1,138 @@
+"""Reads a stream in a thread, and connects again when it ends."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Mapping
+from typing import cast
+
+import av
+from av.audio.stream import AudioStream
+from av.video.stream import VideoStream
+
+from expbackoff import Backoff
+from logthrottle import LogThrottle
+from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
+from server.camera.sources.stream_clock import StreamClock
+from server.system.address_redaction import ffmpeg_reason, redact_to_host
+from server.system.errors import UserError
+
+log = logging.getLogger(__name__)
+
+OPEN_S, READ_S = 10.0, 5.0
+"""Timeouts of connecting and of reading, in seconds."""
+_RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+_JOIN_S = 0.5
+
+
+class StreamChangedError(Exception):
+    """The stream is not what it was; the text says how. The next connection tells damage from a change."""
+
+
+class StreamReader:
+    """Reads a camera's stream; what becomes of its packets is up to the class derived from this."""
+
+    _thread: threading.Thread
+
+    def __init__(self, url: str, options: Mapping[str, str]) -> None:
+        self._url, self._options = url, options
+        self._clock = StreamClock()
+        """Of the present connection."""
+        self._closing = threading.Event()
+        self._away_log = LogThrottle(quiet_s=0.0)
+
+    def _start(self, opened: OpenedVideo | None) -> None:
+        """Begin to read from a connection; None: connect first."""
+        self._thread = threading.Thread(target=self._run, args=(opened,), name="source", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._closing.set()
+        self._thread.join(_JOIN_S)  # a silent camera may block it for longer; it ends by itself
+
+    def _accept(self, opened: OpenedVideo) -> bool:
+        """Prepare for a new connection; return whether its stream can be used."""
+        raise NotImplementedError
+
+    def _decode(self, packet: av.Packet[VideoStream]) -> bool:
+        """Use a packet of the video; return whether it was a picture.
+
+        Raises:
+            StreamChangedError: the connection is of no more use.
+        """
+        raise NotImplementedError
+
+    def _audio_streams(self, opened: OpenedVideo) -> tuple[AudioStream, ...]:  # noqa: ARG002 — for derived classes
+        """Return the audio stream to read beside the video, if any."""
+        return ()
+
+    def _hear(self, packet: av.Packet[AudioStream]) -> None:
+        """Use a packet of the audio."""
+
+    def _run(self, opened: OpenedVideo | None) -> None:
+        backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
+        if opened is None:
+            opened = self._connect()
+        while not self._closing.is_set():
+            if opened is not None and self._read_safely(opened):
+                backoff.reset()
+            if self._closing.wait(backoff.next()):
+                return
+            opened = self._connect()
+
+    def _connect(self) -> OpenedVideo | None:
+        try:
+            return open_video(self._url, self._options, (OPEN_S, READ_S))
+        except UserError as error:
+            self._log_away(str(error))
+            return None
+
+    def _read(self, opened: OpenedVideo) -> bool:
+        """Read until the connection ends; return whether any frame was decoded."""
+        if not self._accept(opened):
+            opened.container.close()
+            return False
+        has_frames, reason = False, "the connection has ended"
+        self._clock = StreamClock()
+        try:
+            for packet in opened.container.demux(opened.stream, *self._audio_streams(opened)):
+                if self._closing.is_set():
+                    break
+                if packet.stream is opened.stream:
+                    video = cast("av.Packet[VideoStream]", packet)
+                    self._clock.observe(video, time.monotonic())
+                    if self._decode(video):
+                        has_frames = True
+                        self._log_recovered()
+                else:
+                    self._hear(cast("av.Packet[AudioStream]", packet))
+        except StreamChangedError as error:
+            reason = str(error)
+        except (av.error.FFmpegError, OSError) as error:
+            reason = f"reading stopped: {timeout_message(error, READ_S) or ffmpeg_reason(error)}"
+        finally:
+            opened.container.close()
+        if not self._closing.is_set():
+            self._log_away(f"{redact_to_host(self._url)}: {reason}")
+        return has_frames
+
+    def _log_away(self, reason: str, *, unexpected: bool = False) -> None:
+        """Log that the camera is away; throttled, as it may come and go."""
+        if (more := self._away_log.record(reason)) is not None:
+            log.warning("%s%s; retrying", reason, more, exc_info=unexpected)
+
+    def _log_recovered(self) -> None:
+        if ended := self._away_log.end():
+            log.info("%s: frames arrive again, after %.0f s", redact_to_host(self._url), ended.seconds)
+
+    def _read_safely(self, opened: OpenedVideo) -> bool:
+        """Read, and log unexpected errors: the thread must survive them."""
+        try:
+            return self._read(opened)
+        except Exception as error:  # noqa: BLE001 — logged with its traceback
+            self._log_away(f"{redact_to_host(self._url)}: unexpected {type(error).__name__}", unexpected=True)
+            opened.container.close()
+            return False

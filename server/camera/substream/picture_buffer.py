@@ -1,0 +1,82 @@
+"""The newest pictures of a substream, among which the one of a moment is found."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+
+from av.video.frame import VideoFrame
+
+from server.camera.sources.stream_clock import CaptureTime
+
+_MATCH_S = 0.25
+"""A picture further away, in seconds, is not of the same moment: people have moved on."""
+_STALE_S = 1.5
+"""Seconds without a picture after which the next one is not waited for."""
+_MAX_PICTURES = 600
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BufferedPicture:
+    """A picture of the substream.
+
+    Attributes:
+        picture: as decoded.
+        pixel_aspect: width of its pixels over their height; 1: not declared.
+        captured: when it was captured.
+    """
+
+    picture: VideoFrame
+    pixel_aspect: float
+    captured: CaptureTime
+
+
+class PictureBuffer:
+    """Keeps pictures of some seconds. One thread adds, another one finds.
+
+    Args:
+        keep_s: seconds by which the main stream may be later.
+        tolerance_s: a picture so much earlier is of the same moment: the next one need not be waited for.
+    """
+
+    def __init__(self, keep_s: float, tolerance_s: float) -> None:
+        self._keep_s, self._tolerance_s = keep_s, tolerance_s
+        self._pictures: deque[BufferedPicture] = deque(maxlen=_MAX_PICTURES)
+        self._newest_at: float | None = None
+        self._changed = threading.Condition()
+
+    def put(self, picture: BufferedPicture) -> None:
+        """Add a picture that has arrived just now."""
+        now = time.monotonic()
+        with self._changed:
+            self._pictures.append(picture)
+            self._newest_at = now
+            while len(self._pictures) > 1 and self._pictures[0].captured.arrival < now - self._keep_s:
+                self._pictures.popleft()
+            self._changed.notify_all()
+
+    def find(self, captured: CaptureTime, until: float) -> BufferedPicture | None:
+        """Return the picture captured at the same time, up to 0.25 s apart; None: there is none.
+
+        Waits for it up to a time by the steady clock, while pictures arrive.
+        """
+        with self._changed:
+            while not self._is_reached(captured):
+                now = time.monotonic()
+                stale_at = 0.0 if self._newest_at is None else self._newest_at + _STALE_S
+                if (wait_s := min(until, stale_at) - now) <= 0:
+                    break
+                self._changed.wait(wait_s)
+            distances = [abs(candidate.captured.seconds_after(captured)) for candidate in self._pictures]
+            if not distances:
+                return None
+            least = min(distances)
+            return self._pictures[distances.index(least)] if least <= _MATCH_S else None
+
+    def _is_reached(self, captured: CaptureTime) -> bool:
+        """Return whether no later picture can be closer."""
+        if not self._pictures:
+            return False
+        return self._pictures[-1].captured.seconds_after(captured) >= -self._tolerance_s
