@@ -40,6 +40,12 @@ def walker_frame(picture: Picture) -> float:
     return float((columns.mean() + 0.5) * MAIN[0] / picture.shape[1] - 4 - _WALKER[0] / 2) / _STEP
 
 
+def walker_box(frame: float) -> tuple[float, float, float, float]:
+    """Return the walker's box in the main picture."""
+    left, top = 4 + _STEP * (frame % FRAMES), 70
+    return left, top, left + _WALKER[0], top + _WALKER[1]
+
+
 @cache
 def walker_gops(size: tuple[int, int]) -> list[list[AccessUnit]]:
     """Encode the frames at a size in GOPs."""
