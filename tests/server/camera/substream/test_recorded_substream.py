@@ -206,8 +206,8 @@ def test_thumbnails_and_sharpness_are_of_the_person(folder: Path, main_tracks: l
         )
     )
     assert large.keys() == small.keys()
-    for track, picture in large.items():
-        same = cv2.resize(small[track].astype(np.uint8), picture.shape[1::-1]).astype(int)
+    for number, picture in large.items():
+        same = cv2.resize(small[number].astype(np.uint8), picture.shape[1::-1]).astype(int)
         assert np.abs(same - picture).mean() < 12
     measured = SharpnessMemory().measure(message, scale.image(frame.image), scale)
     for track in measured.tracks:
