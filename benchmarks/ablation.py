@@ -38,6 +38,10 @@ ABLATIONS = (
     Ablation("no cost of reappearing elsewhere", {"costs": {"reappearance": 0.0}}),
     Ablation("no gate on displacement", {"costs": {"gate": None}}),
     Ablation("births from weak boxes alone", {"window": {"birth_min_peak_score": 0.0}}),
+    Ablation("births from weak boxes too", {"window": {"birth_min_score": 0.0}}),
+    Ablation(
+        "births from any number of boxes", {"window": {"birth_max_tests": PAPER.window.birth_max_tests}}
+    ),
     Ablation("no interpolation of gaps", {"window": {"max_interpolated_gap_s": 0.0}}),
     Ablation("no displacement cost", {"costs": {"displacement": 0.0}}),
     Ablation(
@@ -45,6 +49,8 @@ ABLATIONS = (
         {"costs": {"displacement_unit": "pixels", "displacement": 0.01, "gate": None}},
     ),
     Ablation("no appearance cost", {"costs": {"appearance": 0.0}}),
+    Ablation("appearance of the preset", {"costs": {"appearance": PAPER.costs.appearance}}),
+    Ablation("hiding as cheap as in the preset", {"costs": {"occlusion": PAPER.costs.occlusion}}),
     Ablation("conflicts by corners", {"costs": {"conflict_rule": "corners"}}),
     Ablation("conflict rows of II.D", {"costs": {"conflict_rows": "star"}}),
     Ablation(
@@ -53,6 +59,14 @@ ABLATIONS = (
     ),
     Ablation("window of 0.2 seconds", {"window": {"length_s": 0.2, "birth_s": 0.2, "min_frames": 3}}),
     Ablation("no re-identification", {"window": {"reidentify_max_distance": 0.0}}),
+    Ablation(
+        "hidden objects stay in the program",
+        {"window": {"reidentify_after_s": PAPER.window.reidentify_after_s}},
+    ),
+    Ablation(
+        "hidden objects are never dropped",
+        {"window": {"forget_after_s": PAPER.window.forget_after_s, "max_objects": PAPER.window.max_objects}},
+    ),
     Ablation("fixed templates", {"window": {"template_memory_s": 1e6}}),
     Ablation("the paper's layout term", {"costs": {"layout": PAPER.costs.layout}}),
     Ablation("unknown appearance costs nothing", {"costs": {"unknown_appearance": 0.0}}),
@@ -61,6 +75,7 @@ ABLATIONS = (
         "births in more than 75 % of the frames", {"window": {"birth_min_visible": MORE_THAN_75_PERCENT}}
     ),
     Ablation("windows overlap in one frame", {"window": {"stride_s": 0.6}}),
+    Ablation("windows of the paper's length", {"window": {"length_s": 0.72, "birth_s": 0.72}}),
     Ablation("duplicates are kept", {"window": {"duplicate_overlap": 1.0}}),
     Ablation("the paper's costs", {"costs": asdict(PAPER_COSTS)}),
     Ablation("the paper", {"costs": asdict(PAPER.costs), "window": asdict(PAPER.window)}),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,9 @@ from benchmarks.other_trackers import virtual_environment as peer_environment
 from benchmarks.other_trackers.virtual_environment import OtherTrackersUnavailableError
 from fakes.service.scripted_cameras import small_config
 from server.cli.track.command import track_one
+from server.config.sections import TrackSettings
 from server.system.errors import UserError
-from tracking import OnlineTracker
+from tracking import PAPER, OnlineTracker
 from tracking.evaluation import Scores
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
@@ -80,6 +81,27 @@ def test_a_recording_is_tracked_at_its_true_rate(
 @pytest.mark.parametrize("term", ABLATIONS, ids=lambda term: term.name)
 def test_the_settings_of_an_ablation_exist(term: Ablation, recording: Recording) -> None:
     track(recording, term.settings)
+
+
+def test_each_way_in_which_the_live_tracker_differs_from_the_paper_has_a_row() -> None:
+    """A row for a whole preset is none for each of its settings."""
+    live, few = TrackSettings(), 4
+    papers = {"costs": asdict(PAPER.costs), "window": asdict(PAPER.window)}
+    deviations = {
+        (section, name)
+        for section, settings in papers.items()
+        for name, value in settings.items()
+        if getattr(getattr(live, section), name) != value
+    }
+    rows = {
+        (section, name)
+        for row in ABLATIONS
+        for section, settings in row.settings.items()
+        if len(settings) <= few
+        for name in settings
+    }
+    assert ("costs", "layout") in deviations
+    assert deviations <= rows
 
 
 def test_an_unknown_setting_is_refused(recording: Recording) -> None:
