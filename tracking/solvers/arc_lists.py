@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,12 +26,6 @@ class ArcGroups:
     starts: Ints
     states: Ints
 
-    @classmethod
-    def of(cls, sorted_states: Ints) -> ArcGroups:
-        """Group arcs by their states, (E,), ascending."""
-        starts = np.flatnonzero(np.diff(sorted_states, prepend=-1))
-        return cls(starts, sorted_states[starts])
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepArcs:
@@ -51,12 +46,6 @@ class StepArcs:
     order: Ints
     leaving: ArcGroups
 
-    @classmethod
-    def of(cls, span: slice, origin: Ints, target: Ints) -> StepArcs:
-        """Group the arcs of a step."""
-        order = np.argsort(origin, kind="stable")
-        return cls(span, origin, target, ArcGroups.of(target), order, ArcGroups.of(origin[order]))
-
 
 def existing_arcs(pair: Floats, node: Floats) -> tuple[Ints, Ints, Ints]:
     """Return step, origin and target (E,) of the arcs that any object has, sorted by step, target, origin.
@@ -70,8 +59,36 @@ def existing_arcs(pair: Floats, node: Floats) -> tuple[Ints, Ints, Ints]:
     return step, origin, target
 
 
-def group_by_step(count: int, step: Ints, origin: Ints, target: Ints) -> tuple[StepArcs, ...]:
-    """Return the arcs of each of `count` steps, from lists (E,) that are sorted as in `existing_arcs`."""
+def group_by_step(
+    count: int, step: Ints, origin: Ints, target: Ints, order: Ints | None = None
+) -> tuple[StepArcs, ...]:
+    """Return the arcs of each of `count` steps, from lists (E,) that are sorted as in `existing_arcs`.
+
+    `order` (E,) sorts them all by step, origin, target, if that is known.
+    """
     ends = np.searchsorted(step, np.arange(count + 1))
-    spans = [slice(int(first), int(last)) for first, last in pairwise(ends)]
-    return tuple(StepArcs.of(span, origin[span], target[span]) for span in spans)
+    states = 1 + int(max(origin.max(initial=0), target.max(initial=0)))
+    if order is None:
+        order = np.argsort(step * states + origin, kind="stable")
+    entering = _groups(ends, step * states, target)
+    leaving = _groups(ends, step * states, origin[order])
+    return tuple(
+        StepArcs(
+            slice(first, last),
+            origin[first:last],
+            target[first:last],
+            next(entering),
+            order[first:last] - first,
+            next(leaving),
+        )
+        for first, last in pairwise(ends.tolist())
+    )
+
+
+def _groups(ends: Ints, base: Ints, states: Ints) -> Iterator[ArcGroups]:
+    """Yield the groups of each step; `base` and `states` (E,) ascend together within each step."""
+    starts = np.flatnonzero(np.diff(base + states, prepend=-1))
+    shared = states[starts]
+    bounds = np.searchsorted(starts, ends)
+    for first, (begin, end) in zip(ends.tolist(), pairwise(bounds.tolist()), strict=False):
+        yield ArcGroups(starts[begin:end] - first, shared[begin:end])

@@ -21,7 +21,7 @@ _PASS_ARC = 3e-9
 """Seconds for an arc of a Viterbi pass."""
 _LIST_ARC = 1.5e-7
 """Seconds for an arc of a list in a Viterbi pass, with the layout term."""
-_MOVEMENT_STEP, _MOVEMENT_ARC, _MOVEMENT_CELL = 6e-5, 2.5e-8, 1e-9
+_MOVEMENT_STEP, _MOVEMENT_ARC, _MOVEMENT_CELL = 2.2e-5, 3e-8, 1e-9
 """Seconds for a step with prices of movements, and more for each arc, and each cell and other object."""
 _ITERATION, _ITERATION_ENTRY = 1e-5, 5e-9
 """Seconds for a simplex iteration, and more for each entry of the matrix."""

@@ -12,6 +12,7 @@ from tracking.solvers.budget import Limit
 from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator, RowMembers, conflict_prices
 from tracking.solvers.heuristics.rounding import is_integral
 from tracking.solvers.objective import Ints, conflict_count, path_costs
+from tracking.solvers.sparse_trellis import SparseTrellis
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis, best_paths
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
 
@@ -20,6 +21,19 @@ OPTIMALITY_TOLERANCE = 1e-11
 
 CLOSE_GAP = 2e-3
 """Relative distance of an answer and a bound at which no better ones are searched, with a layout term."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownAnswer:
+    """An answer that a search for the optimum came across.
+
+    Attributes:
+        nodes: (n, M) its nodes, without conflicts.
+        near_arcs: the arcs that cheaper answers are likely on: those of the cheapest paths at the prices.
+    """
+
+    nodes: Ints
+    near_arcs: SparseTrellis
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +52,7 @@ class RelaxedSolution:
         limit: the limit at which the search ended before the optimum, None if it is the optimum. Then y may
             violate rows, and the bound is lower.
         is_optimum: False: it is not the optimum of a relaxation, but near that of one, as an ascent finds it.
-        answer: the cheapest nodes (n, M) without conflicts that the search came across, if any.
+        answer: the cheapest answer that the search came across, if any.
     """
 
     usage: Floats
@@ -49,7 +63,7 @@ class RelaxedSolution:
     bound_reductions: Floats = field(default_factory=lambda: np.empty(0))
     limit: Limit | None = None
     is_optimum: bool = True
-    answer: Ints | None = None
+    answer: KnownAnswer | None = None
 
     @property
     def is_integral(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,8 +43,8 @@ def integer_nodes(
 ) -> Ints:
     """Return nodes (n, M) without conflicts for the relaxation's y.
 
-    If y is integral, they are its paths. Otherwise y is rounded (II.D) and improved by local search, and so
-    are the relaxation's answer, the greedy paths and the cheapest of `candidate_nodes`, until one is close to
+    If y is integral, they are its paths. Otherwise the relaxation's answer is improved by local search, and
+    so are the rounded y (II.D), the cheapest of `candidate_nodes` and the greedy paths, until one is close to
     the bound. The cheapest of all are returned, so no answer is dearer than hiding everybody.
     """
     if found.limit or not found.is_optimum:
@@ -54,23 +55,29 @@ def integer_nodes(
         if found.is_integral and np.isfinite(total_cost(network, nodes, power)):
             return nodes
     network = allow_hiding(network)
-    starts = [nodes] if found.answer is None else [nodes, found.answer]
-    improver = LocalSearch(network, power, meter)
-    candidates = candidate_nodes(network, improver.alone, warm_start)
-    starts.append(min(candidates, key=lambda start: total_cost(network, start, power)))
-    starts = [start for start in starts if not conflict_count(network, start)]
-    starts.sort(key=lambda start: total_cost(network, start, power))
-    close = 0.0 if found.is_optimum else CLOSE_GAP
+    improver = LocalSearch(network, power, meter, found.answer.near_arcs if found.answer else None)
+
+    def starts() -> Iterator[Ints]:
+        if found.answer:
+            yield found.answer.nodes
+        candidates = candidate_nodes(network, improver.alone, warm_start)
+        candidate = min(candidates, key=lambda start: total_cost(network, start, power))
+        yield from sorted([nodes, candidate], key=lambda start: total_cost(network, start, power))
+        yield greedy_paths(network, improver.alone).nodes
+
+    known: list[Ints] = []
     improved: list[Ints] = []
-    for start in [*starts, None]:
-        nodes = greedy_paths(network, improver.alone).nodes if start is None else start
-        if not conflict_count(network, nodes):
-            improved.append(improver.improve(nodes))
+    close = 0.0 if found.is_optimum else CLOSE_GAP
+    for start in starts():
+        if conflict_count(network, start):
+            continue
+        known.append(start)
+        improved.append(improver.improve(start))
         best = min(improved, key=lambda nodes: total_cost(network, nodes, power))
         cost = total_cost(network, best, power)
         if cost - found.bound <= close * max(1.0, abs(cost)):
             return best
-    return improver.improve(recombine(network, [best, *improved, *starts], power, improver.meter))
+    return improver.improve(recombine(network, [best, *improved, *known], power, improver.meter))
 
 
 @dataclass(frozen=True, slots=True)

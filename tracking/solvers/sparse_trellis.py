@@ -51,8 +51,11 @@ class SparseTrellis:
 
     def select(self, kept: Bools) -> SparseTrellis:
         """Return the trellis of the arcs where `kept` (E,) is true, at least one in each step."""
+        if kept.all():
+            return self
         step, origin, target = self.step[kept], self.origin[kept], self.target[kept]
-        steps = group_by_step(len(self.steps), step, origin, target)
+        order = (np.cumsum(kept) - 1)[self.by_origin[kept[self.by_origin]]]
+        steps = group_by_step(len(self.steps), step, origin, target, order)
         return SparseTrellis(self.states, self.sets, step, origin, target, self.costs[:, kept], steps)
 
     def __len__(self) -> int:

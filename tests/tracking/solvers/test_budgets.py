@@ -15,6 +15,7 @@ from tracking.model.settings import PAPER_COSTS
 from tracking.solvers import SolverBudget, create_solver, solver_names
 from tracking.solvers.base import add_reports
 from tracking.solvers.objective import total_cost
+from tracking.solvers.relaxation import CLOSE_GAP
 from tracking.types import Detections
 
 TOLERANCE = 1e-9
@@ -67,7 +68,8 @@ def test_whatever_the_budget_the_answer_has_no_conflicts_and_the_bound_holds(
         hidden = total_cost(network, everybody, power(name))
         assert report.objective <= hidden + TOLERANCE * max(1.0, hidden)
     if report.limit is None:
-        assert report == best
+        # The ascent takes longer steps if it can afford fewer: it may end elsewhere within the gap.
+        assert report == best or (network.layout and report.gap <= CLOSE_GAP)
 
 
 @pytest.mark.parametrize("name", ["arcs", "columns", "exact", "l2"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,10 +13,12 @@ from hypothesis import strategies as st
 from fakes.tracking.random_networks import Case, cases, network_of
 from tracking.model.network import Network
 from tracking.solvers import viterbi
+from tracking.solvers.ascent.soft_paths import SoftPaths
 from tracking.solvers.cutting_planes import ConflictRow, RowMembers
-from tracking.solvers.heuristics.local_search import MovementChanges
+from tracking.solvers.dynamic_programming import greedy_paths
+from tracking.solvers.heuristics.local_search import LocalSearch, MovementChanges
 from tracking.solvers.hidden_paths import allow_hiding
-from tracking.solvers.objective import path_costs
+from tracking.solvers.objective import conflict_count, path_costs, total_cost
 from tracking.solvers.sparse_trellis import SparseTrellis
 from tracking.solvers.viterbi import MinMarginals, Trellis, backward, best_paths, forward
 
@@ -107,6 +110,55 @@ def test_arcs_whose_excess_is_above_a_limit_are_on_no_path_within_it(case: Case,
     more = path_costs(network, paths)[owner] - best_paths(Trellis.of(network)).costs[owner]
     if np.isfinite(more):
         assert dense[owner, np.arange(network.frames - 1), nodes[:-1], nodes[1:]].max() <= more + 1e-9
+
+
+@many
+@given(
+    case=cases(objects=3, frames=4, places=3, layouts=(0.0, 0.002)),
+    kept=st.floats(0.0, 1.0),
+    power=st.sampled_from([1, 2]),
+)
+def test_a_search_over_some_of_the_arcs_never_makes_an_answer_dearer_or_conflicting(
+    case: Case, kept: float, power: int
+) -> None:
+    if (network := window(case)) is None or not network.layout:
+        return
+    trellis, rng = SparseTrellis.of(network), np.random.default_rng(case.seed)
+    chosen = rng.random(len(trellis)) < kept
+    chosen[[step.span.start for step in trellis.steps]] = True
+    nodes = greedy_paths(network).nodes
+    found = LocalSearch(network, power, arcs=trellis.select(chosen)).improve(nodes)
+    assert not conflict_count(network, found)
+    assert total_cost(network, found, power) <= total_cost(network, nodes, power) + 1e-9
+
+
+@many
+@given(
+    case=cases(objects=3, frames=4, places=3),
+    kept=st.floats(0.3, 1.0),
+    temperature=st.sampled_from([0.3, 1.0, 10.0]),
+)
+def test_soft_paths_have_the_shares_of_all_paths_one_by_one(
+    case: Case, kept: float, temperature: float
+) -> None:
+    if (network := window(case)) is None:
+        return
+    trellis, rng = SparseTrellis.of(network), np.random.default_rng(case.seed)
+    trellis = trellis.select((rng.random(len(trellis)) < kept) | (trellis.origin == trellis.target))
+    costs = rng.uniform(0.0, 3.0, (network.objects, len(trellis)))
+    dense = trellis.dense(costs)
+    arcs, nodes = np.zeros_like(dense), np.zeros((network.objects, network.frames, trellis.states))
+    steps, frames = np.arange(network.frames - 1), np.arange(network.frames)
+    for path in product(range(trellis.states), repeat=network.frames):
+        states = np.array(path)
+        weight = np.exp(-dense[:, steps, states[:-1], states[1:]].sum(axis=1) / temperature)
+        arcs[:, steps, states[:-1], states[1:]] += weight[:, None]
+        nodes[:, frames, states] += weight[:, None]
+    total = nodes[:, 0].sum(axis=1)[:, None, None]
+    found = SoftPaths(trellis).shares(costs.astype(np.float32), temperature)
+    np.testing.assert_allclose(found.nodes, nodes / total, atol=1e-3)
+    expected = (arcs / total[..., None])[:, trellis.step, trellis.origin, trellis.target]
+    np.testing.assert_allclose(found.arcs, expected, atol=1e-3)
 
 
 @many

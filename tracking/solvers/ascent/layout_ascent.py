@@ -19,14 +19,14 @@ from tracking.solvers.ascent.movement_prices import (
     MovementPrices,
     slopes_from_tensions,
 )
-from tracking.solvers.ascent.soft_paths import soft_paths
+from tracking.solvers.ascent.soft_paths import SoftPaths
 from tracking.solvers.budget import RELAXATION_SHARE, BudgetMeter
 from tracking.solvers.cutting_planes import ConflictSeparator
 from tracking.solvers.heuristics.candidates import without_conflicts
 from tracking.solvers.heuristics.recombination import recombine
 from tracking.solvers.hidden_paths import hidden_nodes
 from tracking.solvers.objective import Ints, total_cost
-from tracking.solvers.relaxation import CLOSE_GAP, RelaxedSolution
+from tracking.solvers.relaxation import CLOSE_GAP, KnownAnswer, RelaxedSolution
 from tracking.solvers.sparse_trellis import SparseTrellis
 from tracking.solvers.viterbi import PrunedStates, Trellis
 
@@ -36,17 +36,17 @@ _STEPS = 64
 _PROOF_INTERVAL = 8
 """Steps after which all paths are priced, which proves a bound and finds violated conflict rows."""
 
-_STEPS_OF_PROOF, _PROOFS_OF_START = 2, 2
-"""Work of a proof in steps, and that of the start in proofs."""
+_STEPS_OF_PROOF, _STEPS_OF_START = 3, 4
+"""Work of a proof and of the start, in steps."""
 
-_IDLE_PROOFS, _LEAST_GAIN = 2, 3e-4
-"""The ascent ends after so many proofs that raise the bound by less than this share."""
+_IDLE_PROOFS, _LEAST_GAIN = 2, 0.05
+"""The ascent ends after so many proofs that close less than this share of the gap."""
 
 _WORTH_DROPPING = 0.7
 """Arcs are dropped if no more than this share of them is kept."""
 
-_MANY_ARCS, _NEAR = 6000, 0.3
-"""Of more arcs than that, the steps look only at those near the bound: within this share of the gap."""
+_MANY_ARCS = 2000
+"""Of more arcs than that, the steps look only at those on the cheapest paths."""
 
 _TOLERANCE = 1e-9
 """Relative rounding error of sums of costs."""
@@ -103,9 +103,9 @@ class LayoutAscent:
         bound, excess = float(alone.costs.sum()), trellis.excess(trellis.costs, forward, backward)
         kept = self._worth_keeping(excess, bound)
         self._best = _Proof(bound, np.zeros((network.objects, int(kept.sum()))), np.zeros(0))
-        self._all = MovementPrices(cells, trellis, trellis.movements(network.locations)).select(kept)
+        self._all = MovementPrices.of(cells, trellis.select(kept), network.locations)
         self._all_tolls = leap_tolls(network, self._all.trellis, cells.leap)
-        self._focus(excess[:, kept], bound, self._all.trellis.costs)
+        self._focus(excess[:, kept], self._all.trellis.costs)
         self._leaps = cells.are_leaps()
         self._scale = (1.0 / cells.widths()).astype(np.float32)
         charge = network.layout * (network.objects - 1) * cells.height
@@ -114,8 +114,7 @@ class LayoutAscent:
         self._shares = np.full(network.frames - 1, _FIRST_SHARE if self._all_tolls.any() else 0.0)
         self._tension_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON)
         self._share_steps = AdamSteps(_MOMENTUM, _DECAY, _EPSILON * float(self._all_tolls.max(initial=1.0)))
-        for _ in range(_PROOFS_OF_START):
-            self._add_proof(meter)
+        self._add_steps(meter, _STEPS_OF_START)
 
     def run(self) -> RelaxedSolution:
         """Return the best bound, and the last soft paths as the flow."""
@@ -130,7 +129,8 @@ class LayoutAscent:
                 before = self._best.bound
                 is_done = self._prove()
                 gain = self._best.bound - before
-                idle_proofs = idle_proofs + 1 if gain < _LEAST_GAIN * max(1.0, abs(before)) else 0
+                gap = self._answer_cost - before
+                idle_proofs = idle_proofs + 1 if gain < _LEAST_GAIN * gap else 0
                 is_done |= idle_proofs >= _IDLE_PROOFS
         is_cut = not is_done and steps < _STEPS
         network, best = self._network, self._best
@@ -144,7 +144,7 @@ class LayoutAscent:
             bound_reductions=np.bincount(frames, best.rows, network.frames).astype(np.float64),
             limit=(self._meter.reached(RELAXATION_SHARE) or "work") if is_cut else None,
             is_optimum=False,
-            answer=self._answer,
+            answer=KnownAnswer(self._answer, self._trellis),
         )
 
     def _priced_trellis(self) -> Trellis:
@@ -157,18 +157,14 @@ class LayoutAscent:
 
     def _affordable_steps(self) -> int:
         """Return how many steps the budget allows beside their proofs."""
-        step, proof = BudgetMeter(), BudgetMeter()
-        self._add_step(step)
-        self._add_proof(proof)
-        left = self._meter.left(RELAXATION_SHARE) - proof.work_s
-        return int(min(max(left, 0.0) / (step.work_s + proof.work_s / _PROOF_INTERVAL), _STEPS))
+        step = BudgetMeter()
+        self._add_steps(step, 1)
+        steps = self._meter.left(RELAXATION_SHARE) / step.work_s - _STEPS_OF_PROOF
+        return int(min(max(steps, 0.0) / (1.0 + _STEPS_OF_PROOF / _PROOF_INTERVAL), _STEPS))
 
-    def _add_step(self, meter: BudgetMeter) -> None:
-        meter.add_movement_prices(*self._tensions.shape, len(self._trellis))
-
-    def _add_proof(self, meter: BudgetMeter) -> None:
-        for _ in range(_STEPS_OF_PROOF):
-            self._add_step(meter)
+    def _add_steps(self, meter: BudgetMeter, count: int) -> None:
+        for _ in range(count):
+            meter.add_movement_prices(*self._tensions.shape, len(self._trellis))
 
     def _limits(self) -> Floats:
         """Return how much a pair pays at most for each pixel of movement in each cell, (M - 1, 4 C)."""
@@ -185,7 +181,7 @@ class LayoutAscent:
         costs += (network.layout * self._shares[trellis.step] * self._tolls).astype(np.float32)
         if len(self._conflicts.prices):
             costs += trellis.nodes(self._conflicts.price_nodes(self._conflicts.prices).astype(np.float32))
-        soft = soft_paths(trellis, costs, heat)
+        soft = self._soft_paths.shares(costs, heat)
         moved, nodes = self._lengths.moved(soft.arcs), soft.nodes.astype(np.float64)
         self._tensions += np.float32(length) * self._tension_steps.step(moved * self._scale)
         self._conflicts.ascend(
@@ -198,7 +194,7 @@ class LayoutAscent:
             self._shares += _SHARE_STEP * length * self._share_steps.step(paid - lost)
             np.clip(self._shares, 0.0, _LARGEST_SHARE, out=self._shares)
         self._usage = nodes
-        self._add_step(self._meter)
+        self._add_steps(self._meter, 1)
 
     def _prove(self) -> bool:
         """Price all paths, remember the best bound, and return whether an answer is close to it."""
@@ -227,27 +223,28 @@ class LayoutAscent:
             self._all, self._all_tolls = self._all.select(kept), self._all_tolls[kept]
             self._best = replace(self._best, arcs=self._best.arcs[:, kept])
             excess, relative = excess[:, kept], relative[:, kept]
-        self._focus(excess, bound, relative)
-        self._add_proof(self._meter)
+        self._focus(excess, relative)
+        self._add_steps(self._meter, _STEPS_OF_PROOF)
         gap = self._answer_cost - self._best.bound
         return gap <= CLOSE_GAP * max(1.0, abs(self._answer_cost))
 
-    def _worth_keeping(self, excess: Floats, bound: float, share: float = 1.0) -> Bools:
+    def _worth_keeping(self, excess: Floats, bound: float) -> Bools:
         """Return which arcs (E,) may be on an answer that is cheaper than the known one.
 
-        `excess` (n, E) is that of the paths through each arc at the prices that prove the `bound`. `share`:
-        only those on answers that are nearer to the bound by this factor.
+        `excess` (n, E) is that of the paths through each arc at the prices that prove the `bound`.
         """
-        limit = share * (self._answer_cost - bound) + _TOLERANCE * max(1.0, abs(bound))
+        limit = self._answer_cost - bound + _TOLERANCE * max(1.0, abs(bound))
         return np.asarray((excess <= limit).any(axis=0))
 
-    def _focus(self, excess: Floats, bound: float, costs: Floats) -> None:
+    def _focus(self, excess: Floats, costs: Floats) -> None:
         """Choose the arcs that the next steps look at, all or the best of many; `costs` (n, E) are theirs."""
-        near = np.ones(excess.shape[1], dtype=np.bool_)
+        least = excess.min(axis=0)
+        near = np.ones(len(least), dtype=np.bool_)
         if len(near) > _MANY_ARCS:
-            near = self._worth_keeping(excess, bound, _NEAR)
+            near = least <= np.partition(least, _MANY_ARCS)[_MANY_ARCS]
         arcs = self._all.select(near)
         self._trellis, self._lengths = arcs.trellis, MovementLengths(arcs)
+        self._soft_paths = SoftPaths(arcs.trellis)
         self._tolls, self._fixed = self._all_tolls[near], costs[:, near].astype(np.float32)
 
     def _learn(self, nodes: Ints) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.network import Network
+from tracking.solvers.objective import Ints
 from tracking.solvers.sparse_trellis import SparseTrellis
 
 Slopes = NDArray[np.floating[Any]]
@@ -66,14 +67,14 @@ class MovementCells:
         outside = (self.edges[:-1] >= self.leap) | (self.edges[1:] <= -self.leap)
         return np.tile(outside, BOX_SIDES)
 
-    def lengths(self, movements: Floats) -> Floats:
+    def lengths(self, movements: Slopes) -> Floats:
         """Return how far movements (..., 4) go through each cell, (..., 4 C), negative to the left and up.
 
         The sum over a side's cells is its movement.
         """
         lower, upper = self.edges[:-1], self.edges[1:]
         through = np.clip(movements[..., None], lower, upper) - np.clip(0.0, lower, upper)
-        return np.asarray(through.reshape(*movements.shape[:-1], BOX_SIDES * self.count))
+        return np.asarray(through.reshape(*movements.shape[:-1], BOX_SIDES * self.count), dtype=np.float64)
 
     def widths(self) -> Floats:
         """Return the widths of all cells of a box, (4 C,); those at the ends are finite here."""
@@ -97,15 +98,34 @@ def slopes_from_tensions(tensions: Slopes, limits: Slopes) -> Slopes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovementPrices:
-    """The prices of arcs of a trellis for their movements (P, E, 4), in pixels."""
+    """The prices of arcs of a trellis for their movements.
+
+    Attributes:
+        movements: (4, P, E) pixels.
+        places: (4, P, E) where the slope at each of them is in the slopes of an object, (M - 1, 4, C).
+    """
 
     cells: MovementCells
     trellis: SparseTrellis
     movements: Floats
+    places: Ints
+
+    @classmethod
+    def of(cls, cells: MovementCells, trellis: SparseTrellis, locations: Floats) -> MovementPrices:
+        """Return the prices of all arcs between locations (P, M, S, 4), pixels."""
+        movements = np.ascontiguousarray(np.moveaxis(trellis.movements(locations), 2, 0))
+        sides = np.arange(BOX_SIDES)[:, None, None]
+        places = np.searchsorted(cells.edges[1:-1], movements, side="right")
+        places += cells.count * (BOX_SIDES * trellis.step + sides)
+        return cls(cells, trellis, movements, places)
 
     def select(self, kept: NDArray[np.bool_]) -> MovementPrices:
         """Return those of the arcs where `kept` (E,) is true."""
-        return MovementPrices(self.cells, self.trellis.select(kept), self.movements[:, kept])
+        if kept.all():
+            return self
+        return MovementPrices(
+            self.cells, self.trellis.select(kept), self.movements[:, :, kept], self.places[:, :, kept]
+        )
 
     def of_slopes(self, slopes: Slopes) -> Floats:
         """Return the price of each arc, (n, E), from the slopes (n, M - 1, 4 C)."""
@@ -120,14 +140,14 @@ class MovementPrices:
         at_ends -= at_ends[..., [count // 2 - 1]]
         offsets = at_ends[..., np.maximum(np.arange(count) - 1, 0)]
         offsets -= by_side * ends[np.maximum(np.arange(count) - 1, 0)]
+        offsets, flat = offsets.reshape(len(slopes), -1), slopes.reshape(len(slopes), -1)
         prices = np.zeros((len(slopes), len(self.trellis)))
-        for side in range(BOX_SIDES):
-            for p, movements in enumerate(self.movements[:, :, side]):
-                owners = slice(None) if len(self.movements) == 1 else slice(p, p + 1)
-                cell = np.searchsorted(ends, movements, side="right")
-                at = self.trellis.step, cell
-                prices[owners] += offsets[owners, :, side][:, *at]
-                prices[owners] += by_side[owners, :, side][:, *at] * movements
+        shared = self.movements.shape[1] == 1
+        for movements, places in zip(self.movements, self.places, strict=True):
+            for p, own in enumerate(places):
+                owners = slice(None) if shared else slice(p, p + 1)
+                prices[owners] += flat[owners].take(own, axis=1) * movements[p]
+                prices[owners] += offsets[owners].take(own, axis=1)
         return prices
 
 
@@ -136,7 +156,8 @@ class MovementLengths:
 
     def __init__(self, arcs: MovementPrices) -> None:
         self._steps = arcs.trellis.steps
-        self._lengths: Slopes = arcs.cells.lengths(arcs.movements.astype(np.float32)).astype(np.float32)
+        movements = np.moveaxis(arcs.movements, 0, 2).astype(np.float32)
+        self._lengths: Slopes = arcs.cells.lengths(movements).astype(np.float32)
 
     def prices(self, slopes: Slopes) -> Slopes:
         """Return the price of each arc, (n, E), from the slopes (n, M - 1, 4 C) in single precision."""

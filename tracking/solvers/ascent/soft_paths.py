@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tracking.solvers.objective import Ints
 from tracking.solvers.sparse_trellis import SparseTrellis
 
 Singles = NDArray[np.float32]
@@ -27,7 +28,7 @@ _LEAST_ARC = np.float32(1e-12)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SoftPaths:
+class PathShares:
     """Shares of the paths of each object.
 
     Attributes:
@@ -39,43 +40,93 @@ class SoftPaths:
     nodes: Singles
 
 
-def soft_paths(trellis: SparseTrellis, costs: Singles, temperature: float) -> SoftPaths:
-    """Compute the shares from the costs of arcs, (n, E), which are overwritten."""
-    for step in trellis.steps:
-        costs[:, step.span] -= costs[:, step.span].min(axis=1, keepdims=True)
-    costs *= np.float32(-1.0 / temperature)
-    np.maximum(costs, _LEAST_EXPONENT, out=costs)
-    shares = np.exp(costs, out=costs)
-    nodes = np.zeros((len(shares), len(trellis.steps) + 1, trellis.states), dtype=np.float32)
-    ahead = _shares_ahead(trellis, shares, np.zeros_like(nodes))
-    behind = np.ones_like(nodes[:, 0])
-    for m, step in enumerate(trellis.steps):
-        arcs, entering = shares[:, step.span], step.entering
-        arcs *= behind[:, step.origin]
-        through = _normalized(np.add.reduceat(arcs, entering.starts, axis=1))
-        arcs *= ahead[:, m + 1, step.target]
-        arcs /= arcs.sum(axis=1, keepdims=True)
-        nodes[:, m + 1, entering.states] = np.add.reduceat(arcs, entering.starts, axis=1)
-        behind = np.zeros_like(behind)
-        behind[:, entering.states] = through
-    first = trellis.steps[0]
-    leaving = shares[:, first.span][:, first.order]
-    nodes[:, 0, first.leaving.states] = np.add.reduceat(leaving, first.leaving.starts, axis=1)
-    shares += _LEAST_ARC
-    return SoftPaths(shares, nodes)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sweep:
+    """A step of the forward pass, and the step as far from the end of the backward pass, as one.
+
+    The states that the forward pass reaches are 0 to S - 1, those of the backward pass S to 2 S - 1.
+
+    Attributes:
+        span: where the arcs of both are in the lists of the sweeps.
+        before: (A,) the state that each arc continues from.
+        starts: (G,) the first arc of each group that leads to one state.
+        reached: (G,) that state.
+        passes: (2,) the first group of each pass.
+        counts: (2,) their groups.
+    """
+
+    span: slice
+    before: Ints
+    starts: Ints
+    reached: Ints
+    passes: Ints
+    counts: Ints
 
 
-def _shares_ahead(trellis: SparseTrellis, shares: Singles, ahead: Singles) -> Singles:
-    """Fill `ahead` (n, M, S) with the shares of the paths from each state on, up to a factor."""
-    ahead[:, -1] = 1.0
-    ordered = shares[:, trellis.by_origin]
-    for m in range(len(trellis.steps) - 1, 0, -1):
-        step = trellis.steps[m]
-        arcs = ordered[:, step.span]
-        arcs *= ahead[:, m + 1, step.target[step.order]]
-        ahead[:, m, step.leaving.states] = _normalized(np.add.reduceat(arcs, step.leaving.starts, axis=1))
-    return ahead
+class SoftPaths:
+    """The paths of a trellis, ready for their shares at changing costs."""
 
+    def __init__(self, trellis: SparseTrellis) -> None:
+        self._trellis = trellis
+        states, steps = trellis.states, trellis.steps
+        self._starts = np.array([step.span.start for step in steps])
+        parts, self._sweeps, first = [], [], 0
+        for ahead, back in zip(steps, reversed(steps), strict=True):
+            parts += [np.arange(ahead.span.start, ahead.span.stop), back.order + back.span.start]
+            count = len(ahead.origin)
+            last = first + count + len(back.origin)
+            self._sweeps.append(
+                _Sweep(
+                    slice(first, last),
+                    np.concatenate([ahead.origin, states + back.target[back.order]]),
+                    np.concatenate([ahead.entering.starts, count + back.leaving.starts]),
+                    np.concatenate([ahead.entering.states, states + back.leaving.states]),
+                    np.array([0, len(ahead.entering.starts)]),
+                    np.array([len(ahead.entering.starts), len(back.leaving.starts)]),
+                )
+            )
+            first = last
+        self._order = np.concatenate(parts)
+        # After so many sweeps the passes have reached the ends of each arc.
+        sweeps = len(steps)
+        self._behind = 2 * states * trellis.step + trellis.origin
+        self._ahead = 2 * states * (sweeps - 1 - trellis.step) + states + trellis.target
+        self._entering = np.concatenate([step.entering.starts + step.span.start for step in steps])
+        self._entered = trellis.step[self._entering] * states + trellis.target[self._entering]
 
-def _normalized(shares: Singles) -> Singles:
-    return np.asarray(shares / shares.sum(axis=1, keepdims=True) + _LEAST_SHARE)
+    def shares(self, costs: Singles, temperature: float) -> PathShares:
+        """Return the shares at the costs of arcs, (n, E), which are overwritten."""
+        step, starts, states = self._trellis.step, self._starts, self._trellis.states
+        costs -= np.minimum.reduceat(costs, starts, axis=1).take(step, axis=1)
+        costs *= np.float32(-1.0 / temperature)
+        np.maximum(costs, _LEAST_EXPONENT, out=costs)
+        shares = np.exp(costs, out=costs)
+        reached = self._reached(shares.take(self._order, axis=1))
+        shares *= reached.take(self._behind, axis=1)
+        shares *= reached.take(self._ahead, axis=1)
+        shares /= np.add.reduceat(shares, starts, axis=1).take(step, axis=1)
+        frames = len(starts) + 1
+        nodes = np.zeros((len(shares), frames * states), dtype=np.float32)
+        nodes[:, states + self._entered] = np.add.reduceat(shares, self._entering, axis=1)
+        first = self._trellis.steps[0]
+        leaving = shares[:, first.order]
+        nodes[:, first.leaving.states] = np.add.reduceat(leaving, first.leaving.starts, axis=1)
+        shares += _LEAST_ARC
+        return PathShares(shares, nodes.reshape(len(shares), frames, states))
+
+    def _reached(self, shares: Singles) -> Singles:
+        """Return the shares, up to factors, of the paths to each state and on from it, (n, sweeps * 2 S).
+
+        `shares` are those of arcs in the order of the sweeps.
+        """
+        states = self._trellis.states
+        reached = np.zeros((len(self._sweeps), len(shares), 2 * states), dtype=np.float32)
+        reached[0] = 1.0
+        for k, sweep in enumerate(self._sweeps[:-1]):
+            arcs = reached[k].take(sweep.before, axis=1)
+            arcs *= shares[:, sweep.span]
+            found = np.add.reduceat(arcs, sweep.starts, axis=1)
+            found /= np.add.reduceat(found, sweep.passes, axis=1).repeat(sweep.counts, axis=1)
+            found += _LEAST_SHARE
+            reached[k + 1][:, sweep.reached] = found
+        return np.swapaxes(reached, 0, 1).reshape(len(shares), -1)

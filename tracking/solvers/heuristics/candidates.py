@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.model.network import Network
-from tracking.solvers.heuristics.rounding import round_relaxation
 from tracking.solvers.hidden_paths import hidden_nodes
-from tracking.solvers.objective import Ints, conflict_count
+from tracking.solvers.objective import Ints
 from tracking.solvers.relaxation import follow_warm_start
 from tracking.solvers.viterbi import Paths, Trellis
 from tracking.solvers.warm_start import WarmStart
@@ -34,9 +33,13 @@ def candidate_nodes(network: Network, alone: Paths, warm_start: WarmStart | None
 
 def without_conflicts(network: Network, nodes: Ints) -> Ints:
     """Return nodes (n, M) in which objects are hidden where they conflict with one before them."""
-    if not conflict_count(network, nodes):
+    exclusions = network.exclusions()
+    if not exclusions.size:
         return nodes
-    usage = np.zeros(network.node.shape)
-    np.put_along_axis(usage, nodes[:, :, None], 1.0, axis=2)
-    # Shares below 1 are rounded frame by frame instead of taken as integral.
-    return round_relaxation(network, 0.5 * usage)
+    frames, places = np.arange(network.frames), network.max_places
+    visible = nodes < places
+    index = np.where(visible, network.sets[:, None] * places + nodes, 0)
+    for owner in range(1, network.objects):
+        excluded = exclusions[frames, index[:owner], index[owner]] & visible[:owner]
+        visible[owner] &= ~excluded.any(axis=0)
+    return np.where(visible, nodes, places)

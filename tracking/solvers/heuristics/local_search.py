@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from tracking.boxes import Floats
@@ -10,7 +12,7 @@ from tracking.model.network import Network
 from tracking.solvers.budget import BudgetMeter
 from tracking.solvers.objective import Ints, locations_at, path_cost, total_cost
 from tracking.solvers.sparse_trellis import SparseTrellis
-from tracking.solvers.viterbi import MinMarginals, PrunedStates, Trellis, best_paths, trace_back
+from tracking.solvers.viterbi import MinMarginals, Paths, PrunedStates, Trellis, best_paths, trace_back
 
 _MAX_ROUNDS = 20
 """Limit of the rounds, far above what convergence takes."""
@@ -22,21 +24,32 @@ _MIN_IMPROVEMENT = 1e-12
 class LocalSearch:
     """Coordinate descent over the objects of one network; `power` is that of its layout term.
 
+    With a layout term, `arcs` are those that objects may be moved to; None: all.
+
     Attributes:
         meter: what limits the search.
-        alone: the cheapest path of each object without regard to the others.
     """
 
-    def __init__(self, network: Network, power: int = 1, meter: BudgetMeter | None = None) -> None:
+    def __init__(
+        self,
+        network: Network,
+        power: int = 1,
+        meter: BudgetMeter | None = None,
+        arcs: SparseTrellis | None = None,
+    ) -> None:
         self._network = network
         self._power = power
         self.meter = meter or BudgetMeter()
         self._paths: _PathsAlone | _PathsInLayout
         if network.layout and network.frames > 1:
-            self._paths = _PathsInLayout(network, power, self.meter)
+            self._paths = _PathsInLayout(network, power, self.meter, arcs)
         else:
             self._paths = _PathsAlone(network, self.meter)
-        self.alone = self._paths.alone
+
+    @property
+    def alone(self) -> Paths:
+        """The cheapest path of each object without regard to the others."""
+        return self._paths.alone
 
     def improve(self, nodes: Ints, bound: float = -np.inf) -> Ints:
         """Return nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
@@ -69,32 +82,39 @@ class _PathsAlone:
         self._through = passes.through
         self.alone = trace_back(self._trellis, passes.forward)
 
-    def best(self, owner: int, _nodes: Ints, excluded: Bools, limit: float) -> Ints:
-        """Return the best path (M,) of one object outside places `excluded` (M, K).
-
-        It is arbitrary if none costs `limit` at most: states whose best path costs more are left out.
-        """
+    def cheaper(self, owner: int, _nodes: Ints, excluded: Bools, cost: float) -> Ints | None:
+        """Return the best path (M,) of one object outside places `excluded` (M, K) if it is below `cost`."""
+        limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
         node = self._network.node[owner].copy()
         node[:, :-1][excluded] = np.inf
         packed = PrunedStates.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
         self._meter.add_passes(1, self._network.frames, packed.index.shape[2])
         trellis = packed.trellis(self._trellis.select(np.array([owner])).with_node(node[None]))
-        return np.asarray(packed.original_states(best_paths(trellis).nodes)[0])
+        found = best_paths(trellis)
+        return packed.original_states(found.nodes)[0] if found.costs[0] < cost else None
 
 
 class _PathsInLayout:
     """Best paths of single objects whose movements are compared with those of all others."""
 
-    def __init__(self, network: Network, power: int, meter: BudgetMeter) -> None:
+    def __init__(
+        self, network: Network, power: int, meter: BudgetMeter, arcs: SparseTrellis | None = None
+    ) -> None:
         self._network, self._meter = network, meter
-        self._trellis = SparseTrellis.of(network)
+        self._trellis = SparseTrellis.of(network) if arcs is None else arcs
         self._meter.add_arcs(network.objects, len(self._trellis))
         movements = self._trellis.movements(network.locations)
         self._changes = [MovementChanges(self._trellis, own, power) for own in movements]
-        self.alone = self._trellis.best_paths(self._trellis.costs)
 
-    def best(self, owner: int, nodes: Ints, excluded: Bools, _limit: float) -> Ints:
-        """Return the best path (M,) of one object outside places `excluded` (M, K), the others at `nodes`."""
+    @cached_property
+    def alone(self) -> Paths:
+        return best_paths(Trellis.of(self._network))
+
+    def cheaper(self, owner: int, nodes: Ints, excluded: Bools, cost: float) -> Ints | None:
+        """Return the best path (M,) of one object outside places `excluded` (M, K) if it is below `cost`.
+
+        The others are at `nodes`.
+        """
         network, trellis = self._network, self._trellis
         others = np.diff(np.delete(locations_at(network, nodes), owner, axis=0), axis=1)
         changes = self._changes[network.sets[owner]].sums(others)
@@ -102,7 +122,8 @@ class _PathsInLayout:
         barred[0, :, :-1][excluded] = np.inf
         self._meter.add_arcs(1, len(trellis))
         costs = trellis.costs[owner] + network.layout * changes + trellis.nodes(barred)
-        return np.asarray(trellis.best_paths(costs).nodes[0])
+        forward = trellis.forward(costs)
+        return trellis.best_paths(costs, forward).nodes[0] if forward[-1].min() < cost else None
 
 
 class MovementChanges:
@@ -166,15 +187,12 @@ class _CoordinateDescent:
         least = self._paths.alone.costs[owner]
         if np.isfinite(cost) and cost <= least + _MIN_IMPROVEMENT * max(1.0, abs(cost)):
             return False
-        before = self.nodes[owner].copy()
-        limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
         self._meter.add_step()
-        self.nodes[owner] = self._paths.best(owner, self.nodes, self._excluded(owner), limit)
-        moved = self._own_cost(owner) < cost
-        if moved:
+        path = self._paths.cheaper(owner, self.nodes, self._excluded(owner), cost)
+        moved = path is not None
+        if path is not None:
+            self.nodes[owner] = path
             self._settled[:] = False
-        else:
-            self.nodes[owner] = before
         self._settled[owner] = True
         return moved
 
