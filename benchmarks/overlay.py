@@ -20,7 +20,8 @@ from benchmarks.common.report import Report
 from server.camera.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import FragmentSample, fragment
-from server.media.h264.annexb import join_sample, nal_units
+from server.media.h264.annexb import join_sample
+from server.media.nal_units import nal_units
 from server.media.rendering_messages import RenderSettings
 from server.service.rendering.decided_boxes import GopOverlay, first_pulse
 from server.service.rendering.mjpeg_streams import MjpegVariant

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
+from server.media.h264.codec import H264
+from server.media.h265.codec import H265
+from server.media.nal_codec import NalCodec
+from server.media.picture import Codec
 from server.media.stream_format import PerCameraStreamFormat, StreamFormat
 from server.media.vp8.stream_format import Vp8StreamFormat
 
-Codec = Literal["h264", "vp8"]
+
+def nal_codec(codec: Codec) -> NalCodec:
+    """Return a codec of NAL units by its name: H.265 or, by default, H.264."""
+    return H265 if codec == "h265" else H264
 
 
 def stream_format_for(
@@ -15,9 +20,9 @@ def stream_format_for(
 ) -> StreamFormat:
     """Return the stream format of a site.
 
-    ``size`` is (width, height) in pixels. ``per_camera_parameters``: H.264 parameter sets may differ among
-    cameras.
+    ``size`` is (width, height) in pixels. ``per_camera_parameters``: parameter sets may differ among cameras.
     """
     if codec == "vp8":
         return Vp8StreamFormat(*size)
-    return PerCameraStreamFormat() if per_camera_parameters else StreamFormat()
+    kind = PerCameraStreamFormat if per_camera_parameters else StreamFormat
+    return kind(nal_codec(codec))

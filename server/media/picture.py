@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from server.media.containers.fmp4 import sample_of
-from server.media.h264.annexb import ParameterSets
+from server.media.parameter_sets import ParameterSets
+
+Codec = Literal["h264", "h265", "vp8"]
+"""The codecs of a site's streams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +28,7 @@ class EncodedPicture:
     """The pulse of its reference picture; None: unknown, or it has none."""
     parameters: ParameterSets | None = None
     """Its parameter sets; None where all cameras of the site share theirs."""
+    codec: Codec = "h264"
 
     @property
     def until(self) -> int:

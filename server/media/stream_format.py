@@ -14,11 +14,12 @@ from server.media.containers.fmp4 import (
     shift_fragment,
     ticks,
 )
-from server.media.gap_filler import NO_BOOT, GapFiller, H264GapFiller
-from server.media.h264.annexb import ParameterSets, join_sample, nal_units, parameter_sets, split_sample
-from server.media.h264.gray_picture import gray_picture
-from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
-from server.media.picture import EncodedPicture
+from server.media.gap_filler import NO_BOOT, GapFiller
+from server.media.h264.codec import H264
+from server.media.nal_codec import NalCodec
+from server.media.nal_units import nal_units, split_sample
+from server.media.parameter_sets import ParameterSets, UnsupportedParametersError
+from server.media.picture import Codec, EncodedPicture
 
 Container = Literal["mp4", "webm"]
 
@@ -28,12 +29,18 @@ class ParameterMismatchError(Exception):
 
 
 class StreamFormat:
-    """H.264 in MP4: the first keyframe of a site fixes the parameter sets of all its cameras."""
+    """H.264 or H.265 in MP4: the first keyframe of a site fixes the parameter sets of all its cameras."""
 
     container: Container = "mp4"
 
-    def __init__(self) -> None:
+    def __init__(self, codec: NalCodec = H264) -> None:
+        self.nal = codec
         self.parameters: ParameterSets | None = None
+
+    @property
+    def picture_codec(self) -> Codec:
+        """The codec of the pictures."""
+        return self.nal.name
 
     @property
     def codec(self) -> str | None:
@@ -51,7 +58,9 @@ class StreamFormat:
         if self.parameters is None:
             self.parameters = parameters
         elif parameters != self.parameters:
-            raise ParameterMismatchError("its H.264 parameter sets differ from the other cameras'")
+            raise ParameterMismatchError(
+                f"its {self.nal.title} parameter sets differ from the other cameras'"
+            )
 
     def accept(self, access_unit: bytes) -> ParameterSets | None:
         """Check a camera's keyframe; return its parameter sets, None where all cameras share theirs.
@@ -59,12 +68,12 @@ class StreamFormat:
         Raises:
             ParameterMismatchError: it does not fit the site; the camera must be refused.
         """
-        self.adopt_or_check(parameter_sets(nal_units(access_unit)))
+        self.adopt_or_check(self.nal.parameter_sets(nal_units(access_unit)))
         return None
 
     def pack(self, access_unit: bytes, pulse: int, fps: float, *, key: bool) -> bytes:
         """Return a frame as a fragment, which can be spliced into any stream of the site."""
-        return fragment([FragmentSample(join_sample(nal_units(access_unit)), key)], pulse, fps)
+        return fragment([FragmentSample(self.nal.join_sample(nal_units(access_unit)), key)], pulse, fps)
 
     def init_segment(
         self,
@@ -95,7 +104,7 @@ class StreamFormat:
     def gap_filler(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
         """Return the gap filler after a picture; None if its parameter sets are not supported."""
         del newest
-        return None if self.parameters is None else gap_filler_for(self.parameters, fps)
+        return None if self.parameters is None else self._gap_filler(self.parameters, fps)
 
     def blank(
         self, newest: EncodedPicture | None, first: int, frames: int, fps: float
@@ -119,18 +128,23 @@ class StreamFormat:
         if parameters is None:
             return []
         try:
-            gray = gray_picture(parameters, first // frames % 2)
+            gray = self.nal.gray_picture(parameters, first // frames % 2)
         except UnsupportedParametersError:
             return []
-        gap_filler = gap_filler_for(parameters, fps)
+        gap_filler = self._gap_filler(parameters, fps, attached)
         duration = frames if gap_filler is None else 1
         packed = fragment([FragmentSample(gray, key=True, duration=duration)], first, fps)
         key = EncodedPicture(
-            first, key=True, fragment=packed, boot=NO_BOOT, duration=duration, parameters=attached
+            first,
+            key=True,
+            fragment=packed,
+            boot=NO_BOOT,
+            duration=duration,
+            parameters=attached,
+            codec=self.picture_codec,
         )
         if gap_filler is None:
             return [key]
-        gap_filler = replace(gap_filler, parameters=attached)
         return [
             key,
             *gap_filler.repeat_until_keyframe(
@@ -138,9 +152,18 @@ class StreamFormat:
             ),
         ]
 
+    def _gap_filler(
+        self, parameters: ParameterSets, fps: float, attached: ParameterSets | None = None
+    ) -> GapFiller | None:
+        """Return the gap filler for these parameter sets; None if they are not supported."""
+        try:
+            return self.nal.gap_filler(parameters, fps, attached)
+        except UnsupportedParametersError:
+            return None
+
 
 class PerCameraStreamFormat(StreamFormat):
-    """H.264 in MP4 where parameter sets differ among cameras; keyframes carry them."""
+    """H.264 or H.265 in MP4 where parameter sets differ among cameras; keyframes carry them."""
 
     def accept(self, access_unit: bytes) -> ParameterSets:
         """Return the parameter sets of a camera's keyframe.
@@ -148,7 +171,7 @@ class PerCameraStreamFormat(StreamFormat):
         Raises:
             ParameterMismatchError: it has none.
         """
-        parameters = parameter_sets(nal_units(access_unit))
+        parameters = self.nal.parameter_sets(nal_units(access_unit))
         if parameters is None:
             raise ParameterMismatchError("it sends a keyframe without parameter sets")
         if self.parameters is None:
@@ -157,14 +180,13 @@ class PerCameraStreamFormat(StreamFormat):
 
     def camera_parameters(self, fragment: bytes) -> ParameterSets | None:
         """Return the parameter sets in a keyframe fragment, which always has them."""
-        return parameter_sets(split_sample(sample_of(fragment)))
+        return self.nal.parameter_sets(split_sample(sample_of(fragment)))
 
     def gap_filler(self, newest: EncodedPicture, fps: float) -> GapFiller | None:
         """Return the gap filler after a picture, for its parameter sets."""
         if newest.parameters is None:
             return None
-        gap_filler = gap_filler_for(newest.parameters, fps)
-        return None if gap_filler is None else replace(gap_filler, parameters=newest.parameters)
+        return self._gap_filler(newest.parameters, fps, newest.parameters)
 
     def blank(
         self, newest: EncodedPicture | None, first: int, frames: int, fps: float
@@ -172,11 +194,3 @@ class PerCameraStreamFormat(StreamFormat):
         """Return a GOP of gray pictures with the parameter sets of a picture, which the first one carries."""
         parameters = self.parameters if newest is None or newest.parameters is None else newest.parameters
         return self._blank(parameters, parameters, first, frames, fps)
-
-
-def gap_filler_for(parameters: ParameterSets, fps: float) -> H264GapFiller | None:
-    """Return the gap filler for a stream of these parameter sets; None if they are not supported."""
-    try:
-        return H264GapFiller(parse_repeatable(parameters), fps)
-    except UnsupportedParametersError:
-        return None

@@ -24,8 +24,10 @@ from server.config.tokens_file import read_tokens
 from server.http.app import make_app, serving
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.mp4_audio import audio_fragment
-from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
-from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
+from server.media.h264.annexb import H264ParameterSets, parameter_sets
+from server.media.h264.repeat_picture import parse_repeatable
+from server.media.nal_units import nal_units
+from server.media.parameter_sets import UnsupportedParametersError
 from server.media.stream_format import StreamFormat
 from server.messaging.inbox import Message
 from server.service.calibration.points_file import read_points
@@ -186,7 +188,7 @@ def test_parameter_sets_beyond_all_levels_are_unsupported() -> None:
     parse_repeatable(found)
     huge = found.sps[:4] + b"\xf6\x00\x00\x00\x80\x00\x00\x00\x80" + b"\xff" * 20
     with pytest.raises(UnsupportedParametersError):
-        parse_repeatable(ParameterSets(huge, found.pps))
+        parse_repeatable(H264ParameterSets(huge, found.pps))
 
 
 def test_parameter_sets_too_large_for_mp4_are_ignored() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from server.media.h264.annexb import NAL_IDR, NAL_PPS, NAL_SPS, nal_type, nal_units
+from server.media.h264.annexb import NAL_IDR, NAL_PPS, NAL_SPS, nal_type
+from server.media.nal_units import nal_units
 
 _START_CODE = b"\x00\x00\x00\x01"
 _AVCC_VERSION = 1

@@ -12,7 +12,9 @@ from server.camera.sources.frame_timing import frame_index
 from server.camera.sources.opening import OpenedVideo
 from server.camera.sources.orientation import Orientation
 from server.config.site_config import Config
-from server.media.h264.annexb import ParameterSets, nal_units, parameter_sets
+from server.media.h264.annexb import parameter_sets
+from server.media.nal_units import nal_units
+from server.media.parameter_sets import ParameterSets
 
 _SAME_RATE = 0.03
 """Relative deviation allowed of a camera's declared rate, which is often rounded."""

@@ -19,7 +19,7 @@ from typing import Any
 from aiohttp import web
 
 from server.http.viewers.traffic import Traffic
-from server.media.h264.annexb import split_sample
+from server.media.nal_units import split_sample
 from server.media.picture import EncodedPicture
 from server.service.facade.streams import Broadcaster, MediaChunk, Subscriber
 

@@ -14,7 +14,7 @@ from itertools import accumulate
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.mp4_audio import AUDIO_TRACK, audio_track
 from server.media.containers.mp4_boxes import box, full_box, moof_mdat, movie_header, track, track_defaults
-from server.media.h264.annexb import ParameterSets
+from server.media.parameter_sets import ParameterSets
 from server.media.rendering_messages import TIMESCALE
 
 _TRACK = 1
@@ -22,6 +22,7 @@ _SYNC_SAMPLE = 0x02000000
 """sample_depends_on = 2: an I picture (8.8.3.1)."""
 _OTHER_SAMPLE = 0x01010000
 """sample_depends_on = 1, sample_is_non_sync_sample."""
+_BRANDS = {"avcC": b"avc1", "hvcC": b"hvc1"}
 _TFDT_AT = 8 + 16 + 8 + 16 + 12
 """The offset of a fragment's decode time: behind the headers of moof, mfhd, traf, tfhd and tfdt."""
 
@@ -47,7 +48,10 @@ def init_segment(
 ) -> bytes:
     """Return the init segment, ``ftyp`` and ``moov``, of streams with and without audio."""
     last = _TRACK if audio is None else AUDIO_TRACK
-    return box("ftyp", b"iso5" + struct.pack(">I", 512) + b"iso5iso6avc1mp41") + box(
+    return box(
+        "ftyp",
+        b"iso5" + struct.pack(">I", 512) + b"iso5iso6" + _BRANDS[parameters.configuration_kind] + b"mp41",
+    ) + box(
         "moov",
         movie_header(last),
         track(
@@ -91,17 +95,12 @@ def _fragment(samples: Sequence[FragmentSample], first: int, edges: Sequence[int
 
 
 def _entry(parameters: ParameterSets, width: int, height: int) -> bytes:
-    sps, pps = parameters.sps, parameters.pps
-    configuration = (
-        b"\x01" + sps[1:4] + b"\xff\xe1" + struct.pack(">H", len(sps)) + sps
-        + b"\x01" + struct.pack(">H", len(pps)) + pps
-    )  # fmt: skip
     return box(
         parameters.entry,
         bytes(6) + struct.pack(">H", 1) + bytes(16) + struct.pack(">2H", width, height)
         + struct.pack(">2I", 0x480000, 0x480000) + bytes(4) + struct.pack(">H", 1) + bytes(32)
         + struct.pack(">Hh", 24, -1),
-        box("avcC", configuration),
+        box(parameters.configuration_kind, parameters.configuration),
     )  # fmt: skip
 
 

@@ -10,11 +10,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from server.media.audio.audio_chunk import AudioChunk
 from server.media.containers.fmp4 import ticks
-from server.media.h264.annexb import split_sample
-from server.media.picture import EncodedPicture
+from server.media.nal_units import split_sample
+from server.media.picture import Codec, EncodedPicture
 from server.media.rendering_messages import TIMESCALE
 
 PACKET_BYTES = 188
@@ -22,7 +23,8 @@ COUNTERS = 16
 """Packets after which the continuity counter wraps around."""
 
 _PAT_PID, _PMT_PID, _VIDEO_PID, _AUDIO_PID = 0x0000, 0x1000, 0x0100, 0x0101
-_H264, _AAC = 0x1B, 0x0F
+_VIDEO_TYPES: dict[Codec, int] = {"h264": 0x1B, "h265": 0x24}
+_AAC = 0x0F
 """stream_type."""
 _CLOCK = 1 << 33
 """Time stamps are modulo this (2.4.3.7)."""
@@ -33,8 +35,12 @@ _PCR_EVERY = TIMESCALE // 10
 _PAYLOAD = PACKET_BYTES - 4
 _PCR_FIELD = 8
 """Bytes of an adaptation field with a program clock reference."""
-_AUD = b"\x00\x00\x00\x01\x09\xf0"
-"""Access unit delimiter: begins every picture in a transport stream (2.14.1)."""
+_AUD: dict[Codec, bytes] = {
+    "h264": b"\x00\x00\x00\x01\x09\xf0",
+    "h265": b"\x00\x00\x00\x01\x46\x01\x50",
+    "vp8": b"",  # which is not carried
+}
+"""Access unit delimiter: begins every picture in a transport stream (2.14.1, 2.17.1)."""
 _START_CODE = b"\x00\x00\x00\x01"
 _PES_HEAD = 14
 _FRAMES_PER_PES = 6
@@ -54,7 +60,7 @@ class ContinuityCounters:
 
 def count_packets(picture: EncodedPicture) -> int:
     """Return the number of packets of a picture, without packets that are only stuffing."""
-    return _packets(_PES_HEAD + len(_AUD) + len(picture.sample))
+    return _packets(_PES_HEAD + len(_AUD[picture.codec]) + len(picture.sample))
 
 
 def count_audio_packets(audio: AudioChunk) -> int:
@@ -77,7 +83,7 @@ def pack(
     if counters.aligned or pictures[0].key:
         out += [
             _table(_PAT_PID, _PAT, counters.tables),
-            _table(_PMT_PID, _PMT if audio is None else _PMT_WITH_AUDIO, counters.tables),
+            _table(_PMT_PID, _program_map(pictures[0].codec, has_audio=audio is not None), counters.tables),
         ]
     if audio is not None:
         out += _pack_audio(audio, counters)
@@ -132,7 +138,7 @@ def _pes(picture: EncodedPicture, fps: float) -> bytes:
     """Return a picture as a PES packet (2.4.3.6) with its time, and its length if that fits."""
     time = ticks(picture.pulse, fps) % _CLOCK
     stamp = _stamp(time)
-    content = _AUD + b"".join(_annex_b(picture.sample))
+    content = _AUD[picture.codec] + b"".join(_annex_b(picture.sample))
     length = 3 + len(stamp) + len(content)
     # 0x84: data_alignment_indicator; 0x80: a PTS, but no DTS.
     head = struct.pack(">IHBBB", 0x1E0, length if length < 1 << 16 else 0, 0x84, 0x80, len(stamp))
@@ -200,6 +206,14 @@ def _crc(data: bytes) -> int:
 
 
 _PAT = _section(0, 1, struct.pack(">HH", 1, 0xE000 | _PMT_PID))
-_STREAMS = struct.pack(">HHBHH", 0xE000 | _VIDEO_PID, 0xF000, _H264, 0xE000 | _VIDEO_PID, 0xF000)
-_PMT = _section(2, 1, _STREAMS)
-_PMT_WITH_AUDIO = _section(2, 1, _STREAMS + struct.pack(">BHH", _AAC, 0xE000 | _AUDIO_PID, 0xF000))
+
+
+@lru_cache
+def _program_map(codec: Codec, *, has_audio: bool) -> bytes:
+    """Return the program map table (2.4.4.8)."""
+    streams = struct.pack(
+        ">HHBHH", 0xE000 | _VIDEO_PID, 0xF000, _VIDEO_TYPES[codec], 0xE000 | _VIDEO_PID, 0xF000
+    )
+    if has_audio:
+        streams += struct.pack(">BHH", _AAC, 0xE000 | _AUDIO_PID, 0xF000)
+    return _section(2, 1, streams)

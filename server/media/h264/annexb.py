@@ -1,11 +1,13 @@
-"""NAL units of H.264 in byte streams and MP4 samples (ITU-T H.264, Annex B; ISO/IEC 14496-15)."""
+"""NAL units of H.264: their types, parameter sets and MP4 samples (ITU-T H.264, 7.3.1; ISO/IEC 14496-15)."""
 
 from __future__ import annotations
 
-import re
+import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-_START_CODE = re.compile(b"\x00\x00\x01")
+from server.media.nal_units import join_units
+from server.media.parameter_sets import MAX_SET_BYTES, ParameterSets
 
 NAL_SLICE = 1
 NAL_IDR = 5
@@ -15,18 +17,14 @@ NAL_AUD = 9
 
 _SPS_MIN_BYTES = 4
 """NAL header, profile, constraint flags and level, which the decoder configuration record repeats."""
-_SET_MAX_BYTES = 0xFFFF
-"""The record's length field has 16 bits."""
 
 
 @dataclass(frozen=True, slots=True)
-class ParameterSets:
-    """Sequence and picture parameter sets (SPS, PPS), which a decoder needs before the first picture."""
+class H264ParameterSets(ParameterSets):
+    """Sequence and picture parameter sets (SPS, PPS)."""
 
     sps: bytes
     pps: bytes
-    may_change: bool = False
-    """Whether they may change in the stream; keyframes then carry the new ones."""
 
     @property
     def entry(self) -> str:
@@ -38,30 +36,19 @@ class ParameterSets:
         """The codec string of RFC 6381, e.g. ``avc1.42C01E``."""
         return f"{self.entry}.{self.sps[1:4].hex().upper()}"
 
+    @property
+    def configuration_kind(self) -> str:
+        """The type of the box with the decoder configuration record."""
+        return "avcC"
 
-def nal_units(access_unit: bytes) -> list[bytes]:
-    """Split an Annex B access unit into its NAL units, without start codes.
-
-    Bytes before the first start code are not part of any unit and are left out, and so are empty units.
-    """
-    starts = [match.end() for match in _START_CODE.finditer(access_unit)]
-    if not starts:
-        return []
-    ends = [start - 3 for start in starts[1:]] + [len(access_unit)]
-    # A 4-byte start code's first zero, and trailing_zero_8bits, belong to no unit (B.1.1).
-    units = (access_unit[start:end].rstrip(b"\x00") for start, end in zip(starts, ends, strict=True))
-    return [unit for unit in units if unit]
-
-
-def split_sample(sample: bytes) -> list[bytes]:
-    """Split an MP4 sample into its NAL units; an incomplete one is left out."""
-    units, at = [], 0
-    while at + 4 <= len(sample):
-        end = at + 4 + int.from_bytes(sample[at : at + 4], "big")
-        if at + 4 < end <= len(sample):
-            units.append(sample[at + 4 : end])
-        at = end
-    return units
+    @property
+    def configuration(self) -> bytes:
+        """The AVCDecoderConfigurationRecord (ISO/IEC 14496-15, 5.3.3.1)."""
+        sps, pps = self.sps, self.pps
+        return (
+            b"\x01" + sps[1:4] + b"\xff\xe1" + struct.pack(">H", len(sps)) + sps
+            + b"\x01" + struct.pack(">H", len(pps)) + pps
+        )  # fmt: skip
 
 
 def nal_type(unit: bytes) -> int:
@@ -69,18 +56,18 @@ def nal_type(unit: bytes) -> int:
     return unit[0] & 0x1F
 
 
-def parameter_sets(units: list[bytes]) -> ParameterSets | None:
+def parameter_sets(units: Sequence[bytes]) -> H264ParameterSets | None:
     """Return the parameter sets among NAL units; None if one is missing or invalid."""
     sps = next((unit for unit in units if nal_type(unit) == NAL_SPS), None)
     pps = next((unit for unit in units if nal_type(unit) == NAL_PPS), None)
-    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES or max(len(sps), len(pps)) > _SET_MAX_BYTES:
+    if sps is None or pps is None or len(sps) < _SPS_MIN_BYTES or max(len(sps), len(pps)) > MAX_SET_BYTES:
         return None
-    return ParameterSets(sps, pps)
+    return H264ParameterSets(sps, pps)
 
 
-def join_sample(units: list[bytes]) -> bytes:
-    """Return NAL units as an MP4 sample, length-prefixed (ISO/IEC 14496-15, 5.3.2).
+def join_sample(units: Sequence[bytes]) -> bytes:
+    """Return NAL units as an MP4 sample, without access unit delimiters.
 
     Parameter sets stay in the sample: a decoder that joins at a cut needs them.
     """
-    return b"".join(len(unit).to_bytes(4, "big") + unit for unit in units if nal_type(unit) != NAL_AUD)
+    return join_units([unit for unit in units if nal_type(unit) != NAL_AUD])

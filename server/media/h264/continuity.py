@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from server.media.h264.annexb import NAL_IDR, NAL_SLICE, nal_type, nal_units, parameter_sets
-from server.media.h264.bitstream import BitReader, unescape_payload
-from server.media.h264.repeat_picture import (
-    SliceHeaderFormat,
-    UnsupportedParametersError,
-    parse_slice_header_format,
-)
+from server.media.bitstream import BitReader, unescape_payload
+from server.media.h264.annexb import NAL_IDR, NAL_SLICE, nal_type, parameter_sets
+from server.media.h264.repeat_picture import SliceHeaderFormat, parse_slice_header_format
+from server.media.nal_units import nal_units
+from server.media.parameter_sets import UnsupportedParametersError
 
 _HEADER_BYTES = 32
 """Bytes of a slice that hold the beginning of its header."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from server.media.bitstream import BitWriter, escape_payload
 from server.media.h264 import cabac
-from server.media.h264.annexb import NAL_IDR, ParameterSets, join_sample
-from server.media.h264.bitstream import BitWriter, escape_payload
+from server.media.h264.annexb import NAL_IDR, H264ParameterSets, join_sample
 from server.media.h264.repeat_picture import parse_slice_header_format
 
 _SLICE_I = 7
@@ -23,7 +23,7 @@ _GRAY_MACROBLOCK = "00100111"
 
 
 @lru_cache(maxsize=16)
-def gray_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
+def gray_picture(parameters: H264ParameterSets, idr_pic_id: int) -> bytes:
     """Return the sample of a gray keyframe: length-prefixed NAL units, parameter sets first.
 
     ``idr_pic_id`` differs between two keyframes in a row (7.4.3).
@@ -54,4 +54,4 @@ def gray_picture(parameters: ParameterSets, idr_pic_id: int) -> bytes:
         bits.copy(_GRAY_MACROBLOCK * head.macroblocks)
         bits.u(1, 1)
     bits.align(0)
-    return join_sample([parameters.sps, parameters.pps, escape_payload(_IDR, bits.to_bytes())])
+    return join_sample([parameters.sps, parameters.pps, escape_payload(bytes([_IDR]), bits.to_bytes())])

@@ -9,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+from server.media.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
 from server.media.h264 import cabac
-from server.media.h264.annexb import NAL_IDR, NAL_SLICE, ParameterSets, nal_type
-from server.media.h264.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
+from server.media.h264.annexb import NAL_IDR, NAL_SLICE, H264ParameterSets, nal_type
+from server.media.parameter_sets import UnsupportedParametersError
 
 _HIGH_PROFILES = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
 """Profiles whose sequence parameter set has chroma_format_idc and more (7.3.2.1.1)."""
@@ -26,10 +27,6 @@ _MAX_MACROBLOCKS = 139_264
 """Macroblocks of a picture at the highest level (table A-1): bounds the time to write one."""
 _MAX_FRAME_NUM_BITS = 16
 """Also the limit of pic_order_cnt_lsb."""
-
-
-class UnsupportedParametersError(Exception):
-    """The parameter sets are damaged or use features that are not supported here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,11 +112,11 @@ class SliceHeaderFormat:
             bits.ue(self.macroblocks)  # mb_skip_run
             bits.u(1, 1)
         bits.align(0)
-        unit = escape_payload(_REFERENCE if reference else NAL_SLICE, bits.to_bytes())
+        unit = escape_payload(bytes([_REFERENCE if reference else NAL_SLICE]), bits.to_bytes())
         return len(unit).to_bytes(_LENGTH_BYTES, "big") + unit
 
 
-def parse_repeatable(parameters: ParameterSets) -> SliceHeaderFormat:
+def parse_repeatable(parameters: H264ParameterSets) -> SliceHeaderFormat:
     """Parse the slice header format of streams whose last picture can be repeated.
 
     Raises:
@@ -133,7 +130,7 @@ def parse_repeatable(parameters: ParameterSets) -> SliceHeaderFormat:
 
 
 @lru_cache(maxsize=8)
-def parse_slice_header_format(parameters: ParameterSets) -> SliceHeaderFormat:
+def parse_slice_header_format(parameters: H264ParameterSets) -> SliceHeaderFormat:
     """Parse the format of slice headers from the parameter sets.
 
     Raises:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.webm import cluster, header, shift_cluster, ticks
 from server.media.gap_filler import NO_BOOT, GapFiller, Span
-from server.media.picture import EncodedPicture
+from server.media.picture import Codec, EncodedPicture
 from server.media.stream_format import Container, ParameterMismatchError, StreamFormat
 from server.media.vp8.gray_frame import gray_frame
 from server.media.vp8.repeat_frame import repeat_frame
@@ -28,6 +28,11 @@ class Vp8StreamFormat(StreamFormat):
     def __init__(self, width: int, height: int) -> None:
         super().__init__()
         self._size = (width, height)
+
+    @property
+    def picture_codec(self) -> Codec:
+        """The codec of the pictures."""
+        return "vp8"
 
     @property
     def codec(self) -> str:
@@ -74,7 +79,7 @@ class Vp8StreamFormat(StreamFormat):
         """Return a GOP of gray pictures."""
         del newest
         packed = cluster(gray_frame(*self._size), first, fps, key=True)
-        key = EncodedPicture(first, key=True, fragment=packed, boot=NO_BOOT)
+        key = EncodedPicture(first, key=True, fragment=packed, boot=NO_BOOT, codec="vp8")
         spans = [(pulse, 1) for pulse in range(first + 1, first + frames)]
         return [key, *Vp8GapFiller(repeat_frame(*self._size), fps).repeat_until_keyframe(key, spans)]
 
@@ -96,9 +101,11 @@ class Vp8GapFiller:
         del newest
         return [self._picture(span) for span in spans]
 
-    def repeat_before(self, picture: EncodedPicture, span: Span) -> list[EncodedPicture]:
+    def repeat_before(
+        self, newest: EncodedPicture, picture: EncodedPicture, span: Span
+    ) -> list[EncodedPicture]:
         """Return one picture, which does not affect decoding of the next one."""
-        del picture
+        del newest, picture
         return [self._picture(span)]
 
     def is_lost_between(self, newest: EncodedPicture, picture: EncodedPicture, missing: int) -> bool:
@@ -108,7 +115,7 @@ class Vp8GapFiller:
     def _picture(self, span: Span) -> EncodedPicture:
         pulse, duration = span
         packed = cluster(self.data, pulse, self.fps, key=False, duration=duration)
-        return EncodedPicture(pulse, key=False, fragment=packed, boot=NO_BOOT, duration=duration)
+        return EncodedPicture(pulse, key=False, fragment=packed, boot=NO_BOOT, duration=duration, codec="vp8")
 
 
 def keyframe_size(frame: bytes) -> tuple[int, int] | None:

@@ -58,9 +58,11 @@ class RecordedGop:
 
 def pictures_of_gop(gop: RecordedGop, stream_format: StreamFormat) -> list[EncodedPicture]:
     """Return a GOP's pictures for the site's streams."""
-    parameters = stream_format.camera_parameters(gop.fragments[0])
+    parameters, codec = stream_format.camera_parameters(gop.fragments[0]), stream_format.picture_codec
     return [
-        EncodedPicture(gop.first + place, is_key(fragment), fragment, boot=0, parameters=parameters)
+        EncodedPicture(
+            gop.first + place, is_key(fragment), fragment, boot=0, parameters=parameters, codec=codec
+        )
         for place, fragment in enumerate(gop.fragments)
     ]
 

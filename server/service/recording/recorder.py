@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from server.config.site_config import Config
 from server.media.containers.fmp4 import init_segment
 from server.media.containers.mp4_audio import audio_init_segment
-from server.media.h264.annexb import ParameterSets
+from server.media.parameter_sets import ParameterSets
 from server.media.stream_format import StreamFormat
 from server.messaging.messages import GopChoices
 from server.service.recording.recent_gops import RecentGops

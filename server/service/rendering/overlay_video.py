@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment
-from server.media.h264.annexb import join_sample, nal_units, parameter_sets
+from server.media.h264.annexb import join_sample, parameter_sets
+from server.media.nal_units import nal_units
 from server.media.picture import EncodedPicture
 from server.media.rendering_messages import EncodedFrame, RenderSettings
 from server.media.stream_format import StreamFormat

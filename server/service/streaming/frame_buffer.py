@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.media.h264.annexb import ParameterSets
+from server.media.parameter_sets import ParameterSets
 from server.media.picture import EncodedPicture
 from server.media.stream_format import StreamFormat
 
@@ -38,7 +38,13 @@ class FrameBuffer:
             self._parameters = self._stream_format.accept(access_unit)
         fragment = self._stream_format.pack(access_unit, pulse, self._fps, key=key)
         picture = EncodedPicture(
-            pulse, key, fragment, boot, parameters=self._parameters, reference_pulse=reference_pulse
+            pulse,
+            key,
+            fragment,
+            boot,
+            parameters=self._parameters,
+            reference_pulse=reference_pulse,
+            codec=self._stream_format.picture_codec,
         )
         gap_filler = self._stream_format.gap_filler(picture, self._fps)
         if gap_filler is not None and not gap_filler.can_read(picture):

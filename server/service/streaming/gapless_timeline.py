@@ -82,12 +82,10 @@ class GaplessTimeline:
             return []
         if picture.key:
             return self.fill(picture.pulse)
-        gap_filler = self._gap_filler()
-        return (
-            []
-            if gap_filler is None
-            else gap_filler.repeat_before(picture, (self._until, picture.pulse - self._until))
-        )
+        gap_filler, newest = self._gap_filler(), self._newest
+        if gap_filler is None or newest is None:
+            return []
+        return gap_filler.repeat_before(newest, picture, (self._until, picture.pulse - self._until))
 
     def _reference_is_lost(self, picture: EncodedPicture) -> bool:
         """Return whether a reference of a picture is missing."""

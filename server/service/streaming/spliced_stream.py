@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from server.media.containers.mpegts import ContinuityCounters
-from server.media.h264.annexb import ParameterSets
+from server.media.parameter_sets import ParameterSets
 from server.media.picture import EncodedPicture
 from server.media.stream_format import StreamFormat
 from server.service.streaming.audio_buffer import AudioBuffer

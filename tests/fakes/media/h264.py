@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
-from server.media.h264.annexb import nal_units, parameter_sets
+from server.media.h264.annexb import parameter_sets
 from server.media.h264.repeat_picture import SliceHeaderFormat, parse_repeatable
+from server.media.nal_units import nal_units
 
 PRESETS = ("ultrafast", "superfast", "medium")
 

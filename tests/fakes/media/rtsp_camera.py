@@ -13,7 +13,8 @@ import time
 from collections.abc import Iterator, Sequence
 
 from server.camera.encoder import AccessUnit
-from server.media.h264.annexb import NAL_PPS, NAL_SPS, nal_type, nal_units
+from server.media.h264.annexb import NAL_PPS, NAL_SPS, nal_type
+from server.media.nal_units import nal_units
 
 _PAYLOAD_TYPE = 96
 _MAX_BYTES = 200

@@ -9,7 +9,8 @@ import numpy as np
 
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, encoded
 from server.media.containers.fmp4 import FragmentSample, fragment
-from server.media.h264.annexb import join_sample, nal_units
+from server.media.h264.annexb import join_sample
+from server.media.nal_units import nal_units
 from server.media.rendering_messages import RenderSettings
 from server.service.rendering.worker.box_overlay import Image
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
-from server.media.h264.annexb import nal_units, parameter_sets
+from server.media.h264.annexb import parameter_sets
+from server.media.nal_units import nal_units
 
 SITE = SiteSettings(width=160, height=96, fps=25)
 FRAMES = 100

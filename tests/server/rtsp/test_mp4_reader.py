@@ -13,7 +13,8 @@ from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment, still_fragment
 from server.media.containers.mp4_audio import audio_fragment
-from server.media.h264.annexb import join_sample, nal_units, parameter_sets, split_sample
+from server.media.h264.annexb import join_sample, parameter_sets
+from server.media.nal_units import nal_units, split_sample
 from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample, with_parameter_sets
 
 UNITS = encoded(0, 10)

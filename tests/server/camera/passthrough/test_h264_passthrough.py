@@ -38,7 +38,8 @@ from server.camera.process import CameraProcess
 from server.camera.sources import SourceEndedError
 from server.config.site_config import Config
 from server.media.containers.mpegts import ContinuityCounters, pack
-from server.media.h264.annexb import NAL_AUD, nal_type, nal_units
+from server.media.h264.annexb import NAL_AUD, nal_type
+from server.media.nal_units import nal_units
 from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.system.errors import UnavailableError, UserError

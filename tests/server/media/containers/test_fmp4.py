@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment, shift_fragment, ticks
-from server.media.h264.annexb import NAL_AUD, join_sample, nal_type, nal_units, parameter_sets, split_sample
+from server.media.h264.annexb import NAL_AUD, join_sample, nal_type, parameter_sets
+from server.media.nal_units import nal_units, split_sample
 
 SITE = SiteSettings(width=64, height=48, fps=25)
 GOP = 4

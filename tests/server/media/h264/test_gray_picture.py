@@ -18,11 +18,12 @@ from fakes.service.parameter_sets import ENCODINGS, sent_units
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH
 from server.camera.encoder import Encoder
 from server.config.sections import EncodeSettings, SiteSettings
+from server.media.bitstream import BitWriter, escape_payload
 from server.media.containers.fmp4 import init_segment
-from server.media.h264.annexb import ParameterSets, join_sample, nal_units, parameter_sets
-from server.media.h264.bitstream import BitWriter, escape_payload
+from server.media.h264.annexb import H264ParameterSets, join_sample, parameter_sets
 from server.media.h264.gray_picture import gray_picture
-from server.media.h264.repeat_picture import UnsupportedParametersError
+from server.media.nal_units import nal_units
+from server.media.parameter_sets import UnsupportedParametersError
 from server.media.picture import EncodedPicture
 from server.media.stream_format import PerCameraStreamFormat, StreamFormat
 from server.media.vp8.gray_frame import gray_frame
@@ -114,7 +115,7 @@ def test_a_gray_gop_has_the_format_of_the_picture_before_it(*, own: bool) -> Non
     ]
 
 
-def with_explicit_order(parameters: ParameterSets) -> ParameterSets:
+def with_explicit_order(parameters: H264ParameterSets) -> H264ParameterSets:
     """Change baseline parameter sets so that each picture has a display order count."""
     sps = BitWriter()
     sps.u(8, 66)
@@ -129,7 +130,7 @@ def with_explicit_order(parameters: ParameterSets) -> ParameterSets:
         sps.u(1, value)
     sps.u(1, 1)
     sps.align(0)
-    return ParameterSets(escape_payload(0x67, sps.to_bytes()), parameters.pps)
+    return H264ParameterSets(escape_payload(b"\x67", sps.to_bytes()), parameters.pps)
 
 
 def test_one_gray_picture_lasts_for_the_gop_where_none_can_be_repeated() -> None:
@@ -145,7 +146,7 @@ def test_one_gray_picture_lasts_for_the_gop_where_none_can_be_repeated() -> None
 def test_an_unsupported_format_has_no_gray_picture() -> None:
     stream_format = StreamFormat()
     assert stream_format.blank(None, 0, 5, FPS) == []
-    stream_format.adopt_or_check(ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
+    stream_format.adopt_or_check(H264ParameterSets(b"\x67\x00\x00\x00", b"\x68"))
     assert stream_format.blank(None, 0, 5, FPS) == []
 
 
@@ -155,7 +156,7 @@ def test_parameter_sets_of_arbitrary_bytes_are_used_or_unsupported(
     sps: bytes, pps: bytes, number: int
 ) -> None:
     with contextlib.suppress(UnsupportedParametersError):
-        assert gray_picture(ParameterSets(sps, pps), number)
+        assert gray_picture(H264ParameterSets(sps, pps), number)
 
 
 def test_a_gray_gop_of_vp8_has_no_gap() -> None:

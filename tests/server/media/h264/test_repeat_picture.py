@@ -11,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fakes.media.h264 import PRESETS, decoded, encoded, slice_header_format
-from server.media.h264.annexb import ParameterSets, join_sample, nal_units
-from server.media.h264.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
-from server.media.h264.repeat_picture import UnsupportedParametersError, parse_repeatable
+from server.media.bitstream import BitReader, BitWriter, escape_payload, unescape_payload
+from server.media.h264.annexb import H264ParameterSets, join_sample
+from server.media.h264.repeat_picture import parse_repeatable
+from server.media.nal_units import nal_units
+from server.media.parameter_sets import UnsupportedParametersError
 
 
 @settings(max_examples=25, deadline=None)
@@ -78,7 +80,7 @@ def test_a_sample_without_a_picture_has_no_frame_num() -> None:
 @given(st.binary(min_size=4, max_size=30), st.binary(min_size=1, max_size=10))
 def test_parameter_sets_of_arbitrary_bytes_are_parsed_or_unsupported(sps: bytes, pps: bytes) -> None:
     with contextlib.suppress(UnsupportedParametersError):
-        assert parse_repeatable(ParameterSets(sps, pps)).macroblocks > 0
+        assert parse_repeatable(H264ParameterSets(sps, pps)).macroblocks > 0
 
 
 @given(st.lists(st.tuples(st.sampled_from("us"), st.integers(0, 2**20)), max_size=20))
@@ -94,6 +96,6 @@ def test_numbers_are_read_as_they_were_written(numbers: list[tuple[str, int]]) -
 
 @given(st.lists(st.sampled_from(b"\x00\x01\x03\x80"), min_size=1, max_size=40).map(bytes))
 def test_an_escaped_payload_contains_no_start_code(payload: bytes) -> None:
-    unit = escape_payload(1, payload)
+    unit = escape_payload(b"\x01", payload)
     assert not any(code in unit for code in (b"\x00\x00\x00", b"\x00\x00\x01", b"\x00\x00\x02"))
     assert unescape_payload(unit) == payload

@@ -27,7 +27,8 @@ from fakes.service.parameter_sets import (
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, small_config
 from server.config.site_config import Config
 from server.media.codec import stream_format_for
-from server.media.h264.annexb import nal_units, parameter_sets
+from server.media.h264.annexb import parameter_sets
+from server.media.nal_units import nal_units
 from server.media.stream_format import ParameterMismatchError
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.media_chunk import MediaChunk

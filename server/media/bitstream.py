@@ -1,4 +1,4 @@
-"""Reads and writes bits of H.264 syntax (ITU-T H.264, 7.2, 7.4.1 and 9.1)."""
+"""Reads and writes bits of H.264 and H.265 syntax (ITU-T H.264, 7.2, 7.4.1 and 9.1; ITU-T H.265 likewise)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ _ESCAPED = re.compile(b"\x00\x00\x03")
 _TO_ESCAPE = re.compile(b"\x00\x00(?=[\x00-\x03])")
 
 
-def unescape_payload(unit: bytes) -> bytes:
-    """Return a NAL unit's payload, without header and emulation prevention bytes."""
-    return _ESCAPED.sub(b"\x00\x00", unit[1:])
+def unescape_payload(unit: bytes, head_bytes: int = 1) -> bytes:
+    """Return a NAL unit's payload, without its header of ``head_bytes`` and emulation prevention bytes."""
+    return _ESCAPED.sub(b"\x00\x00", unit[head_bytes:])
 
 
-def escape_payload(head: int, payload: bytes) -> bytes:
-    """Return the NAL unit of a payload, with emulation prevention bytes."""
-    return bytes([head]) + _TO_ESCAPE.sub(b"\x00\x00\x03", payload)
+def escape_payload(head: bytes, payload: bytes) -> bytes:
+    """Return the NAL unit of a header and a payload, with emulation prevention bytes."""
+    return head + _TO_ESCAPE.sub(b"\x00\x00\x03", payload)
 
 
 class BitReader:

@@ -1,0 +1,1 @@
+"""H.265 parsing and writing (ITU-T H.265)."""

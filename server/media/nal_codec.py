@@ -1,0 +1,54 @@
+"""What the formats of streams need to know of a codec of NAL units, H.264 or H.265."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from server.media.gap_filler import GapFiller
+from server.media.parameter_sets import ParameterSets
+from server.media.picture import Codec
+
+
+class NalCodec(Protocol):
+    """Parses access units, and writes pictures of its own."""
+
+    @property
+    def name(self) -> Codec:
+        """The codec."""
+
+    @property
+    def title(self) -> str:
+        """The codec's name for people."""
+
+    def parameter_sets(self, units: Sequence[bytes]) -> ParameterSets | None:
+        """Return the parameter sets among NAL units; None if one is missing or invalid."""
+
+    def is_keyframe(self, units: Sequence[bytes]) -> bool:
+        """Return whether an access unit can be decoded without earlier ones."""
+
+    def join_sample(self, units: Sequence[bytes]) -> bytes:
+        """Return NAL units as an MP4 sample, with parameter sets but without access unit delimiters."""
+
+    def check_supported(self, parameters: ParameterSets) -> None:
+        """Check that gaps can be filled in streams of these parameter sets.
+
+        Raises:
+            UnsupportedParametersError: they cannot, and why.
+        """
+
+    def gray_picture(self, parameters: ParameterSets, number: int) -> bytes:
+        """Return the sample of a gray keyframe; ``number``, 0 or 1, differs between two in a row.
+
+        Raises:
+            UnsupportedParametersError: the parameter sets are damaged, or use rare features.
+        """
+
+    def gap_filler(
+        self, parameters: ParameterSets, fps: float, attached: ParameterSets | None = None
+    ) -> GapFiller:
+        """Return the gap filler for these parameter sets; ``attached`` are set in its pictures.
+
+        Raises:
+            UnsupportedParametersError: they are damaged, or use features that are not supported.
+        """
