@@ -23,7 +23,7 @@ from benchmarks.screenshots.webp_files import WIDTHS, options_of, write_webp
 from server.http.setup_app import serve_setup
 from server.setup.camera_address import CameraAddress, free_name, parse_address
 from server.setup.discovery import FoundCamera
-from server.setup.session import SetupSession, TriedCamera
+from server.setup.session import SetupSession, TriedCamera, TriedStream
 from server.setup.trial_messages import ProfileList, StreamProfile, StreamTrial
 from synthetic import Scene
 
@@ -59,12 +59,17 @@ class DrawnSession(SetupSession):
             self._streams[key] = parse_address(profile.address, user, password)
         return ProfileList(profiles=profiles), (number, 100 + number)
 
-    async def _try(self, address: CameraAddress, name: str) -> TriedCamera:
+    async def _try(
+        self, address: CameraAddress, name: str, substream: CameraAddress | None = None
+    ) -> TriedCamera:
         number = len(self.cameras)
         picture = Scene("room", len(_NAMES), 4, 1, *_SIZE).image(number, _START)
         jpeg = np.asarray(cv2.imencode(".jpg", picture)[1]).tobytes()
         trial = StreamTrial(width=1920, height=1080, fps=25, codec="h264", picture=jpeg)
-        camera = TriedCamera(number, free_name(name, set()), address, trial)
+        small = None
+        if substream is not None:
+            small = TriedStream(substream, StreamTrial(width=640, height=360, fps=25, codec="h264"))
+        camera = TriedCamera(number, free_name(name, set()), TriedStream(address, trial), small)
         self.cameras.append(camera)
         return camera
 

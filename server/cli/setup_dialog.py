@@ -13,6 +13,8 @@ from server.setup.discovery import FoundCamera
 from server.setup.onvif_profiles import INSTALL, is_installed
 from server.setup.proposal import SiteProposal
 from server.setup.session import SetupSession, TriedCamera
+from server.setup.stream_pair import propose_pair
+from server.setup.trial_messages import StreamProfile
 from server.system.errors import UserError
 
 _NO_USER = "-"
@@ -87,13 +89,25 @@ class SetupDialog:
                 return
         for number, profile in enumerate(answer.profiles, 1):
             typer.echo(f"  {number}  {profile.name}: {profile.codec} {profile.width}x{profile.height}")
-        number = typer.prompt("Stream", default=1, type=int) if len(keys) > 1 else 1
+        source, substream = self._ask_streams(answer.profiles)
         try:
             typer.echo("Trying …")
-            key = keys[max(1, min(number, len(keys))) - 1]
-            self._take(self._runner.run(self._session.try_stream(key, found.name)))
+            small = None if substream is None else keys[substream]
+            self._take(self._runner.run(self._session.try_stream(keys[source], found.name, small)))
         except UserError as error:
             typer.echo(str(error))
+
+    def _ask_streams(self, profiles: Sequence[StreamProfile]) -> tuple[int, int | None]:
+        """Ask which stream viewers get, and in which people are tracked; return their places."""
+        if len(profiles) < 2:  # noqa: PLR2004 — a pair
+            return 0, None
+        pair = propose_pair(profiles)
+        number = typer.prompt("Stream", default=pair.source + 1, type=int)
+        source = max(1, min(number, len(profiles))) - 1
+        proposed = 0 if pair.substream in {None, source} else (pair.substream or 0) + 1
+        number = typer.prompt("Substream, in which people are tracked (0: none)", default=proposed, type=int)
+        substream = max(0, min(number, len(profiles))) - 1
+        return source, None if substream in {-1, source} else substream
 
     def _ask_address(self, question: str = "Address of a camera (empty: no more)") -> bool:
         """Ask for an address and try it; return whether there was one."""
@@ -120,7 +134,8 @@ class SetupDialog:
 
     def _take(self, camera: TriedCamera) -> None:
         """Name a camera that sends pictures."""
-        typer.echo(f"It sends {camera.sends}.")
+        tracked = f"; people are tracked in {camera.tracked_in}" if camera.tracked_in else ""
+        typer.echo(f"It sends {camera.sends}{tracked}.")
         while True:
             name = typer.prompt("Name", default=camera.name)
             try:

@@ -35,11 +35,9 @@ Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, slots=True)
-class TriedCamera:
-    """A camera that sends pictures, and its name in the site."""
+class TriedStream:
+    """A stream that sends pictures."""
 
-    key: int
-    name: str
     address: CameraAddress
     trial: StreamTrial
 
@@ -49,9 +47,41 @@ class TriedCamera:
         rate = f", {self.trial.fps:g} fps" if self.trial.fps else ""
         return f"{self.trial.codec} {self.trial.width}x{self.trial.height}{rate}"
 
+
+@dataclass(frozen=True, slots=True)
+class TriedCamera:
+    """A camera that sends pictures, and its name in the site."""
+
+    key: int
+    name: str
+    source: TriedStream
+    substream: TriedStream | None = None
+    """The one in which people are tracked."""
+
+    @property
+    def address(self) -> CameraAddress:
+        """The address of what viewers get."""
+        return self.source.address
+
+    @property
+    def trial(self) -> StreamTrial:
+        """What viewers get."""
+        return self.source.trial
+
+    @property
+    def sends(self) -> str:
+        """What viewers get, in a few words."""
+        return self.source.sends
+
+    @property
+    def tracked_in(self) -> str:
+        """The substream in a few words; empty: there is none."""
+        return "" if self.substream is None else self.substream.sends
+
     def as_new(self, name: str) -> NewCamera:
         """Return the camera to write, under a name."""
-        return NewCamera(name, self.address, self.sends)
+        substream = None if self.substream is None else self.substream.address.source
+        return NewCamera(name, self.address, self.sends, substream, self.tracked_in)
 
 
 @dataclass(slots=True)
@@ -100,30 +130,47 @@ class SetupSession:
             keys.append(key)
         return answer, keys
 
-    async def try_address(self, text: str, user: str, password: str, name: str = "") -> TriedCamera:
-        """Try an address, and add the camera if it sends pictures.
+    async def try_address(
+        self, text: str, user: str, password: str, name: str = "", substream: str = ""
+    ) -> TriedCamera:
+        """Try an address, and that of a substream, if any; add the camera if both send pictures.
 
         Raises:
-            UserError: it is no address, or no picture arrives.
+            UserError: one is no address, or no picture arrives.
         """
-        return await self._try(parse_address(text, user, password), name)
+        address = parse_address(text, user, password)
+        if not substream.strip():
+            return await self._try(address, name)
+        small = parse_address(substream, user, password)
+        if small.password is not None and small.password != address.password:
+            raise UserError("the substream's password must be that of the camera")
+        return await self._try(address, name, small)
 
-    async def try_stream(self, key: int, name: str = "") -> TriedCamera:
-        """Try a stream that a camera offers, and add the camera.
+    async def try_stream(self, key: int, name: str = "", substream: int | None = None) -> TriedCamera:
+        """Try a stream that a camera offers, and another one as its substream, if any; add the camera.
 
         Raises:
             UserError: there is no such stream, or no picture arrives.
         """
-        if key not in self._streams:
+        if key not in self._streams or (substream is not None and substream not in self._streams):
             raise UserError("no such stream; ask the camera again")
-        return await self._try(self._streams[key], name)
+        return await self._try(
+            self._streams[key], name, None if substream is None else self._streams[substream]
+        )
 
-    async def _try(self, address: CameraAddress, name: str) -> TriedCamera:
+    async def _try(
+        self, address: CameraAddress, name: str, substream: CameraAddress | None = None
+    ) -> TriedCamera:
         if any(camera.address.source == address.source for camera in self.cameras):
             raise UserError(f"{address.shown}: this camera is in the list already")
         if len(self.cameras) >= MAX_CAMERAS:
             raise UserError(f"a site set up here has at most {MAX_CAMERAS} cameras")
+        if substream is not None and substream.source == address.source:
+            raise UserError("the substream is the stream that viewers get: leave it out")
         camera = await self._tried(address, name)
+        if substream is not None:
+            small = await self._tried_stream(substream, "the substream: ")
+            camera = replace(camera, substream=small)
         taken = {camera.name for camera in self.cameras}
         camera = replace(camera, name=free_name(name, taken))
         self.cameras.append(camera)
@@ -138,10 +185,13 @@ class SetupSession:
         return await self._tried(parse_address(text, user, password), name)
 
     async def _tried(self, address: CameraAddress, name: str) -> TriedCamera:
+        return TriedCamera(next(self._keys), name, await self._tried_stream(address))
+
+    async def _tried_stream(self, address: CameraAddress, which: str = "") -> TriedStream:
         trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options))
         if trial.error:
-            raise UserError(f"{address.shown}: {trial.error}")
-        return TriedCamera(next(self._keys), name, address, trial)
+            raise UserError(f"{which}{address.shown}: {trial.error}")
+        return TriedStream(address, trial)
 
     async def _limited(self, ask: Callable[[Request], Awaitable[Answer]], request: Request) -> Answer:
         """Speak to a camera when few others are spoken to.

@@ -41,11 +41,13 @@ _FILE_LINE = "    password: {file}  # replaces {{password}}; only you can read t
 
 @dataclass(frozen=True, slots=True)
 class NewCamera:
-    """A camera to write: its id, its address, and what it sends, for a comment."""
+    """A camera to write: its id, its address, and what it sends, for a comment; the same of its substream."""
 
     id: str
     address: CameraAddress
     sends: str = ""
+    substream: str | None = None
+    substream_sends: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,9 @@ def _camera_text(camera: NewCamera, path: Path) -> str:
     address = camera.address
     lines = f"  - id: {camera.id}\n    source: {_scalar(address.source)}"
     lines += f"  # {camera.sends}\n" if camera.sends else "\n"
+    if camera.substream is not None:
+        tracked = f", {camera.substream_sends}" if camera.substream_sends else ""
+        lines += f"    substream: {_scalar(camera.substream)}  # people are tracked in it{tracked}\n"
     if address.password is not None:
         lines += _FILE_LINE.format(file=_scalar(str(password_file(path, camera.id))))
     if address.options:
@@ -134,6 +139,8 @@ def _scalar(text: str) -> str:
 def camera_entry(camera: NewCamera, path: Path) -> dict[str, Any]:
     """Return a camera as an entry of a configuration at a path."""
     entry: dict[str, Any] = {"id": camera.id, "source": camera.address.source}
+    if camera.substream is not None:
+        entry["substream"] = camera.substream
     if camera.address.password is not None:
         entry["password"] = str(password_file(path, camera.id))
     return {**entry, "options": dict(camera.address.options)} if camera.address.options else entry

@@ -101,6 +101,9 @@ async def up(folder: Path, discovery: str) -> AsyncIterator[SetupRun]:
 async def add_camera(page: Page, name: str) -> None:
     """Try the main stream of a found camera."""
     item = page.locator("#found li", has_text=name)
+    if name == NAMES[0]:
+        sub = item.locator("option", has_text="sub")
+        await item.get_by_label("in which people are tracked").select_option(await sub.get_attribute("value"))
     await item.get_by_role("button", name=re.compile("Try main")).click()
     await expect(page.get_by_label(re.compile("Name of the camera")).last).to_have_value(name)
 
@@ -136,6 +139,7 @@ async def test_a_site_of_three_cameras_is_set_up_watched_and_its_passwords_stay_
             await page.close()
         config = load_config(tmp_path / "site.yaml")
         assert config.camera_ids == ("front", *NAMES[1:])
+        assert [camera.substream is not None for camera in config.cameras] == [True, False, False]
         assert (config.site.name, config.site.size, config.site.fps) == ("hall", (320, 180), 10.0)
         assert stat.S_IMODE((tmp_path / "site.passwords" / "front").stat().st_mode) == 0o600
         for text in (*run.lines, (tmp_path / "site.yaml").read_text()):

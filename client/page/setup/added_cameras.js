@@ -27,7 +27,7 @@ export class AddedCameras {
   }
 
   /** @param {AddedCamera} camera */
-  #tile({ key, name, address, sends }) {
+  #tile({ key, name, address, sends, tracked_in: tracked }) {
     const picture = make('img', { src: `api/operator/setup/cameras/${key}/picture.jpg`, alt: `Picture of ${name}` });
     const field = make('input', { value: name, maxLength: 32, autocomplete: 'off', spellcheck: false });
     field.setAttribute('aria-label', `Name of the camera at ${address}`);
@@ -45,7 +45,7 @@ export class AddedCameras {
       { className: 'camera-tile added-camera' },
       make('div', { className: 'still' }, picture),
       make('p', { className: 'buttons' }, field, remove),
-      make('p', { className: 'quiet', textContent: `${sends} · ${address}` }),
+      make('p', { className: 'quiet', textContent: `${sends}${tracked && `, people tracked in ${tracked}`} · ${address}` }),
     );
   }
 

@@ -23,12 +23,15 @@
  * @property {string} error
  * @property {boolean} needs_password
  * @property {OfferedStream[]} streams
+ * @property {number | null} source key of the stream proposed for viewers
+ * @property {number | null} substream key of the stream proposed for tracking; null: the same
  *
  * @typedef {object} AddedCamera that was tried
  * @property {number} key
  * @property {string} name
  * @property {string} address without passwords
  * @property {string} sends
+ * @property {string} tracked_in what its substream sends; empty: it has none
  *
  * @typedef {object} SetupState
  * @property {string} file

@@ -16,6 +16,8 @@ export class CameraSearch {
   #password = element('camera-password');
   /** @type {HTMLInputElement} */
   #address = element('address');
+  /** @type {HTMLInputElement} */
+  #substream = element('substream-address');
   #state = element('search-state');
   #trial = element('trial-state');
   #hint = '';
@@ -31,7 +33,8 @@ export class CameraSearch {
     element('login').addEventListener('submit', (event) => event.preventDefault());
     element('address-form').addEventListener('submit', async (event) => {
       event.preventDefault();
-      if (await this.#try(this.#address.value, { address: this.#address.value, ...this.#login })) this.#address.value = '';
+      const trial = { address: this.#address.value, substream_address: this.#substream.value, ...this.#login };
+      if (await this.#try(this.#address.value, trial)) this.#address.value = this.#substream.value = '';
     });
   }
 
@@ -90,9 +93,13 @@ export class CameraSearch {
     try {
       const { host, port } = camera;
       /** @type {OfferedStreams} */
-      const { error, streams } = await requestOperator('setup/streams', 'POST', { host, port, ...this.#login }, CAMERA_TIMEOUT_MS);
+      const { error, streams, source, substream } = await requestOperator('setup/streams', 'POST', { host, port, ...this.#login }, CAMERA_TIMEOUT_MS);
       setText(message, error ? `${host}: ${error}.` : '');
-      list.replaceChildren(...streams.map((stream) => this.#streamButton(camera, stream)));
+      const tracked = trackedChoice(camera, streams, substream);
+      const first = streams.filter(({ key }) => key === source);
+      const sorted = [...first, ...streams.filter(({ key }) => key !== source)];
+      const buttons = sorted.map((stream) => this.#streamButton(camera, stream, tracked));
+      list.replaceChildren(...buttons, ...(streams.length > 1 ? [make('label', {}, 'People are tracked in ', tracked)] : []));
       this.showError(null);
     } catch (error) {
       setText(message, '');
@@ -103,15 +110,17 @@ export class CameraSearch {
 
   /**
    * @param {SearchedCamera} camera
-   * @param {OfferedStream} stream
+   * @param {OfferedStream} offered
+   * @param {HTMLSelectElement} tracked
    */
-  #streamButton({ host, name }, { key, name: stream, codec, width, height, fps }) {
-    const rate = fps ? `, ${fps} fps` : '';
-    const textContent = `Try ${stream}: ${codec} ${width}×${height}${rate}`;
-    const button = make('button', { type: 'button', textContent });
+  #streamButton({ host, name }, offered, tracked) {
+    const { key, name: stream } = offered;
+    const button = make('button', { type: 'button', textContent: `Try ${describeStream(offered)}` });
     button.addEventListener('click', async () => {
       button.disabled = true;
-      await this.#try(`${host} ${stream}`, { stream: key, name: name || host });
+      const chosen = Number(tracked.value);
+      const substream = chosen && chosen !== key ? chosen : null;
+      await this.#try(`${host} ${stream}`, { stream: key, substream, name: name || host });
       button.disabled = false;
     });
     return button;
@@ -135,4 +144,24 @@ export class CameraSearch {
       return false;
     }
   }
+}
+
+/** @param {OfferedStream} stream */
+function describeStream({ name, codec, width, height, fps }) {
+  return `${name}: ${codec} ${width}×${height}${fps ? `, ${fps} fps` : ''}`;
+}
+
+/**
+ * Choice of the stream in which people are tracked; 0: the one that viewers get.
+ *
+ * @param {SearchedCamera} camera
+ * @param {OfferedStream[]} streams
+ * @param {number | null} proposed
+ */
+function trackedChoice({ host }, streams, proposed) {
+  const options = streams.map((stream) => make('option', { value: String(stream.key), textContent: describeStream(stream) }));
+  const choice = make('select', {}, make('option', { value: '0', textContent: 'the stream that is tried' }), ...options);
+  choice.value = String(proposed ?? 0);
+  choice.setAttribute('aria-label', `Stream of ${host} in which people are tracked`);
+  return choice;
 }

@@ -14,6 +14,7 @@ from server.http.json_responses import error_response, json_response, read_json
 from server.setup.onvif_profiles import INSTALL, is_installed
 from server.setup.proposal import SiteProposal
 from server.setup.session import SetupSession
+from server.setup.stream_pair import propose_pair
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
@@ -66,13 +67,19 @@ class OfferedStreams(msgspec.Struct, frozen=True):
     error: str
     needs_password: bool
     streams: list[OfferedStream]
+    source: int | None = None
+    """Key of the stream that is proposed for viewers."""
+    substream: int | None = None
+    """Key of the stream that is proposed for tracking; null: the same."""
 
 
 class CameraTrial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A camera to try and add: an offered stream, or an address with a login."""
+    """A camera to try and add: an offered stream, or an address with a login; and its substream, if any."""
 
     stream: int | None = None
+    substream: int | None = None
     address: Annotated[str, msgspec.Meta(max_length=1000)] = ""
+    substream_address: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     user: Login = ""
     password: Login = ""
     name: Name = ""
@@ -101,6 +108,8 @@ class AddedCamera(msgspec.Struct, frozen=True):
     address: str
     """Without anything that may be secret."""
     sends: str
+    tracked_in: str
+    """What its substream sends; empty: it has none."""
 
 
 class ProposedSite(msgspec.Struct, frozen=True):
@@ -170,7 +179,13 @@ async def post_streams(request: web.Request) -> web.StreamResponse:
         OfferedStream(key, one.name, one.codec, one.width, one.height, one.fps)
         for key, one in zip(keys, answer.profiles, strict=True)
     ]
-    return json_response(OfferedStreams(answer.error, answer.needs_password, streams))
+    if not streams:
+        return json_response(OfferedStreams(answer.error, answer.needs_password, []))
+    pair = propose_pair(answer.profiles)
+    substream = None if pair.substream is None else keys[pair.substream]
+    return json_response(
+        OfferedStreams(answer.error, answer.needs_password, streams, keys[pair.source], substream)
+    )
 
 
 @routes.post(f"{_PATH}/cameras")
@@ -180,9 +195,10 @@ async def post_camera(request: web.Request) -> web.StreamResponse:
     session = request.app[SETUP]
     trial = await read_json(request, CameraTrial)
     if trial.stream is not None:
-        await session.try_stream(trial.stream, trial.name)
+        await session.try_stream(trial.stream, trial.name, trial.substream)
     else:
-        await session.try_address(trial.address, trial.user, trial.password, trial.name)
+        login = trial.user, trial.password
+        await session.try_address(trial.address, *login, trial.name, trial.substream_address)
     return json_response(_state(session))
 
 
@@ -227,7 +243,8 @@ async def post_site(request: web.Request) -> web.StreamResponse:
 def _state(session: SetupSession) -> SetupState:
     proposal = session.proposal
     cameras = [
-        AddedCamera(camera.key, camera.name, camera.address.shown, camera.sends) for camera in session.cameras
+        AddedCamera(camera.key, camera.name, camera.address.shown, camera.sends, camera.tracked_in)
+        for camera in session.cameras
     ]
     return SetupState(
         file=str(session.path),

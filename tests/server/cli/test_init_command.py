@@ -39,11 +39,13 @@ def test_a_site_is_set_up_from_a_found_camera_and_an_address(tmp_path: Path) -> 
     pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
     units = encoded(0, 40)
     gops = [units[at : at + 5] for at in range(0, 40, 5)]
-    stream, other = (RtspCamera(gops, 12.5, login=LOGIN, live=True) for _ in range(2))
-    camera = OnvifCamera("door", [FakeProfile("main", stream.url, 64, 48, 12)], LOGIN)
+    stream, small, other = (RtspCamera(gops, 12.5, login=LOGIN, live=True) for _ in range(3))
+    profiles = [FakeProfile("main", stream.url, 1920, 1080, 12), FakeProfile("sub", small.url, 640, 360, 12)]
+    camera = OnvifCamera("door", profiles, LOGIN)
     login, as_before = ["viewer", "s3cret"], ["", ""]
     answers = [
-        *("y", "viewer", "wrong", "y", *login, ""),  # a wrong password first; the camera's own name
+        *("y", "viewer", "wrong", "y", *login),  # a wrong password first
+        *("", "", ""),  # the proposed streams; the camera's own name
         "not an address",
         *(other.url, *as_before, "bad name", "hall"),
         *("", "", "", "", ""),  # no more cameras; the proposals
@@ -53,13 +55,19 @@ def test_a_site_is_set_up_from_a_found_camera_and_an_address(tmp_path: Path) -> 
             ended = init(tmp_path, answers, "--search", "1", targets=targets)
     finally:
         stream.close()
+        small.close()
         other.close()
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert "it refuses this user and password" in ended.stdout
     assert "enter an address such as" in ended.stdout
+    assert "It sends h264 64x48, 12.5 fps; people are tracked in h264 64x48, 12.5 fps." in ended.stdout
     assert "It sends h264 64x48, 12.5 fps." in ended.stdout
     assert "s3cret" not in ended.stdout + ended.stderr
     config = load_config(tmp_path / "site.yaml")
+    door, hall = config.cameras
+    assert (door.source, door.substream) != (None, None)
+    assert small.url.rpartition("@")[2].removeprefix("rtsp://") in (door.substream or "")
+    assert hall.substream is None
     assert (config.camera_ids, config.site.size, config.site.fps) == (("door", "hall"), (64, 48), 12.5)
 
 

@@ -11,7 +11,7 @@ import pytest
 from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
 from server.setup.camera_address import parse_address
-from server.setup.session import TriedCamera
+from server.setup.session import TriedCamera, TriedStream
 from server.setup.site_cameras import add_camera, list_cameras, remove_camera, rename_camera
 from server.setup.trial_messages import StreamTrial
 from server.system.errors import UserError
@@ -39,7 +39,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def tried(name: str = "", source: str = "rtsp://10.0.0.9/live") -> TriedCamera:
-    return TriedCamera(1, name, parse_address(source, "viewer", SECRET), StreamTrial())
+    return TriedCamera(1, name, TriedStream(parse_address(source, "viewer", SECRET), StreamTrial()))
 
 
 def ids(path: Path) -> list[str]:

@@ -16,9 +16,13 @@ from hypothesis import strategies as st
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.service.scripted_cameras import encoded
 from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
+from server.config.camera_password import fill_in_password
+from server.config.loader import load_config
+from server.setup.camera_address import parse_address
 from server.setup.onvif_profiles import INSTALL, query_profiles, stream_address
 from server.setup.session import SetupSession
-from server.setup.trial_messages import ProfilesRequest
+from server.setup.stream_pair import propose_pair
+from server.setup.trial_messages import ProfilesRequest, StreamProfile
 from server.system.errors import UserError
 
 LOGIN = ("viewer", "p@ss:/w ord")
@@ -63,6 +67,61 @@ async def test_a_found_camera_is_asked_tried_named_and_written(
     session.rename(tried.key, "door")
     session.write("hall", session.proposal)
     assert "rtsp://viewer:{password}@127.0.0.1" in session.path.read_text()
+
+
+def profile(name: str, width: int, height: int, codec: str = "H264") -> StreamProfile:
+    return StreamProfile(name, f"rtsp://10.0.0.1/{name}", codec, width, height, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("profiles", "source", "substream"),
+    [
+        ([profile("main", 1920, 1080), profile("sub", 640, 360)], "main", "sub"),
+        ([profile("sub", 640, 360), profile("main", 1920, 1080)], "main", "sub"),
+        (
+            [profile("4k", 3840, 2160, "H265"), profile("hd", 1920, 1080), profile("cif", 352, 288)],
+            "hd",
+            "cif",
+        ),
+        ([profile("4k", 3840, 2160, "H265"), profile("sub", 640, 480, "H265")], "4k", "sub"),
+        (
+            [profile("main", 1920, 1080), profile("third", 704, 576), profile("tiny", 176, 144)],
+            "main",
+            "third",
+        ),
+        ([profile("main", 1920, 1080), profile("low", 320, 180)], "main", None),
+        ([profile("main", 1920, 1080), profile("again", 1920, 1080)], "main", None),
+        ([profile("only", 640, 480)], "only", None),
+        ([profile("unknown", 0, 0)], "unknown", None),
+    ],
+)
+def test_the_largest_h264_and_the_smallest_useful_stream_are_proposed(
+    profiles: list[StreamProfile], source: str, substream: str | None
+) -> None:
+    pair = propose_pair(profiles)
+    assert profiles[pair.source].name == source
+    assert (None if pair.substream is None else profiles[pair.substream].name) == substream
+
+
+async def test_a_camera_is_written_with_its_substream(tmp_path: Path) -> None:
+    session = SetupSession(tmp_path / "site.yaml")
+    with rtsp() as main, rtsp() as small:
+        with pytest.raises(UserError, match="the substream is the stream that viewers get"):
+            await session.try_address(main.url, *LOGIN, "door", main.url)
+        one, other = (url.replace("//", f"//viewer:{n}@") for n, url in enumerate((main.url, small.url)))
+        with pytest.raises(UserError, match="the substream's password must be that of the camera"):
+            await session.try_address(one, "", "", "door", other)
+        with pytest.raises(UserError, match=r"the substream: rtsp://.*: cannot open this video"):
+            await session.try_address(main.url, *LOGIN, "door", "rtsp://127.0.0.1:9/live")
+        tried = await session.try_address(main.url, *LOGIN, "door", small.url)
+        assert (tried.sends, tried.tracked_in) == ("h264 64x48, 12.5 fps", "h264 64x48, 12.5 fps")
+        session.write("hall", session.proposal)
+        assert LOGIN[1] not in session.path.read_text()
+        camera = fill_in_password(load_config(session.path), "door").camera("door")
+        address = parse_address(small.url, *LOGIN).with_password
+        assert camera.substream == address
+        assert camera.source != address
+    assert "  # people are tracked in it, h264 64x48" in session.path.read_text()
 
 
 @pytest.mark.parametrize(
