@@ -43,22 +43,23 @@ def fit_points(points: MarkedPoints, settings: PointSettings | None = None) -> P
     settings = settings or PointSettings()
     _check(points)
     backwards = _fit(points.floor, points.image, points.camera)
-    errors = image_errors(backwards, points)
     allowed = settings.tolerance * _extent(points.image)
+    errors = image_errors(backwards, points)
     if errors.max() > allowed:
         raise CalibrationError(describe_inconsistency(points, errors, allowed, settings))
-    try:
-        homography = validate_homography(np.linalg.inv(backwards), f"camera {points.camera}")
-    except (ValueError, np.linalg.LinAlgError):
-        raise CalibrationError(_on_a_line(points.camera)) from None
-    homography = homography / np.abs(homography).max()
-    floor = to_ground(homography, points.image)
-    if not np.isfinite(floor).all():
-        pair = points.label(int(np.flatnonzero(~np.isfinite(floor).all(axis=1))[0]))
+    homography = _inverse(backwards, points.camera)
+    if _first_above_horizon(homography, points) is not None:
+        # From straight above, errors of the points decide on which side of the picture the far horizon is.
+        backwards = _fit_affine(points.floor, points.image)
+        if image_errors(backwards, points).max() <= allowed:
+            errors, homography = image_errors(backwards, points), _inverse(backwards, points.camera)
+    above = _first_above_horizon(homography, points)
+    if above is not None:
         raise CalibrationError(
-            f"camera {points.camera}: {pair} would be above the horizon; the points go round in another "
-            "order on the floor than in the picture, or the picture is upside down"
+            f"camera {points.camera}: {points.label(above)} would be above the horizon; the points go round "
+            "in another order on the floor than in the picture, or the picture is upside down"
         )
+    floor = to_ground(homography, points.image)
     return PointFit(homography, np.hypot(*(floor - points.floor).T), errors)
 
 
@@ -128,6 +129,27 @@ def _fit(source: Floats, target: Floats, camera: str) -> Floats:
         return fit_homography(source, target)
     except (ValueError, np.linalg.LinAlgError):
         raise CalibrationError(_on_a_line(camera)) from None
+
+
+def _fit_affine(source: Floats, target: Floats) -> Floats:
+    """Return the homography without a horizon that maps source to target with least squared error."""
+    ones = np.column_stack([source, np.ones(len(source))])
+    upper = np.linalg.lstsq(ones, target, rcond=None)[0].T
+    return np.vstack([upper, [0.0, 0.0, 1.0]])
+
+
+def _inverse(backwards: Floats, camera: str) -> Floats:
+    try:
+        homography = validate_homography(np.linalg.inv(backwards), f"camera {camera}")
+    except (ValueError, np.linalg.LinAlgError):
+        raise CalibrationError(_on_a_line(camera)) from None
+    return np.asarray(homography / np.abs(homography).max())
+
+
+def _first_above_horizon(homography: Floats, points: MarkedPoints) -> int | None:
+    """Return the first pair that is above the horizon in the picture; None: there is none."""
+    above = ~np.isfinite(to_ground(homography, points.image)).all(axis=1)
+    return int(np.flatnonzero(above)[0]) if above.any() else None
 
 
 def _on_a_line(camera: str) -> str:

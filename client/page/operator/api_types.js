@@ -75,6 +75,24 @@
  * @property {string} insufficient what the walk did not cover, if the result is uncertain
  * @property {string} configuration YAML; empty: there is no ground file
  *
+ * @typedef {object} PointsFile marked points, as `myview calibrate` reads them
+ * @property {string} unit of the floor
+ * @property {Record<string, {image: [number, number], floor: [number, number], name?: string}[]>} cameras
+ *
+ * @typedef {object} PointsResult
+ * @property {string[]} lines the report
+ * @property {Record<string, {floor: number, image: number}[]>} errors by camera, of each of its points
+ * @property {string} ground the text of the ground file
+ * @property {string} configuration YAML
+ * @property {string} plan PNG in base64; empty: it could not be drawn
+ *
+ * @typedef {object} MarkedPoints /api/operator/marked_points
+ * @property {string | null} unit of the floor
+ * @property {PointsFile['cameras']} points that the configuration's calibration was computed from
+ * @property {Record<string, number[][]>} homographies of the configuration, by camera
+ * @property {string} digest of that calibration
+ * @property {PointsResult | null} result
+ *
  * @typedef {object} ZoneRule
  * @property {string} rule its id
  * @property {string} kind entered, left, crossed, stayed, crowded or close

@@ -60,7 +60,7 @@ export function drawTrack({ object, positions }, size) {
 export function describeCalibration(calibrated, uncalibrated) {
   if (calibrated) return uncalibrated.length ? `Not calibrated: ${uncalibrated.join(', ')}.` : '';
   if (!uncalibrated.length) return 'No camera has reported yet.';
-  return 'No camera is calibrated: mark points on the floor under Ignored areas, or calibrate by a walk.';
+  return 'No camera is calibrated: calibrate by walking, or by points.';
 }
 
 /** @param {number[]} values */

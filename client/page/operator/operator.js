@@ -10,10 +10,11 @@ import { ConfigurationTable } from './configuration.js';
 import { FloorPlan } from './floor_plan.js';
 import { Downloads } from './downloads.js';
 import { FlagList } from './assist/flag_list.js';
-import { PictureMarks } from './marking/picture_marks.js';
+import { IgnoredAreas } from './marking/ignored_areas.js';
 import { ZoneEditor } from './zones/zone_editor.js';
 import { PeopleEditor } from './people_editor.js';
-import { CalibrationWalk } from './calibration.js';
+import { CalibrationWalk } from './calibration/walk.js';
+import { CalibrationPoints } from './calibration/points.js';
 import { Palette } from '../people/palette.js';
 import { CamerasSection, SiteCameras } from './site_cameras.js';
 import { SiteRestart } from './site_restart.js';
@@ -76,8 +77,9 @@ function createSections(site) {
   sections.set('flags', flags);
   sections.set('downloads', downloads);
   sections.set('zones', new ZoneEditor(site, palette, floor, showError, () => restart.check()));
-  sections.set('ignored-areas', new PictureMarks(site, showError));
+  sections.set('ignored-areas', new IgnoredAreas(site, showError));
   sections.set('calibration', new CalibrationWalk(showError, () => restart.check()));
+  sections.set('calibration-points', new CalibrationPoints(site, showError, () => restart.check()));
   sections.set('view-selection', new ViewSelectionForm(showError));
   sections.set('configuration', new ConfigurationTable(showError));
   new ServerEvents({

@@ -148,3 +148,14 @@ def test_no_other_homography_fits_noisy_points_better(random: np.random.Generato
     least = error(found)
     for _ in range(20):
         assert error(found * (1 + random.normal(0, 1e-4, (3, 3)))) >= least - 1e-9 * (1 + least)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_camera_straight_above_is_calibrated_whatever_the_errors_of_its_points(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    image = random.uniform((0, 0), (640, 480), (12, 2))
+    points = MarkedPoints("c0", image, image @ np.array([[0.0, 0.01], [0.01, 0.0]]) + 3.0)
+    clicked = MarkedPoints("c0", image + random.normal(0, 0.5, image.shape), points.floor)
+    fit = fit_points(clicked)
+    np.testing.assert_allclose(to_ground(fit.homography, points.image), points.floor, atol=0.02)
+    assert fit.image_error.max() < 3

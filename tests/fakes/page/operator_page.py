@@ -20,19 +20,26 @@ async def open_operator_page(
     browser: Browser, place: str = "", axe: str = "", *, patience: float = 60, **changes: Any
 ) -> AsyncIterator[tuple[ServedSite, Page]]:
     """Open the operator's page of a site; an exception or a refused resource in the page fails the test."""
-    complaints: list[str] = []
     async with aclosing(serve_site(patience=patience, **changes)) as sites:
         served = await anext(sites)
-        page = await new_page(browser, viewport={"width": 1000, "height": 800})
-        await page.add_init_script(axe)  # without the site's content policy
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on(
-            "console",
-            lambda message: complaints.append(message.text) if "Content Security" in message.text else None,
-        )
-        await page.goto(f"http://127.0.0.1:{served.port}/operator{place}")
-        yield served, page
-        await page.close()
+        async with operator_page(browser, served.port, place, axe) as page:
+            yield served, page
+
+
+@asynccontextmanager
+async def operator_page(browser: Browser, port: int, place: str = "", axe: str = "") -> AsyncIterator[Page]:
+    """Open the operator's page on a port; an exception or a refused resource in the page fails the test."""
+    complaints: list[str] = []
+    page = await new_page(browser, viewport={"width": 1000, "height": 800})
+    await page.add_init_script(axe)  # without the site's content policy
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on(
+        "console",
+        lambda message: complaints.append(message.text) if "Content Security" in message.text else None,
+    )
+    await page.goto(f"http://127.0.0.1:{port}/operator{place}")
+    yield page
+    await page.close()
     assert complaints == []
 
 

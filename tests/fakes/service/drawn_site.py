@@ -29,6 +29,7 @@ from fakes.timeouts import PATIENCE
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
+from server.http.app_keys import SiteControl
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, GopChoices, TrackMessage
 from server.messaging.packed_arrays import pack_boxes
@@ -108,7 +109,7 @@ class DrawnSite(ServedSite):
             self.advance()
 
 
-async def drawn_room(**changes: object) -> AsyncIterator[DrawnSite]:
+async def drawn_room(control: SiteControl | None = None, **changes: object) -> AsyncIterator[DrawnSite]:
     """Yield the site; its rendering processes may take as long as a loaded machine needs."""
     with pytest.MonkeyPatch.context() as patch:
         for module, bound in (
@@ -116,16 +117,16 @@ async def drawn_room(**changes: object) -> AsyncIterator[DrawnSite]:
             *((rendered_stream, bound) for bound in ("START_S", "_ANSWER_S", "_PICTURE_TIMEOUT_S")),
         ):
             patch.setattr(module, bound, PATIENCE)
-        async for site in _drawn_room(**changes):
+        async for site in _drawn_room(control, **changes):
             yield site
 
 
-async def _drawn_room(**changes: object) -> AsyncIterator[DrawnSite]:
+async def _drawn_room(control: SiteControl | None, **changes: object) -> AsyncIterator[DrawnSite]:
     service = FedService(small_config(site={"width": SIZE[0], "height": SIZE[1]}, **changes))
     service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
     decisions: dict[int, GopChoices] = {}
     service.on_decision.append(lambda choices: decisions.update({choices.first: choices}))
-    app = make_app(BestViewService(service))
+    app = make_app(BestViewService(service), control=control)
     async with (
         asyncio.timeout(2 * PATIENCE),
         serving(app, HttpSettings(port=0)) as port,

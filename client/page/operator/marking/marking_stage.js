@@ -6,7 +6,9 @@
 import { svg } from '../../shared/dom.js';
 
 /** @import {Site} from '../../shared/api_types.js' */
-/** @import {Point} from './mark_export.js' */
+/** @import {Point} from './camera_pixels.js' */
+
+/** @typedef {{point: Point, label: string, isWrong: boolean}} MarkedPoint */
 
 const STEP = 1; // pixels that an arrow key moves the cross
 const LARGE_STEP = 10; // with shift
@@ -45,13 +47,13 @@ export class MarkingStage {
     this.#draw();
   }
 
-  /** @param {Point[]} points numbered from 1 */
+  /** @param {MarkedPoint[]} points */
   drawPoints(points) {
     const size = this.site.width * CROSS;
-    this.#marks = points.flatMap(([x, y], at) => {
-      const number = svg('text', { x: x + size / 3, y: y - size / 3, 'font-size': size });
-      number.textContent = String(at + 1);
-      return [svg('circle', { cx: x, cy: y, r: size / 4, class: 'point' }), number];
+    this.#marks = points.flatMap(({ point: [x, y], label, isWrong }) => {
+      const text = svg('text', { x: x + size / 3, y: y - size / 3, 'font-size': size });
+      text.textContent = label;
+      return [svg('circle', { cx: x, cy: y, r: size / 4, class: isWrong ? 'point wrong' : 'point' }), text];
     });
     this.#draw();
   }

@@ -1,6 +1,6 @@
 /** Shapes of zones: areas and lines with a direction, and the places that they are drawn on. */
 
-import { toCameraPixels, toSitePixels } from '../marking/mark_export.js';
+import { toCameraPixels, toSitePixels } from '../marking/camera_pixels.js';
 
 /** @import {CameraPicture, SiteZone} from '../api_types.js' */
 

@@ -43,10 +43,9 @@ from server.config.running_config import ConfigFileState
 from server.http.app_keys import SiteControl
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
-from server.service.calibration.points_file import read_points
 
 SECTIONS = ["cameras", "floor", "people", "flags", "downloads"]
-SECTIONS += ["zones", "ignored-areas", "calibration", "view-selection", "configuration"]
+SECTIONS += ["zones", "ignored-areas", "calibration", "calibration-points", "view-selection", "configuration"]
 
 
 pytestmark = [
@@ -333,7 +332,7 @@ async def test_a_late_picture_of_another_camera_does_not_replace_the_selected_on
         await page.route("**/live.jpg", answer)
         async with page.expect_request(f"**/{A}/live.jpg"):
             await page.locator("#sections").get_by_role("link", name="Ignored areas").click()
-        await page.get_by_label("Camera", exact=True).select_option(B)
+        await page.locator("#mark-camera").select_option(B)
         image = page.locator("#mark-image")
         await expect(image).to_have_attribute("src", re.compile("^blob:"))
         shown = await image.get_attribute("src")
@@ -358,7 +357,7 @@ async def test_configured_areas_appear_even_if_buttons_are_pressed_before_they_l
 
         await page.route("**/api/operator/config", answer)
         await page.reload()
-        await page.get_by_label("Camera", exact=True).select_option(B)
+        await page.locator("#mark-camera").select_option(B)
         await page.get_by_role("button", name="Next area").click()
         pressed.set()
         await expect(page.get_by_label("Marks as YAML")).to_have_value(
@@ -395,32 +394,6 @@ async def test_ignored_areas_become_configuration_lines(browser: Browser) -> Non
         small_config(cameras=[{**written, "source": "scene:room"}])
         await page.get_by_role("button", name="Clear").click()
         assert "ignore: []" in await lines.input_value()
-
-
-async def test_floor_points_become_an_input_file_of_calibrate(browser: Browser, tmp_path: Path) -> None:
-    async with open_operator_page(browser, "#ignored-areas") as (served, page):
-        show_people(served)
-        await page.reload()
-        await page.get_by_label("Camera", exact=True).select_option(B)
-        await page.get_by_role("button", name="Points on the floor").click()
-        stage = page.locator("#mark-stage")
-        box = await stage.bounding_box()
-        assert box is not None
-        for pair, (x, y) in enumerate(((0.1, 0.9), (0.9, 0.9), (0.9, 0.5), (0.1, 0.5)), 1):
-            await stage.click(position={"x": x * box["width"], "y": y * box["height"]})
-            await page.get_by_label(f"Pair {pair}, x on the floor").fill(str(10 * x))
-            if pair == 4:
-                await expect(page.locator("#mark-message")).to_contain_text("1 of 4 pairs have no position")
-            await page.get_by_label(f"Pair {pair}, y on the floor").fill(str(-10 * y))
-        await expect(page.locator("#mark-message")).to_be_empty()
-        async with page.expect_download() as download:
-            await page.get_by_role("button", name="Download the points").click()
-        await (await download.value).save_as(tmp_path / "points.json")
-    points = read_points(tmp_path / "points.json")
-    assert points.unit == "m"
-    [camera] = points.cameras
-    assert camera.camera == B
-    np.testing.assert_allclose(camera.image / (64, 48), np.abs(camera.floor) / 10, atol=0.01)
 
 
 async def test_a_calibration_walk_yields_the_scenes_homographies(browser: Browser, tmp_path: Path) -> None:

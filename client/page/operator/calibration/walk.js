@@ -1,12 +1,12 @@
 /** The calibration walk: its coverage while a person walks, and the result of the calibration. */
 
-import { requestOperator } from '../shared/requests.js';
-import { element, make, setText } from '../shared/dom.js';
-import { Repeater } from './section.js';
-import { copy } from '../shared/tools.js';
+import { requestOperator } from '../../shared/requests.js';
+import { element, make, setText } from '../../shared/dom.js';
+import { Repeater } from '../section.js';
+import { ResultView, showList } from './result_view.js';
 
-/** @import {Walk, WalkCamera} from './api_types.js' */
-/** @import {Section, ShowError} from './section.js' */
+/** @import {Walk, WalkCamera} from '../api_types.js' */
+/** @import {Section, ShowError} from '../section.js' */
 
 const INTERVAL_MS = 1000;
 /** @type {Record<Walk['state'], string>} */
@@ -30,11 +30,8 @@ export class CalibrationWalk {
   #discard = element('walk-discard');
   /** @type {HTMLInputElement} */
   #person = element('walk-person');
-  /** @type {HTMLImageElement} */
-  #plan = element('walk-plan');
-  /** @type {HTMLTextAreaElement} */
-  #lines = element('walk-configuration');
   #state = element('walk-state');
+  #result = new ResultView('walk', (text) => setText(this.#state, text));
   #shownResult = '';
 
   /**
@@ -55,11 +52,6 @@ export class CalibrationWalk {
       if (!(await this.#request('POST', { action: 'apply' }))) return;
       setText(this.#state, 'Written into the configuration; the earlier file is kept beside it.');
       await this.fileChanged();
-    });
-    element('walk-copy').addEventListener('click', async () => {
-      const copied = await copy(this.#lines.value);
-      setText(this.#state, copied ? 'Copied.' : 'Select the lines and copy them.');
-      if (!copied) this.#lines.select();
     });
   }
 
@@ -109,12 +101,9 @@ export class CalibrationWalk {
     if (result === this.#shownResult) return;
     this.#shownResult = result;
     if (result) setText(this.#state, walk.error ? `Calibration failed: ${walk.error}` : describeResult(walk));
-    const hasGround = walk.configuration !== '';
-    element('walk-result').hidden = !hasGround;
-    showList('walk-lines', walk.lines);
-    this.#lines.value = walk.configuration;
-    if (hasGround) this.#plan.src = `api/operator/walk/plan.png?${Date.now()}`; // each plan has the same address
-    else this.#plan.removeAttribute('src');
+    const { lines, configuration } = walk;
+    const plan = `api/operator/walk/plan.png?${Date.now()}`; // each plan has the same address
+    this.#result.show(configuration ? { lines, plan, ground: 'api/operator/walk/ground.json', configuration } : null);
   }
 }
 
@@ -134,16 +123,4 @@ function describeResult({ insufficient }) {
 function coverageRow({ camera, foot_points: footPoints, thirds, depth_ratio: depthRatio }) {
   const shares = thirds.map((share) => make('td', { textContent: footPoints ? `${Math.round(100 * share)} %` : '–' }));
   return make('tr', {}, make('th', { scope: 'row', textContent: camera }), ...shares, make('td', { textContent: depthRatio === null ? '–' : `${depthRatio.toFixed(1)} times` }));
-}
-
-/**
- * Update a list if it differs, so that selected text stays selected.
- *
- * @param {string} id
- * @param {string[]} lines
- */
-function showList(id, lines) {
-  const list = element(id);
-  if ([...list.children].map((item) => item.textContent).join('\n') === lines.join('\n')) return;
-  list.replaceChildren(...lines.map((textContent) => make('li', { textContent })));
 }
