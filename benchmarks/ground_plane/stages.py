@@ -11,6 +11,7 @@ from unittest.mock import patch
 from tracking.ground_plane import keyframe_tracker
 from tracking.model.network import Network
 from tracking.solvers import PartsSolver, Solution, WarmStart
+from tracking.solvers.budget import BudgetMeter
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -75,9 +76,13 @@ class ClockedSolver:
         """Solve the network."""
         return self._solve(network, warm_start)
 
-    def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
+    def start(self) -> BudgetMeter:
+        """Return a meter of the budget of one solve."""
+        return self._solver.start()
+
+    def solve_parts(self, networks: Sequence[Network], meter: BudgetMeter | None = None) -> list[Solution]:
         """Solve networks that share the budget."""
-        return self._solve_parts(networks)
+        return self._solve_parts(networks, meter)
 
 
 @contextmanager

@@ -120,8 +120,14 @@ class Solver(Protocol):
 class PartsSolver(Solver, Protocol):
     """Also solves parts that have nothing in common."""
 
-    def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
-        """Return the solutions of networks that are parts of one, and share the budget of one."""
+    def start(self) -> BudgetMeter:
+        """Return a meter of the budget of one solve."""
+
+    def solve_parts(self, networks: Sequence[Network], meter: BudgetMeter | None = None) -> list[Solution]:
+        """Return the solutions of networks that are parts of one, and share the budget of one.
+
+        `meter`: of that budget, of which some may be spent; None: nothing is.
+        """
 
 
 def add_reports(solver: str, reports: Sequence[SolveReport], rest: float = 0.0) -> SolveReport:
@@ -169,14 +175,18 @@ class TimedSolver(ABC):
 
     def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
         """Return the states of all objects in all frames; a warm start only makes it faster."""
-        return self._timed(network, warm_start, BudgetMeter(self._budget))
+        return self._timed(network, warm_start, self.start())
 
-    def solve_parts(self, networks: Sequence[Network]) -> list[Solution]:
+    def start(self) -> BudgetMeter:
+        """Return a meter of the budget of one solve."""
+        return BudgetMeter(self._budget)
+
+    def solve_parts(self, networks: Sequence[Network], meter: BudgetMeter | None = None) -> list[Solution]:
         """Return the solutions of networks that share the budget, the smallest first.
 
         The hardest parts get what is left, so that they keep no other from being solved.
         """
-        meter = BudgetMeter(self._budget)
+        meter = meter or self.start()
         solutions: dict[int, Solution] = {}
         for k in sorted(range(len(networks)), key=lambda k: networks[k].node.size):
             part = meter.rest()

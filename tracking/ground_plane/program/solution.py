@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracking.ground_plane.places.hypotheses import Places
 from tracking.ground_plane.program.costs import Ints, ProgramCosts
 from tracking.ground_plane.program.parts import Part, divide, part_network
+from tracking.ground_plane.program.program_flow import ProgramFlow
 from tracking.ground_plane.program.useful_arcs import GONE, HIDDEN, UnseenPaths, unseen_paths, useful_arcs
 from tracking.solvers.base import PartsSolver, Solution, SolveReport, add_reports
+from tracking.solvers.budget import BudgetMeter
+from tracking.solvers.programs.linear_program import WorkLimitError
+from tracking.solvers.programs.linear_program import solve_program as solve_linear_program
 
 _NEWCOMERS = 4
 """People who may arrive in one part of a window; doubled as long as all of them do."""
@@ -34,21 +41,66 @@ class ProgramSolution:
 def solve_program(costs: ProgramCosts, frames: Sequence[Places], solver: PartsSolver) -> ProgramSolution:
     """Return the optimum of a program, with as many newcomers as it takes.
 
-    The parts share the solver's budget.
+    `solver` solves it part by part if its relaxation is not integral, or takes too much of the budget.
     """
     unseen = unseen_paths(costs)
-    parts = divide(useful_arcs(costs, unseen), [places.conflicts for places in frames])
-    return join_parts(unseen, parts, solve_parts(parts, solver), solver.name)
+    useful, conflicts = useful_arcs(costs, unseen), [places.conflicts for places in frames]
+    meter = solver.start()
+    with suppress(WorkLimitError):
+        if (found := _solve_flow(useful, conflicts, meter, solver.name)) is not None:
+            return found
+    return solve_by_parts(useful, conflicts, unseen, solver, meter)
 
 
-def solve_parts(parts: Sequence[Part], solver: PartsSolver) -> list[Solution]:
+def solve_by_parts(
+    costs: ProgramCosts,
+    conflicts: Sequence[NDArray[np.bool_]],
+    unseen: UnseenPaths,
+    solver: PartsSolver,
+    meter: BudgetMeter | None = None,
+) -> ProgramSolution:
+    """Return the solution of a program of useful arcs, each part solved by itself."""
+    parts = divide(costs, conflicts)
+    return join_parts(unseen, parts, solve_parts(parts, solver, meter), solver.name)
+
+
+def _solve_flow(
+    costs: ProgramCosts, conflicts: Sequence[NDArray[np.bool_]], meter: BudgetMeter, solver: str
+) -> ProgramSolution | None:
+    """Return the optimum of a program whose relaxation is integral; None: it is not.
+
+    Raises:
+        WorkLimitError: the relaxation's share of the meter's budget is spent before.
+    """
+    began = time.perf_counter()
+    flow = ProgramFlow(costs, conflicts)
+    found = solve_linear_program(flow.program, meter=meter)
+    states = flow.states(found.values)
+    if states is None:
+        return None
+    report = SolveReport(
+        solver=solver,
+        objective=found.objective,
+        bound=found.objective,
+        integral=True,
+        conflicts=0,
+        rounds=1,
+        seconds=time.perf_counter() - began,
+    )
+    return ProgramSolution(states, report)
+
+
+def solve_parts(
+    parts: Sequence[Part], solver: PartsSolver, meter: BudgetMeter | None = None
+) -> list[Solution]:
     """Return the solution of each part, with more newcomers as long as all of them arrive."""
+    meter = meter or solver.start()
     newcomers = [min(_NEWCOMERS, part.arrivals) for part in parts]
     solutions: dict[int, Solution] = {}
     unsolved = list(range(len(parts)))
     while unsolved:
         networks = [part_network(parts[k], newcomers[k]) for k in unsolved]
-        solutions |= zip(unsolved, solver.solve_parts(networks), strict=True)
+        solutions |= zip(unsolved, solver.solve_parts(networks, meter), strict=True)
         unsolved = [k for k in unsolved if _needs_more(parts[k], newcomers[k], solutions[k])]
         for k in unsolved:
             newcomers[k] = min(2 * newcomers[k], parts[k].arrivals)

@@ -90,6 +90,10 @@ _FALLBACKS: tuple[tuple[str, str], ...] = (("presolve", "off"),)
 were added may be ill-conditioned, and presolve has reported feasible integer programs as infeasible."""
 
 
+_SOLVED = (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kModelEmpty)
+"""A program without columns and rows has an optimum, too."""
+
+
 class WorkLimitError(Exception):
     """A program was not solved within the budget."""
 
@@ -115,7 +119,7 @@ def run_highs(solver: highspy.Highs, meter: BudgetMeter | None = None) -> Linear
     if status == highspy.HighsModelStatus.kIterationLimit:
         raise WorkLimitError
     for name, value in _FALLBACKS:
-        if status == highspy.HighsModelStatus.kOptimal:
+        if status in _SOLVED:
             break
         _, usual = solver.getOptionValue(name)
         solver.clearSolver()
@@ -123,7 +127,7 @@ def run_highs(solver: highspy.Highs, meter: BudgetMeter | None = None) -> Linear
         solver.run()
         status = solver.getModelStatus()
         solver.setOptionValue(name, usual)
-    if status != highspy.HighsModelStatus.kOptimal:
+    if status not in _SOLVED:
         raise RuntimeError(f"the LP solver ended with {solver.modelStatusToString(status)}")
     found = solver.getSolution()
     info = solver.getInfo()

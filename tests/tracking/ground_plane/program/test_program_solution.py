@@ -1,6 +1,8 @@
-"""A program that is solved in parts has the answer of one network over everybody and all places."""
+"""A program solved as a flow, or in parts, has the answer of one network over everybody and all places."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,10 +11,12 @@ from hypothesis import strategies as st
 
 from fakes.tracking.undivided_window import Window, random_window, undivided_network
 from tracking.ground_plane.program.parts import divide
-from tracking.ground_plane.program.solution import ProgramSolution, solve_program
+from tracking.ground_plane.program.program_flow import ProgramFlow
+from tracking.ground_plane.program.solution import ProgramSolution, solve_by_parts, solve_program
 from tracking.ground_plane.program.useful_arcs import GONE, HIDDEN, unseen_paths, useful_arcs
 from tracking.solvers import SolverBudget, create_solver
 from tracking.solvers.objective import conflict_count, total_cost
+from tracking.solvers.programs.linear_program import solve_program as solve_linear_program
 
 NEWCOMERS = 6
 TOLERANCE = 1e-6
@@ -28,6 +32,21 @@ windows = st.builds(
 
 def solve(window: Window, solver: str = "exact", budget: SolverBudget | None = None) -> ProgramSolution:
     return solve_program(window.costs(), window.frames, create_solver(solver, budget))
+
+
+def solve_in_parts(window: Window, solver: str = "exact") -> ProgramSolution:
+    costs = window.costs()
+    unseen = unseen_paths(costs)
+    conflicts = [places.conflicts for places in window.frames]
+    return solve_by_parts(useful_arcs(costs, unseen), conflicts, unseen, create_solver(solver))
+
+
+def flow_states(window: Window) -> np.ndarray | None:
+    costs = window.costs()
+    flow = ProgramFlow(
+        useful_arcs(costs, unseen_paths(costs)), [places.conflicts for places in window.frames]
+    )
+    return flow.states(solve_linear_program(flow.program).values)
 
 
 def with_gone(states: np.ndarray, gone: int) -> np.ndarray:
@@ -50,10 +69,12 @@ def arrivals(states: np.ndarray, known: int) -> list[list[int]]:
 
 
 @settings(deadline=None, max_examples=150)
-@given(window=windows)
-def test_parts_have_the_cost_and_the_states_of_the_whole(window: Window) -> None:
+@given(window=windows, solving=st.sampled_from([solve, solve_in_parts]))
+def test_flows_and_parts_have_the_cost_and_the_states_of_the_whole(
+    window: Window, solving: Callable[[Window], ProgramSolution]
+) -> None:
     network = undivided_network(window, NEWCOMERS)
-    whole, parts = create_solver("exact").solve(network), solve(window)
+    whole, parts = create_solver("exact").solve(network), solving(window)
     assert parts.report.status == "optimal"
     assert parts.report.objective == pytest.approx(whole.report.objective, abs=TOLERANCE)
     nodes = nodes_of(window, parts.states)
@@ -69,12 +90,20 @@ def test_parts_have_the_cost_and_the_states_of_the_whole(window: Window) -> None
 @given(window=windows, solver=st.sampled_from(["arcs", "columns"]))
 def test_parts_prove_what_the_whole_proves(window: Window, solver: str) -> None:
     whole = create_solver(solver).solve(undivided_network(window, NEWCOMERS)).report
-    parts = solve(window, solver).report
+    parts = solve_in_parts(window, solver).report
     assert parts.bound >= whole.bound - TOLERANCE
     assert parts.bound <= parts.objective
     assert parts.integral or not whole.integral
     assert parts.conflicts == 0
     assert (parts.solver, parts.limit, parts.skipped) == (solver, None, ())
+
+
+@pytest.mark.parametrize("seed", [7, 46, 288, 435])
+def test_where_the_relaxation_is_fractional_the_answer_is_the_optimum_of_the_whole(seed: int) -> None:
+    window = random_window(seed, people=4, frames=4, places=6, width=[1.0, 2.0, 4.0][seed % 3])
+    assert flow_states(window) is None
+    whole = create_solver("exact").solve(undivided_network(window, NEWCOMERS))
+    assert solve(window).report.objective == pytest.approx(whole.report.objective, abs=TOLERANCE)
 
 
 @settings(deadline=None, max_examples=50)
