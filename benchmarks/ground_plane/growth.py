@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.ground_plane.square import FPS, SimulatedSquare
-from benchmarks.ground_plane.stages import STAGES, ClockedSolver, timed_stages
+from benchmarks.ground_plane.stages import STAGES, timed_stages
 from tracking import create_solver
 from tracking.ground_plane import GroundPlaneTracker, GroundSettings
 
@@ -31,8 +31,9 @@ def measure_square(cameras: int, people: int, frames: int, solver: str) -> dict[
     square = SimulatedSquare(cameras, people)
     detections = list(square.frames(_BEFORE + frames))
     with timed_stages() as clock:
-        timed = ClockedSolver(create_solver(solver), clock)
-        tracker = GroundPlaneTracker(square.views, GroundSettings(), timed, FPS, units_per_meter=1.0)
+        tracker = GroundPlaneTracker(
+            square.views, GroundSettings(), create_solver(solver), FPS, units_per_meter=1.0
+        )
         for number, found in enumerate(detections):
             if number == _BEFORE:
                 clock.restart()

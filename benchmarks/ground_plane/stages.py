@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import ParamSpec, TypeVar
 from unittest.mock import patch
 
 from tracking.ground_plane import keyframe_tracker
-from tracking.model.network import Network
-from tracking.solvers import PartsSolver, Solution, WarmStart
-from tracking.solvers.budget import BudgetMeter
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 PLACES, NETWORK, SOLVING, FINISHING, OTHER = "places", "network", "solving", "finishing", "other"
 STAGES = (PLACES, NETWORK, SOLVING, FINISHING, OTHER)
-"""Hypotheses of places; the program and its parts; their solution; people who move, arrive and leave; the
+"""Hypotheses of places; the costs of the program; its solution; people who move, arrive and leave; the
 rest, of which most are boxes between keyframes."""
 
 
@@ -59,35 +56,9 @@ class StageClock:
         self._since = now
 
 
-class ClockedSolver:
-    """A solver whose time counts as that of solving."""
-
-    def __init__(self, solver: PartsSolver, clock: StageClock) -> None:
-        self._solver = solver
-        self._solve = clock.timed(SOLVING, solver.solve)
-        self._solve_parts = clock.timed(SOLVING, solver.solve_parts)
-
-    @property
-    def name(self) -> str:
-        """The name in the registry."""
-        return self._solver.name
-
-    def solve(self, network: Network, warm_start: WarmStart | None = None) -> Solution:
-        """Solve the network."""
-        return self._solve(network, warm_start)
-
-    def start(self) -> BudgetMeter:
-        """Return a meter of the budget of one solve."""
-        return self._solver.start()
-
-    def solve_parts(self, networks: Sequence[Network], meter: BudgetMeter | None = None) -> list[Solution]:
-        """Solve networks that share the budget."""
-        return self._solve_parts(networks, meter)
-
-
 @contextmanager
 def timed_stages() -> Iterator[StageClock]:
-    """Time the stages of all joint trackers within the context, whose solvers are `ClockedSolver`s."""
+    """Time the stages of all joint trackers within the context."""
     clock = StageClock()
     tracker = keyframe_tracker.KeyframeTracker
     functions = [
@@ -95,6 +66,7 @@ def timed_stages() -> Iterator[StageClock]:
         (keyframe_tracker, "predict_places", PLACES),
         (keyframe_tracker, "find_places", PLACES),
         (tracker, "_solve", NETWORK),
+        (keyframe_tracker, "solve_program", SOLVING),
         (tracker, "_finish_oldest", FINISHING),
     ]
     with ExitStack() as stack:

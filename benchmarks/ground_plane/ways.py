@@ -11,7 +11,7 @@ from benchmarks.bestview.camera_tracks import Rows, SceneDetections, track_scene
 from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.bestview.service_decisions import decide
 from benchmarks.ground_plane.frame_by_frame import track_frame_by_frame
-from benchmarks.ground_plane.stages import ClockedSolver, timed_stages
+from benchmarks.ground_plane.stages import timed_stages
 from tracking import Detections, create_solver
 from tracking.evaluation import MultiCameraScores, TruthAndTracks, evaluate_cameras
 from tracking.ground_plane import (
@@ -77,8 +77,7 @@ def run_ways(
     if JOINT in ways:
         began = time.process_time()
         with timed_stages() as clock:
-            timed = ClockedSolver(create_solver(solver), clock)
-            tracker = GroundPlaneTracker(cameras, GroundSettings(), timed, fps)
+            tracker = GroundPlaneTracker(cameras, GroundSettings(), create_solver(solver), fps)
             joint = rows_of(track_ground_plane(tracker, enumerate(frames)), cameras)
         yield score(JOINT, joint, began, clock.seconds)
     if BY_FRAME in ways:

@@ -77,6 +77,22 @@ def fuse(places: Floats, covariances: Floats) -> tuple[Floats, Floats]:
     return np.asarray(covariance @ np.einsum("nij,nj->i", weights, places)), covariance
 
 
+def fuse_two(first: tuple[Floats, Floats], second: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Return what `fuse` does for two measurements, each a place and its covariance, in less time."""
+    information = [0.0] * 5  # xx, xy, yy of the inverse covariance, and its product with the place
+    for place, covariance in (first, second):
+        (xx, xy), (_, yy) = covariance.tolist()
+        x, y = place.tolist()
+        scale = 1.0 / (xx * yy - xy * xy)
+        xx, xy, yy = scale * yy, -scale * xy, scale * xx
+        found = (xx, xy, yy, xx * x + xy * y, xy * x + yy * y)
+        information = [one + other for one, other in zip(information, found, strict=True)]
+    xx, xy, yy, x, y = information
+    scale = 1.0 / (xx * yy - xy * xy)
+    xx, xy, yy = scale * yy, -scale * xy, scale * xx
+    return np.array([xx * x + xy * y, xy * x + yy * y]), np.array([[xx, xy], [xy, yy]])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FusedPlaces:
     """The places that groups of measurements determine.

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from tracking.boxes import Floats
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
@@ -130,14 +131,15 @@ def find_places(
     members = np.concatenate([members, (members | more.members)[extended]])
     costs *= settings.detection_weight(seconds)
     kept = np.flatnonzero(costs < _MAX_COST)
-    shared = members[kept].astype(np.float64)
+    sharing = csr_array(members[kept], dtype=np.int32)
+    shared = csr_array(sharing @ sharing.T)
     return Places(
         measurements,
         tuple(groups[k] for k in kept),
         means[kept],
         covariances[kept],
         costs[kept],
-        np.asarray(shared @ shared.T > 0.0),
+        np.asarray(shared.toarray() > 0),
         misplaced[kept],
     )
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fakes.tracking.walked_floor import FloorNoise, detect_walkers, floor_views
 from tracking.ground_plane import GroundSettings
 from tracking.ground_plane.camera import BoxSizes
-from tracking.ground_plane.gaussians import FusedPlaces, fuse, negative_log_densities
+from tracking.ground_plane.gaussians import FusedPlaces, fuse, fuse_two, negative_log_densities
 from tracking.ground_plane.places.agglomeration import agglomerate
 from tracking.ground_plane.places.hypotheses import find_places, group_costs
 from tracking.ground_plane.places.measurements import Measurements, covered_by_better, measure
@@ -47,6 +47,17 @@ def test_the_cost_of_a_group_is_the_integral_over_its_place(seed: int) -> None:
     expected = -integral + measurements.log_clutter.sum() - len(group) * np.log(0.9)
     (cost,) = group_costs(measurements, np.ones((1, len(group)), dtype=np.bool_), fused, 0.9)
     assert cost == pytest.approx(expected, abs=0.02)
+
+
+@few
+@given(seeds)
+def test_two_measurements_are_fused_like_any_number(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    places, roots = random.normal(0.0, 3.0, (2, 2)), random.normal(0.0, 1.0, (2, 2, 2))
+    covariances = roots @ roots.transpose(0, 2, 1) + 0.01 * np.eye(2)
+    found = fuse_two((places[0], covariances[0]), (places[1], covariances[1]))
+    for one, other in zip(found, fuse(places, covariances), strict=True):
+        assert one == pytest.approx(other, rel=1e-9)
 
 
 @few
