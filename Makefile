@@ -12,7 +12,7 @@ install = UV_SYSTEM_CERTS=1 $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 DOCS_STAMP := $(VENV)/.docs
 
-.PHONY: demo test test-slow test-loaded lint lint-tests format bench docs lock clean node_modules
+.PHONY: demo test test-slow test-loaded lint lint-tests format bench docs lock sbom clean node_modules
 
 demo: $(RUNTIME)
 	$(BIN)/myview demo
@@ -58,6 +58,10 @@ docs: $(DOCS_STAMP)
 lock: $(STAMP)
 	$(BIN)/uv pip compile --quiet --universal --no-emit-index-url --no-emit-find-links --no-header \
 		--extra dev --extra docs --output-file requirements/lock.txt pyproject.toml
+
+# Lists what MyView needs to run, with versions and licenses, as CycloneDX: build/sbom.cdx.json.
+sbom: $(STAMP)
+	$(BIN)/python requirements/sbom.py build/sbom.cdx.json
 
 # Installs only what MyView needs to run, for a fast start of the demo.
 $(RUNTIME): pyproject.toml requirements/lock.txt

@@ -21,7 +21,7 @@ DOCKERFILE = """
 FROM {image}
 USER root
 RUN apt-get update -qq && apt-get install -y -qq --no-install-recommends systemd systemd-sysv >/dev/null \\
-    && ln -s /usr/local /opt/myview && install --directory --owner myview /etc/myview
+    && install --directory --owner myview /etc/myview
 ENTRYPOINT []
 CMD ["/lib/systemd/systemd"]
 """
