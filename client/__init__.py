@@ -1,8 +1,17 @@
 """The Python client of MyView's HTTP interface; ``page/`` is the browser's."""
 
 from client.api import cameras, choice, delays, objects, past, site, spans
+from client.deletion import PersonDeletion, delete_person, plan_deletion
 from client.events import events
-from client.http import AwayError, ClientError, ContractError, HttpSettings, NotFoundError, RefusedError
+from client.http import (
+    AwayError,
+    ClientError,
+    ContractError,
+    HttpSettings,
+    NotFoundError,
+    RefusedError,
+    ServerError,
+)
 from client.model import (
     Box,
     Camera,
@@ -40,10 +49,12 @@ __all__ = [
     "HttpSettings",
     "NotFoundError",
     "Objects",
+    "PersonDeletion",
     "PersonNow",
     "Progress",
     "RefusedError",
     "SeenObject",
+    "ServerError",
     "ServiceNow",
     "Site",
     "SiteNow",
@@ -52,9 +63,11 @@ __all__ = [
     "cameras",
     "choice",
     "delays",
+    "delete_person",
     "events",
     "objects",
     "past",
+    "plan_deletion",
     "record",
     "site",
     "spans",

@@ -24,6 +24,7 @@ _MAX_SHOWN = 300
 """Characters of a library's message."""
 _SILENT_S, _SILENT_GOPS = 1.0, 2.5
 """Silence after which a server that can be replaced counts as gone."""
+_JSON = "application/json"
 _NOT_FOUND = 404
 _CLIENT_ERRORS = range(400, 500)
 _ANSWER = TypeVar("_ANSWER")
@@ -43,6 +44,10 @@ class RefusedError(ClientError):
 
 class AwayError(ClientError):
     """The server cannot be reached, or the connection is lost."""
+
+
+class ServerError(AwayError):
+    """The server answers that it cannot do this now (5xx)."""
 
 
 class ContractError(ClientError):
@@ -142,7 +147,16 @@ async def get(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[ai
 
 @asynccontextmanager
 async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterator[aiohttp.ClientResponse]:
-    """Open a response of any status for reading.
+    """Open a response of any status for reading; errors as `_request`."""
+    async with _request("GET", url, settings, accept) as answer:
+        yield answer
+
+
+@asynccontextmanager
+async def _request(
+    method: str, url: URL, settings: HttpSettings, accept: str, content: object = None
+) -> AsyncIterator[aiohttp.ClientResponse]:
+    """Open a response of any status, to a request with this content as JSON unless it is None.
 
     Raises:
         AwayError: there is no response, or a network error occurs inside the block.
@@ -153,7 +167,8 @@ async def get_any(url: URL, settings: HttpSettings, accept: str) -> AsyncIterato
     try:
         async with aiohttp.ClientSession(timeout=timeout) as session:
             async with asyncio.timeout(settings.answer_timeout):
-                opening = await session.get(url, headers=_headers(settings, accept))
+                headers = _headers(settings, accept)
+                opening = await session.request(method, url, headers=headers, json=content)
             async with opening as answer:
                 yield answer
     except aiohttp.TooManyRedirects as error:
@@ -213,7 +228,18 @@ async def get_json(url: URL, kind: type[_ANSWER], settings: HttpSettings) -> _AN
     Raises:
         ClientError: the request fails, or the body is not of type ``kind``.
     """
-    body = await get_body(url, settings, "application/json")
+    return _decode_answer(url, await get_body(url, settings, _JSON), kind)
+
+
+async def post_json(url: URL, content: object, kind: type[_ANSWER], settings: HttpSettings) -> _ANSWER:
+    """Send JSON that changes something; decode the answer; errors as `get_json`."""
+    async with _request("POST", url, settings, _JSON, content) as answer:
+        await _check(answer, settings)
+        body = await read_body(answer, settings)
+    return _decode_answer(url, body, kind)
+
+
+def _decode_answer(url: URL, body: bytes, kind: type[_ANSWER]) -> _ANSWER:
     try:
         return decode_json(body, kind)
     except ValueError as error:
@@ -233,7 +259,7 @@ def decode_json(text: bytes | str, kind: type[_ANSWER]) -> _ANSWER:
 
 
 def _headers(settings: HttpSettings, accept: str) -> dict[str, str]:
-    heads = {"Accept": accept}
+    heads = {"Accept": accept, "X-MyView-Changes": "1"}  # which tells pages of other sites apart
     return heads if settings.token is None else {**heads, "Authorization": f"Bearer {settings.token}"}
 
 
@@ -249,7 +275,7 @@ async def _check(answer: aiohttp.ClientResponse, settings: HttpSettings) -> None
         raise NotFoundError(message)
     if answer.status in _CLIENT_ERRORS:
         raise RefusedError(message)
-    raise AwayError(f"{answer.url.origin()}: {message}")
+    raise ServerError(f"{answer.url.origin()}: {message}")
 
 
 class _ErrorBody(msgspec.Struct):

@@ -1,4 +1,4 @@
-"""Commands for users of a site: doctor, status, watch and token.
+"""Commands for users of a site: doctor, status, watch, delete-person and token.
 
 Each imports its modules when it runs, so that a process loads no more than it needs.
 """
@@ -83,6 +83,31 @@ def watch(
     from server.cli.watch import run_watch
 
     asyncio.run(run_until_signal(lambda: run_watch(urls, number, out, seconds, start, end, token, delay)))
+
+
+def delete_person(
+    number: Annotated[int, typer.Option("--object", min=1, help="The person's number.")],
+    url: Annotated[
+        str, typer.Argument(metavar="[URL]", help="The server.", show_default=True)
+    ] = "http://localhost:8080",
+    recordings: Annotated[
+        Literal["keep", "delete"] | None,
+        typer.Option("--recordings", help="What to do with video and sound of when they were visible."),
+    ] = None,
+    run: Annotated[
+        str | None,
+        typer.Option("--run", help="The recorded session that the number is of, if an earlier one."),
+    ] = None,
+    for_good: Annotated[
+        bool, typer.Option("--for-good", help="Delete; without it, print what would be deleted.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    token: _AccessToken = None,
+) -> None:
+    """Show what would be deleted of a person, and what others lose; delete it with --for-good."""
+    from server.cli.person_deletion import run_delete_person
+
+    asyncio.run(run_delete_person(url, number, recordings, run, token, for_good=for_good, as_json=as_json))
 
 
 def token(

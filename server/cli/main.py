@@ -63,6 +63,7 @@ for run in (
     client_commands.watch,
     client_commands.doctor,
     client_commands.status,
+    client_commands.delete_person,
     client_commands.token,
 ):
     app.command()(run)

@@ -13,12 +13,11 @@ from typing import Any
 
 import pytest
 
-from fakes.http.tokens import TOKEN_ENTRIES, bearer, serve_with_tokens
+from fakes.http.tokens import TOKEN_ENTRIES, bearer
 from fakes.service.fed_site import ServedSite
-from fakes.service.scripted_cameras import CAMERAS, FPS, LARGE
+from fakes.service.recorded_people import EPOCHS, FEET, serve_recorded_people, show
+from fakes.service.scripted_cameras import CAMERAS, FPS
 from server.http.access.csrf import CSRF_HEADER
-from server.messaging.messages import Box
-from server.service.decision_files.live_decision_writer import LiveDecisionWriter
 from server.service.deletion import decision_rows, recording_deletion
 from server.service.deletion.journal import JOURNAL_FILE, Deletion, DeletionJournal
 from server.service.deletion.recorded_traces import RecordedTraces, find_traces
@@ -30,13 +29,6 @@ from server.service.recording.segment_index import IndexEntry, SegmentIndex
 
 DELETION = "/api/operator/deletion"
 A, B = CAMERAS
-FEET: Box = (22.0, 10.0, 28.0, 28.0)
-EPOCHS = 16
-ZONES = [{"id": "all", "camera": "c0", "area": [[0, 0], [64, 0], [64, 48], [0, 48]]}]
-RULES = [
-    {"id": "in", "kind": "entered", "zone": "all"},
-    {"id": "ann", "kind": "left", "zone": "all", "people": ["Ann"]},
-]
 
 
 async def search_here(task: SearchTask) -> SearchResult:
@@ -45,28 +37,9 @@ async def search_here(task: SearchTask) -> SearchResult:
 
 @pytest.fixture
 async def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[ServedSite]:
-    """Serve a recording site: person 1 is in both cameras for 8 epochs, person 2 in c1 all the time."""
     monkeypatch.setattr(past_search, "run_search", search_here)
-    record = {"folder": str(tmp_path / "kept"), "segment_s": 0.4}
-    async with serve_with_tokens(tmp_path, record=record, zones=ZONES, rules=RULES) as served:
-        service = served.service
-        service.frames = (EPOCHS + 16) * 5
-        service.recorder.open()
-        service.decision_writer = LiveDecisionWriter(
-            tmp_path / "out", service.config.camera_ids, service.decider.people.letterboxes
-        )
-        service.connect_cameras(*CAMERAS)
-        for epoch in range(EPOCHS):
-            show(served, epoch, ann=FEET if epoch < 8 else None)
-        service.decider.people.registry.names = {1: "Ann"}
-        assert service.recorder.writer is not None
-        await asyncio.wrap_future(service.recorder.writer.run(lambda: None))  # all is on the disk
+    async with serve_recorded_people(tmp_path) as served:
         yield served
-        service.decision_writer.close()
-
-
-def show(site: ServedSite, epoch: int, ann: Box | None) -> None:
-    site.service.feed(epoch, {A: {1: ann}, B: {1: ann, 2: LARGE}})
 
 
 async def plan(site: ServedSite, query: str, token: str = "lead") -> tuple[int, Any]:  # noqa: S107
