@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEndedError
 from server.cli.doctor.stream_probe import StreamStats, file_fps, measure_stream
+from server.cli.doctor.substream import SubstreamProbe, probe_substream
 from server.config.camera_password import fill_in_password
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
@@ -31,6 +32,7 @@ class CameraProbe:
         frames: the number of frames run.
         kbps: bit rate of the site's stream.
         cores: processor cores that the camera needs at the site's rate.
+        substream: the result for its substream; None: it has none.
     """
 
     problem: str = ""
@@ -42,6 +44,7 @@ class CameraProbe:
     frames: int = 0
     kbps: float = 0.0
     cores: float = 0.0
+    substream: SubstreamProbe | None = None
 
 
 def probe_camera(config: Config, camera_id: str, seconds: float) -> CameraProbe:
@@ -53,18 +56,24 @@ def probe_camera(config: Config, camera_id: str, seconds: float) -> CameraProbe:
         kind = source_kind(camera.source)
         if kind is SourceKind.STREAM:
             sent = measure_stream(camera.source, camera.options, seconds / 2, seconds)
+        substream = probe_substream(camera, sent, seconds / 4, seconds)
         pipeline = CameraPipeline(config, camera_id)
     except UserError as error:
         return CameraProbe(str(error).removeprefix(f"camera {camera_id}: "), sent)
     try:
-        probe = _run_frames(config, pipeline, sent, time.monotonic() + seconds / 2)
-        return replace(probe, recorded_fps=file_fps(camera.source) if kind is SourceKind.FILE else None)
+        probe = _run_frames(config, pipeline, sent, substream, time.monotonic() + seconds / 2)
+        recorded_fps = file_fps(camera.source) if kind is SourceKind.FILE else None
+        return replace(probe, recorded_fps=recorded_fps, substream=substream)
     finally:
         pipeline.close()
 
 
 def _run_frames(
-    config: Config, pipeline: CameraPipeline, sent: StreamStats | None, until: float
+    config: Config,
+    pipeline: CameraPipeline,
+    sent: StreamStats | None,
+    substream: SubstreamProbe | None,
+    until: float,
 ) -> CameraProbe:
     fps, size = config.site.fps, pipeline.source.size
     live = not pipeline.source.recorded
@@ -84,6 +93,8 @@ def _run_frames(
             time.sleep(1 / fps)
     cpu_s = time.thread_time() - began
     decoding = sent.cpu_s_per_picture if sent is not None else 0.0
+    if sent is not None and substream is not None and substream.substream is not None:
+        decoding = substream.substream.cpu_s_per_picture + (0.0 if pipeline.is_passthrough else decoding)
     per_frame = 1 / max(1, frames)
     return CameraProbe(
         problem="" if frames else "no picture arrived in time",

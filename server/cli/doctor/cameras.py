@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from server.camera.audio import open_site_audio
 from server.cli.doctor.camera_probe import CameraProbe, probe_camera
 from server.cli.doctor.findings import Finding, bad, describe_bug, ok, reason_of, warning
+from server.cli.doctor.substream import substream_findings
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, is_device_path, source_kind
 from server.system.address_redaction import redact_to_host
@@ -106,7 +107,8 @@ def _findings_of(config: Config, camera: str, probe: CameraProbe, *, runs: bool)
         parts.append(f"{rate:.1f} pictures a second")
     encoding = "its own H.264 passes" if probe.passes else f"{probe.kbps:.0f} kbit/s"
     parts += [encoding, f"{probe.cores:.2f} of a core"]
-    return [ok(check, ", ".join(parts)), *_quality_findings(config, check, probe)]
+    small = [] if probe.substream is None else substream_findings(check, probe.substream)
+    return [ok(check, ", ".join(parts)), *small, *_quality_findings(config, check, probe)]
 
 
 def _remedy(source: str) -> str:

@@ -7,10 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import av
+import numpy as np
 from av.video.frame import VideoFrame
+from numpy.typing import NDArray
 
 from server.camera.sources.opening import OpenedVideo, open_video
+from server.camera.sources.orientation import pixel_aspect
 
+_SMALL = (64, 36)
+"""Size to which pictures are scaled for their mean, which shows what stands still."""
 _MIN_PICTURES = 5
 """Fewest pictures from which a rate is computed."""
 
@@ -25,6 +30,8 @@ class StreamStats:
         pictures: the number of decoded pictures.
         damaged_packets: the number of packets that could not be decoded.
         cpu_s_per_picture: processor seconds for decoding a picture.
+        pixel_aspect: width of a pixel over its height.
+        picture: the mean of the pictures, small, gray; None: there was none.
     """
 
     size: tuple[int, int]
@@ -32,6 +39,13 @@ class StreamStats:
     pictures: int
     damaged_packets: int
     cpu_s_per_picture: float
+    pixel_aspect: float = 1.0
+    picture: NDArray[np.float64] | None = None
+
+    @property
+    def shown_size(self) -> tuple[float, int]:
+        """Width and height as displayed."""
+        return self.size[0] * self.pixel_aspect, self.size[1]
 
 
 def measure_stream(url: str, options: Mapping[str, str], seconds: float, open_s: float) -> StreamStats:
@@ -59,7 +73,8 @@ def file_fps(file: str) -> float:
 
 
 def _measure(opened: OpenedVideo, until: float) -> StreamStats:
-    times: list[float] = []
+    times, stamps = list[float](), list[float]()
+    total = np.zeros((_SMALL[1], _SMALL[0]))
     damaged, began = 0, time.thread_time()
     try:
         for packet in opened.container.demux(opened.stream):
@@ -67,12 +82,25 @@ def _measure(opened: OpenedVideo, until: float) -> StreamStats:
                 pictures = [frame for frame in packet.decode() if isinstance(frame, VideoFrame)]
             except av.error.FFmpegError:
                 damaged, pictures = damaged + 1, []
-            times += [time.monotonic() if frame.time is None else frame.time for frame in pictures]
+            for picture in pictures:
+                total += picture.reformat(*_SMALL, format="gray").to_ndarray()
+            times += [time.monotonic() for _ in pictures]
+            stamps += [frame.time for frame in pictures if frame.time is not None]
             if time.monotonic() >= until:
                 break
     except (av.error.FFmpegError, OSError):
         damaged += 1  # it stopped sending
     cpu_s = time.thread_time() - began
-    span = times[-1] - times[0] if times else 0.0
-    fps = (len(times) - 1) / span if len(times) >= _MIN_PICTURES and span > 0 else None
-    return StreamStats(opened.size, fps, len(times), damaged, cpu_s / max(1, len(times)))
+    # The first picture by RTSP has no time stamp.
+    measured = stamps if len(stamps) > 1 else times
+    span = measured[-1] - measured[0] if measured else 0.0
+    fps = (len(measured) - 1) / span if len(measured) >= _MIN_PICTURES and span > 0 else None
+    return StreamStats(
+        opened.size,
+        fps,
+        len(times),
+        damaged,
+        cpu_s / max(1, len(times)),
+        pixel_aspect(opened.stream),
+        total / len(times) if times else None,
+    )

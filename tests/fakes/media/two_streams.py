@@ -26,9 +26,11 @@ Picture = NDArray[np.uint8]
 
 
 def walker_picture(frame: int, size: tuple[int, int]) -> Picture:
-    """Draw a frame at a size: a bright walker in a dark room."""
+    """Draw a frame at a size: a bright walker before a dark wall with panels."""
     scale = size[0] / MAIN[0]
-    picture = np.full((size[1], size[0], 3), 40, dtype=np.uint8)
+    rows, columns = np.arange(size[1]) * 6 // size[1], np.arange(size[0]) * 10 // size[0]
+    gray = 25 + 15 * ((2 * rows[:, None] + 3 * columns[None]) % 5)
+    picture = np.repeat(gray.astype(np.uint8)[..., None], 3, axis=2)
     left, top = round((4 + _STEP * (frame % FRAMES)) * scale), round(70 * scale)
     picture[top : top + round(_WALKER[1] * scale), left : left + round(_WALKER[0] * scale)] = 230
     return picture
