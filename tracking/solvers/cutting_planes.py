@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,17 @@ class RowMembers:
         owner = np.zeros_like(owners) if self._alike else owners
         return np.asarray(self._members[np.arange(len(self._frames)), owner[:, None], nodes[:, self._frames]])
 
+    def of_arcs(self, owners: Ints, frames: Ints, nodes: Ints) -> tuple[Ints, Ints]:
+        """Return pairs of arc and row, both (X,): arcs (A,) of `owners` into `nodes` of `frames`."""
+        owner = np.zeros_like(owners) if self._alike else owners
+        arcs, rows = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+        for frame in np.unique(self._frames).tolist():
+            into, limited = np.flatnonzero(frames == frame), np.flatnonzero(self._frames == frame)
+            row, arc = np.nonzero(self._members[limited][:, owner[into], nodes[into]])
+            arcs.append(into[arc])
+            rows.append(limited[row])
+        return np.concatenate(arcs), np.concatenate(rows)
+
     def add_prices(self, node: Floats, prices: Floats) -> Floats:
         """Return node costs `node` (n, M, S) with prices (R,) of the first R rows."""
         sheet = np.zeros((self._members.shape[1], *node.shape[1:]))
@@ -91,20 +102,39 @@ class ConflictSeparator:
 
     def find_new_violated(self, usage: Floats) -> list[ConflictRow]:
         """Return the rows that y = `usage` (n, M, S) violates and that were not returned before."""
-        found = []
+        found: list[ConflictRow] = []
         visits = self._visits(usage)
         around = (self._relation @ visits[:, :, None])[:, :, 0]
         # Places whose conflicting places carry more than one path; without any, no row is violated.
         suspects = around > 1.0 + _TOLERANCE
+        if self._network.shared and not self._stars and suspects.any():
+            for frame, place in self._whole_cliques(suspects):
+                suspects[frame, place] = False
+                self._add_new(found, frame, self._relation[frame, place])
         for frame in np.flatnonzero(suspects.any(axis=1)).tolist():
             flow = usage[:, frame, :-1].ravel() if self._stars else visits[frame]
             for component in self._components_at(frame, np.flatnonzero(suspects[frame])):
                 for row in component.rows[component.rows @ flow > 1.0 + _TOLERANCE]:
-                    key = (frame, row.tobytes())
-                    if key not in self._returned:
-                        self._returned.add(key)
-                        found.append(self._row(frame, row))
+                    self._add_new(found, frame, row)
         return found
+
+    def _whole_cliques(self, suspects: Bools) -> Iterator[tuple[int, int]]:
+        """Yield frame and place of the suspects (M, K) whose component is one clique.
+
+        Each place that they conflict with conflicts with the same places.
+        """
+        frames, places = np.nonzero(suspects)
+        own = self._network.conflicts[frames, places]
+        differs = (self._network.conflicts[frames] != own[:, None]).any(axis=2)
+        alike = ~(differs & own).any(axis=1)
+        yield from zip(frames[alike].tolist(), places[alike].tolist(), strict=True)
+
+    def _add_new(self, found: list[ConflictRow], frame: int, row: Floats) -> None:
+        """Add a row to `found` if it was not returned before."""
+        key = (frame, row.tobytes())
+        if key not in self._returned:
+            self._returned.add(key)
+            found.append(self._row(frame, row))
 
     def match_prices(self, rows: Sequence[ConflictPrice]) -> tuple[list[ConflictRow], list[float]]:
         """Return those of the rows, with their prices, that are rows of this network."""

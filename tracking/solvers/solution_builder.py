@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.base import Solution, SolveReport
 from tracking.solvers.budget import BudgetMeter, Limit
@@ -18,7 +19,11 @@ from tracking.solvers.heuristics.rounding import round_relaxation
 from tracking.solvers.hidden_paths import allow_hiding
 from tracking.solvers.objective import Ints, conflict_count, states_from_nodes, total_cost
 from tracking.solvers.relaxation import CLOSE_GAP, RelaxedSolution
+from tracking.solvers.viterbi import MinMarginals, Trellis, best_paths
 from tracking.solvers.warm_start import ConflictPrice, WarmStart
+
+_TOLERANCE = 1e-9
+"""Relative tolerance of bounds, for the rounding errors of sums of costs."""
 
 
 def solution_from_relaxation(
@@ -55,15 +60,21 @@ def integer_nodes(
         if found.is_integral and np.isfinite(total_cost(network, nodes, power)):
             return nodes
     network = allow_hiding(network)
-    improver = LocalSearch(network, power, meter, found.answer.near_arcs if found.answer else None)
+    alone = best_paths(Trellis.of(network))
+    if found.answer:
+        improver = LocalSearch(network, power, meter, found.answer.near_arcs)
+    else:
+        greedy = greedy_paths(network, alone).nodes
+        states = None if network.layout else _states_within(found, total_cost(network, greedy))
+        improver = LocalSearch(network, power, meter, states=states)
 
     def starts() -> Iterator[Ints]:
         if found.answer:
             yield found.answer.nodes
-        candidates = candidate_nodes(network, improver.alone, warm_start)
+        candidates = candidate_nodes(network, alone, warm_start)
         candidate = min(candidates, key=lambda start: total_cost(network, start, power))
         yield from sorted([nodes, candidate], key=lambda start: total_cost(network, start, power))
-        yield greedy_paths(network, improver.alone).nodes
+        yield greedy_paths(network, alone).nodes if found.answer else greedy
 
     known: list[Ints] = []
     improved: list[Ints] = []
@@ -78,6 +89,13 @@ def integer_nodes(
         if cost - found.bound <= close * max(1.0, abs(cost)):
             return best
     return improver.improve(recombine(network, [best, *improved, *known], power, improver.meter))
+
+
+def _states_within(found: RelaxedSolution, cost: float) -> Bools:
+    """Return which states (n, M, S) answers without layout term that cost no more than `cost` may have."""
+    passes = MinMarginals.of(found.priced)
+    gap = max(cost - found.bound, 0.0) + _TOLERANCE * max(1.0, abs(cost))
+    return np.asarray(passes.through - passes.least[:, None, None] <= gap)
 
 
 @dataclass(frozen=True, slots=True)

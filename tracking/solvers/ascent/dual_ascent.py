@@ -15,7 +15,7 @@ from tracking.solvers.cutting_planes import ConflictRow, ConflictSeparator
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import MinMarginals, PathPricer, PrunedStates, best_paths
 
-_STEPS, _STEP_DECAY, _FIRST_STEP = 25, 0.92, 0.2
+_STEPS, _STEP_DECAY, _FIRST_STEP = 15, 0.88, 0.2
 """Steps, the length of each over the one before, and that of the first as a share of a typical price."""
 
 _MOMENTUM, _DECAY, _EPSILON = 0.6, 0.9, 1e-3

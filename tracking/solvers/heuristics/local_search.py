@@ -1,8 +1,6 @@
-"""Local search: one object after another takes its best path around the others."""
+"""Local search: objects take their best paths around the others, as long as that makes an answer cheaper."""
 
 from __future__ import annotations
-
-from functools import cached_property
 
 import numpy as np
 
@@ -10,9 +8,9 @@ from tracking.boxes import Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.budget import BudgetMeter
-from tracking.solvers.objective import Ints, locations_at, path_cost, total_cost
+from tracking.solvers.objective import Ints, locations_at, path_cost, path_costs, total_cost
 from tracking.solvers.sparse_trellis import SparseTrellis
-from tracking.solvers.viterbi import MinMarginals, Paths, PrunedStates, Trellis, best_paths, trace_back
+from tracking.solvers.viterbi import Paths, PrunedStates, Trellis, best_paths
 
 _MAX_ROUNDS = 20
 """Limit of the rounds, far above what convergence takes."""
@@ -24,7 +22,7 @@ _MIN_IMPROVEMENT = 1e-12
 class LocalSearch:
     """Coordinate descent over the objects of one network; `power` is that of its layout term.
 
-    With a layout term, `arcs` are those that objects may be moved to; None: all.
+    Objects are moved to `states` (n, M, S), with a layout term to `arcs`; None: to all.
 
     Attributes:
         meter: what limits the search.
@@ -36,94 +34,147 @@ class LocalSearch:
         power: int = 1,
         meter: BudgetMeter | None = None,
         arcs: SparseTrellis | None = None,
+        states: Bools | None = None,
     ) -> None:
-        self._network = network
-        self._power = power
         self.meter = meter or BudgetMeter()
-        self._paths: _PathsAlone | _PathsInLayout
+        self._descent: _TogetherDescent | _LayoutDescent
         if network.layout and network.frames > 1:
-            self._paths = _PathsInLayout(network, power, self.meter, arcs)
+            self._descent = _LayoutDescent(network, power, self.meter, arcs)
         else:
-            self._paths = _PathsAlone(network, self.meter)
+            self._descent = _TogetherDescent(network, self.meter, states)
 
-    @property
-    def alone(self) -> Paths:
-        """The cheapest path of each object without regard to the others."""
-        return self._paths.alone
-
-    def improve(self, nodes: Ints, bound: float = -np.inf) -> Ints:
+    def improve(self, nodes: Ints) -> Ints:
         """Return nodes (n, M) without conflicts that cost no more, from nodes without conflicts.
 
-        They are the same nodes if the meter's budget is spent. It ends when they cost no more than `bound`.
-        Repairs the effects of rounding each frame separately (II.D): missing arcs if arcs are gated, and
-        jumps where the relaxation was fractional.
+        They are the same nodes if the meter's budget is spent. Repairs the effects of rounding each frame
+        separately (II.D): missing arcs if arcs are gated, and jumps where the relaxation was fractional.
         """
-        descent = _CoordinateDescent(self._network, self._paths, self._power, self.meter, nodes)
-        cost = total_cost(self._network, nodes, self._power)
-        for _ in range(_MAX_ROUNDS):
-            if cost <= bound:
-                break
-            changed = [descent.reroute(owner) for owner in range(self._network.objects)]
-            before, cost = cost, total_cost(self._network, descent.nodes, self._power)
-            if not any(changed) or not cost < before - _MIN_IMPROVEMENT * max(1.0, abs(cost)):
-                break
-        return descent.nodes
+        return self._descent.improve(nodes.copy())
 
 
-class _PathsAlone:
-    """Best paths of single objects where only conflicts couple them."""
+class _OccupiedPlaces:
+    """The places that paths exclude for others."""
 
-    def __init__(self, network: Network, meter: BudgetMeter) -> None:
+    def __init__(self, network: Network) -> None:
+        self._network, self._exclusions = network, network.exclusions()
+        self._frames = np.arange(network.frames)
+
+    def of(self, owners: Ints, nodes: Ints) -> Bools:
+        """Return the places (C, M, P K) that conflict with paths `nodes` (C, M) of `owners` (C,)."""
+        network, places = self._network, self._network.max_places
+        if not self._exclusions.size:
+            return np.zeros((*nodes.shape, len(network.boxes) * places), dtype=np.bool_)
+        visible = nodes < places
+        index = np.where(visible, network.sets[owners][:, None] * places + nodes, 0)
+        return np.asarray(self._exclusions[self._frames, index] & visible[:, :, None])
+
+    def own(self, owners: Ints, occupied: Bools) -> Bools:
+        """Return those of places `occupied` (C, M, P K) that are observations of `owners`, (C, M, K)."""
+        sets, places = len(self._network.boxes), self._network.max_places
+        by_set = occupied.reshape(*occupied.shape[:2], sets, places)
+        return np.asarray(by_set[np.arange(len(owners)), :, self._network.sets[owners]])
+
+    def are_free(self, owner: int, nodes: Ints, occupied: Bools) -> bool:
+        """Return whether a path `nodes` (M,) of `owner` is outside places `occupied` (M, P K)."""
+        places = self._network.max_places
+        visible = np.flatnonzero(nodes < places)
+        return not bool(occupied[visible, self._network.sets[owner] * places + nodes[visible]].any())
+
+
+class _TogetherDescent:
+    """Where only conflicts couple objects: the best paths of all around the others, in one pass a round."""
+
+    def __init__(self, network: Network, meter: BudgetMeter, states: Bools | None = None) -> None:
         self._network, self._meter = network, meter
-        meter.add_passes(*network.node.shape)
-        meter.add_passes(*network.node.shape)
-        self._trellis = Trellis.of(network)
-        passes = MinMarginals.of(self._trellis)
-        self._through = passes.through
-        self.alone = trace_back(self._trellis, passes.forward)
+        usable = np.isfinite(network.node)
+        self._packed = PrunedStates.of(usable if states is None else usable & states)
+        self._trellis = self._packed.trellis(Trellis.of(network))
+        self._places = _OccupiedPlaces(network)
 
-    def cheaper(self, owner: int, _nodes: Ints, excluded: Bools, cost: float) -> Ints | None:
-        """Return the best path (M,) of one object outside places `excluded` (M, K) if it is below `cost`."""
-        limit = cost + _MIN_IMPROVEMENT * max(1.0, abs(cost)) if np.isfinite(cost) else np.inf
-        node = self._network.node[owner].copy()
-        node[:, :-1][excluded] = np.inf
-        packed = PrunedStates.of(((self._through[owner] <= limit) & np.isfinite(node))[None])
-        self._meter.add_passes(1, self._network.frames, packed.index.shape[2])
-        trellis = packed.trellis(self._trellis.select(np.array([owner])).with_node(node[None]))
-        found = best_paths(trellis)
-        return packed.original_states(found.nodes)[0] if found.costs[0] < cost else None
+    def improve(self, nodes: Ints) -> Ints:
+        everybody = np.arange(self._network.objects)
+        for _ in range(_MAX_ROUNDS):
+            if self._meter.reached():
+                break
+            occupied = self._places.of(everybody, nodes)
+            by_others = np.asarray(occupied.sum(axis=0) - occupied > 0)
+            found = self._cheapest_around(self._places.own(everybody, by_others))
+            costs = path_costs(self._network, nodes)
+            gains = np.where(np.isfinite(found.costs), costs - found.costs, 0.0)
+            gains[gains < _MIN_IMPROVEMENT * np.maximum(1.0, np.abs(found.costs))] = 0.0
+            if not gains.any():
+                break
+            self._move(nodes, found, gains)
+        return nodes
+
+    def _cheapest_around(self, excluded: Bools) -> Paths:
+        """Return the best paths outside places `excluded` (n, M, K)."""
+        barred = np.zeros(self._network.node.shape)
+        barred[:, :, :-1][excluded] = np.inf
+        node = self._trellis.node + self._packed.states(barred, np.inf)
+        self._meter.add_step()
+        self._meter.add_passes(*node.shape)
+        found = best_paths(self._trellis.with_node(node))
+        return Paths(self._packed.original_states(found.nodes), found.costs)
+
+    def _move(self, nodes: Ints, found: Paths, gains: Floats) -> None:
+        """Move objects in `nodes` to found paths, who gains most first, if nobody has come in their way."""
+        occupied = self._places.of(np.arange(len(nodes)), found.nodes)
+        moved: list[int] = []
+        for owner in np.argsort(-gains, kind="stable")[: np.count_nonzero(gains)].tolist():
+            if self._places.are_free(owner, found.nodes[owner], np.asarray(occupied[moved].any(axis=0))):
+                moved.append(owner)
+        nodes[moved] = found.nodes[moved]
 
 
-class _PathsInLayout:
-    """Best paths of single objects whose movements are compared with those of all others."""
+class _LayoutDescent:
+    """Where movements are compared with those of all others: one object after another."""
 
     def __init__(
         self, network: Network, power: int, meter: BudgetMeter, arcs: SparseTrellis | None = None
     ) -> None:
-        self._network, self._meter = network, meter
+        self._network, self._power, self._meter = network, power, meter
         self._trellis = SparseTrellis.of(network) if arcs is None else arcs
         self._meter.add_arcs(network.objects, len(self._trellis))
         movements = self._trellis.movements(network.locations)
         self._changes = [MovementChanges(self._trellis, own, power) for own in movements]
+        self._places = _OccupiedPlaces(network)
 
-    @cached_property
-    def alone(self) -> Paths:
-        return best_paths(Trellis.of(self._network))
+    def improve(self, nodes: Ints) -> Ints:
+        cost = total_cost(self._network, nodes, self._power)
+        settled = np.zeros(self._network.objects, dtype=np.bool_)
+        for _ in range(_MAX_ROUNDS):
+            for owner in range(self._network.objects):
+                # An object is settled until another one moves.
+                if not settled[owner] and not self._meter.reached():
+                    if self._reroute(owner, nodes):
+                        settled[:] = False
+                    settled[owner] = True
+            before, cost = cost, total_cost(self._network, nodes, self._power)
+            if settled.all() or not cost < before - _MIN_IMPROVEMENT * max(1.0, abs(cost)):
+                break
+        return nodes
 
-    def cheaper(self, owner: int, nodes: Ints, excluded: Bools, cost: float) -> Ints | None:
-        """Return the best path (M,) of one object outside places `excluded` (M, K) if it is below `cost`.
-
-        The others are at `nodes`.
-        """
+    def _reroute(self, owner: int, nodes: Ints) -> bool:
+        """Move one object to its best path around the others, in `nodes`; return whether it moved."""
         network, trellis = self._network, self._trellis
-        others = np.diff(np.delete(locations_at(network, nodes), owner, axis=0), axis=1)
-        changes = self._changes[network.sets[owner]].sums(others)
+        moves = np.diff(locations_at(network, nodes), axis=1)
+        cost = path_cost(network, nodes[owner], owner)
+        cost += network.layout * float((np.abs(moves - moves[owner]) ** self._power).sum())
+        others = np.delete(np.arange(network.objects), owner)
+        occupied = np.asarray(self._places.of(others, nodes[others]).any(axis=0, keepdims=True))
+        excluded = self._places.own(np.array([owner]), occupied)
         barred = np.zeros((1, network.frames, trellis.states))
-        barred[0, :, :-1][excluded] = np.inf
+        barred[:, :, :-1][excluded] = np.inf
+        changes = self._changes[network.sets[owner]].sums(moves[others])
+        self._meter.add_step()
         self._meter.add_arcs(1, len(trellis))
         costs = trellis.costs[owner] + network.layout * changes + trellis.nodes(barred)
         forward = trellis.forward(costs)
-        return trellis.best_paths(costs, forward).nodes[0] if forward[-1].min() < cost else None
+        if not forward[-1].min() < cost - _MIN_IMPROVEMENT * max(1.0, abs(cost)):
+            return False
+        nodes[owner] = trellis.best_paths(costs, forward).nodes[0]
+        return True
 
 
 class MovementChanges:
@@ -161,60 +212,3 @@ class MovementChanges:
             below -= earlier[step, side]
             sums[order] += known * (2 * number - count) + totals[step, side] - 2.0 * below
         return sums
-
-
-class _CoordinateDescent:
-    """Reroutes one object after another; an object is skipped if no other has moved since its last turn."""
-
-    def __init__(
-        self,
-        network: Network,
-        paths: _PathsAlone | _PathsInLayout,
-        power: int,
-        meter: BudgetMeter,
-        nodes: Ints,
-    ) -> None:
-        self._network, self._paths, self._power, self._meter = network, paths, power, meter
-        self._exclusions = network.exclusions()
-        self._settled = np.zeros(network.objects, dtype=np.bool_)
-        self.nodes = nodes.copy()
-
-    def reroute(self, owner: int) -> bool:
-        """Move one object to its best path around the others; return whether it moved."""
-        if self._settled[owner] or self._meter.reached():
-            return False
-        cost = self._own_cost(owner)
-        least = self._paths.alone.costs[owner]
-        if np.isfinite(cost) and cost <= least + _MIN_IMPROVEMENT * max(1.0, abs(cost)):
-            return False
-        self._meter.add_step()
-        path = self._paths.cheaper(owner, self.nodes, self._excluded(owner), cost)
-        moved = path is not None
-        if path is not None:
-            self.nodes[owner] = path
-            self._settled[:] = False
-        self._settled[owner] = True
-        return moved
-
-    def _own_cost(self, owner: int) -> float:
-        """Return the part of the objective that depends on one object's path."""
-        network = self._network
-        cost = path_cost(network, self.nodes[owner], owner)
-        if network.layout:
-            moves = np.diff(locations_at(network, self.nodes), axis=1)
-            cost += network.layout * float((np.abs(moves - moves[owner]) ** self._power).sum())
-        return cost
-
-    def _excluded(self, owner: int) -> Bools:
-        """Return the places of one object that the others exclude, (M, K)."""
-        network = self._network
-        places, sets = network.max_places, network.sets
-        others = np.delete(np.arange(network.objects), owner)
-        occupied = self.nodes[others]
-        visible = occupied < places
-        index = np.where(visible, sets[others, None] * places + occupied, 0)
-        own = slice(sets[owner] * places, (sets[owner] + 1) * places)
-        if not self._exclusions.size:
-            return np.zeros((network.frames, places), dtype=np.bool_)
-        excluded = self._exclusions[np.arange(network.frames), index, own] & visible[:, :, None]
-        return np.asarray(excluded.any(axis=0))

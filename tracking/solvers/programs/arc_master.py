@@ -11,7 +11,7 @@ from tracking.boxes import BOX_SIDES, Floats
 from tracking.model.conflicts import Bools
 from tracking.model.network import Network
 from tracking.solvers.budget import BudgetMeter
-from tracking.solvers.cutting_planes import ConflictRow
+from tracking.solvers.cutting_planes import ConflictRow, RowMembers
 from tracking.solvers.objective import Ints
 from tracking.solvers.programs.layout_rows import LayoutConstraints
 from tracking.solvers.programs.linear_program import LinearSolution, create_highs, run_highs
@@ -55,11 +55,12 @@ class ArcSet:
 
 def path_arcs(owners: Ints, nodes: Ints) -> ArcSet:
     """Return the distinct arcs of paths `nodes` (P, M) of the objects `owners` (P,)."""
-    path, frame = (index.ravel() for index in np.indices(nodes.shape))
     before = np.zeros_like(nodes)
     before[:, 1:] = nodes[:, :-1]
-    once = np.unique(np.stack([owners[path], frame, before.ravel(), nodes.ravel()]), axis=1)
-    return ArcSet(*once)
+    shape = (int(owners.max(initial=0)) + 1, nodes.shape[1], *[int(nodes.max(initial=0)) + 1] * 2)
+    frames = np.arange(nodes.shape[1])
+    once = np.unique(np.ravel_multi_index((owners[:, None], frames, before, nodes), shape))
+    return ArcSet(*np.unravel_index(once, shape))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +99,7 @@ class ArcMaster:
         self._known = np.zeros((frames, objects, states, states), dtype=np.bool_)
         self._node_rows = np.full((objects, frames, states), _NO_ROW)
         self._conflict_rows: list[int] = []
+        self._members = RowMembers(network)
         self.rows: list[ConflictRow] = []
         ones = np.ones(objects)
         self._empty_rows(ones, ones)
@@ -175,11 +177,10 @@ class ArcMaster:
             self._node_rows[n, m, j][outgoing],
         ]
         values = [np.ones(int(first.sum())), np.full(int(inner.sum()), -1.0), np.ones(int(outgoing.sum()))]
-        for number, row in zip(self._conflict_rows, self.rows, strict=True):
-            through = np.flatnonzero((m == row.frame) & row.members[n, j])
-            columns.append(through)
-            rows.append(np.full(len(through), number))
-            values.append(np.ones(len(through)))
+        through, row = self._members.of_arcs(n, m, j)
+        columns.append(through)
+        rows.append(np.array(self._conflict_rows, dtype=np.int64)[row])
+        values.append(np.ones(len(through)))
         if self._layout is not None:
             moved = index[inner]
             layout_rows, layout_values = self._layout.entries(n[inner], m[inner] - 1, i[inner], j[inner])
@@ -190,6 +191,7 @@ class ArcMaster:
 
     def add_rows(self, rows: Sequence[ConflictRow]) -> None:
         """Add conflict rows."""
+        self._members.add(rows)
         for row in rows:
             arcs = self._arcs
             through = np.flatnonzero((arcs.frame == row.frame) & row.members[arcs.owner, arcs.target])
