@@ -19,7 +19,7 @@ from server.config.sections.detect import DetectSettings
 from server.config.site_config import Config
 from server.media.letterbox import Image, Letterbox
 from server.models.installed import check_installed
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from tracking import Detections
 from tracking.detectors import (
     AppearanceExtractor,
@@ -169,7 +169,7 @@ def _as_user_error(where: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise UserError(f"{where}: {error.filename}: {error.strerror}") from error
+        raise UserError(f"{where}: {error.filename}: {reason_of(error)}") from error
     except (ValueError, ImportError) as error:
         raise UserError(f"{where}: {error}") from error
 

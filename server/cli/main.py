@@ -17,7 +17,7 @@ from server.cli import client_commands, file_commands, site_commands
 from server.cli.calibrate.command import calibrate
 from server.cli.models.command import app as models_app
 from server.supervisor.shutdown import SUPERVISED_VARIABLE
-from server.system.address_redaction import redact_to_host
+from server.system.address_redaction import located_reason_of
 from server.system.child_process import terminate_with_parent
 from server.system.descriptors import raise_descriptor_limit
 from server.system.errors import UserError
@@ -124,7 +124,7 @@ def _fail(error: Exception) -> None:
         sys.exit(0)
     if isinstance(error, OSError) and error.filename is not None and error.errno in _PATH_ERRORS:
         # An inaccessible path.
-        report_error(f"{redact_to_host(str(error.filename))}: {error.strerror}")
+        report_error(located_reason_of(error))
         sys.exit(_BAD_INPUT)
     raise error
 

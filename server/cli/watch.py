@@ -14,7 +14,7 @@ from rich.table import Table
 from client import AwayError as ServerAway
 from client import ClientError, HttpSettings, Progress, objects, watch
 from server.system.atomic_write import check_output_file
-from server.system.errors import UnavailableError, UserError
+from server.system.errors import UnavailableError, UserError, reason_of
 
 _PRINT_EVERY_S = 1.0
 
@@ -64,7 +64,7 @@ async def run_watch(
         raise UserError(f"watch: {error}") from error
     except OSError as error:
         suffix = "; the recording up to then is kept" if _file_at(out) != before else ""
-        raise UserError(f"{out}: cannot write there: {error.strerror}{suffix}") from error
+        raise UserError(f"{out}: cannot write there: {reason_of(error)}{suffix}") from error
     where = f" in {out}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:

@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 PLACEHOLDER = "{password}"
 """Replaced by the password in a camera's source and substream."""
@@ -36,7 +36,7 @@ def _quoted(camera: CameraSettings) -> str:
     try:
         text = camera.password.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
+        reason = reason_of(error, "it is not text")
         raise UserError(f"{where} cannot be read: {reason}") from None
     password = text.removesuffix("\n").removesuffix("\r")
     if not password or not password.isprintable():

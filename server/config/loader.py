@@ -35,7 +35,7 @@ from server.config.values import (
     redact_and_abbreviate,
 )
 from server.config.yaml_file import read_yaml
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 ProcessSection = TypeVar("ProcessSection", SyncSettings, ZenohSettings)
 
@@ -246,7 +246,7 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
         content = parse_json(path.read_text(encoding="utf-8"))
         matrices = dict(content["homography"].items())
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise UserError(f"{where}: ground: cannot read {path}: {_reason(error)}") from error
+        raise UserError(f"{where}: ground: cannot read {path}: {reason_of(error)}") from error
     except DuplicateKeyError as error:
         raise UserError(f"{where}: ground: {path}: {error}") from error
     except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
@@ -261,12 +261,6 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
         return matrices, None if content.get("unit") is None else check_unit_spelling(content["unit"])
     except ValueError as error:
         raise UserError(f"{where}: ground: {path}: unit: {error}") from error
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return " ".join(str(error).split())
 
 
 def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) -> str:

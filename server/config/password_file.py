@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 
 def read_users(path: Path, setting: str) -> dict[str, str]:
@@ -16,7 +16,7 @@ def read_users(path: Path, setting: str) -> dict[str, str]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
+        reason = reason_of(error, "it is not text")
         raise UserError(f"{setting}: cannot read {path}: {reason}") from error
     users: dict[str, str] = {}
     numbers: dict[str, int] = {}

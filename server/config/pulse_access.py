@@ -8,7 +8,7 @@ from camsync import Credentials
 from camsync.protocol import is_password
 from server.config.password_file import password_of, read_users
 from server.config.site_config import Config
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 SETTING = "sync.users"
 
@@ -68,7 +68,7 @@ def pulse_server_tls(config: Config) -> ssl.SSLContext | None:
     try:
         context.load_cert_chain(tls.certificate, tls.key, password="")
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
-        reason = getattr(error, "strerror", None) or "they are not a certificate and its key"
+        reason = reason_of(error, "they are not a certificate and its key")
         raise UserError(f"sync.tls: cannot use {tls.certificate} and {tls.key}: {reason}") from error
     return context
 
@@ -85,7 +85,7 @@ def pulse_client_tls(config: Config) -> ssl.SSLContext | None:
     try:
         return ssl.create_default_context(cafile=authority)
     except OSError as error:
-        reason = getattr(error, "strerror", None) or "it holds no certificate"
+        reason = reason_of(error, "it holds no certificate")
         raise UserError(f"sync.tls.authority: cannot use {authority}: {reason}") from error
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from server.config.duplicate_keys import DuplicateKeyError, check_yaml_keys
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 try:
     from yaml import CSafeDumper as SafeDumper  # libyaml's: five times as fast
@@ -55,7 +55,7 @@ def read_yaml(path: Path, label: str) -> Any:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        reason = reason_of(error)
         raise UserError(f"{path}: cannot read {label}: {reason}") from error
     try:
         _check_depth(text)

@@ -47,7 +47,7 @@ from server.http.viewers.viewer_limits import EVENT_SLOTS, SEARCH_SLOTS, VIEWER_
 from server.service.service import BestViewService
 from server.setup.session import SetupSession
 from server.system.descriptors import descriptor_limit
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -148,7 +148,7 @@ async def serving(app: web.Application, settings: HttpSettings) -> AsyncIterator
             try:
                 port = await stack.enter_async_context(listener.listening(settings.host, settings.port))
             except OSError as error:
-                reason = error.strerror or error
+                reason = reason_of(error)
                 raise UserError(
                     f"http.port: cannot listen on {settings.host}:{settings.port}: {reason}"
                 ) from error

@@ -25,7 +25,7 @@ from server.http.error_responses import FAILURES, answer_errors, note_begun
 from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator import setup
 from server.setup.session import SetupSession
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 COOKIE = "myview_setup"
 _BODY_MAX_BYTES = 65_536
@@ -133,7 +133,7 @@ async def serve_setup(session: SetupSession, port: int, announce: Callable[[str]
         try:
             await site.start()
         except OSError as error:
-            reason = error.strerror or error
+            reason = reason_of(error)
             raise UserError(f"http.port: cannot listen on 127.0.0.1:{port}: {reason}") from error
         bound = int(runner.addresses[0][1])
         announce(f"http://127.0.0.1:{bound}/#token={access.token}")

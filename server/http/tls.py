@@ -8,7 +8,7 @@ from pathlib import Path
 
 from server.config.sections import TlsSettings
 from server.http.periodic import run_periodically
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from server.system.file_state import FileState, file_state
 
 log = logging.getLogger(__name__)
@@ -77,11 +77,11 @@ class Certificate:
             try:
                 path.read_bytes()
             except OSError as error:
-                raise UserError(f"http.tls.{kind}: cannot read {path}: {error.strerror}") from error
+                raise UserError(f"http.tls.{kind}: cannot read {path}: {reason_of(error)}") from error
         try:
             context.load_cert_chain(self._certificate, self._key, password=_no_password)
         except (OSError, ValueError) as error:  # an SSL error, or a file was removed meanwhile
-            reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
+            reason = getattr(error, "reason", None) or reason_of(error)
             raise UserError(
                 f"http.tls: {self._certificate} and {self._key} are not a certificate and its key: {reason}"
             ) from error

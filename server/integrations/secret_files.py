@@ -6,7 +6,7 @@ import base64
 import binascii
 from pathlib import Path
 
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 _PREFIX = "whsec_"
 _KEY_BYTES = (24, 64)
@@ -22,7 +22,7 @@ def read_secret(path: Path, where: str) -> str:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
+        reason = reason_of(error, "it is not text")
         raise UserError(f"{where}: the file cannot be read: {reason}") from None
     secret = text.removesuffix("\n").removesuffix("\r")
     if not secret or not secret.isprintable():

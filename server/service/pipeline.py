@@ -40,7 +40,7 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 from server.service.view_selection.delay_modes import ModeDecision
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -230,7 +230,7 @@ class BestViewPipeline:
         try:
             return LiveDecisionWriter(out, self.config.camera_ids, self.decider.people.letterboxes)
         except OSError as error:
-            raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+            raise UserError(f"{out}: cannot write there: {reason_of(error)}") from error
 
     def apply_live_view_settings(self, view: ViewSettings) -> None:
         """Select views by other settings from the next GOP on, as far as they can change at run time.

@@ -18,7 +18,7 @@ from server.config.yaml_file import dump_yaml_inline
 from server.setup.camera_address import CameraAddress
 from server.setup.proposal import SiteProposal
 from server.system.atomic_write import atomic_file
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from server.system.private_files import FILE, make_private_folder, write_private
 
 _HEAD = """\
@@ -162,7 +162,7 @@ def write_passwords(cameras: Sequence[NewCamera], path: Path) -> None:
             write_private(file, f"{password}\n".encode())
             file.chmod(FILE)
     except OSError as error:
-        raise UserError(f"{path}: cannot write the passwords beside it: {error.strerror}") from error
+        raise UserError(f"{path}: cannot write the passwords beside it: {reason_of(error)}") from error
 
 
 def _free_path(path: Path) -> Path:

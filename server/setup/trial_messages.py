@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import msgspec
 
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from server.system.worker.process import WorkerDiedError
 from server.system.worker.single_request import ask_new_worker
 
@@ -104,6 +104,6 @@ async def _ask(request: msgspec.Struct, answer_type: type[Answer], seconds: floa
     except TimeoutError:
         raise UserError(f"no answer within {seconds:g} s") from None
     except OSError as error:
-        raise UserError(f"the camera cannot be tried: {error.strerror}") from error
+        raise UserError(f"the camera cannot be tried: {reason_of(error)}") from error
     except WorkerDiedError:
         raise UserError("what it sends cannot be read") from None

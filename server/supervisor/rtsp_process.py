@@ -17,7 +17,7 @@ from server.supervisor.exposure_checks import check_rtsp
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_signal import signal_started
 from server.system.child_process import run_on_python, start_on_python
-from server.system.errors import UnavailableError, UserError
+from server.system.errors import UnavailableError, UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +49,8 @@ def check_gateway_installed(config: Config) -> None:
         probe = run_on_python(python, _PROBE, _PROBE_S)
     except OSError as error:
         raise UserError(
-            f"rtsp.python: {python}: {error.strerror}; the gateway needs GStreamer's RTSP server ({_INSTALL})"
+            f"rtsp.python: {python}: {reason_of(error)}; "
+            f"the gateway needs GStreamer's RTSP server ({_INSTALL})"
         ) from error
     if probe.returncode:
         reason = (probe.stderr.strip().splitlines() or ["it failed"])[-1]

@@ -22,7 +22,7 @@ from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_source_opens, check_sources_open
 from server.supervisor.supervisor import Supervisor
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -111,7 +111,7 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
     try:
         return tempfile.TemporaryDirectory(prefix="myview-up-")
     except OSError as error:
-        reason = error.strerror or error
+        reason = reason_of(error)
         raise UserError(f"cannot make a temporary folder (TMPDIR names where): {reason}") from error
 
 
@@ -131,5 +131,5 @@ def _write_active_config(running: ActiveConfig, path: Path, failures: LogThrottl
         new.write_text(serialize_with_absolute_paths(running.now, running.path.parent), encoding="utf-8")
         new.replace(path)
     except OSError as error:
-        if (more := failures.record(str(error.strerror))) is not None:
-            log.warning("%s: cannot write the running configuration: %s%s", path, error.strerror, more)
+        if (more := failures.record(reason_of(error))) is not None:
+            log.warning("%s: cannot write the running configuration: %s%s", path, reason_of(error), more)

@@ -8,7 +8,7 @@ from server.camera.audio import open_site_audio
 from server.camera.pipeline import CameraPipeline
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 
 def check_port_free(host: str, port: int, label: str) -> None:
@@ -22,7 +22,7 @@ def check_port_free(host: str, port: int, label: str) -> None:
         try:
             probe.bind((host, port))
         except OSError as error:
-            raise UserError(f"{label}: cannot listen on {host}:{port}: {error.strerror}") from error
+            raise UserError(f"{label}: cannot listen on {host}:{port}: {reason_of(error)}") from error
 
 
 def check_ports(config: Config) -> None:

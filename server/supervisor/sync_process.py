@@ -11,7 +11,7 @@ from server.config.running_config import ActiveConfig
 from server.supervisor.exposure_checks import check_pulses
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_signal import signal_started
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ async def sync_process(running: ActiveConfig) -> None:
         await server.start()
     except OSError as error:
         in_use = error.errno == errno.EADDRINUSE
-        reason = "the port is in use" if in_use else (error.strerror or error)
+        reason = "the port is in use" if in_use else reason_of(error)
         raise UserError(f"sync.port: cannot listen on {sync.bind}:{sync.port}: {reason}") from error
     log.info("pulses at %g a second on %s:%d", config.site.fps, sync.bind, server.port)
     signal_started()

@@ -8,6 +8,7 @@ import logging
 from typing import Any
 
 from logthrottle import LogThrottle
+from server.system.errors import reason_of
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +37,7 @@ class AcceptErrors:
 
     def failed(self, error: OSError) -> None:
         """Log that a connection could not be accepted."""
-        reason = error.strerror or str(error)
+        reason = reason_of(error)
         if (more := self._throttle.record(reason)) is not None:
             log.error("a connection cannot be accepted: %s%s", reason, more)
 

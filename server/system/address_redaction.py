@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 
+from server.system.errors import UserError, reason_of
+
 HIDDEN = "(not shown)"
 _MORE = "..."
 """Replaces the hidden part of an address."""
@@ -91,4 +93,12 @@ def _cut(line: str) -> str:
 
 def ffmpeg_reason(error: Exception) -> str:
     """Return the reason of an FFmpeg error by its errno, since its text repeats the whole address."""
-    return getattr(error, "strerror", None) or "it is not an address or path that FFmpeg understands"
+    return reason_of(error, "it is not an address or path that FFmpeg understands")
+
+
+def located_reason_of(error: BaseException) -> str:
+    """Return in one line what failed, and why; a bug, which no text explains, as its name and arguments."""
+    if isinstance(error, OSError):
+        where = f"{redact_to_host(str(error.filename))}: " if error.filename else ""
+        return f"{where}{reason_of(error)}"
+    return str(error) if isinstance(error, UserError) else repr(error)

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 """Errors of a full disk."""
@@ -98,7 +98,7 @@ def _cannot_write(out: Path, only: Collection[int] | None = None) -> Iterator[No
     except OSError as error:
         if only is not None and error.errno not in only:
             raise
-        raise UserError(f"{out}: cannot write there: {error.strerror}") from error
+        raise UserError(f"{out}: cannot write there: {reason_of(error)}") from error
 
 
 def _umask() -> int:

@@ -1,4 +1,4 @@
-"""Errors that are shown to the user as one line: what, where, and what to do."""
+"""Errors that are shown to the user as one line: what, where, and what to do; and why others happened."""
 
 from __future__ import annotations
 
@@ -15,3 +15,12 @@ class UnavailableError(UserError):
     """Something that this process needs is unavailable now; a supervisor starts the process again."""
 
     code: ClassVar[int] = 3
+
+
+def reason_of(error: BaseException, otherwise: str = "") -> str:
+    """Return in one line why something failed, without the file: in the words of the system or of FFmpeg.
+
+    ``otherwise`` replaces other errors' texts, which may repeat what was read.
+    """
+    reason = getattr(error, "strerror", None)
+    return " ".join(str(reason or otherwise or error).split()) or type(error).__name__

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from server.camera.audio.frames import EncodedAudioFrame, Packet
 from server.media.audio.audio_format import AudioFormat
+from server.system.errors import reason_of
 
 log = logging.getLogger(__name__)
 
@@ -71,7 +72,7 @@ class AudioEncoder:
                 log.warning(
                     "audio of %s at %d Hz cannot be converted: %s",
                     *(self._input_format or ())[1:],
-                    error.strerror,
+                    reason_of(error),
                 )
             self._has_warned = True
         return self._encode_full_frames()

@@ -19,7 +19,7 @@ from server.camera.sources.frame_timing import frame_count, frame_rate
 from server.config.sections import SoundSettings
 from server.config.source_address import path_is_missing
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -105,7 +105,9 @@ class RecordedAudioSource:
         except av.error.FFmpegError as error:
             if not self._has_warned:  # a loop would repeat it
                 log.warning(
-                    "%s: its audio cannot be read any further: %s", redact_to_host(self._path), error.strerror
+                    "%s: its audio cannot be read any further: %s",
+                    redact_to_host(self._path),
+                    reason_of(error),
                 )
             self._has_warned = True
         finally:

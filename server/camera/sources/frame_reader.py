@@ -15,6 +15,7 @@ from av.video.stream import VideoStream
 from server.camera.sources.opening import OpenedVideo
 from server.camera.sources.timestamp_jump_repair import TimestampJumpRepair
 from server.system.address_redaction import redact_to_host
+from server.system.errors import reason_of
 
 log = logging.getLogger(__name__)
 
@@ -194,5 +195,5 @@ def _packets(opened: OpenedVideo, *, quiet: bool) -> Iterator[av.Packet[VideoStr
             raise  # a signal interrupted the read: the file has not ended
         if not quiet:
             log.warning(
-                "%s: cannot be read any further: %s", redact_to_host(opened.container.name), error.strerror
+                "%s: cannot be read any further: %s", redact_to_host(opened.container.name), reason_of(error)
             )

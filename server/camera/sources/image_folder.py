@@ -13,7 +13,7 @@ import numpy as np
 from server.camera.sources.base import Image, SourceEndedError
 from server.camera.sources.missing_frames import MissingFrames
 from server.media.letterbox import Letterbox
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ class ImageFolder:
         try:
             self._files = sorted(file for file in Path(path).iterdir() if file.suffix.lower() in _ENDINGS)
         except OSError as error:
-            raise UserError(f"{path}: cannot read this folder: {error.strerror}") from error
+            raise UserError(f"{path}: cannot read this folder: {reason_of(error)}") from error
         if not self._files:
             raise UserError(f"{path}: there are no images in this folder ({', '.join(sorted(_ENDINGS))})")
         first = _read(self._files[0])

@@ -17,7 +17,7 @@ from av.video.stream import VideoStream
 from server.camera.sources.frame_timing import frame_rate
 from server.config.source_address import is_device_path
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 _TEXT = "tty"
 """FFmpeg's format for text files, which it would render as letters."""
@@ -99,7 +99,7 @@ def _reason(source: str, error: Exception) -> str:
         try:
             socket.getaddrinfo(urlsplit(source).hostname, None)
         except socket.gaierror as resolution_error:
-            return str(resolution_error.strerror)
+            return reason_of(resolution_error)
         except ValueError:
             pass  # not a valid address
     return ffmpeg_reason(error)

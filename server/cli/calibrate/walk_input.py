@@ -15,7 +15,7 @@ from server.cli.generated_config import camera_name
 from server.cli.render.video_info import Size, read_video_info
 from server.cli.track.command import config_for_video, track_one
 from server.service.calibration.calibration_report import RecordedWalk, comparison_step
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from tracking.motchallenge import MotRow, read_rows
 
 ENDINGS = (".txt", ".txt.gz")
@@ -131,7 +131,7 @@ def _rows(path: Path, name: str | None = None) -> list[MotRow]:
     try:
         rows = [row for row in read_rows(path) if row.confidence != 0.0]
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+        raise UserError(f"{path}: cannot be read: {reason_of(error)}") from error
     except ValueError as error:
         raise UserError(str(error)) from error
     if not rows:

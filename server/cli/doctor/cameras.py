@@ -9,11 +9,11 @@ from collections.abc import Mapping
 
 from server.camera.audio import open_site_audio
 from server.cli.doctor.camera_probe import CameraProbe, probe_camera
-from server.cli.doctor.findings import Finding, bad, describe_bug, ok, reason_of, warning
+from server.cli.doctor.findings import Finding, bad, describe_bug, ok, warning
 from server.cli.doctor.substream import substream_findings
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, is_device_path, source_kind
-from server.system.address_redaction import redact_to_host
+from server.system.address_redaction import located_reason_of, redact_to_host
 from server.system.errors import UserError
 
 _GRACE_S = 3.0
@@ -32,7 +32,7 @@ def probe_cameras(config: Config, seconds: float) -> dict[str, CameraProbe]:
         try:
             probes[camera] = probe_camera(config, camera, seconds)
         except OSError as error:
-            probes[camera] = CameraProbe(reason_of(error))
+            probes[camera] = CameraProbe(located_reason_of(error))
         except Exception as error:  # noqa: BLE001 — the other cameras are still reported
             probes[camera] = CameraProbe(describe_bug(error))
 

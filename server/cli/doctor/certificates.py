@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from server.cli.doctor.findings import Finding, bad, ok, warning
+from server.system.errors import reason_of
 
 _SOON_DAYS = 14
 _DAY_S = 86_400
@@ -94,7 +95,7 @@ def _unreadable(path: Path) -> str:
         with path.open("rb"):
             return ""
     except OSError as error:
-        return error.strerror or str(error)
+        return reason_of(error)
 
 
 def _no_password() -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from server.cli.doctor.camera_probe import CameraProbe
 from server.cli.doctor.findings import Finding, bad, ok, warning
 from server.config.site_config import Config
+from server.system.errors import reason_of
 from server.system.private_files import mode_if_shared
 
 _INDEX_BYTES = 100
@@ -29,7 +30,7 @@ def disk_findings(config: Config, probes: Mapping[str, CameraProbe]) -> list[Fin
         with tempfile.TemporaryFile(dir=existing):
             pass  # an unnamed file leaves nothing behind
     except OSError as error:
-        text = f"{_place(folder, error)}: cannot write there: {error.strerror}"
+        text = f"{_place(folder, error)}: cannot write there: {reason_of(error)}"
         return [bad("record.folder", text, "use another folder, or let this user write there")]
     findings = [_writable_finding(folder)]
     return findings + _size_findings(

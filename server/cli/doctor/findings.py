@@ -10,7 +10,7 @@ import msgspec
 from rich.console import Console
 from rich.markup import escape
 
-from server.system.address_redaction import cut_at_addresses, redact_to_host
+from server.system.address_redaction import cut_at_addresses, located_reason_of
 from server.system.errors import UserError
 from server.system.printable import printable
 
@@ -69,18 +69,9 @@ def report_failure(check: str, findings: list[Finding]) -> Iterator[None]:
     try:
         yield
     except (OSError, UserError) as error:
-        findings.append(bad(check, reason_of(error), "fix that, then try again"))
+        findings.append(bad(check, located_reason_of(error), "fix that, then try again"))
     except Exception as error:  # noqa: BLE001 — a bug in one check must not hide the others
         findings.append(bad(check, describe_bug(error), "please report it"))
-
-
-def reason_of(error: Exception) -> str:
-    """Return the reason of an error in one line."""
-    if isinstance(error, OSError) and error.strerror:
-        return (
-            f"{redact_to_host(str(error.filename))}: {error.strerror}" if error.filename else error.strerror
-        )
-    return str(error)
 
 
 def describe_bug(error: Exception) -> str:

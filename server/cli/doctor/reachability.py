@@ -8,6 +8,7 @@ import socket
 
 from server.cli.doctor.findings import Finding, bad, ok, report_failure, warning
 from server.config.site_config import Config
+from server.system.errors import reason_of
 
 _ANSWER_S = 3.0
 _ANYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 — compared, not listened on
@@ -42,7 +43,7 @@ async def _check_route(check: str, target: Place, setting: str, listener: Place)
     try:
         addresses = await _addresses(target[0])
     except (socket.gaierror, TimeoutError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or "no answer from DNS"
+        reason = reason_of(error, "no answer from DNS")
         return bad(
             check,
             f"{where} cannot be resolved: {reason}",

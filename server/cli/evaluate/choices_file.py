@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import NO_CAMERA
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 _COLUMNS = ["frame", "object", "camera"]
 _LAST_FRAME = 10_000_000
@@ -44,7 +44,7 @@ def read_choices(path: Path) -> list[Choice]:
                     raise UserError(f"{path}:{number}: object {choice.object} has two cameras in one frame")
                 choices[choice.frame, choice.object] = choice
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+        raise UserError(f"{path}: cannot be read: {reason_of(error)}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"{path}: is not a choices file: {error}") from error
     return list(choices.values())

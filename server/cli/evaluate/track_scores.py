@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from server.cli.evaluate.file_pairing import pair_files
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from tracking.evaluation import HEADINGS, MultiCameraScores, TruthAndTracks, evaluate_cameras, format_scores
 from tracking.motchallenge import MotRow, read_rows
 
@@ -75,7 +75,7 @@ def rows_of(path: Path) -> list[MotRow]:
     try:
         return read_rows(path)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+        raise UserError(f"{path}: cannot be read: {reason_of(error)}") from error
     except ValueError as error:
         raise UserError(str(error)) from error
 

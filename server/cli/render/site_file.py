@@ -11,7 +11,7 @@ from pathlib import Path
 from server.cli.render.video_info import Size
 from server.config.duplicate_keys import parse_json
 from server.config.site_config import Config
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 SITE_FILE = "site.json"
 
@@ -59,7 +59,7 @@ def read_site(path: Path) -> RenderedSite:
         sizes = {str(name): (int(width), int(height)) for name, (width, height) in content["sizes"].items()}
         info = RenderedSite(float(content["fps"]), float(content["switch_cost_s"]), sizes)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+        raise UserError(f"{path}: cannot be read: {reason_of(error)}") from error
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise UserError(f"{path}: was not written by `myview render`: {error}") from error
     is_valid = 0 < info.fps < math.inf and 0 <= info.switch_cost_s < math.inf

@@ -18,7 +18,7 @@ from server.config.loader import build_config, read_content
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.system.atomic_write import atomic_file
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from tracking import Detections, Solver, WindowResult, solver_names
 from tracking.detectors import MotFileDetector
 from tracking.motchallenge import MotRow, write_rows
@@ -143,7 +143,7 @@ def _from_detections(path: Path) -> Iterator[RecordedFrame]:
     try:
         detector = MotFileDetector(path)
     except OSError as error:
-        raise UserError(f"--det: {path}: {error.strerror}") from error
+        raise UserError(f"--det: {path}: {reason_of(error)}") from error
     except ValueError as error:
         raise UserError(f"--det: {error}") from error
     for number in range(detector.last_frame + 1):

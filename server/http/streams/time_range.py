@@ -11,6 +11,7 @@ from server.http.json_responses import error_response, unavailable
 from server.messaging.messages import GopChoices
 from server.service.facade.recordings import PlaybackRange, RecordedStream, TimeReferenceError
 from server.service.service import BestViewService
+from server.system.errors import reason_of
 
 
 class RecordedChoices(GopChoices, frozen=True, kw_only=True):
@@ -99,7 +100,7 @@ async def decisions_in(
 
 def disk_error(error: OSError) -> web.Response:
     """Return 503 for a recording that cannot be read."""
-    return unavailable(f"cannot read the recording: {error.strerror or error}")
+    return unavailable(f"cannot read the recording: {reason_of(error)}")
 
 
 async def _prepend(first: bytes | None, lines: AsyncIterator[bytes]) -> AsyncIterator[bytes]:

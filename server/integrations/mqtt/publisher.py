@@ -22,7 +22,7 @@ from server.integrations.mqtt.site_reader import SiteReader
 from server.integrations.mqtt.site_state import PersonState, Topics, state_messages
 from server.integrations.secret_files import read_secret
 from server.service.facade.rules import PicturedEvent, event_without
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -228,7 +228,7 @@ def _tls_context(settings: MqttSettings) -> ssl.SSLContext:
     try:
         return ssl.create_default_context(cafile=settings.authority)
     except (OSError, ssl.SSLError) as error:
-        raise UserError(f"mqtt.authority: cannot be read: {error.strerror or error}") from None
+        raise UserError(f"mqtt.authority: cannot be read: {reason_of(error)}") from None
 
 
 def _first_of(errors: BaseExceptionGroup[BaseException]) -> BaseException:

@@ -15,7 +15,7 @@ import numpy as np
 from bestview.calibration import MarkedPoints
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
 from server.config.values import check_printable_name
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 
 COLUMNS = ("camera", "image_x", "image_y", "floor_x", "floor_y")
 ENDINGS = (".json", ".csv")
@@ -51,7 +51,7 @@ def read_points(path: Path) -> PointFile:
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets begin a CSV with a byte order mark
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+        raise UserError(f"{path}: cannot be read: {reason_of(error)}") from error
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: is not a text file") from error
     if path.suffix.lower() == ".csv":

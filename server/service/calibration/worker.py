@@ -6,6 +6,7 @@ import logging
 
 import msgspec
 
+from server.system.errors import reason_of
 from server.system.worker.process import WorkerDiedError
 from server.system.worker.single_request import ask_new_worker
 
@@ -62,7 +63,7 @@ async def run_calibration(task: CalibrationTask) -> CalibrationResult:
     try:
         return await ask_new_worker("server.service.calibration", task, CalibrationResult)
     except OSError as error:
-        return CalibrationResult(error=f"the calibration cannot be started: {error.strerror}")
+        return CalibrationResult(error=f"the calibration cannot be started: {reason_of(error)}")
     except WorkerDiedError as error:
         log.error("the calibration process %s", error)  # noqa: TRY400
         return CalibrationResult(error="the calibration failed; see the server's log")

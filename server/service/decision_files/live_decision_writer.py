@@ -22,6 +22,7 @@ from server.service.recording.media_files import run_in_reader_thread
 from server.service.rules.engine import SiteEvent
 from server.service.view_selection.decider import GopDecision
 from server.service.view_selection.delay_modes import ModeDecision
+from server.system.errors import reason_of
 
 log = logging.getLogger(__name__)
 
@@ -111,7 +112,7 @@ class LiveDecisionWriter:
         try:
             self._writer.write_late(self._rows())
         except OSError as error:
-            log.warning("%s: the end of late.csv could not be written: %s", self._folder, error.strerror)
+            log.warning("%s: the end of late.csv could not be written: %s", self._folder, reason_of(error))
         self._late.clear()
         self._writer.close()
 
@@ -120,7 +121,7 @@ class LiveDecisionWriter:
             log.error(
                 "%s: cannot write: %s; decisions are skipped until writing succeeds; the streams continue",
                 self._folder,
-                error.strerror or error,
+                reason_of(error),
             )
         last = decision.first + decision.frames
         self._missing = range(self._missing.start if self._missing else decision.first, last)

@@ -12,6 +12,7 @@ import msgspec
 from server.messaging.camera_identity_snapshot import PersonNumber, UnixTime
 from server.messaging.messages import DECODE_ERRORS
 from server.service.recording.person_removal import SegmentFile
+from server.system.errors import reason_of
 from server.system.private_files import write_private
 
 JOURNAL_FILE = "deletions.json"
@@ -61,7 +62,7 @@ class DeletionJournal:
         except FileNotFoundError:
             pass
         except (OSError, *DECODE_ERRORS) as error:
-            reason = (error.strerror if isinstance(error, OSError) else None) or error
+            reason = reason_of(error)
             text = f"{self._path}: cannot be read ({reason}): repair it, or move it away and delete again"
             raise OSError(text) from error
         self._is_read = True

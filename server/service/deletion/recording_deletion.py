@@ -19,6 +19,7 @@ from server.service.recording.recorder import Recorder
 from server.service.recording.recording_folder import RecordingFolder
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.writer_thread import WriterThread
+from server.system.address_redaction import located_reason_of
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +68,9 @@ class RecordingDeletion:
                 try:
                     await self.execute(deletion)
                 except Exception as error:  # noqa: BLE001 — nobody waits for it, and the others are completed
-                    log.error("deletion of a person: %s; tried again at the next start", error_text(error))  # noqa: TRY400
+                    log.error(  # noqa: TRY400
+                        "deletion of a person: %s; tried again at the next start", located_reason_of(error)
+                    )
                 else:
                     log.info("completed the deletion of a person that was interrupted")
 
@@ -145,11 +148,3 @@ class RecordingDeletion:
         done = msgspec.structs.replace(deletion, sessions=[], files=None, is_done=True)
         await run_in_reader_thread(journal.put, done, deletion)
         return traces
-
-
-def error_text(error: BaseException) -> str:
-    """Return what failed, and where, in one line."""
-    if not isinstance(error, OSError):
-        return repr(error)
-    where = "" if error.filename is None else f"{error.filename}: "
-    return f"{where}{error.strerror or error}"

@@ -16,13 +16,13 @@ from server.messaging.service_record import DeletedPerson
 from server.service.deletion.journal import Deletion
 from server.service.deletion.memory import forget_people
 from server.service.deletion.recorded_traces import RecordedTraces
-from server.service.deletion.recording_deletion import error_text
 from server.service.facade.deletion_plan import PersonDeletion, camera_losses, other_losses, rounded
 from server.service.facade.errors import BusyError, ConflictError, InvalidCommandError, UnknownObjectError
 from server.service.facade.people import PeopleService
 from server.service.facade.rules import RulesService
 from server.service.pipeline import BestViewPipeline
 from server.service.recording.session_files import AUDIO
+from server.system.address_redaction import located_reason_of
 from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
@@ -98,7 +98,7 @@ class DeletionService:
             completing.result()
         except OSError as error:
             raise BusyError(
-                f"object {command.number}: {error_text(error)}; the rest is deleted at the next start"
+                f"object {command.number}: {located_reason_of(error)}; the rest is deleted at the next start"
             ) from error
         return msgspec.structs.replace(planned, state="done", recordings=command.recordings)
 
@@ -122,7 +122,7 @@ class DeletionService:
                 await self._pipeline.recording_deletion.begin(deletion, before)
             except OSError as error:
                 what = "nothing is deleted" if before is None else "deleted at the next start only"
-                raise BusyError(f"object {command.number}: {what}: {error_text(error)}") from error
+                raise BusyError(f"object {command.number}: {what}: {located_reason_of(error)}") from error
             if not person.is_of_today or (numbers := self._with_merged(traces.numbers)) == traces.numbers:
                 break
             person = replace(person, numbers=numbers)
@@ -158,7 +158,7 @@ class DeletionService:
     def _ended(self, task: asyncio.Task[None]) -> None:
         self._running.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.error("deletion of a person: %s; completed at the next start", error_text(error))
+            log.error("deletion of a person: %s; completed at the next start", located_reason_of(error))
 
     async def _complete_followed(self, deleted: DeletedPerson) -> None:
         deletion = Deletion(
@@ -171,7 +171,7 @@ class DeletionService:
             await self._pipeline.recording_deletion.begin(deletion)
         except OSError as error:
             self._turn.release()
-            log.error("deletion of a person by another service: %s", error_text(error))  # noqa: TRY400
+            log.error("deletion of a person by another service: %s", located_reason_of(error))  # noqa: TRY400
             return
         await self._complete(deletion)
 
@@ -211,7 +211,7 @@ class DeletionService:
         try:
             traces = await deletion.find(sessions, person.numbers)
         except OSError as error:
-            raise BusyError(f"object {number}: nothing is deleted: {error_text(error)}") from error
+            raise BusyError(f"object {number}: nothing is deleted: {located_reason_of(error)}") from error
         known = self._pipeline.decider.people.registry.first_seen if person.is_of_today else {}
         if not traces.sessions and traces.numbers.isdisjoint(known):
             raise self._people.unknown(number) if person.is_of_today else UnknownObjectError(number)

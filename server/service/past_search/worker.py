@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from server.system.errors import reason_of
 from server.system.worker.process import WorkerDiedError
 from server.system.worker.single_request import ask_new_worker
 
@@ -126,6 +127,6 @@ async def run_search(task: SearchTask) -> SearchResult:
     except TimeoutError as error:
         raise SearchError(f"the recording was not read within {SEARCH_TIMEOUT_S:g} s") from error
     except OSError as error:
-        raise SearchError(f"the search cannot be started: {error.strerror}") from error
+        raise SearchError(f"the search cannot be started: {reason_of(error)}") from error
     except WorkerDiedError as error:
         raise SearchError(f"the search process {error}") from error

@@ -21,7 +21,7 @@ from server.service.recording.session_files import InitSegments, RecordingSessio
 from server.service.recording.writer_thread import WriterThread
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import FrameBuffer
-from server.system.errors import UserError
+from server.system.errors import UserError, reason_of
 from server.system.private_files import mode_if_shared
 
 log = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ class Recorder:
             raise UserError(f"record.folder: {self.folder.folder}: another process records there") from error
         except OSError as error:
             raise UserError(
-                f"record.folder: {self.folder.folder}: cannot write there: {error.strerror}"
+                f"record.folder: {self.folder.folder}: cannot write there: {reason_of(error)}"
             ) from error
         self.writer.start()
         log.info("recording to %s", self.folder.folder)

@@ -26,6 +26,7 @@ from server.service.recording.retention import SEGMENTS_PER_DISK_QUOTA, Retentio
 from server.service.recording.segment_writer import SegmentWriter
 from server.service.recording.session_discovery import assign_age, load_and_clean_sessions
 from server.service.recording.session_files import InitSegments, RecordingSessionInfo, remove_session_files
+from server.system.errors import reason_of
 from server.system.private_files import make_private_folder, open_private
 
 log = logging.getLogger(__name__)
@@ -95,7 +96,7 @@ class RecordingFolder:
         except OSError as error:
             if error.errno in _NO_RESOURCES:
                 raise
-            self._leave_session(error.strerror or str(error))
+            self._leave_session(reason_of(error))
             self._check_folder()
             self._append(record, info, init)
 

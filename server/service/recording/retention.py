@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from logthrottle import LogThrottle
 from server.service.recording.recording_session import RecordingSegment, RecordingSession
+from server.system.errors import reason_of
 
 log = logging.getLogger(__name__)
 
@@ -79,8 +80,8 @@ class RetentionPolicy:
         if failed is None:
             self._log_deleted(expired)
             self._failures.end()
-        elif (more := self._failures.record(failed.strerror or "")) is not None:
-            failure = f"{failed.filename}: {failed.strerror or failed}{more}"
+        elif (more := self._failures.record(reason_of(failed))) is not None:
+            failure = f"{failed.filename}: {reason_of(failed)}{more}"
             log.error("recording: cannot delete expired segments: %s; tried again each time", failure)
 
     def expired(self, sessions: Sequence[RecordingSession]) -> ExpiredSegments:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from logthrottle import LogThrottle
 from server.service.recording.recording_folder import GopRecord
+from server.system.errors import reason_of
 
 log = logging.getLogger(__name__)
 
@@ -121,7 +122,7 @@ class WriterThread:
         try:
             self._close()
         except OSError as error:
-            log.warning("recording: cannot close the session: %s", error.strerror)
+            log.warning("recording: cannot close the session: %s", reason_of(error))
 
     def _next(self) -> GopRecord | Callable[[], None] | None:
         with self._condition:
@@ -134,7 +135,7 @@ class WriterThread:
         try:
             self._write(record)
         except OSError as error:
-            self.error_text = error.strerror or str(error)
+            self.error_text = reason_of(error)
             if (more := self._failing.record(self.error_text)) is not None:
                 log.error(  # noqa: TRY400 — a traceback adds nothing
                     "recording: cannot write: %s%s%s; nothing is recorded until writing succeeds, "

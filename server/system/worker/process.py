@@ -9,6 +9,7 @@ from typing import Generic, NoReturn, Self, TypeVar
 import msgspec
 
 from server.system.child_process import start_worker
+from server.system.errors import reason_of
 from server.system.worker.protocol import LENGTH_BYTES, READY, encode_message
 
 Answer = TypeVar("Answer", bound=msgspec.Struct)
@@ -51,7 +52,7 @@ class WorkerProcess(Generic[Answer]):
         try:
             process = await start_worker(module)
         except OSError as error:
-            raise WorkerDiedError(f"cannot be started: {error.strerror}") from error
+            raise WorkerDiedError(f"cannot be started: {reason_of(error)}") from error
         started = cls(process, answer_type, answer_s)
         started._requests.write(encode_message(settings))
         return started
