@@ -33,19 +33,19 @@ from tracking.solvers.viterbi import PrunedStates, Trellis
 _STEPS = 64
 """Steps where the budget allows them."""
 
-_PROOF_INTERVAL = 8
+_PROOF_INTERVAL = 12
 """Steps after which all paths are priced, which proves a bound and finds violated conflict rows."""
 
 _STEPS_OF_PROOF, _STEPS_OF_START = 3, 4
 """Work of a proof and of the start, in steps."""
 
-_IDLE_PROOFS, _LEAST_GAIN = 2, 0.05
-"""The ascent ends after so many proofs that close less than this share of the gap."""
+_LEAST_GAIN = 0.05
+"""The ascent ends after a proof that closes less than this share of the gap."""
 
 _WORTH_DROPPING = 0.7
 """Arcs are dropped if no more than this share of them is kept."""
 
-_MANY_ARCS = 2000
+_MANY_ARCS = 1200
 """Of more arcs than that, the steps look only at those on the cheapest paths."""
 
 _TOLERANCE = 1e-9
@@ -119,7 +119,7 @@ class LayoutAscent:
     def run(self) -> RelaxedSolution:
         """Return the best bound, and the last soft paths as the flow."""
         is_done = self._prove()
-        steps, idle_proofs, progress = 0, 0, 0.0
+        steps, progress = 0, 0.0
         while progress < 1.0 and not is_done and not self._meter.reached(RELAXATION_SHARE):
             self._step(progress)
             # Arcs are dropped on the way, so that more steps become affordable.
@@ -129,9 +129,7 @@ class LayoutAscent:
                 before = self._best.bound
                 is_done = self._prove()
                 gain = self._best.bound - before
-                gap = self._answer_cost - before
-                idle_proofs = idle_proofs + 1 if gain < _LEAST_GAIN * gap else 0
-                is_done |= idle_proofs >= _IDLE_PROOFS
+                is_done |= gain < _LEAST_GAIN * (self._answer_cost - before)
         is_cut = not is_done and steps < _STEPS
         network, best = self._network, self._best
         frames = np.array([row.frame for row in self._conflicts.rows[: len(best.rows)]], dtype=np.int64)
