@@ -83,6 +83,7 @@ BENCHMARKS = (
     Benchmark("calibration", "accuracy of cameras calibrated from walking people; 5 minutes"),
     Benchmark("scaling", "many simulated cameras on one best-view process; 4 minutes"),
     Benchmark("streaming", "splicing, viewers and HLS delay, beside ffmpeg and nginx; 6 minutes"),
+    Benchmark("substream", "processor time of a camera with and without a substream; 3 minutes"),
     Benchmark("codecs", "cost and size of H.264, VP8 and passthrough; 1 minute"),
     Benchmark("faults", "injected faults of processes, sources, messages, disk and clock; 12 minutes"),
     Benchmark("faults.failover", "failures of a site with two best-view services; 9 minutes"),
