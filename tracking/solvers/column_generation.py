@@ -37,7 +37,7 @@ from tracking.solvers.solution_builder import empty_solution, solution_from_rela
 from tracking.solvers.viterbi import PathPricer, Paths, Trellis
 from tracking.solvers.warm_start import WarmStart
 
-_MAX_PATH_GROUP = 12
+_MAX_PATH_GROUP = 8
 """Largest group of conflicting objects for which columns of paths converge faster than arcs."""
 
 _SUBGRADIENT_STEPS, _STEP_FACTOR = 8, 1.2
