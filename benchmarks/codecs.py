@@ -68,6 +68,7 @@ VARIANTS = (
     StreamVariant("H.264 (the default)", {}),
     StreamVariant("H.264, preset veryfast", {"preset": "veryfast"}),
     StreamVariant("H.264, max_kbps 500", {"max_kbps": 500}),
+    StreamVariant("H.265", {"codec": "h265"}),
     StreamVariant("VP8 (quantizer 16, speed 10)", {"codec": "vp8"}),
     StreamVariant("VP8, quantizer 24", {"codec": "vp8", "quantizer": 24}),
     StreamVariant("H.264, passed through", {}, "pass"),
@@ -89,7 +90,8 @@ def measure(variant: StreamVariant, recording: Path, site: SiteSettings, frames:
     """Run a camera pipeline over a recording, and measure it."""
     pipeline = CameraPipeline(_config(variant, recording, site), "c0")
     spent, size, error = np.zeros(3), 0, 0.0
-    decoder = av.CodecContext.create(variant.encode.get("codec", "h264"), "r")
+    codec = variant.encode.get("codec", "h264")
+    decoder = av.CodecContext.create("hevc" if codec == "h265" else codec, "r")
     assert isinstance(decoder, av.VideoCodecContext)  # noqa: S101 — narrows the type for mypy
     decoder.thread_count = 1
     for pulse in range(frames):

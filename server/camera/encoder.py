@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from server.media.color_conversion import to_yuv
 from server.media.rendering_messages import RenderSettings
+from server.system.errors import UserError
 
 if TYPE_CHECKING:  # a render worker must start fast, without the configuration's libraries
     from server.config.sections import EncodeSettings, SiteSettings
@@ -31,7 +32,7 @@ _UNLIMITED_BITRATE = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class AccessUnit:
-    """One encoded frame: H.264 in Annex B, a keyframe with SPS and PPS; or VP8."""
+    """One encoded frame: H.264 or H.265 in Annex B, a keyframe with its parameter sets; or VP8."""
 
     pulse: int
     key: bool
@@ -43,8 +44,11 @@ class AccessUnit:
 class Encoder:
     """Returns one access unit for each frame, without delay.
 
-    SPS and PPS depend on the site's configuration alone, so they are equal in all cameras, and a decoder sees
-    a cut between cameras as an ordinary GOP boundary. With :class:`RenderSettings` it encodes H.264.
+    Parameter sets depend on the site's configuration alone, so they are equal in all cameras, and a decoder
+    sees a cut between cameras as an ordinary GOP boundary. With :class:`RenderSettings` it encodes H.264.
+
+    Raises:
+        UserError: FFmpeg has no such encoder here.
     """
 
     def __init__(
@@ -59,6 +63,8 @@ class Encoder:
             or settings.codec == "h264"
         ):
             self._context = _open_x264(site, settings)
+        elif settings.codec == "h265":
+            self._context = _open_x265(site, settings)
         else:
             self._context = _open_libvpx(site, settings)
 
@@ -86,6 +92,28 @@ def _open_x264(
         "forced-idr": "1",
         "x264-params": "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m"
         + _rate_limit(site, settings),
+    }
+    context.open()
+    return context
+
+
+def _open_x265(site: SiteSettings, settings: EncodeSettings) -> VideoCodecContext:
+    try:
+        context = _create_context("libx265", site)
+    except av.codec.codec.UnknownCodecError:
+        raise UserError(
+            "encode.codec: h265: PyAV has no libx265 here to encode cameras; "
+            "let all cameras pass through (passthrough: pass), or use h264"
+        ) from None
+    context.max_b_frames = 0
+    context.options = {
+        "preset": settings.preset,
+        "tune": "zerolatency",
+        "crf": str(settings.crf),
+        "forced-idr": "1",
+        # Pools of threads would delay frames.
+        "x265-params": "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m:info=0:log-level=none"
+        ":pools=none:frame-threads=1" + _rate_limit(site, settings),
     }
     context.open()
     return context
@@ -125,7 +153,7 @@ def _frames_per_gop(site: SiteSettings | RenderSettings, settings: EncodeSetting
 
 
 def _rate_limit(site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings) -> str:
-    """Return x264's VBV parameters that keep every second below ``max_kbps`` (H.264, annex C).
+    """Return x264's and x265's VBV parameters that keep every second below ``max_kbps`` (H.264, annex C).
 
     In one second a full buffer and the fill rate pass at once, so the rate is ``max_kbps / (1 + buffer
     seconds)``. The buffer holds a GOP, up to half a second, since a keyframe is larger than other frames.

@@ -108,7 +108,7 @@ class CameraPipeline:
         camera, site = config.camera(camera_id), config.site
         passthrough = open_passthrough(config, camera, listener)
         self.is_passthrough = passthrough.source is not None
-        """Whether the source's own H.264 is passed through."""
+        """Whether the source's own video is passed through."""
         self.why_encoded = passthrough.reason
         """Why it cannot be passed through; empty: that was not requested."""
         self.source: FrameSource = (

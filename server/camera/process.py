@@ -68,9 +68,9 @@ class CameraProcess:
         listener = self._audio if isinstance(self._audio, LiveAudioSource) else None
         self._pipeline = CameraPipeline(config, camera_id, self._boot, listener)
         if self._pipeline.is_passthrough:
-            log.info("camera %s: its own H.264 is passed through", camera_id)
+            log.info("camera %s: its own video is passed through", camera_id)
         elif self._pipeline.why_encoded:
-            log.warning("camera %s is re-encoded: its own H.264: %s", camera_id, self._pipeline.why_encoded)
+            log.warning("camera %s is re-encoded: its own video: %s", camera_id, self._pipeline.why_encoded)
         self._video = ThreadPoolExecutor(1, "video")
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps

@@ -10,6 +10,13 @@ from server.media.parameter_sets import ParameterSets
 from server.media.picture import Codec
 
 
+class Continuity(Protocol):
+    """Finds lost pictures of a stream without decoding it."""
+
+    def follows(self, access_unit: bytes) -> bool:
+        """Return whether an access unit, Annex B, has its beginning and follows the last one."""
+
+
 class NalCodec(Protocol):
     """Parses access units, and writes pictures of its own."""
 
@@ -20,6 +27,16 @@ class NalCodec(Protocol):
     @property
     def title(self) -> str:
         """The codec's name for people."""
+
+    @property
+    def ffmpeg_name(self) -> str:
+        """The name of FFmpeg's decoder."""
+
+    def select_sets(self, units: Sequence[bytes]) -> list[bytes]:
+        """Return those NAL units that are parameter sets."""
+
+    def continuity(self) -> Continuity:
+        """Return the continuity check of a stream that begins."""
 
     def parameter_sets(self, units: Sequence[bytes]) -> ParameterSets | None:
         """Return the parameter sets among NAL units; None if one is missing or invalid."""
@@ -36,6 +53,12 @@ class NalCodec(Protocol):
         Raises:
             UnsupportedParametersError: they cannot, and why.
         """
+
+    def may_reorder(self, parameters: ParameterSets | None) -> bool:
+        """Return whether these parameter sets allow pictures that are shown in another order than decoded."""
+
+    def is_in_order(self, units: Sequence[bytes], parameters: ParameterSets | None) -> bool:
+        """Return whether the picture does not refer to later ones, as far as its slice header tells."""
 
     def gray_picture(self, parameters: ParameterSets, number: int) -> bytes:
         """Return the sample of a gray keyframe; ``number``, 0 or 1, differs between two in a row.

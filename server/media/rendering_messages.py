@@ -27,7 +27,7 @@ TIMESCALE = 90_000
 class RenderSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Size, rate and encoder settings of a site's video; the worker encodes H.264 as the cameras do."""
 
-    input_codec: Literal["h264", "vp8"] = "h264"
+    input_codec: Literal["h264", "h265", "vp8"] = "h264"
     """The codec of the frames to decode; the worker always encodes H.264."""
     width: int
     height: int

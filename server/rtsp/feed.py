@@ -162,7 +162,7 @@ class Feed:
         due_s = self._clock.due(part.time_s, _running_s(media), is_key=is_keyframe)
         due_s = max(due_s, self._last_due_s.get(part.track.codec, 0.0) + _LEAST_STEP_S)
         self._last_due_s[part.track.codec] = due_s
-        data = with_parameter_sets(part.data, part.track.configuration) if is_keyframe else part.data
+        data = with_parameter_sets(part.data, part.track) if is_keyframe else part.data
         buffer = Gst.Buffer.new_wrapped(data)
         buffer.pts = buffer.dts = int(due_s * Gst.SECOND)
         buffer.duration = int(part.duration_s * Gst.SECOND)
@@ -197,6 +197,9 @@ def caps_of(track: Track) -> Gst.Caps:
     match track.codec:
         case "h264":
             text = "video/x-h264,stream-format=avc,alignment=au"
+        case "h265":
+            kind = "hev1" if track.may_change else "hvc1"
+            text = f"video/x-h265,stream-format={kind},alignment=au"
         case "aac":
             text = f"audio/mpeg,mpegversion=4,stream-format=raw,rate={track.rate},channels={track.channels}"
         case _:

@@ -19,7 +19,7 @@ _TRUN_OFFSET, _TRUN_FIRST_FLAGS, _TRUN_DURATION, _TRUN_SIZE, _TRUN_FLAGS, _TRUN_
     0x1, 0x4, 0x100, 0x200, 0x400, 0x800,
 )  # fmt: skip
 _TFHD_BASE, _TFHD_DESCRIPTION, _TFHD_DURATION, _TFHD_SIZE, _TFHD_FLAGS = 0x1, 0x2, 0x8, 0x10, 0x20
-_NAL_SPS = 7
+_NAL_SPS, _NAL_SPS_H265 = 7, 33
 _SAMPLE_ENTRY_VIDEO, _SAMPLE_ENTRY_AUDIO = 78, 28
 """Bytes of a sample entry before its boxes."""
 
@@ -36,17 +36,19 @@ class Track:
     timescale: int
     """Ticks a second."""
     codec: str
-    """h264, aac or opus."""
+    """h264, h265, aac or opus."""
     configuration: bytes
-    """H.264: AVCDecoderConfigurationRecord; AAC: AudioSpecificConfig; Opus: nothing."""
+    """H.264 and H.265: the decoder configuration record; AAC: AudioSpecificConfig; Opus: nothing."""
     rate: int = 0
     """Audio: samples a second."""
     channels: int = 0
+    may_change: bool = False
+    """Whether keyframes carry parameter sets of their own, which the configuration then lacks."""
 
     @property
     def is_video(self) -> bool:
         """Whether it is the video."""
-        return self.codec == "h264"
+        return self.codec in {"h264", "h265"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,30 +70,45 @@ class Sample:
     data: bytes = field(repr=False)
 
 
-def with_parameter_sets(sample: bytes, configuration: bytes) -> bytes:
+def with_parameter_sets(sample: bytes, track: Track) -> bytes:
     """Return a keyframe with its track's parameter sets before it, unless it has its own.
 
     Not by the payloader, which would put them between the slices of a picture, too. Lengths have four bytes.
 
     Raises:
-        Mp4Error: the configuration is not an AVCDecoderConfigurationRecord (ISO/IEC 14496-15, 5.3.3.1).
+        Mp4Error: the configuration is not a decoder configuration record (ISO/IEC 14496-15).
     """
-    at = 0
+    is_h265, at = track.codec == "h265", 0
     while at + 5 <= len(sample):
-        if sample[at + 4] & 0x1F == _NAL_SPS:
+        kind = sample[at + 4] >> 1 & 0x3F if is_h265 else sample[at + 4] & 0x1F
+        if kind == (_NAL_SPS_H265 if is_h265 else _NAL_SPS):
             return sample
         at += 4 + int.from_bytes(sample[at : at + 4], "big")
-    sets, at = b"", 5
     try:
-        for mask in (0x1F, 0xFF):  # SPS, then PPS
-            count, at = configuration[at] & mask, at + 1
-            for _ in range(count):
-                size = int.from_bytes(configuration[at : at + 2], "big")
-                sets += size.to_bytes(4, "big") + configuration[at + 2 : at + 2 + size]
-                at += 2 + size
+        sets = list(_hvcc_sets(track.configuration) if is_h265 else _avcc_sets(track.configuration))
     except IndexError as error:
-        raise Mp4Error("the description of H.264 is incomplete") from error
-    return sets + sample
+        raise Mp4Error("the description of the video is incomplete") from error
+    return b"".join(len(unit).to_bytes(4, "big") + unit for unit in sets) + sample
+
+
+def _avcc_sets(record: bytes) -> Iterator[bytes]:
+    at = 5
+    for mask in (0x1F, 0xFF):  # SPS, then PPS
+        count, at = record[at] & mask, at + 1
+        for _ in range(count):
+            size = int.from_bytes(record[at : at + 2], "big")
+            yield record[at + 2 : at + 2 + size]
+            at += 2 + size
+
+
+def _hvcc_sets(record: bytes) -> Iterator[bytes]:
+    at = 23
+    for _ in range(record[at - 1]):
+        count, at = int.from_bytes(record[at + 1 : at + 3], "big"), at + 3
+        for _ in range(min(count, len(record))):
+            size = int.from_bytes(record[at : at + 2], "big")
+            yield record[at + 2 : at + 2 + size]
+            at += 2 + size
 
 
 class Mp4Reader:
@@ -197,6 +214,9 @@ def _track(trak: bytes) -> Track:
     kind, entry = next(_boxes(_child(mdia, b"minf", b"stbl", b"stsd")[8:]), (b"", b""))
     if kind in {b"avc1", b"avc3"}:
         return Track(number, timescale, "h264", _child(entry[_SAMPLE_ENTRY_VIDEO:], b"avcC"))
+    if kind in {b"hvc1", b"hev1"}:
+        configuration = _child(entry[_SAMPLE_ENTRY_VIDEO:], b"hvcC")
+        return Track(number, timescale, "h265", configuration, may_change=kind == b"hev1")
     channels, _, _, _, rate = struct.unpack_from(">4HI", entry, 16)
     codec = {b"mp4a": "aac", b"Opus": "opus"}.get(kind)
     if codec is None:

@@ -31,7 +31,12 @@ log = logging.getLogger(__name__)
 _Status = GstRtsp.RTSPStatusCode
 _STATUS: Mapping[int, Any] = {401: _Status.UNAUTHORIZED, 403: _Status.FORBIDDEN, 404: _Status.NOT_FOUND}
 """The RTSP status of the service's; others are 503."""
-_PAYLOADERS = {"h264": "rtph264pay config-interval=0", "aac": "rtpmp4gpay", "opus": "rtpopuspay"}
+_PAYLOADERS = {
+    "h264": "rtph264pay config-interval=0",
+    "h265": "rtph265pay config-interval=0",
+    "aac": "rtpmp4gpay",
+    "opus": "rtpopuspay",
+}
 _OPENING = GstRtsp.RTSPMethod.DESCRIBE | GstRtsp.RTSPMethod.SETUP
 """Requests that name a stream; others need a session."""
 _IDLE_CONNECTIONS = 64

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from random import Random
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -14,6 +14,7 @@ from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
+from server.media.picture import Codec
 from server.messaging.camera_status import CameraStatus
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
@@ -43,7 +44,7 @@ TracksMaker = Callable[[Random, str, int], CameraTracks]
 """Makes a camera's track message of an epoch."""
 
 
-def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
+def site(*, codec: Codec = "h264", **changes: Any) -> Config:
     """Return the configuration of two cameras that share a floor; every epoch is a GOP."""
     content: dict[str, Any] = {
         "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
@@ -66,12 +67,12 @@ def site(*, codec: Literal["h264", "vp8"] = "h264", **changes: Any) -> Config:
         },
         **changes,
     }
-    if codec == "h264":
+    if codec != "vp8":
         content["sound"] = {"source": "c0"}
     return build_config(content, where="hall", folder=Path())
 
 
-def pictures(seed: int, frames: int, codec: Literal["h264", "vp8"] = "h264") -> tuple[AccessUnit, ...]:
+def pictures(seed: int, frames: int, codec: Codec = "h264") -> tuple[AccessUnit, ...]:
     """Encode pictures that differ by camera (seed) and by frame."""
     encoder = Encoder(
         SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS), EncodeSettings(gop_s=GOP / FPS, codec=codec)

@@ -19,6 +19,9 @@ from server.camera.passthrough.compatibility import IncompatibleStreamError, Req
 from server.camera.passthrough.recording_source import PassthroughRecording
 from server.camera.sources.base import FrameSource, SourceEndedError
 from server.camera.sources.recording import Recording
+from server.media.h264.codec import H264
+from server.media.h265.codec import H265
+from server.media.nal_units import join_units, nal_units
 from server.system.errors import UserError
 
 
@@ -34,7 +37,7 @@ def _take(source: FrameSource) -> None:
 
 
 class PassthroughPackets(Target):
-    """Target for packets of a camera's H.264 stream, as for passthrough."""
+    """Target for packets of a camera's H.264 or H.265 stream, as for passthrough."""
 
     name = "media-packets"
 
@@ -43,7 +46,16 @@ class PassthroughPackets(Target):
         sps = b"\x67\x42\xc0\x1e\xd9"
         avcc = b"\x01\x42\xc0\x1e\xff\xe1" + struct.pack(">H", len(sps)) + sps + b"\x01\x00\x02\x68\xce"
         lengths = b"".join(struct.pack(">I", len(unit)) + unit for unit in (b"\x65\x88\x84", b"\x41\x9a"))
-        self._valid = ((avcc, lengths), (units[0].data[:40], units[1].data), (b"", units[0].data))
+        h265 = pictures(0, 2, "h265")
+        sets, packed = H265.parameter_sets(nal_units(h265[0].data)), join_units(nal_units(h265[1].data))
+        hvcc = b"" if sets is None else sets.configuration
+        self._valid = (
+            (avcc, lengths),
+            (units[0].data[:40], units[1].data),
+            (b"", units[0].data),
+            (hvcc, packed),
+            (b"", h265[0].data),
+        )
 
     def make(self, rng: Random) -> bytes:
         """Return the extradata of a stream, and a packet."""
@@ -56,7 +68,9 @@ class PassthroughPackets(Target):
         """Parse the packet."""
         extradata, packet = msgspec.msgpack.decode(data, type=tuple[bytes, bytes])
         try:
-            parse_packing(extradata).annex_b(packet)
+            for codec in (H264, H265):
+                access_unit = parse_packing(extradata, codec).annex_b(packet)
+                codec.continuity().follows(access_unit)
         except ValueError as error:
             return refused(error)
         return True
@@ -92,7 +106,7 @@ class RecordingFile(Target):
     def feed(self, data: bytes) -> bool:
         """Read its frames, decoded and passed through."""
         self._path.write_bytes(data)
-        required = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
+        required = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, H264, None)
         try:
             recording = Recording(str(self._path), 0, "stop")
         except UserError as error:

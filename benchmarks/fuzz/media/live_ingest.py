@@ -21,6 +21,7 @@ from server.camera.passthrough.stream_source import PassthroughStream
 from server.camera.sources.live_stream import LiveStream
 from server.camera.sources.opening import OpenedVideo
 from server.config.sections import SoundSettings
+from server.media.h264.codec import H264
 from server.system.errors import UserError
 
 _FRAMES = 2 * STRIDE + 3
@@ -59,7 +60,7 @@ class LiveIngest(ScriptTarget):
     """Target for live streams of a camera, read from a file, without network protocols."""
 
     name = "media-live"
-    _required = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, None)
+    _required = RequiredFormat((WIDTH, HEIGHT), FPS, STRIDE, H264, None)
 
     def __init__(self) -> None:
         self._folder, self._memory = TemporaryDirectory(), folder()

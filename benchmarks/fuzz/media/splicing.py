@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 from random import Random
-from typing import Literal
 
 import msgspec
 
@@ -25,6 +24,7 @@ from benchmarks.fuzz.engine.target import ScriptTarget
 from benchmarks.fuzz.media.damaged_media import damage_media
 from server.camera.encoder import AccessUnit
 from server.config.site_config import Config
+from server.media.picture import Codec
 from server.messaging.epochs import end_of_epoch
 from server.service.streaming.broadcaster import Broadcaster
 from server.service.view_selection.decider import GopDecision, ObjectChoice
@@ -44,7 +44,7 @@ _script = msgspec.msgpack.Decoder(tuple[_Cuts, _Units])
 class _Splice(ScriptTarget):
     """Frames of two cameras, and the cuts between them in people's streams."""
 
-    codec: Literal["h264", "vp8"] = "h264"
+    codec: Codec = "h264"
     parameters = "equal"
 
     def __init__(self) -> None:
@@ -167,3 +167,11 @@ class SpliceVp8(_Splice):
 
     name = "media-splice-vp8"
     codec = "vp8"
+
+
+class SpliceH265(_Splice):
+    """H.265 with each camera's own parameter sets."""
+
+    name = "media-splice-h265"
+    codec = "h265"
+    parameters = "own"

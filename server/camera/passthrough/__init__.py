@@ -1,4 +1,4 @@
-"""Passthrough of a camera's own H.264, where it fits the site's streams."""
+"""Passthrough of a camera's own video, where it fits the site's streams."""
 
 from __future__ import annotations
 

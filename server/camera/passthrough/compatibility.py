@@ -1,4 +1,4 @@
-"""Check whether a camera's own H.264 can be passed through into the site's streams."""
+"""Check whether a camera's own video can be passed through into the site's streams."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from server.camera.encoder import Encoder
-from server.camera.passthrough.access_units import is_keyframe
 from server.camera.sources.frame_timing import frame_index
 from server.camera.sources.opening import OpenedVideo
 from server.camera.sources.orientation import Orientation
 from server.config.site_config import Config
-from server.media.h264.annexb import parameter_sets
+from server.media.codec import nal_codec
+from server.media.nal_codec import NalCodec
 from server.media.nal_units import nal_units
-from server.media.parameter_sets import ParameterSets
+from server.media.parameter_sets import ParameterSets, UnsupportedParametersError
 
 _SAME_RATE = 0.03
 """Relative deviation allowed of a camera's declared rate, which is often rounded."""
@@ -31,6 +31,7 @@ class RequiredFormat:
     size: tuple[int, int]
     fps: float
     gop: int
+    codec: NalCodec
     parameters: ParameterSets | None
     """Those of the re-encoded cameras; None: there are none, and the cameras' own must agree."""
 
@@ -38,13 +39,13 @@ class RequiredFormat:
 def required_format(config: Config) -> RequiredFormat:
     """Return the format that a site requires."""
     site = config.site
-    parameters = None
+    parameters, codec = None, nal_codec(config.encode.codec)
     encoding = any(camera.passthrough != "pass" for camera in config.cameras)
     if encoding and config.encode.parameters == "equal":
         black = np.zeros((site.height, site.width, 3), dtype=np.uint8)
         first = Encoder(site, config.encode).encode(0, black)
-        parameters = parameter_sets(nal_units(first.data))
-    return RequiredFormat((site.width, site.height), site.fps, config.gop, parameters)
+        parameters = codec.parameter_sets(nal_units(first.data))
+    return RequiredFormat((site.width, site.height), site.fps, config.gop, codec, parameters)
 
 
 class CompatibilityCheck:
@@ -62,8 +63,9 @@ class CompatibilityCheck:
             IncompatibleStreamError: it does not fit.
         """
         required, codec = self._required, opened.stream.codec_context.name
-        if codec != "h264":
-            raise IncompatibleStreamError(f"it is {codec}, not H.264")
+        if codec != required.codec.ffmpeg_name:
+            sent = {"h264": "H.264", "hevc": "H.265"}.get(codec, codec)
+            raise IncompatibleStreamError(f"it is {sent}, not {required.codec.title} (encode.codec)")
         if opened.size != required.size:
             camera_size, site_size = ("x".join(map(str, size)) for size in (opened.size, required.size))
             raise IncompatibleStreamError(
@@ -104,14 +106,15 @@ class CompatibilityCheck:
         Raises:
             IncompatibleStreamError: it does not fit.
         """
-        gop = self._required.gop
+        gop, codec, units = self._required.gop, self._required.codec, nal_units(data)
         goes_back = shown is not None and self._shown is not None and shown <= self._shown
-        if goes_back or (shown is not None and decoded is not None and shown != decoded):
+        is_late = None not in (shown, decoded) and shown != decoded and codec.may_reorder(self._parameters)
+        if goes_back or is_late or not codec.is_in_order(units, self._parameters):
             raise IncompatibleStreamError(
                 f"frame {frame} is decoded and shown in another order: it has B frames"
             )
         self._shown = shown
-        if is_keyframe(data) != (pulse % gop == 0):
+        if codec.is_keyframe(units) != (pulse % gop == 0):
             problem = (
                 "begins a GOP, but none of the site's GOPs begins there"
                 if pulse % gop
@@ -121,13 +124,19 @@ class CompatibilityCheck:
                 f"frame {frame} {problem}: they begin every {gop} frames (encode.gop_s)"
             )
         if pulse % gop == 0:
-            self._check_parameters(frame, parameter_sets(nal_units(data)))
+            self._check_parameters(frame, codec.parameter_sets(units))
 
     def _check_parameters(self, frame: int, found: ParameterSets | None) -> None:
         if found is None:
-            raise IncompatibleStreamError(f"frame {frame} begins a GOP without parameter sets")
+            raise IncompatibleStreamError(
+                f"frame {frame} begins a GOP without one set of parameters of each kind"
+            )
         if self._parameters is None:
             self._parameters = found
+            try:
+                self._required.codec.check_supported(found)
+            except UnsupportedParametersError as error:
+                raise IncompatibleStreamError(f"its parameter sets are not supported: {error}") from error
         elif found != self._parameters:
             expected = (
                 "those that this site encodes with" if self._required.parameters else "at its beginning"

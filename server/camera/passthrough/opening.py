@@ -1,4 +1,4 @@
-"""Opens a camera for passthrough of its own H.264."""
+"""Opens a camera for passthrough of its own video."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PassthroughOpening:
 def open_passthrough(
     config: Config, camera: CameraSettings, listener: LiveAudioSource | None
 ) -> PassthroughOpening:
-    """Open a camera for passthrough of its own H.264, where the configuration asks for that.
+    """Open a camera for passthrough of its own video, where the configuration asks for that.
 
     Raises:
         UserError: it cannot be opened, or does not fit though the configuration demands it.
@@ -61,4 +61,4 @@ def _open(config: Config, camera: CameraSettings, listener: LiveAudioSource | No
                 camera.source, first, camera.at_end, required_format(config), decodes=decodes
             )
         case _:
-            raise IncompatibleStreamError("image files contain no H.264")
+            raise IncompatibleStreamError("image files contain no video stream")

@@ -9,7 +9,7 @@ import av
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
-from server.camera.passthrough.access_units import is_keyframe, parse_packing
+from server.camera.passthrough.access_units import parse_packing
 from server.camera.passthrough.compatibility import (
     CompatibilityCheck,
     IncompatibleStreamError,
@@ -22,6 +22,7 @@ from server.camera.sources.orientation import Orientation, parse_orientation
 from server.camera.sources.recording import Recording, decode_frames
 from server.config.source_address import path_is_missing
 from server.media.color_conversion import to_bgr
+from server.media.nal_units import nal_units
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
@@ -48,7 +49,7 @@ class PassthroughRecording:
         if path_is_missing(path):
             raise UserError(f"{redact_to_host(path)}: no such file or folder")
         self._path, self._offset, self._loop = path, offset, at_end == "loop"
-        self._fps, self.decodes = required.fps, decodes
+        self._fps, self._codec, self.decodes = required.fps, required.codec, decodes
         self._length = _check_file(path, offset, required)
         if self._loop and self._length % required.gop:
             raise IncompatibleStreamError(
@@ -89,7 +90,7 @@ class PassthroughRecording:
 
     def _begin(self) -> None:
         self._opened = open_video(self._path)
-        self._packing = parse_packing(self._opened.stream.codec_context.extradata)
+        self._packing = parse_packing(self._opened.stream.codec_context.extradata, self._codec)
         self._packets, self._next = access_unit_packets(self._opened), 0
 
     def _read(self) -> None:
@@ -98,13 +99,14 @@ class PassthroughRecording:
             raise SourceEndedError(self._path)
         data = self._packing.annex_b(bytes(packet))
         self._next += 1
+        key = self._codec.is_keyframe(nal_units(data))
         if not self.decodes:
-            self.current = PassthroughUnit(is_keyframe(data), data, None)
+            self.current = PassthroughUnit(key, data, None)
             return
         image = decode_unit(packet)
         if image is None and self.current is not None:
             image = self.current.image  # damaged: viewers see the previous image, too
-        self.current = None if image is None else PassthroughUnit(is_keyframe(data), data, image)
+        self.current = None if image is None else PassthroughUnit(key, data, image)
 
 
 def decode_unit(packet: av.Packet[VideoStream]) -> Image | None:
@@ -147,7 +149,7 @@ def _check_file(path: str, offset: int, required: RequiredFormat) -> int:
     try:
         check.check_video(opened)
         check.check_orientation(_orientation(path))
-        packing = parse_packing(opened.stream.codec_context.extradata)
+        packing = parse_packing(opened.stream.codec_context.extradata, required.codec)
         for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
             check.check_access_unit(frame, frame + offset, data, packet.pts, packet.dts)

@@ -11,7 +11,7 @@ import av
 from av.video.stream import VideoStream
 
 from server.camera.audio import LiveAudioSource
-from server.camera.passthrough.access_units import is_keyframe, parse_packing
+from server.camera.passthrough.access_units import parse_packing
 from server.camera.passthrough.compatibility import (
     CompatibilityCheck,
     IncompatibleStreamError,
@@ -30,7 +30,7 @@ from server.camera.sources.live_stream import LiveStream
 from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.camera.sources.stream_reader import OPEN_S, READ_S
-from server.media.h264.continuity import PictureContinuity
+from server.media.nal_units import nal_units
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
@@ -59,7 +59,7 @@ class PassthroughStream(LiveStream):
     ) -> None:
         _check(url, options, required)
         self.decodes = self._is_decoding = decodes
-        self._continuity = PictureContinuity()
+        self._continuity = required.codec.continuity()
         self._required = required
         self._waiting = GopAlignmentQueue(required.gop)
         self._waiting_lock = threading.Lock()
@@ -88,7 +88,7 @@ class PassthroughStream(LiveStream):
             self._log_away(f"{redact_to_host(self._url)}: its stream does not fit any more: {error}")
             return False
         decode_without_delay(opened)
-        self._is_decodable, self._continuity = False, PictureContinuity()
+        self._is_decodable, self._continuity = False, self._required.codec.continuity()
         return super()._accept(opened)
 
     def _decode(self, packet: av.Packet[VideoStream]) -> bool:
@@ -96,10 +96,11 @@ class PassthroughStream(LiveStream):
         if not packet.size:
             return False
         try:
-            data = parse_packing(packet.stream.codec_context.extradata).annex_b(bytes(packet))
+            packing = parse_packing(packet.stream.codec_context.extradata, self._required.codec)
+            data = packing.annex_b(bytes(packet))
         except ValueError:
             data = b""
-        key = is_keyframe(data)
+        key = self._required.codec.is_keyframe(nal_units(data))
         if key:  # a decoder can begin only there
             self._is_decoding = self.decodes
         image = decode_unit(packet) if self._is_decoding else None
@@ -131,14 +132,16 @@ def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> No
     try:
         check.check_video(opened)
         aspect = pixel_aspect(opened.stream)
-        packing, start, extra = parse_packing(opened.stream.codec_context.extradata), -1, 0
+        packing = parse_packing(opened.stream.codec_context.extradata, required.codec)
+        start, extra = -1, 0
         for frame, packet in enumerate(access_unit_packets(opened)):
             data = packing.annex_b(bytes(packet))
             for picture in decode_pictures(packet):
                 check.check_orientation(parse_orientation(picture, aspect))
-            if is_keyframe(data) and start < 0:
+            key = required.codec.is_keyframe(nal_units(data))
+            if key and start < 0:
                 start = frame
-            elif is_keyframe(data) and frame - start < required.gop and extra < _EXTRA_KEYFRAMES:
+            elif key and frame - start < required.gop and extra < _EXTRA_KEYFRAMES:
                 start, extra = frame, extra + 1
             if start >= 0:
                 check.check_access_unit(frame - start, frame - start, data, packet.pts, packet.dts)

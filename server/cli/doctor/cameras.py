@@ -105,7 +105,7 @@ def _findings_of(config: Config, camera: str, probe: CameraProbe, *, runs: bool)
     rate = probe.recorded_fps if probe.sent is None else probe.sent.fps
     if rate is not None:
         parts.append(f"{rate:.1f} pictures a second")
-    encoding = "its own H.264 passes" if probe.passes else f"{probe.kbps:.0f} kbit/s"
+    encoding = "its own video passes" if probe.passes else f"{probe.kbps:.0f} kbit/s"
     parts += [encoding, f"{probe.cores:.2f} of a core"]
     small = [] if probe.substream is None else substream_findings(check, probe.substream)
     return [ok(check, ", ".join(parts)), *small, *_quality_findings(config, check, probe)]

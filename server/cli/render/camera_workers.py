@@ -108,7 +108,7 @@ def _work(config: Config, camera: str, outbox: Outbox, peers: PeerPipes) -> None
     try:
         pipeline = CameraPipeline(config, camera)
         if pipeline.why_encoded:
-            log.warning("camera %s is re-encoded: its own H.264: %s", camera, pipeline.why_encoded)
+            log.warning("camera %s is re-encoded: its own video: %s", camera, pipeline.why_encoded)
         for batch in run_camera(pipeline, camera, peers):
             outbox.put(batch)
     except UserError as error:

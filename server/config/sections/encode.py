@@ -13,17 +13,17 @@ from tracking.frame_rate import frames_in
 class EncodeSettings(Section):
     """Encoder settings, equal in all cameras, so that views can be cut without re-encoding."""
 
-    codec: Literal["h264", "vp8"] = "h264"
-    """H.264 by x264 in MP4, or VP8 by libvpx in WebM: free of patents' and of the GPL's terms."""
+    codec: Literal["h264", "h265", "vp8"] = "h264"
+    """H.264 (x264) or H.265 (x265) in MP4, or VP8 (libvpx) in WebM: free of patents' and the GPL's terms."""
     gop_s: Annotated[float, Field(gt=0, le=60)] = 0.4
     """Seconds of a closed group of pictures, at least one frame; views can change only where one begins."""
     crf: Annotated[int, Field(ge=0, le=51)] = 23
-    """x264's constant quality: smaller is better and larger; 18 to 28 is sensible."""
+    """x264's or x265's constant quality: smaller is better and larger; 18 to 28 is sensible."""
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = "ultrafast"
     max_kbps: Annotated[int, Field(ge=16)] | None = None
     """Kilobits of a camera's pictures in any second at most; None: as many as the quality needs."""
     parameters: Literal["equal", "own"] = "equal"
-    """H.264 parameter sets (SPS, PPS): equal in all cameras, or own ones where a camera passes through."""
+    """Parameter sets of H.264 or H.265: equal in all cameras, or own ones where a camera passes through."""
     quantizer: Annotated[int, Field(ge=0, le=63)] = 16
     """VP8's constant quality, instead of crf: smaller is better and larger; 8 to 32 is sensible."""
     speed: Annotated[int, Field(ge=1, le=16)] = 10

@@ -112,8 +112,10 @@ def _refused(request: web.Request) -> web.Response | None:
         return error_response(415, f"send the SDP offer as {_SDP}")
     if streams.codec is None:
         return unavailable("no camera has delivered a picture yet")
-    if streams.container != "mp4":
-        return error_response(404, "these streams are VP8 (encode.codec): WebRTC hands on H.264 only")
+    codec = request.app[SERVICE].config.encode.codec
+    if codec != "h264":
+        name = {"vp8": "VP8", "h265": "H.265"}[codec]
+        return error_response(404, f"these streams are {name} (encode.codec): WebRTC hands on H.264 only")
     return None
 
 

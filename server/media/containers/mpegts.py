@@ -23,7 +23,7 @@ COUNTERS = 16
 """Packets after which the continuity counter wraps around."""
 
 _PAT_PID, _PMT_PID, _VIDEO_PID, _AUDIO_PID = 0x0000, 0x1000, 0x0100, 0x0101
-_VIDEO_TYPES: dict[Codec, int] = {"h264": 0x1B, "h265": 0x24}
+_VIDEO_TYPES: dict[Codec, int] = {"h264": 0x1B, "h265": 0x24, "vp8": 0x06}
 _AAC = 0x0F
 """stream_type."""
 _CLOCK = 1 << 33

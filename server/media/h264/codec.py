@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from server.media.h264 import annexb
+from server.media.h264.continuity import PictureContinuity
 from server.media.h264.gap_filler import H264GapFiller
 from server.media.h264.gray_picture import gray_picture
 from server.media.h264.repeat_picture import parse_repeatable
@@ -17,6 +18,15 @@ class H264Codec:
 
     name: Codec = "h264"
     title = "H.264"
+    ffmpeg_name = "h264"
+
+    def select_sets(self, units: Sequence[bytes]) -> list[bytes]:
+        """Return those NAL units that are parameter sets."""
+        return [unit for unit in units if annexb.nal_type(unit) in (annexb.NAL_SPS, annexb.NAL_PPS)]
+
+    def continuity(self) -> PictureContinuity:
+        """Return the continuity check of a stream that begins."""
+        return PictureContinuity()
 
     def parameter_sets(self, units: Sequence[bytes]) -> ParameterSets | None:
         """Return the parameter sets among NAL units; None if one is missing or invalid."""
@@ -32,6 +42,16 @@ class H264Codec:
 
     def check_supported(self, parameters: ParameterSets) -> None:
         """Do nothing: where a gap cannot be filled, a picture lasts longer."""
+
+    def may_reorder(self, parameters: ParameterSets | None) -> bool:
+        """Return True: they may not tell."""
+        del parameters
+        return True
+
+    def is_in_order(self, units: Sequence[bytes], parameters: ParameterSets | None) -> bool:
+        """Return True: it is not in the header."""
+        del units, parameters
+        return True
 
     def gray_picture(self, parameters: ParameterSets, number: int) -> bytes:
         """Return the sample of a gray keyframe.

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from server.media.h265 import nal
+from server.media.h265.continuity import ReferenceContinuity
 from server.media.h265.gap_filler import H265GapFiller
 from server.media.h265.gray_picture import gray_keyframe
 from server.media.h265.parameter_sets import H265ParameterSets, parameter_sets
 from server.media.h265.repeat_picture import parse_repeatable_syntax
+from server.media.h265.slice_header import read_picture_order
 from server.media.parameter_sets import ParameterSets, UnsupportedParametersError
 from server.media.picture import Codec
 
@@ -18,6 +20,15 @@ class H265Codec:
 
     name: Codec = "h265"
     title = "H.265"
+    ffmpeg_name = "hevc"
+
+    def select_sets(self, units: Sequence[bytes]) -> list[bytes]:
+        """Return those NAL units that are parameter sets."""
+        return [unit for unit in units if nal.nal_type(unit) in (nal.NAL_VPS, nal.NAL_SPS, nal.NAL_PPS)]
+
+    def continuity(self) -> ReferenceContinuity:
+        """Return the continuity check of a stream that begins."""
+        return ReferenceContinuity()
 
     def parameter_sets(self, units: Sequence[bytes]) -> ParameterSets | None:
         """Return the parameter sets among NAL units; None if one is missing or invalid."""
@@ -41,6 +52,23 @@ class H265Codec:
             UnsupportedParametersError: they cannot, and why.
         """
         parse_repeatable_syntax(_own(parameters))
+
+    def may_reorder(self, parameters: ParameterSets | None) -> bool:
+        """Return whether a decoder must reorder pictures; FFmpeg guesses decoding times in Matroska."""
+        try:
+            return parameters is not None and _own(parameters).syntax.sequence.reorders
+        except UnsupportedParametersError:
+            return False
+
+    def is_in_order(self, units: Sequence[bytes], parameters: ParameterSets | None) -> bool:
+        """Return whether the picture does not refer to later ones, as far as its slice header tells."""
+        if parameters is None:
+            return True
+        try:
+            order = read_picture_order(nal.join_sample(units), _own(parameters).syntax)
+        except (ValueError, UnsupportedParametersError):
+            return True
+        return all(reference.distance < 0 for reference in order.references)
 
     def gray_picture(self, parameters: ParameterSets, number: int) -> bytes:
         """Return the sample of a gray keyframe; two in a row may be equal.

@@ -24,12 +24,12 @@ class H265GapFiller:
     """As in :class:`EncodedPicture`."""
 
     def can_read(self, picture: EncodedPicture) -> bool:
-        """Return whether the picture has a picture order count."""
+        """Return whether the picture has a picture order count, and refers to no later one."""
         try:
-            self._order(picture)
+            order = self._order(picture)
         except ValueError:
             return False
-        return True
+        return all(reference.distance < 0 for reference in order.references)
 
     def repeat_until_keyframe(self, newest: EncodedPicture, spans: Sequence[Span]) -> list[EncodedPicture]:
         """Return repetitions whose order counts continue from the newest picture's."""

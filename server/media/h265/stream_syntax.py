@@ -43,6 +43,7 @@ class SequenceSyntax:
     Attributes:
         width, height: of a picture before cropping, in samples.
         order_bits: bits of slice_pic_order_cnt_lsb.
+        reorders: whether pictures may be shown in another order than decoded.
         kept: pictures besides the current one that a decoder keeps.
         pcm: the smallest and largest PCM block, as binary logarithms; None: there are none.
     """
@@ -52,6 +53,7 @@ class SequenceSyntax:
     bit_depth: int
     order_bits: int
     kept: int
+    reorders: bool
     blocks: BlockSizes
     sample_adaptive_offset: bool
     pcm: tuple[int, int] | None
@@ -123,10 +125,9 @@ def _read_sps(bits: BitReader) -> SequenceSyntax:
     if bit_depth != chroma_depth or bit_depth > _MAX_DEPTH:
         raise ValueError("unusual bit depths")
     order_bits = _limited(bits.ue() + 4, 16)
-    kept = 0
+    kept = reordered = 0
     for _ in range(sub_layers if bits.u(1) else 1):
-        kept = bits.ue()
-        _skip(bits, 2)
+        kept, reordered, _ = bits.ue(), bits.ue(), bits.ue()
     blocks = _read_blocks(bits)
     if width % (1 << blocks.min_cb) or height % (1 << blocks.min_cb):
         raise ValueError("impossible sizes of blocks")
@@ -148,6 +149,7 @@ def _read_sps(bits: BitReader) -> SequenceSyntax:
         bit_depth=bit_depth,
         order_bits=order_bits,
         kept=kept,
+        reorders=reordered > 0,
         blocks=blocks,
         sample_adaptive_offset=sample_adaptive_offset,
         pcm=pcm,

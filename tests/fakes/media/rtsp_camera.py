@@ -1,4 +1,4 @@
-"""A minimal RTSP server (RFC 2326): H.264 over RTP (RFC 6184), interleaved over TCP."""
+"""A minimal RTSP server (RFC 2326): H.264 (RFC 6184) or H.265 (RFC 7798) over RTP, interleaved over TCP."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ import time
 from collections.abc import Iterator, Sequence
 
 from server.camera.encoder import AccessUnit
-from server.media.h264.annexb import NAL_PPS, NAL_SPS, nal_type
+from server.media.codec import nal_codec
 from server.media.nal_units import nal_units
+from server.media.picture import Codec
 
 _PAYLOAD_TYPE = 96
 _MAX_BYTES = 200
 """Bytes of a NAL unit in one packet: few, so that small pictures are fragmented."""
-_FU_A = 28
+_FU_A, _FU_H265 = 28, 49
 _NTP_EPOCH = 2_208_988_800
 """Seconds from 1900 to 1970."""
 
@@ -46,7 +47,9 @@ class RtspCamera:
         delay_s: float = 0.0,
         reports: bool = False,
         port: int = 0,
+        codec: Codec = "h264",
     ) -> None:
+        self.codec = codec
         self.gops, self.fps, self.gop_limit = gops, fps, 40
         self.login, self.live = login, live
         self.began = time.monotonic() if began is None else began
@@ -103,7 +106,7 @@ class _Handler(socketserver.StreamRequestHandler):
         elif method == "OPTIONS":
             headers_out.append("Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN")
         elif method == "DESCRIBE":
-            body = _describe(self.server.camera.gops[0][0])
+            body = _describe(self.server.camera.gops[0][0], self.server.camera.codec)
             headers_out += [f"Content-Base: {address}/", "Content-Type: application/sdp"]
             headers_out.append(f"Content-Length: {len(body)}")
         elif "TCP" in headers.get("transport", "TCP"):
@@ -119,7 +122,7 @@ class _Handler(socketserver.StreamRequestHandler):
             if camera.reports:
                 report = _sender_report(camera.unix_began + time_s, stamp)
                 self.wfile.write(struct.pack(">cBH", b"$", 1, len(report)) + report)
-            for payload, is_last in _payloads(unit):
+            for payload, is_last in _payloads(unit, camera.codec):
                 kind = _PAYLOAD_TYPE | is_last << 7
                 packet = struct.pack(">BBHII", 0x80, kind, number % 2**16, stamp, 1) + payload
                 self.wfile.write(struct.pack(">cBH", b"$", 0, len(packet)) + packet)
@@ -174,23 +177,29 @@ def _md5(text: str) -> str:
     return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
 
 
-def _describe(key: AccessUnit) -> bytes:
-    sets = [unit for unit in nal_units(key.data) if nal_type(unit) in (NAL_SPS, NAL_PPS)]
-    sprop = ",".join(base64.b64encode(parameter_set).decode() for parameter_set in sets)
+def _describe(key: AccessUnit, codec: Codec) -> bytes:
+    units = nal_codec(codec).select_sets(nal_units(key.data))
+    sets = [base64.b64encode(parameter_set).decode() for parameter_set in units]
+    if codec == "h265":
+        fields = "; ".join(
+            f"sprop-{kind}={one}" for kind, one in zip(("vps", "sps", "pps"), sets, strict=True)
+        )
+    else:
+        fields = f"packetization-mode=1;sprop-parameter-sets={','.join(sets)}"
     lines = [
         "v=0",
         "o=- 0 0 IN IP4 127.0.0.1",
         "s=a camera",
         "t=0 0",
         f"m=video 0 RTP/AVP {_PAYLOAD_TYPE}",
-        f"a=rtpmap:{_PAYLOAD_TYPE} H264/90000",
-        f"a=fmtp:{_PAYLOAD_TYPE} packetization-mode=1;sprop-parameter-sets={sprop}",
+        f"a=rtpmap:{_PAYLOAD_TYPE} {codec.upper()}/90000",
+        f"a=fmtp:{_PAYLOAD_TYPE} {fields}",
         "a=control:video",
     ]
     return "\r\n".join([*lines, ""]).encode()
 
 
-def _payloads(unit: AccessUnit) -> Iterator[tuple[bytes, bool]]:
+def _payloads(unit: AccessUnit, codec: Codec) -> Iterator[tuple[bytes, bool]]:
     """Yield RTP payloads, and whether each is the last of the picture."""
     units = list(nal_units(unit.data))
     for index, nal in enumerate(units):
@@ -198,8 +207,13 @@ def _payloads(unit: AccessUnit) -> Iterator[tuple[bytes, bool]]:
         if len(nal) <= _MAX_BYTES:
             yield nal, is_last_unit
             continue
-        offsets = range(1, len(nal), _MAX_BYTES)
+        offsets = range(2 if codec == "h265" else 1, len(nal), _MAX_BYTES)
         for at in offsets:
             is_first, is_last = at == offsets[0], at == offsets[-1]
-            head = bytes([nal[0] & 0xE0 | _FU_A, is_first << 7 | is_last << 6 | nal[0] & 0x1F])
+            if codec == "h265":
+                head = bytes(
+                    [nal[0] & 0x81 | _FU_H265 << 1, nal[1], is_first << 7 | is_last << 6 | nal[0] >> 1]
+                )
+            else:
+                head = bytes([nal[0] & 0xE0 | _FU_A, is_first << 7 | is_last << 6 | nal[0] & 0x1F])
             yield head + nal[at : at + _MAX_BYTES], is_last_unit and is_last

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -15,6 +15,7 @@ from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
+from server.media.picture import Codec
 from server.messaging.camera_status import CameraStatus
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
@@ -72,7 +73,7 @@ def small_config(cameras: Sequence[str | dict[str, Any]] = CAMERAS, **changes: A
 
 @cache
 def encoded(
-    seed: int, frames: int = 40, *, gop: int = GOP, crf: int = 23, codec: Literal["h264", "vp8"] = "h264"
+    seed: int, frames: int = 40, *, gop: int = GOP, crf: int = 23, codec: Codec = "h264"
 ) -> tuple[AccessUnit, ...]:
     """Encode pictures that differ from camera to camera (by seed) and from frame to frame."""
     encoder = Encoder(

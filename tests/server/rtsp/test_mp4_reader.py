@@ -9,13 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fakes.media.h265 import sets_of, x265_units
 from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.fmp4 import FragmentSample, fragment, init_segment, still_fragment
 from server.media.containers.mp4_audio import audio_fragment
 from server.media.h264.annexb import join_sample, parameter_sets
-from server.media.nal_units import nal_units, split_sample
-from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample, with_parameter_sets
+from server.media.h265.nal import is_idr
+from server.media.nal_units import join_units, nal_units, split_sample
+from server.rtsp.mp4_reader import Head, Mp4Error, Mp4Reader, Sample, Track, with_parameter_sets
 
 UNITS = encoded(0, 10)
 SAMPLES = [join_sample(nal_units(unit.data)) for unit in UNITS]
@@ -93,12 +95,25 @@ def test_a_keyframe_has_its_parameter_sets_once_before_all_slices() -> None:
     assert parameters is not None
     slices = [b"\x65first", b"\x65second"]
     sample = b"".join(len(nal).to_bytes(4, "big") + nal for nal in slices)
-    whole = with_parameter_sets(sample, track.configuration)
+    whole = with_parameter_sets(sample, track)
     assert list(split_sample(whole)) == [parameters.sps, parameters.pps, *slices]
-    assert with_parameter_sets(whole, track.configuration) == whole, "avc3 has its own"
+    assert with_parameter_sets(whole, track) == whole, "avc3 has its own"
 
 
-@given(st.binary(max_size=40), st.binary(max_size=40))
-def test_any_configuration_is_an_error_or_ignored(sample: bytes, configuration: bytes) -> None:
+def test_a_keyframe_of_h265_has_its_parameter_sets_once() -> None:
+    (unit,) = x265_units((64, 48), 1)
+    sets = sets_of(unit)
+    head, *_ = Mp4Reader().feed(init_segment(sets, 64, 48))
+    assert isinstance(head, Head)
+    (track,) = head.tracks
+    assert (track.codec, track.is_video, track.may_change) == ("h265", True, False)
+    picture = join_units([one for one in nal_units(unit) if is_idr(one)])
+    whole = with_parameter_sets(picture, track)
+    assert split_sample(whole)[:3] == [sets.vps, sets.sps, sets.pps]
+    assert with_parameter_sets(whole, track) == whole
+
+
+@given(st.sampled_from(["h264", "h265"]), st.binary(max_size=40), st.binary(max_size=40))
+def test_any_configuration_is_an_error_or_ignored(codec: str, sample: bytes, configuration: bytes) -> None:
     with contextlib.suppress(Mp4Error):
-        with_parameter_sets(sample, configuration)
+        with_parameter_sets(sample, Track(1, 90_000, codec, configuration))

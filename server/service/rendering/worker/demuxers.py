@@ -6,7 +6,6 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from server.media.h264.annexb import NAL_IDR, nal_type
 from server.media.rendering_messages import TIMESCALE
 
 _HEAD = 8
@@ -16,7 +15,9 @@ _CONTAINERS = frozenset({b"moof", b"traf"})
 _TFDT_TIME = 4
 """Bytes of version and flags before the time."""
 _TRUN_DURATION = 12
-"""Bytes of version, flags, sample_count and data_offset, before the first sample's duration."""
+"""Bytes of version, flags, sample_count and data_offset, before the first sample's fields."""
+_NON_SYNC = 0x00010000
+"""sample_is_non_sync_sample."""
 _START_CODE = b"\x00\x00\x00\x01"
 
 
@@ -33,18 +34,17 @@ class DemuxedFrame:
 
 def demux_mp4(fragments: bytes, fps: float) -> Iterator[DemuxedFrame]:
     """Yield the frames of MP4 fragments in order."""
-    pulse, duration = -1, 1
+    pulse, duration, key = -1, 1, False
     for kind, start, end in _boxes(fragments, 0, len(fragments)):
         if kind == b"tfdt" and end - start >= _TFDT_TIME + 8:
             (ticks,) = struct.unpack_from(">Q", fragments, start + _TFDT_TIME)
             pulse = round(ticks * fps / TIMESCALE)
-        elif kind == b"trun" and end - start >= _TRUN_DURATION + 4:
-            (ticks,) = struct.unpack_from(">I", fragments, start + _TRUN_DURATION)
-            duration = max(1, round(ticks * fps / TIMESCALE))
+        elif kind == b"trun" and end - start >= _TRUN_DURATION + 12:
+            ticks, _, flags = struct.unpack_from(">3I", fragments, start + _TRUN_DURATION)
+            duration, key = max(1, round(ticks * fps / TIMESCALE)), not flags & _NON_SYNC
         elif kind == b"mdat":
-            units = list(_units(fragments, start, end))
-            key = any(nal_type(unit) == NAL_IDR for unit in units)
-            yield DemuxedFrame(pulse, key, b"".join(_START_CODE + unit for unit in units), duration)
+            data = b"".join(_START_CODE + unit for unit in _units(fragments, start, end))
+            yield DemuxedFrame(pulse, key, data, duration)
 
 
 def _boxes(data: bytes, start: int, end: int) -> Iterator[tuple[bytes, int, int]]:

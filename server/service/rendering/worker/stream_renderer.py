@@ -142,7 +142,7 @@ class StreamRenderer:
 
 
 def _decoder(codec: str) -> VideoCodecContext:
-    decoder = av.CodecContext.create(codec, "r")
+    decoder = av.CodecContext.create("hevc" if codec == "h265" else codec, "r")
     assert isinstance(decoder, VideoCodecContext)  # noqa: S101 — for mypy
     decoder.thread_count = 1  # more threads delay frames
     return decoder

@@ -27,6 +27,7 @@ from server.camera.sources import ImageFolder, Recording
 from server.camera.sources.live_stream import LiveStream
 from server.cli.generated_config import config_for_videos
 from server.cli.render.video_info import read_video_info
+from server.media.h264.codec import H264
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
 __all__ = ["myview"]
@@ -34,7 +35,7 @@ __all__ = ["myview"]
 WIDE, HIGH = 96, 64
 ORIENTATIONS = [(turn, flip) for turn in (0, 90, 180, 270) for flip in (False, True)]
 """Rotations to the left, in degrees, and whether the picture is mirrored afterwards."""
-SITE = RequiredFormat((WIDE, HIGH), 25.0, 10, None)
+SITE = RequiredFormat((WIDE, HIGH), 25.0, 10, H264, None)
 
 Picture = NDArray[np.uint8]
 

@@ -20,6 +20,7 @@ from server.camera.passthrough.compatibility import IncompatibleStreamError, Req
 from server.camera.passthrough.recording_source import PassthroughRecording
 from server.camera.sources import SourceEndedError
 from server.camera.sources.recording import Recording
+from server.media.h264.codec import H264
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
 __all__ = ["myview"]
@@ -167,7 +168,7 @@ def test_video_without_one_frame_per_pulse_is_not_passed_through(tmp_path: Path)
     with pytest.raises(
         IncompatibleStreamError, match=r"frame 35 is shown at 1.44 s, which is frame 36 at the site's 25 "
     ):
-        PassthroughRecording(str(hole), 0, "stop", RequiredFormat((64, 48), 25.0, 10, None))
+        PassthroughRecording(str(hole), 0, "stop", RequiredFormat((64, 48), 25.0, 10, H264, None))
 
 
 def test_views_of_two_frame_rates_are_rendered_to_one_length(tmp_path: Path, myview: RunCommand) -> None:

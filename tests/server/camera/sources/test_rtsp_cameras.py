@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.rtsp.cameras import passes, simulated, site_of
-from benchmarks.rtsp.simulated_cameras import FPS, HEIGHT, ODD_NAME, ODD_PASSWORD, WIDTH, SimulatedCamera
+from benchmarks.rtsp.simulated_cameras import FPS, GOP, HEIGHT, ODD_NAME, ODD_PASSWORD, WIDTH, SimulatedCamera
 from fakes.programs import needs_openssl
 from fakes.rtsp.gateway import needs_gstreamer
 from fakes.timeouts import PATIENCE
@@ -84,13 +84,16 @@ def test_a_certificate_is_checked_if_the_camera_has_options_for_that(tmp_path: P
         source.close()
 
 
-def test_h265_is_encoded_anew(tmp_path: Path) -> None:
-    encoder = "x265enc speed-preset=ultrafast tune=zerolatency key-int-max=15 ! h265parse config-interval=-1"
+def test_h265_passes_at_a_site_of_h265_alone(tmp_path: Path) -> None:
+    options = f"tune=zerolatency key-int-max={GOP} option-string=open-gop=0:scenecut=0"
+    encoder = f"x265enc speed-preset=ultrafast {options} ! h265parse config-interval=-1"
     camera = SimulatedCamera("", "", f"{PICTURE} ! {encoder} ! rtph265pay name=pay0 pt=96")
     with running(camera, tmp_path) as config:
         with opened(config) as source:
             until(lambda pulse: source.take(pulse) is not None)
-        assert passes(config) == "encoded: it is hevc, not H.264"
+        assert passes(config) == "encoded: it is H.265, not H.264 (encode.codec)"
+        encode = config.encode.model_copy(update={"codec": "h265"})
+        assert passes(config.model_copy(update={"encode": encode})) == "passes"
 
 
 def test_a_picture_that_changes_its_size_opens_the_camera_again(tmp_path: Path) -> None:

@@ -17,7 +17,9 @@ from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON,
 from fakes.timeouts import PATIENCE
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.sections import EncodeSettings, SiteSettings
+from server.media.codec import stream_format_for
 from server.media.containers.fmp4 import init_segment
+from server.media.picture import Codec
 from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
@@ -37,19 +39,22 @@ class ShownPicture:
 
 
 @cache
-def captured_units(seed: int, missed: frozenset[int], preset: str) -> tuple[AccessUnit, ...]:
+def captured_units(
+    seed: int, missed: frozenset[int], preset: str, codec: Codec = "h264"
+) -> tuple[AccessUnit, ...]:
     """Encode a camera's pictures except at missed pulses."""
     encoder = Encoder(
         SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS),
-        EncodeSettings.model_validate({"gop_s": GOP / FPS, "preset": preset}),
+        EncodeSettings.model_validate({"gop_s": GOP / FPS, "preset": preset, "codec": codec}),
     )
     noise = np.random.default_rng(seed).integers(0, 255, (FRAMES, HEIGHT, WIDTH, 3), dtype=np.uint8)
     return tuple(encoder.encode(pulse, noise[pulse]) for pulse in range(FRAMES) if pulse not in missed)
 
 
-def decoded_alone(units: tuple[AccessUnit, ...]) -> dict[int, NDArray[np.uint8]]:
+def decoded_alone(units: tuple[AccessUnit, ...], codec: Codec = "h264") -> dict[int, NDArray[np.uint8]]:
     """Decode a camera's own stream."""
-    decoder = av.CodecContext.create("h264", "r")
+    decoder = av.CodecContext.create({"h265": "hevc"}.get(codec, codec), "r")
+    assert isinstance(decoder, av.VideoCodecContext)
     frames = [
         frame for data in [*units, None] for frame in decoder.decode(av.Packet(data.data) if data else None)
     ]
@@ -81,18 +86,20 @@ pulses = st.frozensets(st.integers(0, FRAMES - 1), max_size=8)
     lost=st.tuples(pulses, pulses),
     selected_cameras=st.lists(st.sampled_from([*CAMERAS, None]), min_size=6, max_size=6),
     preset=st.sampled_from(["ultrafast", "superfast"]),
+    codec=st.sampled_from(["h264", "h265"]),
 )
 def test_every_pulse_shows_a_cameras_own_picture_of_it_or_the_picture_before(
     missed: frozenset[int],
     lost: tuple[frozenset[int], frozenset[int]],
     selected_cameras: list[str | None],
     preset: str,
+    codec: Codec,
 ) -> None:
-    stream_format = StreamFormat()
+    stream_format = stream_format_for(codec, (WIDTH, HEIGHT))
     frame_buffers = {camera: FrameBuffer(FPS, FRAMES, stream_format) for camera in CAMERAS}
     splicer = Splicer(frame_buffers, stream_format, small_config())
-    sent = {camera: captured_units(seed, missed, preset) for seed, camera in enumerate(CAMERAS)}
-    own = {camera: decoded_alone(units) for camera, units in sent.items()}
+    sent = {camera: captured_units(seed, missed, preset, codec) for seed, camera in enumerate(CAMERAS)}
+    own = {camera: decoded_alone(units, codec) for camera, units in sent.items()}
     live = {camera: splicer.cameras[camera].subscribe() for camera in CAMERAS}
     for camera, lost_frames in zip(CAMERAS, lost, strict=True):
         for unit in sent[camera]:
