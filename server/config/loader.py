@@ -37,6 +37,7 @@ from server.config.values import (
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError, reason_of
 
+SectionT = TypeVar("SectionT", bound=BaseModel)
 ProcessSection = TypeVar("ProcessSection", SyncSettings, ZenohSettings)
 
 
@@ -261,6 +262,18 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
         return matrices, None if content.get("unit") is None else check_unit_spelling(content["unit"])
     except ValueError as error:
         raise UserError(f"{where}: ground: {path}: unit: {error}") from error
+
+
+def check_section(section: type[SectionT], content: Mapping[str, Any], where: str) -> SectionT:
+    """Check the content of one section.
+
+    Raises:
+        UserError: something is wrong; the text begins with ``where``.
+    """
+    try:
+        return section(**content)
+    except ValidationError as error:
+        raise UserError(_one_line(where, error)) from None  # its text repeats keys unredacted
 
 
 def _one_line(where: str, error: ValidationError, within: tuple[str, ...] = ()) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from server.config.loader import load_config, read_content
+from server.config.loader import check_section, load_config, read_content
+from server.config.sections import RuleSettings, ZoneSettings
 from server.setup.site_file import check_text, replace_file
 from server.setup.yaml_edit import changed_lists_text
 from server.system.errors import UserError
@@ -15,8 +16,14 @@ from server.system.errors import UserError
 _Entry = dict[str, Any]
 
 _ZONE_KEYS = ("id", "camera", "area", "line", "inner")
-_RULE_KEYS = ("id", "kind", "zone", "direction", "longer_than_s", "more_than", "closer_than_m")
 """Settings that are given with a change; others of an earlier entry stay."""
+_ALWAYS: dict[str, tuple[Any, ...]] = {
+    "people": ([],),
+    "days": (RuleSettings.model_fields["days"].default,),
+    "cameras": ([],),
+    "hold_s": (RuleSettings.model_fields["hold_s"].default,),
+}
+"""Values of a rule's settings that are as good as none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +32,7 @@ class ZoneChange:
 
     Attributes:
         zone: its settings but for those of tolerance, as in the file; None: not set.
-        rules: all rules on it, likewise, without the zone and what restricts a rule to times and people.
+        rules: all rules on it, likewise, without the zone.
         replaces: the id of the zone that it replaces; None: it is a new one.
     """
 
@@ -43,20 +50,23 @@ def save_zone(path: Path, change: ZoneChange) -> None:
     """
     zones, rules = _entries(path)
     old = _find(zones, change.replaces) if change.replaces is not None else {}
-    zone = _merged(old, change.zone, _ZONE_KEYS)
-    on_it = {str(rule["id"]): {**rule, "zone": zone["id"]} for rule in change.rules}
-    if len(on_it) < len(change.rules):
-        raise UserError(f"{path}: rules: two have the same id; ids must be unique")
-    earlier = {str(rule.get("id")): rule for rule in rules if _is_on(rule, change.replaces)}
-    merged = {name: _merged(earlier.get(name, {}), rule, _RULE_KEYS) for name, rule in on_it.items()}
+    zone = _merged(old, change.zone)
+    check_section(ZoneSettings, zone, "the zone")
     _write(
         path,
         [zone if each is old else each for each in zones] + ([] if change.replaces is not None else [zone]),
-        [
-            *_with_changed(rules, change.replaces, merged),
-            *(rule for name, rule in merged.items() if name not in earlier),
-        ],
+        _with_rules(rules, change.rules, zone["id"], lambda rule: _is_on(rule, change.replaces)),
     )
+
+
+def save_site_rules(path: Path, wanted: Sequence[Mapping[str, Any]]) -> None:
+    """Replace the rules that are on no zone in a configuration file; the earlier file is kept.
+
+    Raises:
+        UserError: the file or what it would become is invalid, or it cannot be written.
+    """
+    zones, rules = _entries(path)
+    _write(path, zones, _with_rules(rules, wanted, None, lambda rule: rule.get("zone") is None))
 
 
 def remove_zone(path: Path, zone_id: str) -> None:
@@ -93,21 +103,45 @@ def _is_on(rule: Mapping[str, Any], zone_id: str | None) -> bool:
     return zone_id is not None and rule.get("zone") is not None and str(rule["zone"]) == zone_id
 
 
-def _with_changed(
-    rules: Sequence[_Entry], zone_id: str | None, changed: Mapping[str, _Entry]
-) -> Iterator[_Entry]:
-    """Yield the rules of an earlier file, those on a zone as they will be, without the removed ones."""
-    for rule in rules:
-        if not _is_on(rule, zone_id):
-            yield rule
-        elif str(rule["id"]) in changed:
-            yield changed[str(rule["id"])]
+def _with_rules(
+    rules: Sequence[_Entry],
+    wanted: Sequence[Mapping[str, Any]],
+    zone: str | None,
+    is_replaced: Callable[[_Entry], bool],
+) -> list[_Entry]:
+    """Return the rules of an earlier file with other ones on a zone; None: on none.
+
+    Raises:
+        UserError: a rule is invalid, or two have the same id.
+    """
+    earlier = {str(rule["id"]): rule for rule in rules if is_replaced(rule)}
+    changed: dict[str, _Entry] = {}
+    for number, each in enumerate(wanted, start=1):
+        given = {**each, "zone": zone}
+        entry = {
+            key: _plain(given[key])
+            for key in RuleSettings.model_fields
+            if given.get(key) not in (None, *_ALWAYS.get(key, ()))
+        }
+        checked = check_section(RuleSettings, entry, f"rule {number}")
+        if checked.id in changed:
+            raise UserError(f"rule {number}: another one is called {checked.id!r}; ids must be unique")
+        old = earlier.get(checked.id)
+        is_same = old is not None and _meaning(RuleSettings(**old)) == _meaning(checked)
+        changed[checked.id] = old if old is not None and is_same else entry
+    kept = [changed.get(str(rule["id"])) if is_replaced(rule) else rule for rule in rules]
+    added = [rule for name, rule in changed.items() if name not in earlier]
+    return [rule for rule in (*kept, *added) if rule is not None]
 
 
-def _merged(old: Mapping[str, Any], new: Mapping[str, Any], keys: Sequence[str]) -> _Entry:
-    """Return an entry with the new values of some keys, and the other values of an earlier one."""
-    given = {key: _plain(new[key]) for key in keys if new.get(key) is not None}
-    return {**given, **{key: value for key, value in old.items() if key not in keys}}
+def _meaning(rule: RuleSettings) -> dict[str, Any]:
+    return {**rule.model_dump(), "days": sorted(rule.days)}
+
+
+def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> _Entry:
+    """Return a zone with new values, and with the tolerances of an earlier one."""
+    given = {key: _plain(new[key]) for key in _ZONE_KEYS if new.get(key) is not None}
+    return {**given, **{key: value for key, value in old.items() if key not in _ZONE_KEYS}}
 
 
 def _plain(value: Any) -> Any:

@@ -100,6 +100,11 @@
  * @property {number | null} longer_than_s of stayed
  * @property {number | null} more_than of crowded: people
  * @property {number | null} closer_than_m of close
+ * @property {number | null} hold_s of crowded and close
+ * @property {(number | string)[]} people empty: everybody
+ * @property {string[] | null} days mon to sun; null: all
+ * @property {[string, string] | null} hours HH:MM; null: all day
+ * @property {string[]} cameras that must send a clear picture
  *
  * @typedef {object} SiteZone a zone in the configuration file
  * @property {string} zone its id
@@ -114,6 +119,7 @@
  * @property {boolean} in_force
  * @property {string} unit of coordinates on the floor
  * @property {SiteZone[]} zones
+ * @property {ZoneRule[]} rules that are on no zone
  *
  * @typedef {object} Setting an entry of /api/operator/config
  * @property {string} key

@@ -66,7 +66,7 @@ class SiteCameras(msgspec.Struct, frozen=True):
 
 
 class ZoneRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rule on a zone, without what restricts it to times and people."""
+    """A rule, on a zone or anywhere on the site."""
 
     rule: str
     """Its id."""
@@ -80,6 +80,16 @@ class ZoneRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """For crowded: the number of people."""
     closer_than_m: float | None = None
     """For close."""
+    hold_s: float | None = None
+    """For crowded and close: seconds for which that must last; null: the default."""
+    people: list[int | str] = []
+    """Numbers or names; empty: everybody."""
+    days: list[str] | None = None
+    """mon to sun; null: all."""
+    hours: tuple[str, str] | None = None
+    """From and to, HH:MM; null: all day. If it passes midnight, it belongs to the day before."""
+    cameras: list[str] = []
+    """It applies while each of these sends a clear picture."""
 
 
 class SiteZone(msgspec.Struct, frozen=True):
@@ -106,6 +116,8 @@ class SiteZones(msgspec.Struct, frozen=True):
     unit: str
     """Of coordinates on the floor: m, or the ground's own; empty: unknown."""
     zones: list[SiteZone]
+    rules: list[ZoneRule]
+    """Those that are on no zone: they apply anywhere on the site."""
 
 
 class PointError(msgspec.Struct, frozen=True):

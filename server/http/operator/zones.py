@@ -18,7 +18,9 @@ from server.http.app_keys import CONTROL, SERVICE
 from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteZone, SiteZones, ZoneRule
-from server.setup.site_zones import ZoneChange, remove_zone, save_zone
+from server.rules import RuleKind
+from server.rules.schedule import DAYS
+from server.setup.site_zones import ZoneChange, remove_zone, save_site_rules, save_zone
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
@@ -27,9 +29,16 @@ _PATH = f"{OPERATOR_PATH}/zones"
 _SEVERAL = "the site has several services (view.share): change zones in the file, and reload all of them"
 
 
-class ZoneToSave(SiteZone, frozen=True, forbid_unknown_fields=True):
-    """A zone with all rules on it."""
+class ZoneToSave(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A zone with all rules on it, or all rules that are on none."""
 
+    zone: str | None
+    """Its id; null: the rules apply anywhere on the site, and nothing else is given."""
+    camera: str | None = None
+    area: list[tuple[float, float]] | None = None
+    line: list[tuple[float, float]] | None = None
+    inner: tuple[float, float] | None = None
+    rules: list[ZoneRule] = []
     replaces: str | None = None
     """The id of the zone that it replaces; null: it is a new one."""
 
@@ -48,10 +57,12 @@ async def get_zones(request: web.Request) -> web.Response:
 
 @routes.put(_PATH)
 async def put_zone(request: web.Request) -> web.Response:
-    """Save a zone with its rules in the configuration file, and apply it."""
+    """Save a zone with its rules in the configuration file, or the rules on no zone, and apply that."""
     wanted = await read_json(request, ZoneToSave)
-    zone = {"id": wanted.zone, "camera": wanted.camera, "area": wanted.area, "line": wanted.line}
     rules = [{**msgspec.structs.asdict(rule), "id": rule.rule} for rule in wanted.rules]
+    if wanted.zone is None:
+        return await _change(request, partial(save_site_rules, wanted=rules))
+    zone = {"id": wanted.zone, "camera": wanted.camera, "area": wanted.area, "line": wanted.line}
     change = ZoneChange({**zone, "inner": wanted.inner}, rules, wanted.replaces)
     return await _change(request, partial(save_zone, change=change))
 
@@ -93,33 +104,39 @@ async def _zones(request: web.Request) -> SiteZones:
     try:
         file = await asyncio.to_thread(load_config, _editable_path(request))
     except UserError as error:
-        return SiteZones(str(error), in_force=True, unit=_floor_unit(running), zones=_zones_of(running))
+        return _answer(running, str(error), in_force=True, unit=_floor_unit(running))
     in_force = (file.zones, file.rules) == (running.zones, running.rules)
-    return SiteZones("", in_force, _floor_unit(running), _zones_of(file))
+    return _answer(file, "", in_force=in_force, unit=_floor_unit(running))
+
+
+def _answer(config: Config, unavailable: str, *, in_force: bool, unit: str) -> SiteZones:
+    return SiteZones(unavailable, in_force, unit, _zones_of(config), _rules_on(None, config))
 
 
 def _zones_of(config: Config) -> list[SiteZone]:
     return [
-        SiteZone(
-            zone.id,
-            zone.camera,
-            zone.area,
-            zone.line,
-            zone.inner,
-            [
-                ZoneRule(
-                    rule.id,
-                    rule.kind.value,
-                    None if rule.direction is None else rule.direction.value,
-                    rule.longer_than_s,
-                    rule.more_than,
-                    rule.closer_than_m,
-                )
-                for rule in config.rules
-                if rule.zone == zone.id
-            ],
-        )
+        SiteZone(zone.id, zone.camera, zone.area, zone.line, zone.inner, _rules_on(zone.id, config))
         for zone in config.zones
+    ]
+
+
+def _rules_on(zone: str | None, config: Config) -> list[ZoneRule]:
+    return [
+        ZoneRule(
+            rule=rule.id,
+            kind=rule.kind.value,
+            direction=None if rule.direction is None else rule.direction.value,
+            longer_than_s=rule.longer_than_s,
+            more_than=rule.more_than,
+            closer_than_m=rule.closer_than_m,
+            hold_s=rule.hold_s if rule.kind in (RuleKind.CROWDED, RuleKind.CLOSE) else None,
+            people=list(rule.people),
+            days=None if set(rule.days) == set(DAYS) else list(rule.days),
+            hours=None if rule.hours is None else (f"{rule.hours[0]:%H:%M}", f"{rule.hours[1]:%H:%M}"),
+            cameras=list(rule.cameras),
+        )
+        for rule in config.rules
+        if rule.zone == zone
     ]
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from server.config.loader import load_config
 from server.config.site_config import Config
-from server.setup.site_zones import ZoneChange, remove_zone, save_zone
+from server.setup.site_zones import ZoneChange, remove_zone, save_site_rules, save_zone
 from server.system.errors import UserError
 
 TEXT = """\
@@ -40,7 +40,7 @@ rules:
 view: {switch_cost_s: 2.0}
 """
 AREA = [(0.0, 0.0), (2.5, 0.0), (2.0, 3.0)]
-QUEUE = {"id": "queue", "kind": "crowded", "more_than": 4}
+QUEUE = {"id": "queue", "kind": "crowded", "more_than": 4, "days": ["mon"]}
 
 
 @pytest.fixture
@@ -94,7 +94,6 @@ def test_a_changed_zone_keeps_its_place_comments_and_other_settings(path: Path) 
     )
     config = load_config(path)
     assert [zone.id for zone in config.zones] == ["till", "door"]
-    assert config.rules[0].days == ["mon"]
     assert TEXT[TEXT.index("  # the way in") :] in path.read_text()
 
 
@@ -120,6 +119,72 @@ def test_a_rule_changes_its_kind_and_another_is_removed(path: Path) -> None:
     assert "# anybody\n- {id: close" in path.read_text()
 
 
+def test_what_restricts_a_rule_is_saved_and_what_stays_the_same_keeps_its_text(path: Path) -> None:
+    written = (
+        "- id: queue  # at noon\n  kind: crowded\n  zone: till\n  more_than: 4.0\n  days: [wed, mon]\n"
+        "  hours: [08:30, 1320]\n  people: [Ann, 3]\n  cameras: [c0]\n  hold_s: 1\n"
+    )
+    text = TEXT.replace("- {id: queue, kind: crowded, zone: till, more_than: 4, days: [mon]}\n", written)
+    path.write_text(text)
+    same: dict[str, Any] = {
+        **QUEUE,
+        "days": ["mon", "wed"],
+        "hours": ("08:30", "22:00"),
+        "people": ["Ann", 3],
+    }
+    same |= {"cameras": ["c0"], "hold_s": 1.0}
+    save_zone(path, change("till", same, replaces="till", area=[(0.0, 0.0), (2.0, 0.0), (2.0, 4.0)]))
+    assert written in path.read_text()
+    week = list(load_config(path).rules[1].days)
+    save_zone(path, change("till", {**same, "days": week, "hours": ("22:00", "06:00")}, replaces="till"))
+    line = (
+        "- {id: queue, kind: crowded, zone: till, people: [Ann, 3], hours: ['22:00', '06:00'], cameras: [c0],"
+        " more_than: 4}\n"
+    )
+    assert line in path.read_text()
+    cleared = {"people": [], "days": None, "hours": None, "cameras": [], "hold_s": 2.5}
+    save_zone(path, change("till", {**same, **cleared}, replaces="till"))
+    assert "- {id: queue, kind: crowded, zone: till, more_than: 4, hold_s: 2.5}\n" in path.read_text()
+
+
+def test_rules_on_no_zone_are_replaced_and_the_others_stay(path: Path) -> None:
+    save_site_rules(
+        path, [{"id": "close", "kind": "close", "closer_than_m": 2.0}, {"id": "all", "kind": "entered"}]
+    )
+    assert "# anybody\n- {id: close, kind: close, closer_than_m: 2}\n" in path.read_text()
+    assert [(rule.id, rule.zone) for rule in load_config(path).rules] == [
+        ("queue", "till"),
+        ("close", None),
+        ("came-in", "door"),
+        ("all", None),
+    ]
+    save_site_rules(path, [])
+    assert [rule.id for rule in load_config(path).rules] == ["queue", "came-in"]
+    with pytest.raises(UserError, match=r"rule 1: a: crossed needs zone"):
+        save_site_rules(path, [{"id": "a", "kind": "crossed"}])
+
+
+@pytest.mark.parametrize(
+    ("rule", "error"),
+    [
+        ({"hours": ("8", "25:00")}, "rule 1: hours.0: is not a time of day such as 08:30 (and 1 more)"),
+        ({"days": ["moon"]}, "rule 1: days.0: Input should be 'mon'"),
+        ({"days": ()}, "rule 1: days: "),
+        ({"people": [-3]}, "rule 1: people.0"),
+        ({"cameras": ["c7"]}, "rules: queue: there is no camera 'c7'; there are c0"),
+        ({"hold_s": -1}, "rule 1: hold_s: Input should be greater than or equal to 0"),
+        ({"more_than": 10_001}, "rule 1: more_than: Input should be less than or equal to 10000"),
+        ({"direction": "inward"}, "rule 1: queue: direction: is for crossed, not for crowded; leave it out"),
+    ],
+)
+def test_an_invalid_rule_is_one_line_that_names_it(path: Path, rule: dict[str, Any], error: str) -> None:
+    with pytest.raises(UserError) as refused:
+        save_zone(path, change("till", {**QUEUE, **rule}, replaces="till"))
+    assert error in str(refused.value)
+    assert len(str(refused.value).splitlines()) == 1
+    assert path.read_text() == TEXT
+
+
 def test_a_removed_zone_takes_its_rules_along(path: Path) -> None:
     remove_zone(path, "till")
     config = load_config(path)
@@ -132,11 +197,11 @@ def test_a_removed_zone_takes_its_rules_along(path: Path) -> None:
     ("wanted", "error"),
     [
         (change("till"), "zones: two are called 'till'"),
-        (change("", replaces="till"), "zones.0.id: String should match pattern"),
-        (change("a/b"), "zones.2.id"),
-        (change("x", area=AREA[:2]), "zones.2.area: List should have at least 3 items"),
+        (change("", replaces="till"), "the zone: id: String should match pattern"),
+        (change("a/b"), "the zone: id"),
+        (change("x", area=AREA[:2]), "the zone: area: List should have at least 3 items"),
         (change("x", area=[(0.0, 0.0)] * 3), "x: area: the corners are all on one line"),
-        (change("x", area=AREA * 40), "zones.2.area: List should have at most 100 items"),
+        (change("x", area=AREA * 40), "the zone: area: List should have at most 100 items"),
         (change("x", area=[(float("inf"), 0.0), *AREA]), "zones"),
         (change("x", camera="c7"), "zones: x: there is no camera 'c7'; there are c0"),
         (
@@ -144,10 +209,10 @@ def test_a_removed_zone_takes_its_rules_along(path: Path) -> None:
             "x: needs either area, its corners, or line, its two ends",
         ),
         (change("x", {"id": "a", "kind": "crossed"}), "rules: a: crossed is about lines, and x is an area"),
-        (change("x", {"id": "a", "kind": "stayed"}), "rules.3: a: stayed needs longer_than_s"),
-        (change("x", {"id": "a", "kind": "wave"}), "rules.3.kind: Input should be 'entered'"),
+        (change("x", {"id": "a", "kind": "stayed"}), "rule 1: a: stayed needs longer_than_s"),
+        (change("x", {"id": "a", "kind": "wave"}), "rule 1: kind: Input should be 'entered'"),
         (change("x", {"id": "close", "kind": "left"}), "rules: two are called 'close'"),
-        (change("x", QUEUE, QUEUE), "rules: two have the same id"),
+        (change("x", QUEUE, QUEUE), "rule 2: another one is called 'queue'"),
         (change("x", replaces="gone"), "there is no zone 'gone'"),
     ],
 )

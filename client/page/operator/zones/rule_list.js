@@ -1,6 +1,7 @@
 /** The rules on one zone, as rows of a form. */
 
 import { element, make } from '../../shared/dom.js';
+import { restrictionFields } from './rule_restrictions.js';
 
 /** @import {ZoneRule} from '../api_types.js' */
 /** @import {Shape} from './zone_shapes.js' */
@@ -16,13 +17,28 @@ const KINDS = {
   close: 'Two people are closer than',
   crossed: 'Someone crosses',
 };
-/** @type {Partial<Record<Kind, {key: 'longer_than_s' | 'more_than' | 'closer_than_m', unit: string, usual: number, step: string}>>} */
+/**
+ * @typedef {object} Limit of a kind
+ * @property {'longer_than_s' | 'more_than' | 'closer_than_m'} key
+ * @property {string} unit
+ * @property {number} usual
+ * @property {number} most
+ * @property {boolean} isCount a whole number, or none; else above 0
+ */
+
+/** @type {Partial<Record<Kind, Limit>>} */
 const LIMITS = {
-  stayed: { key: 'longer_than_s', unit: 'seconds', usual: 60, step: 'any' },
-  crowded: { key: 'more_than', unit: 'people', usual: 4, step: '1' },
-  close: { key: 'closer_than_m', unit: 'meters', usual: 1.5, step: 'any' },
+  stayed: { key: 'longer_than_s', unit: 'seconds', usual: 60, most: 86_400, isCount: false },
+  crowded: { key: 'more_than', unit: 'people', usual: 4, most: 10_000, isCount: true },
+  close: { key: 'closer_than_m', unit: 'meters', usual: 1.5, most: 1e9, isCount: false },
 };
+const HELD = /** @type {string[]} */ (['crowded', 'close']); // kinds that must last
+const HOLD_S = 1;
+const MAX_HOLD_S = 3600;
+const NAME = /^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$/;
 const DIRECTIONS = { '': 'either way', inward: 'inward', outward: 'outward' };
+
+const NO_LIMITS = { direction: null, longer_than_s: null, more_than: null, closer_than_m: null, hold_s: null };
 
 export class RuleList {
   /** @type {ZoneRule[]} */
@@ -31,11 +47,16 @@ export class RuleList {
   #added = new Set();
   /** @type {Kind[]} that fit the zone */
   #kinds = [];
+  /** @type {Set<string>} names of rules elsewhere */
+  #taken = new Set();
   #list = element('zone-rules');
 
-  constructor() {
+  /** @param {string[]} cameras of the site */
+  constructor(cameras) {
+    this.cameras = cameras;
     element('zone-add-rule').addEventListener('click', () => {
-      const rule = { rule: '', kind: this.#kinds[0], direction: null, longer_than_s: null, more_than: null, closer_than_m: null };
+      /** @type {ZoneRule} */
+      const rule = { rule: '', kind: this.#kinds[0], ...NO_LIMITS, people: [], days: null, hours: null, cameras: [] };
       this.#rules.push(rule);
       this.#added.add(rule);
       this.#show();
@@ -45,11 +66,13 @@ export class RuleList {
 
   /**
    * @param {ZoneRule[]} rules
-   * @param {Shape['kind']} shape of the zone
+   * @param {Shape['kind'] | null} shape of the zone; null: they are on none
    * @param {string | null} camera of the zone
+   * @param {string[]} taken names of rules elsewhere
    */
-  set(rules, shape, camera) {
+  set(rules, shape, camera, taken) {
     this.#rules = rules.map((rule) => ({ ...rule }));
+    this.#taken = new Set(taken);
     this.#added.clear();
     const ofAreas = /** @type {Kind[]} */ (['entered', 'left', 'stayed', 'crowded', ...(camera === null ? ['close'] : [])]);
     this.#kinds = shape === 'line' ? ['crossed'] : ofAreas;
@@ -61,14 +84,28 @@ export class RuleList {
    * @returns {ZoneRule[]}
    */
   read(zone) {
-    const taken = new Set(this.#rules.map(({ rule }) => rule));
+    const taken = new Set([...this.#taken, ...this.#rules.map(({ rule }) => rule)]);
     return this.#rules.map((rule) => {
       if (rule.rule) return rule;
-      const names = [1, 2, 3, 4, 5, 6, 7, 8, 9].map((number) => `${zone}-${rule.kind}${number === 1 ? '' : `-${number}`}`);
-      const name = names.find((free) => !taken.has(free)) ?? '';
+      const name = freeName(`${zone.slice(0, 21)}-${rule.kind}`, taken);
       taken.add(name);
       return { ...rule, rule: name };
     });
+  }
+
+  /**
+   * Show what the server refuses at the rule that it names.
+   *
+   * @param {string} message
+   * @returns {boolean} whether it names one
+   */
+  showRefusal(message) {
+    const [, number, what] = /^rule (\d+): (.*)$/.exec(message) ?? [];
+    const item = number && this.#list.children[Number(number) - 1];
+    if (!item) return false;
+    item.append(make('p', { className: 'error-message', textContent: what, role: 'alert' }));
+    item.querySelector('select')?.focus();
+    return true;
   }
 
   #show() {
@@ -83,7 +120,7 @@ export class RuleList {
     const options = this.#kinds.map((kind) => make('option', { value: kind, textContent: KINDS[kind], selected: kind === rule.kind }));
     const kind = make('select', { ariaLabel: `Rule ${number}` }, ...options);
     kind.addEventListener('change', () => {
-      Object.assign(rule, { kind: kind.value, direction: null, longer_than_s: null, more_than: null, closer_than_m: null });
+      Object.assign(rule, { kind: kind.value, ...NO_LIMITS });
       this.#show();
       this.#list.querySelectorAll('li')[number - 1].querySelector('select')?.focus();
     });
@@ -93,7 +130,7 @@ export class RuleList {
       this.#show();
       element('zone-add-rule').focus();
     });
-    return make('li', {}, kind, ...parameter(rule, number), ...this.#name(rule, number), remove);
+    return make('li', {}, kind, ...parameter(rule, number), ...duration(rule, number), ...this.#name(rule, number), remove, restrictionFields(rule, number, this.cameras));
   }
 
   /**
@@ -104,8 +141,32 @@ export class RuleList {
     if (!this.#added.has(rule)) return [make('span', { className: 'quiet', textContent: rule.rule })];
     const name = make('input', { value: rule.rule, size: 12, maxLength: 32, placeholder: 'its name', spellcheck: false });
     name.ariaLabel = `Name of rule ${number}; empty: after the zone`;
-    name.addEventListener('input', () => (rule.rule = name.value.trim()));
+    name.addEventListener('input', () => {
+      rule.rule = name.value.trim();
+      name.setCustomValidity(this.#describeName(rule));
+    });
     return [name];
+  }
+
+  /**
+   * @param {ZoneRule} rule
+   * @returns {string} what is wrong with its name; empty: nothing
+   */
+  #describeName(rule) {
+    if (rule.rule && !NAME.test(rule.rule)) return 'Use letters, digits, _ and -, at most 32.';
+    const isTaken = this.#taken.has(rule.rule) || this.#rules.some((other) => other !== rule && other.rule && other.rule === rule.rule);
+    return isTaken ? `Another rule is called ${rule.rule}.` : '';
+  }
+}
+
+/**
+ * @param {string} base
+ * @param {Set<string>} taken
+ */
+function freeName(base, taken) {
+  for (let number = 1; ; number += 1) {
+    const name = number === 1 ? base : `${base}-${number}`;
+    if (!taken.has(name)) return name;
   }
 }
 
@@ -123,10 +184,27 @@ function parameter(rule, number) {
   }
   const limit = LIMITS[/** @type {Kind} */ (rule.kind)];
   if (!limit) return [];
-  const { key, unit, usual, step } = limit;
+  const { key, unit, usual, most, isCount } = limit;
   rule[key] ??= usual;
-  const field = make('input', { type: 'number', min: '0', step, value: String(rule[key]), required: true });
+  const field = make('input', { type: 'number', min: '0', max: String(most), step: isCount ? '1' : 'any', value: String(rule[key]), required: true });
   field.ariaLabel = `Limit of rule ${number}, ${unit}`;
-  field.addEventListener('input', () => (rule[key] = field.valueAsNumber));
+  field.addEventListener('input', () => {
+    rule[key] = field.valueAsNumber;
+    field.setCustomValidity(!isCount && field.valueAsNumber === 0 ? 'Enter more than 0.' : '');
+  });
   return [field, make('span', { textContent: unit })];
+}
+
+/**
+ * @param {ZoneRule} rule
+ * @param {number} number
+ * @returns {(Node | string)[]} for how long it must last, to change
+ */
+function duration(rule, number) {
+  if (!HELD.includes(rule.kind)) return [];
+  rule.hold_s ??= HOLD_S;
+  const field = make('input', { type: 'number', min: '0', max: String(MAX_HOLD_S), step: 'any', value: String(rule.hold_s), required: true });
+  field.ariaLabel = `Rule ${number} must last, seconds`;
+  field.addEventListener('input', () => (rule.hold_s = field.valueAsNumber));
+  return ['for', field, make('span', { textContent: 'seconds' })];
 }

@@ -12,7 +12,7 @@ import { ZoneStage } from './zone_stage.js';
 
 /** @import {Rules, Site} from '../../shared/api_types.js' */
 /** @import {Palette} from '../../people/palette.js' */
-/** @import {CameraDiagnostics, Floor, SiteZone, SiteZones} from '../api_types.js' */
+/** @import {CameraDiagnostics, Floor, SiteZone, SiteZones, ZoneRule} from '../api_types.js' */
 /** @import {FloorPlan} from '../floor_plan.js' */
 /** @import {Coverage} from '../floor_drawing.js' */
 /** @import {Section, ShowError} from '../section.js' */
@@ -32,6 +32,8 @@ const HELP = {
 export class ZoneEditor {
   /** @type {SiteZone[]} */
   #zones = [];
+  /** @type {ZoneRule[]} on no zone */
+  #rules = [];
   #unit = ''; // on the floor
   #editable = false;
   /** @type {Map<string, CameraDiagnostics['picture']>} by camera */
@@ -66,8 +68,9 @@ export class ZoneEditor {
     this.plan = plan;
     this.showError = showError;
     this.fileChanged = fileChanged;
-    this.#form = new ZoneForm({
+    this.#form = new ZoneForm(site.cameras, {
       save: (zone) => void this.#save(zone),
+      saveSiteRules: (rules) => void this.#change('PUT', { zone: null, rules }),
       remove: () => void this.#remove(),
       cancel: () => this.#deselect(''),
       changed: () => this.#draw(),
@@ -87,6 +90,7 @@ export class ZoneEditor {
     for (const kind of /** @type {const} */ (['area', 'line'])) {
       element(`zone-new-${kind}`).addEventListener('click', () => this.#create(kind));
     }
+    element('zone-anywhere').addEventListener('click', () => this.#editSiteRules());
     element('zone-picture').addEventListener('click', () => void this.#loadPicture());
   }
 
@@ -117,10 +121,12 @@ export class ZoneEditor {
   }
 
   /** @param {SiteZones} zones */
-  #take({ unavailable, unit, zones }) {
+  #take({ unavailable, unit, zones, rules }) {
     this.#unit = unit;
     this.#zones = zones;
+    this.#rules = rules;
     this.#editable = unavailable === '';
+    this.#button('zone-anywhere').disabled = !this.#editable;
     setText(element('zones-unavailable'), unavailable && `Zones cannot be changed here: ${unavailable}`);
     this.#showList();
   }
@@ -177,11 +183,26 @@ export class ZoneEditor {
     if (!this.#place) return;
     this.#selected = zone;
     const shape = shapeOf(zone);
-    this.#form.open(zone, shape, this.#place);
+    this.#form.open(zone, shape, this.#place, this.#ruleNames(zone));
     setText(element('zone-help'), HELP[shape.kind]);
     setText(this.#state, '');
     this.#showList();
     this.#draw();
+  }
+
+  #editSiteRules() {
+    this.#deselect('');
+    this.#form.openSiteRules(this.#rules, this.#ruleNames(null));
+    setText(element('zone-help'), 'These rules apply anywhere on the site.');
+  }
+
+  /**
+   * @param {SiteZone | null} except null: those on no zone
+   * @returns {string[]} names of all other rules
+   */
+  #ruleNames(except) {
+    const rules = this.#zones.flatMap((zone) => (zone === except ? [] : zone.rules));
+    return [...rules, ...(except ? this.#rules : [])].map(({ rule }) => rule);
   }
 
   /** @param {string} message */
@@ -247,7 +268,8 @@ export class ZoneEditor {
       this.#draw();
       await this.#awaitApplied(answer);
     } catch (error) {
-      setText(this.#state, error instanceof Error ? error.message : '');
+      const message = error instanceof Error ? error.message : '';
+      setText(this.#state, this.#form.showRefusal(message) ? '' : message);
     }
   }
 

@@ -4,7 +4,7 @@ import { element, make } from '../../shared/dom.js';
 import { RuleList } from './rule_list.js';
 import { addCorner, moveCorner, turnDirection } from './zone_shapes.js';
 
-/** @import {SiteZone} from '../api_types.js' */
+/** @import {SiteZone, ZoneRule} from '../api_types.js' */
 /** @import {Place, Point, Shape} from './zone_shapes.js' */
 
 const MIN_CORNERS = 3;
@@ -12,6 +12,7 @@ const MIN_CORNERS = 3;
 /**
  * @typedef {object} FormActions
  * @property {(zone: SiteZone) => void} save
+ * @property {(rules: ZoneRule[]) => void} saveSiteRules
  * @property {() => void} remove
  * @property {() => void} cancel
  * @property {() => void} changed called when the shape has changed
@@ -23,18 +24,23 @@ export class ZoneForm {
   /** @type {Place | null} */
   #place = null;
   #isNew = true;
-  #rules = new RuleList();
+  #rules;
   /** @type {HTMLFormElement} */
   #form = element('zone-form');
   /** @type {HTMLInputElement} */
   #name = element('zone-name');
 
-  /** @param {FormActions} actions */
-  constructor(actions) {
+  /**
+   * @param {string[]} cameras of the site
+   * @param {FormActions} actions
+   */
+  constructor(cameras, actions) {
     this.actions = actions;
+    this.#rules = new RuleList(cameras);
     this.#form.addEventListener('submit', (event) => {
       event.preventDefault();
       if (this.shape && this.#place) actions.save(this.#read(this.shape, this.#place));
+      else actions.saveSiteRules(this.#rules.read('site'));
     });
     element('zone-remove').addEventListener('click', actions.remove);
     element('zone-cancel').addEventListener('click', actions.cancel);
@@ -46,19 +52,49 @@ export class ZoneForm {
    * @param {SiteZone} zone its name is empty if it is new
    * @param {Shape} shape
    * @param {Place} place
+   * @param {string[]} taken names of the rules that are not on it
    */
-  open(zone, shape, place) {
+  open(zone, shape, place, taken) {
     this.shape = shape;
     this.#place = place;
     this.#isNew = zone.zone === '';
     this.#name.value = zone.zone;
-    this.#rules.set(zone.rules, shape.kind, zone.camera);
+    this.#rules.set(zone.rules, shape.kind, zone.camera, taken);
+    this.#showFields(true);
     element('zone-x').textContent = ['x', place.unit].filter(Boolean).join(', ');
     element('zone-y').textContent = ['y', place.unit].filter(Boolean).join(', ');
     element('zone-remove').hidden = this.#isNew;
     element('zone-turn').hidden = shape.kind === 'area';
     this.#form.hidden = false;
     this.#showCorners();
+  }
+
+  /**
+   * Open the rules that are on no zone.
+   *
+   * @param {ZoneRule[]} rules
+   * @param {string[]} taken names of the other rules
+   */
+  openSiteRules(rules, taken) {
+    this.shape = this.#place = null;
+    this.#rules.set(rules, null, null, taken);
+    this.#showFields(false);
+    element('zone-remove').hidden = true;
+    this.#form.hidden = false;
+  }
+
+  /** @param {boolean} isZone else there is no name and no shape */
+  #showFields(isZone) {
+    element('zone-shape').hidden = !isZone;
+    this.#name.disabled = !isZone;
+  }
+
+  /**
+   * @param {string} message of the server
+   * @returns {boolean} whether it is shown at the rule that it names
+   */
+  showRefusal(message) {
+    return this.#rules.showRefusal(message);
   }
 
   close() {

@@ -20,12 +20,17 @@ PATH = "/api/operator/zones"
 CHANGES = {CSRF_HEADER: "1"}
 TEXT = "# mine\ncameras: [{id: c0, source: 'scene:room'}, {id: c1, source: 'scene:room'}]\n"
 RULE = {"rule": "in", "kind": "entered"}
+ALWAYS: dict[str, Any] = {
+    **dict.fromkeys(("direction", "longer_than_s", "more_than", "closer_than_m", "hold_s", "days", "hours")),
+    "people": [],
+    "cameras": [],
+}
 ZONE: dict[str, Any] = {"zone": "till", "camera": "c0", "area": [[0, 0], [32, 0], [32, 48]], "rules": [RULE]}
 LISTED: dict[str, Any] = {
     **ZONE,
     "line": None,
     "inner": None,
-    "rules": [{**RULE, "direction": None, "longer_than_s": None, "more_than": None, "closer_than_m": None}],
+    "rules": [{**ALWAYS, **RULE}],
 }
 NO_FILE = "this service has no configuration file"
 
@@ -60,7 +65,7 @@ async def send(
 
 
 async def test_a_zone_is_saved_changed_and_removed_and_applies(site: ServedSite, path: Path) -> None:
-    nothing = {"unavailable": "", "in_force": True, "unit": "", "zones": []}
+    nothing = {"unavailable": "", "in_force": True, "unit": "", "zones": [], "rules": []}
     assert await site.get_json(PATH) == nothing
     assert await send(site, "PUT", ZONE) == (200, {**nothing, "zones": [LISTED]})
     assert [zone["zone"] for zone in (await site.get_json("/api/rules"))["zones"]] == ["till"]
@@ -74,6 +79,20 @@ async def test_a_zone_is_saved_changed_and_removed_and_applies(site: ServedSite,
     assert len(list(path.parent.glob("site.2*.yaml"))) == 3
 
 
+async def test_rules_with_schedules_are_saved_on_a_zone_and_on_none(site: ServedSite, path: Path) -> None:
+    night = {"rule": "night", "kind": "crowded", "more_than": 0, "hold_s": 5.0, "days": ["fri", "sat"]}
+    night |= {"hours": ["22:00", "06:00"], "people": [3, "Ann"], "cameras": ["c0"]}
+    status, answer = await send(site, "PUT", {**ZONE, "rules": [night]})
+    assert (status, answer["in_force"], answer["zones"][0]["rules"]) == (200, True, [{**ALWAYS, **night}])
+    status, answer = await send(site, "PUT", {"zone": None, "rules": [{**night, "rule": "anywhere"}, RULE]})
+    assert (status, answer["in_force"]) == (200, True)
+    assert answer["rules"] == [{**ALWAYS, **night, "rule": "anywhere"}, {**ALWAYS, **RULE}]
+    assert answer["zones"][0]["rules"] == [{**ALWAYS, **night}]
+    assert [rule.id for rule in site.service.config.rules] == ["night", "anywhere", "in"]
+    assert (await send(site, "PUT", {"zone": None}))[1]["rules"] == []
+    assert [rule.id for rule in load_config(path).rules] == ["night"]
+
+
 async def test_a_change_that_waits_for_a_restart_says_so(site: ServedSite, path: Path) -> None:
     other = load_config(path).model_copy(update={"zones": []})
     path.write_text(path.read_text() + "zones: [{id: hall, area: [[0, 0], [9, 0], [9, 9]]}]\n")
@@ -85,11 +104,11 @@ async def test_a_change_that_waits_for_a_restart_says_so(site: ServedSite, path:
 @pytest.mark.parametrize(
     ("method", "body", "status", "error"),
     [
-        ("PUT", {**ZONE, "area": ZONE["area"][:2]}, 409, "zones.0.area: List should have at least 3 items"),
+        ("PUT", {**ZONE, "area": ZONE["area"][:2]}, 409, "the zone: area: List should have at least 3 items"),
         ("PUT", {**ZONE, "area": None}, 409, "needs either area, its corners, or line"),
-        ("PUT", {**ZONE, "zone": "../x"}, 409, "zones.0.id: "),
+        ("PUT", {**ZONE, "zone": "../x"}, 409, "the zone: id: "),
         ("PUT", {**ZONE, "camera": "c7"}, 409, "there is no camera 'c7'"),
-        ("PUT", {**ZONE, "rules": [{"rule": "a", "kind": "wave"}]}, 409, "rules.0.kind: Input should be"),
+        ("PUT", {**ZONE, "rules": [{"rule": "a", "kind": "wave"}]}, 409, "rule 1: kind: Input should be"),
         ("PUT", {**ZONE, "replaces": "hall"}, 409, "there is no zone 'hall'"),
         ("PUT", {**ZONE, "hold_s": 3}, 400, "unknown field `hold_s`"),
         ("PUT", {**ZONE, "area": [[0, 0, 0]]}, 400, "length 2"),

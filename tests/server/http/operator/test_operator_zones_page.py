@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from datetime import time
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +57,7 @@ async def open_zones(
 
     control = SiteControl(path, reload=reload)
     async with open_operator_page(
-        browser, "#configuration", axe, patience=280, control=control, **changes
+        browser, "#configuration", axe, patience=120, control=control, **changes
     ) as (site, page):
         served.append(site)
         show_people(site)
@@ -180,6 +182,122 @@ async def test_a_zone_is_made_with_the_keyboard_alone(browser: Browser, path: Pa
         assert (config.rules[0].id, config.rules[0].more_than) == ("till-crowded", 2)
 
 
+async def restrict(page: Page, rule: int, **values: str) -> None:
+    """Fill in the fields that restrict a rule."""
+    summary = page.locator("#zone-rules li").nth(rule - 1).locator("summary")
+    await summary.focus()
+    await page.keyboard.press("Enter")
+    for label, value in values.items():
+        await page.get_by_label(re.compile(rf"{label}.* rule {rule}|[Rr]ule {rule} applies {label}")).fill(
+            value
+        )
+
+
+async def test_rules_have_schedules_people_and_clear_cameras_on_a_zone_and_anywhere(
+    browser: Browser, path: Path
+) -> None:
+    rule = "{id: queue, kind: crowded, zone: till, more_than: 4, days: [sat, mon, tue], people: [Ann]}"
+    zone = "zones:\n- {id: till, camera: c0, area: [[0, 0], [9, 0], [9, 9]], margin: 2.0}  # pay\n"
+    path.write_text(f"{TEXT}{zone}rules:\n# at the till\n- {rule}  # mine\n")
+    async with open_zones(browser, path) as (served, page):
+        await page.get_by_role("button", name="till, c0").click()
+        summary, state = page.locator("#zone-rules summary"), page.locator("#zone-state")
+        await expect(summary).to_have_text("When and for whom: Mon\u2013Tue, Sat, for Ann")
+        await page.get_by_role("button", name="Add a rule").click()
+        await page.get_by_label("Rule 2", exact=True).select_option("stayed")
+        await restrict(page, 2, People='3, "7"', to="06:00")
+        await page.get_by_role("button", name="Save").click()
+        start = page.get_by_label("Rule 2 applies from")
+        await expect(start).to_be_focused()
+        assert (
+            await start.evaluate("(it) => it.validationMessage") == "Enter both times, or none for all day."
+        )
+        await start.fill("22:00")
+        for day in ("Sat", "Sun"):
+            await page.locator("#zone-rules li").nth(1).get_by_label(day).uncheck()
+        await page.locator("#zone-rules li").nth(1).get_by_label("c1").check()
+        await expect(summary.nth(1)).to_have_text(
+            "When and for whom: Mon\u2013Fri, 22:00 to 06:00 of the next day, for 3, 7, while c1 is clear"
+        )
+        await page.get_by_role("button", name="Save").click()
+        await expect(state).to_contain_text("Saved, and in force")
+        assert f"# at the till\n- {rule}  # mine\n" in path.read_text()
+        assert zone in path.read_text()
+        queue, stayed = served.service.config.rules
+        assert queue.days == ["sat", "mon", "tue"]
+        assert (stayed.id, stayed.kind, stayed.longer_than_s) == ("till-stayed", "stayed", 60)
+        assert (stayed.people, stayed.days) == ([3, "7"], ["mon", "tue", "wed", "thu", "fri"])
+        assert (stayed.hours, stayed.cameras) == ((time(22), time(6)), ["c1"])
+        await page.get_by_role("button", name="Rules anywhere").click()
+        await expect(page.locator("#zone-name")).to_be_hidden()
+        await page.get_by_role("button", name="Add a rule").click()
+        await page.get_by_label("Rule 1", exact=True).select_option("close")
+        await page.get_by_label("Rule 1 must last, seconds").fill("2.5")
+        await page.get_by_role("button", name="Save").click()
+        await expect(state).to_contain_text("Saved, and in force")
+        close = served.service.config.rules[2]
+        assert (close.id, close.zone, close.closer_than_m, close.hold_s) == ("site-close", None, 1.5, 2.5)
+        await page.get_by_role("button", name="Rules anywhere").click()
+        await restrict(page, 1)
+        await page.get_by_role("button", name="Remove rule 1").click()
+        await page.get_by_role("button", name="Save").click()
+        await expect(state).to_contain_text("Saved, and in force")
+        assert [each.id for each in load_config(path).rules] == ["queue", "till-stayed"]
+
+
+async def test_an_invalid_entry_of_a_rule_is_one_line_at_its_field(browser: Browser, path: Path) -> None:
+    path.write_text(
+        f"{TEXT}zones:\n- {{id: till, camera: c0, area: [[0, 0], [9, 0], [9, 9]]}}\n"
+        "rules: [{id: other, kind: entered}]\n"
+    )
+    before = path.read_text()
+    async with open_zones(browser, path) as (_, page):
+        await page.get_by_role("button", name="till, c0").click()
+        await page.get_by_role("button", name="Add a rule").click()
+        await page.get_by_label("Rule 1", exact=True).select_option("stayed")
+        await restrict(page, 1)
+        details = page.locator("#zone-rules details")
+        for label, values in (
+            (
+                "Name of rule 1",
+                {"a b": "Use letters, digits, _ and -", "other": "Another rule is called other."},
+            ),
+            (
+                "Limit of rule 1, seconds",
+                {"0": "Enter more than 0.", "86401": "86400", "-1": "0", "": "fill out"},
+            ),
+            ("People of rule 1", {"3,,": "Enter numbers or names with commas", '"Ann': "Enter numbers"}),
+            ("Rule 1 applies to", {"06:00": "Enter both times, or none for all day."}),
+        ):
+            field = page.get_by_label(label)
+            usual = await field.input_value()
+            for value, message in values.items():
+                await details.evaluate("(it) => { it.open = true; }")
+                await field.fill(value)
+                await details.evaluate("(it) => { it.open = false; }")
+                await page.get_by_role("button", name="Save").click()
+                invalid = page.locator("#zone-form input:invalid")
+                await expect(invalid).to_be_focused()
+                assert message in await invalid.evaluate("(it) => it.validationMessage")
+            await field.fill(usual)
+        for box in await details.locator("fieldset").first.get_by_role("checkbox").all():
+            await box.uncheck()
+        await page.get_by_role("button", name="Save").click()
+        monday = page.locator("#zone-rules").get_by_label("Mon")
+        await expect(monday).to_be_focused()
+        assert await monday.evaluate("(it) => it.validationMessage") == "Choose at least one day."
+        await monday.check()
+        await page.locator("#zone-rules li").evaluate(
+            "(it) => { it.querySelector('select').add(new Option('wave')); }"
+        )
+        await page.get_by_label("Rule 1", exact=True).select_option("wave")
+        await page.get_by_role("button", name="Save").click()
+        await expect(page.locator("#zone-rules li .error-message")).to_contain_text(
+            "kind: Input should be 'entered'"
+        )
+        assert path.read_text() == before
+
+
 async def test_what_the_loader_refuses_is_shown_and_what_was_drawn_stays(
     browser: Browser, path: Path
 ) -> None:
@@ -189,7 +307,7 @@ async def test_what_the_loader_refuses_is_shown_and_what_was_drawn_stays(
         await page.locator("#zone-name").fill("till")
         await page.get_by_role("button", name="Save").click()
         await expect(page.locator("#zone-state")).to_contain_text(
-            "zones.0.area: List should have at least 3 items"
+            "the zone: area: List should have at least 3 items"
         )
         await expect(page.locator("#zone-corners tr")).to_have_count(1)
         assert path.read_text() == TEXT
@@ -221,6 +339,8 @@ async def test_the_open_form_fits_every_width_and_axe_finds_no_serious_violation
         for number, kind in enumerate(("entered", "left", "stayed", "crowded", "close"), 1):
             await page.get_by_role("button", name="Add a rule").click()
             await page.get_by_label(f"Rule {number}", exact=True).select_option(kind)
+        for number in range(1, 6):
+            await restrict(page, number, People="Ann", to="06:00")
         for width in (360, 800, 1600):
             await page.set_viewport_size({"width": width, "height": 800})
             assert await page.evaluate("document.documentElement.scrollWidth") <= width
