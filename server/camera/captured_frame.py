@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field
 
 from server.camera.sources.base import Image
-from server.camera.sources.stream_clock import CaptureTime
+from server.camera.substream.picture_buffer import PictureRequest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,11 +16,11 @@ class CapturedFrame:
     Attributes:
         pulse: its pulse.
         image: at the site's size; None: it is passed through without being decoded.
-        captured: when it was captured; None: unknown.
+        request: for the substream's picture of the same moment; None: there is none to look for.
         taken: when it was taken from the source, by the steady clock.
     """
 
     pulse: int
     image: Image | None
-    captured: CaptureTime | None
+    request: PictureRequest | None = None
     taken: float = field(default_factory=time.monotonic)

@@ -26,7 +26,7 @@ from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetection
 from server.camera.sharpness import SharpnessMemory
 from server.camera.sources import FrameSource, Image, open_source
 from server.camera.sources.live_stream import LiveStream
-from server.camera.substream import open_tracked_pictures
+from server.camera.substream.opening import open_tracked_pictures
 from server.camera.track_messages import TrackMessageBuilder
 from server.camera.tracker_setup import set_up_tracker
 from server.config.sections import CameraSettings
@@ -178,7 +178,7 @@ class CameraPipeline:
         self._missing = 0
         captured = self.source.captured if isinstance(self.source, LiveStream) else None
         site_image = None if image is None else self._letterbox.image(image)
-        return CapturedFrame(pulse, site_image, captured)
+        return CapturedFrame(pulse, site_image, self.tracked.request(captured))
 
     @property
     def away(self) -> bool:

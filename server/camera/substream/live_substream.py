@@ -14,7 +14,7 @@ from server.camera.sources.opening import OpenedVideo
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.camera.sources.stream_clock import CaptureTime
 from server.camera.sources.stream_reader import StreamReader
-from server.camera.substream.picture_buffer import BufferedPicture, PictureBuffer
+from server.camera.substream.picture_buffer import BufferedPicture, PictureBuffer, PictureRequest
 
 _FIRST_PICTURE_S = 4.0
 """Seconds to wait for the first picture: its size decides at which size people are tracked."""
@@ -33,9 +33,13 @@ class LiveSubstream(StreamReader):
         self._start(None)
         self._sized.wait(_FIRST_PICTURE_S)
 
-    def find(self, captured: CaptureTime, until: float) -> BufferedPicture | None:
-        """Return the picture captured at the same time; see :meth:`PictureBuffer.find`."""
-        return self._pictures.find(captured, until)
+    def request(self, captured: CaptureTime) -> PictureRequest:
+        """Look for the picture captured at a time."""
+        return self._pictures.request(captured)
+
+    def wait(self, request: PictureRequest, until: float) -> BufferedPicture | None:
+        """Return a request's picture; see :meth:`PictureBuffer.wait`."""
+        return self._pictures.wait(request, until)
 
     def _accept(self, opened: OpenedVideo) -> bool:
         self._aspect = pixel_aspect(opened.stream)

@@ -20,7 +20,8 @@ from server.media.letterbox import Letterbox
 from server.system.errors import UserError
 from tracking.registry import needs_images
 
-_SLACK_S = 1.0
+_KEPT_S = 2.0
+"""Seconds by which a stream that is decoded may be later than its substream."""
 _GOPS_BEHIND = 2
 """GOPs by which a stream that is passed through may be later."""
 
@@ -67,7 +68,7 @@ def _open_live(
     letterbox: Letterbox,
     passthrough: PassthroughSource | None,
 ) -> LiveSubstreamPictures:
-    keep_s = config.track.backlog_s + _SLACK_S
+    keep_s = _KEPT_S
     if passthrough is not None:
         keep_s += _GOPS_BEHIND * config.gop / config.site.fps
     reader = LiveSubstream(address, camera.options, PictureBuffer(keep_s, 0.5 / config.site.fps))

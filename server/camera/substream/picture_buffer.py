@@ -16,6 +16,8 @@ _MATCH_S = 0.25
 _STALE_S = 1.5
 """Seconds without a picture after which the next one is not waited for."""
 _MAX_PICTURES = 600
+_MAX_REQUESTS = 200
+"""Requests that wait for a picture; older ones are answered when they are asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,8 +35,18 @@ class BufferedPicture:
     captured: CaptureTime
 
 
+class PictureRequest:
+    """A picture that is looked for, and found when it arrives: it may be asked for much later."""
+
+    def __init__(self, captured: CaptureTime) -> None:
+        self.captured = captured
+        self.picture: BufferedPicture | None = None
+        """The picture of that time, up to 0.25 s apart; None: there is none, or it is not known yet."""
+        self.is_answered = False
+
+
 class PictureBuffer:
-    """Keeps pictures of some seconds. One thread adds, another one finds.
+    """Keeps pictures of some seconds. One thread adds, others find.
 
     Args:
         keep_s: seconds by which the main stream may be later.
@@ -44,6 +56,7 @@ class PictureBuffer:
     def __init__(self, keep_s: float, tolerance_s: float) -> None:
         self._keep_s, self._tolerance_s = keep_s, tolerance_s
         self._pictures: deque[BufferedPicture] = deque(maxlen=_MAX_PICTURES)
+        self._open: deque[PictureRequest] = deque(maxlen=_MAX_REQUESTS)
         self._newest_at: float | None = None
         self._changed = threading.Condition()
 
@@ -53,30 +66,44 @@ class PictureBuffer:
         with self._changed:
             self._pictures.append(picture)
             self._newest_at = now
+            for request in [each for each in self._open if self._is_reached(each)]:
+                self._answer(request)
+                self._open.remove(request)
             while len(self._pictures) > 1 and self._pictures[0].captured.arrival < now - self._keep_s:
                 self._pictures.popleft()
             self._changed.notify_all()
 
-    def find(self, captured: CaptureTime, until: float) -> BufferedPicture | None:
-        """Return the picture captured at the same time, up to 0.25 s apart; None: there is none.
-
-        Waits for it up to a time by the steady clock, while pictures arrive.
-        """
+    def request(self, captured: CaptureTime) -> PictureRequest:
+        """Look for the picture captured at a time."""
+        request = PictureRequest(captured)
         with self._changed:
-            while not self._is_reached(captured):
+            if self._is_reached(request):
+                self._answer(request)
+            else:
+                self._open.append(request)
+        return request
+
+    def wait(self, request: PictureRequest, until: float) -> BufferedPicture | None:
+        """Return a request's picture; wait for it up to a time by the steady clock, while pictures arrive."""
+        with self._changed:
+            while not request.is_answered:
                 now = time.monotonic()
                 stale_at = 0.0 if self._newest_at is None else self._newest_at + _STALE_S
                 if (wait_s := min(until, stale_at) - now) <= 0:
+                    self._answer(request)
                     break
                 self._changed.wait(wait_s)
-            distances = [abs(candidate.captured.seconds_after(captured)) for candidate in self._pictures]
-            if not distances:
-                return None
-            least = min(distances)
-            return self._pictures[distances.index(least)] if least <= _MATCH_S else None
+            return request.picture
 
-    def _is_reached(self, captured: CaptureTime) -> bool:
+    def _is_reached(self, request: PictureRequest) -> bool:
         """Return whether no later picture can be closer."""
         if not self._pictures:
             return False
-        return self._pictures[-1].captured.seconds_after(captured) >= -self._tolerance_s
+        return self._pictures[-1].captured.seconds_after(request.captured) >= -self._tolerance_s
+
+    def _answer(self, request: PictureRequest) -> None:
+        """Give a request the closest picture that has arrived, if that is close enough."""
+        request.is_answered = True
+        distances = [abs(each.captured.seconds_after(request.captured)) for each in self._pictures]
+        if distances and (least := min(distances)) <= _MATCH_S:
+            request.picture = self._pictures[distances.index(least)]

@@ -13,7 +13,9 @@ from server.camera.passthrough.encoder import PassthroughSource
 from server.camera.passthrough.recording_source import PassthroughRecording
 from server.camera.sources import FrameSource, Image, ImageFolder, Recording, SourceEndedError
 from server.camera.sources.orientation import parse_orientation
+from server.camera.sources.stream_clock import CaptureTime
 from server.camera.substream.live_substream import LiveSubstream
+from server.camera.substream.picture_buffer import PictureRequest
 from server.camera.substream.picture_scale import PictureScale, SubstreamPlacement
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import SUBSTREAM_AWAY, SubstreamState
@@ -35,6 +37,10 @@ class TrackedPictures(Protocol):
     """Whether a substream delivers it."""
     waited_s: float
     """Seconds that the last image was waited for."""
+
+    def request(self, captured: CaptureTime | None) -> PictureRequest | None:
+        """Look for the picture captured at a time already now; it may be needed much later."""
+        ...
 
     def image(self, frame: CapturedFrame) -> Image | None:
         """Return the picture captured at the time of a frame, at the tracked size; None: there is none.
@@ -61,6 +67,10 @@ class MainPictures:
     def __init__(self, source: FrameSource, letterbox: Letterbox) -> None:
         self._source, self._letterbox = source, letterbox
         self.scale = PictureScale(letterbox.site_size, letterbox.site_size)
+
+    def request(self, captured: CaptureTime | None) -> PictureRequest | None:  # noqa: ARG002 — TrackedPictures
+        """Return None: the frame has it."""
+        return None
 
     def image(self, frame: CapturedFrame) -> Image | None:
         """Return the frame's own picture."""
@@ -99,11 +109,15 @@ class LiveSubstreamPictures:
         self.waited_s = 0.0
         self._found_at = time.monotonic()
 
+    def request(self, captured: CaptureTime | None) -> PictureRequest | None:
+        """Look for the picture captured at a time already now."""
+        return None if captured is None else self._reader.request(captured)
+
     def image(self, frame: CapturedFrame) -> Image | None:
         """Return the substream's picture of the frame's moment, or else the frame's own, if it has one."""
         found, began = None, time.monotonic()
-        if frame.captured is not None:
-            found = self._reader.find(frame.captured, frame.taken + _WAIT_S)
+        if frame.request is not None:
+            found = self._reader.wait(frame.request, frame.taken + _WAIT_S)
         now = time.monotonic()
         self.waited_s = now - began
         if found is not None:
@@ -164,6 +178,10 @@ class RecordedSubstreamPictures:
         self._placement, self.scale = placement, scale
         self._has_true_shape = isinstance(source, Recording) and source.orientation.pixel_aspect != 1.0
         self.state: SubstreamState = "live"
+
+    def request(self, captured: CaptureTime | None) -> PictureRequest | None:  # noqa: ARG002 — TrackedPictures
+        """Return None: it is read when it is needed."""
+        return None
 
     def image(self, frame: CapturedFrame) -> Image | None:
         """Return the second recording's picture of the frame's moment."""
