@@ -102,7 +102,7 @@ class PictureBuffer:
         return self._pictures[-1].captured.seconds_after(request.captured) >= -self._tolerance_s
 
     def _answer(self, request: PictureRequest) -> None:
-        """Give a request the closest picture that has arrived, if that is close enough."""
+        """Answer a request with the closest picture that has arrived, if that is close enough."""
         request.is_answered = True
         distances = [abs(each.captured.seconds_after(request.captured)) for each in self._pictures]
         if distances and (least := min(distances)) <= _MATCH_S:
