@@ -15,6 +15,7 @@ from typing import Any
 from server.config.loader import build_config, read_content
 from server.config.password_file import read_users
 from server.config.pulse_access import bestview_client_name
+from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, is_device_path, source_kind
 from server.models.catalog import find_model
@@ -224,17 +225,26 @@ def _move_ground(content: Content, folder: Path) -> dict[str, str]:
     return {"ground.json": text}
 
 
+def _is_moved(camera: CameraSettings, key: str) -> bool:
+    """Return whether a camera's source or substream is a recording.
+
+    Raises:
+        UserError: it is a device.
+    """
+    source = getattr(camera, key)
+    if source is not None and is_device_path(source):
+        raise UserError(
+            f"cameras.{camera.id}: {source} is a device of one machine, which a cluster does not "
+            "give to containers: connect it by RTSP"
+        )
+    return source is not None and _is_file(source)
+
+
 def _move_files(content: Content, config: Config, folder: Path) -> bool:
     """Replace the paths of recordings, detections and networks; return whether there are any."""
     found: list[tuple[Content, str]] = []
     for raw, camera in zip(content["cameras"], config.cameras, strict=True):
-        if is_device_path(camera.source):
-            raise UserError(
-                f"cameras.{camera.id}: {camera.source} is a device of one machine, which a cluster does not "
-                "give to containers: connect it by RTSP"
-            )
-        if _is_file(camera.source):
-            found.append((raw, "source"))
+        found += [(raw, key) for key in ("source", "substream") if _is_moved(camera, key)]
         if camera.detections:
             found.append((raw, "detections"))
         if camera.password:
@@ -255,7 +265,7 @@ def _move_files(content: Content, config: Config, folder: Path) -> bool:
 
 def _sources(config: Config) -> list[str]:
     sound = config.sound.source
-    own = [camera.source for camera in config.cameras]
+    own = [source for camera in config.cameras for source in (camera.source, camera.substream) if source]
     return own if sound in {None, *config.camera_ids} else [*own, str(sound)]
 
 

@@ -66,7 +66,7 @@ def config_for_videos(
     for number, video in enumerate(videos):
         name = camera_name(video)
         source = str(video.absolute())
-        camera = {**known.get(name, {}), "id": name, "source": source, "at_end": "stop"}
+        camera = {**_recorded_settings(known.get(name, {})), "id": name, "source": source, "at_end": "stop"}
         if detections:
             camera["detections"] = str(detections[number].absolute())
         cameras.append(camera)
@@ -74,6 +74,15 @@ def config_for_videos(
     if ground is not None:
         content["ground"] = str(ground.absolute())
     return build_config(content, where=where, folder=folder)
+
+
+def _recorded_settings(camera: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a camera's settings without those of its network: a login, and a live substream."""
+    dropped = {"password"}
+    substream = camera.get("substream")
+    if isinstance(substream, str) and source_kind(substream) is SourceKind.STREAM:
+        dropped.add("substream")
+    return {key: value for key, value in camera.items() if key not in dropped}
 
 
 def camera_name(video: Path) -> str:

@@ -181,6 +181,10 @@ def sites(draw: st.DrawFn) -> Manifest:
         camera: Manifest = {"id": name, "source": draw(SOURCES)}
         if "{password}" in camera["source"]:
             camera["password"] = "camera.password"  # noqa: S105 — a file
+        if draw(st.booleans()) and not camera["source"].startswith("scene:"):
+            is_address = "://" in camera["source"]
+            small = f"rtsp://viewer:{SECRET}8@192.0.2.1/small" if is_address else "recordings/small.mp4"
+            camera["substream"] = small
         if draw(st.booleans()):
             camera["options"] = {"headers": f"Authorization: {SECRET}3"}
         cameras.append(camera)

@@ -252,6 +252,8 @@ class Ingest:
             state.status = status
             if state.is_source_away and not was_away:
                 state.metrics.record_problem(state.message)
+            elif status.substream == "away" and (before is None or before.substream != "away"):
+                state.metrics.record_problem(SUBSTREAM_AWAY)
             elif status.condition not in {"clear", "clear" if before is None else before.condition}:
                 state.metrics.record_problem(CONDITION_TEXTS[status.condition])
 

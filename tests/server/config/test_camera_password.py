@@ -19,7 +19,7 @@ SOURCE = "rtsp://viewer:{password}@192.0.2.11/stream1"
 
 def config_of(folder: Path, source: str = SOURCE) -> Config:
     cameras = [
-        {"id": "door", "source": source, "password": "door.password"},
+        {"id": "door", "source": source, "substream": f"{source}/small", "password": "door.password"},
         {"id": "stairs", "source": "rtsp://192.0.2.12/"},
     ]
     return build_config({"cameras": cameras}, where="site.yaml", folder=folder)
@@ -33,6 +33,7 @@ def test_any_password_is_passed_unchanged(tmp_path_factory: pytest.TempPathFacto
     address = urlsplit(filled.source)
     assert unquote(address.password or "") == password
     assert (address.username, address.hostname, address.path) == ("viewer", "192.0.2.11", "/stream1")
+    assert filled.substream == f"{filled.source}/small"
 
 
 def test_other_processes_do_not_need_the_password_file(tmp_path: Path) -> None:

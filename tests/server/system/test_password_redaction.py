@@ -104,6 +104,8 @@ def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
         {"cameras": [{**camera, "source": f"{address}\n"}]},
         {"cameras": [{**camera, "source": f"{address}\ud800"}]},
         {"cameras": [{**camera, "source": [address]}]},
+        {"cameras": [{**camera, "source": address, "substream": address}]},
+        {"cameras": [{**camera, "substream": f"{address}\n"}]},
         {"cameras": address},
         {"cameras": [address]},
         {address: None, "cameras": [camera]},

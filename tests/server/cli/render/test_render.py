@@ -168,6 +168,17 @@ def test_a_recording_is_played_once_regardless_of_the_configuration(tmp_path: Pa
     assert (camera.at_end, camera.offset_s, camera.source) == ("stop", 0.28, str(path))
 
 
+def test_a_recording_has_no_login_and_no_live_substream(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "c0.mp4", 3)
+    login = {"source": "rtsp://u:{password}@10.0.0.1/1", "password": "file"}
+    live, recorded = (
+        config_for_videos([path], base={"cameras": [{"id": "c0", "substream": small, **login}]}).cameras[0]
+        for small in ("rtsp://u:{password}@10.0.0.1/2", str(tmp_path / "small.mp4"))
+    )
+    assert (live.source, live.password, live.substream) == (str(path), None, None)
+    assert recorded.substream == str(tmp_path / "small.mp4")
+
+
 def test_rate_and_size_are_those_of_the_first_view_unless_configured(tmp_path: Path) -> None:
     path = write_video(tmp_path / "c0.mp4", 3)
     site = config_for_videos([path]).site

@@ -119,6 +119,20 @@ def test_a_picture_that_is_not_clear_is_the_cameras_message_and_its_last_error()
     assert state.message == ""
 
 
+def test_a_substream_without_pictures_is_the_cameras_message_and_its_last_error() -> None:
+    served = IngestWithBuffers()
+    state = served.ingest.states["c0"]
+    served.handle("status", status("c0", substream="live"))
+    assert (state.message, state.metrics.last_error) == ("", None)
+    served.handle("status", status("c0", substream="away", load="busy"))
+    text = "its substream delivers no pictures: people are tracked in its source"
+    assert state.message == f"{text}; busy"
+    assert state.metrics.last_error is not None
+    assert state.metrics.last_error.text == text
+    served.handle("status", status("c0", substream="live"))
+    assert state.message == ""
+
+
 def test_a_camera_that_was_knocked_is_to_be_calibrated_again() -> None:
     served = IngestWithBuffers()
     motion = PictureMotion(x=6.0, y=0.0, grow=0.0, turn=0.0175)
