@@ -1,4 +1,4 @@
-"""The cameras in a configuration file: listed, added, renamed and removed; a restart brings it into force."""
+"""The cameras in a configuration file: listed, added, changed and removed; a restart brings it into force."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from server.config.loader import read_content
 from server.setup.camera_address import check_name, free_name
 from server.setup.ground import read_ground
 from server.setup.session import TriedCamera
 from server.setup.site_file import camera_entry, check_text, password_file, replace_file, write_passwords
-from server.setup.yaml_edit import changed_text
+from server.setup.yaml_edit import changed_lists_text
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
@@ -51,14 +52,39 @@ def add_camera(path: Path, tried: TriedCamera) -> None:
     cameras = _cameras(path)
     if any(camera.get("source") == tried.address.source for camera in cameras):
         raise UserError(f"{tried.address.shown}: this camera is in the configuration already")
-    folder = (path.parent / password_file(path, "any")).parent
-    taken = {str(camera.get("id")) for camera in cameras} | {file.name for file in folder.glob("*")}
+    taken = {str(camera.get("id")) for camera in cameras} | _password_files(path)
     ground = read_ground(path)
     if ground is not None:
         taken |= ground.content["homography"].keys()
     camera = tried.as_new(free_name(tried.name, taken))
     text = _checked_text(path, [*cameras, camera_entry(camera, path)])
     write_passwords([camera], path)
+    replace_file(text, path)
+
+
+def readdress_camera(path: Path, camera_id: str, tried: TriedCamera) -> None:
+    """Change a camera's address and login to those of one that was tried; its other settings stay.
+
+    The password has a new file: the running camera and the earlier configuration use the earlier one.
+
+    Raises:
+        UserError: there is no such camera, another one has this address, or the files would be invalid or
+            cannot be written.
+    """
+    cameras = _cameras(path)
+    earlier = next((camera for camera in cameras if str(camera.get("id")) == camera_id), None)
+    if earlier is None:
+        raise UserError(f"there is no camera {camera_id!a}")
+    if any(camera.get("source") == tried.address.source for camera in cameras if camera is not earlier):
+        raise UserError(f"{tried.address.shown}: another camera of the configuration has this address")
+    new = tried.as_new(free_name(camera_id, _password_files(path)))
+    entry = camera_entry(new, path)
+    is_same_host = _host(str(earlier.get("source"))) == _host(tried.address.source)
+    replaced = {"source", "password", "options"} | (set() if is_same_host else {"substream"})
+    other = {key: value for key, value in earlier.items() if key not in replaced}
+    changed = {**other, **entry, "id": camera_id}
+    text = _checked_text(path, [changed if camera is earlier else camera for camera in cameras])
+    write_passwords([new], path)
     replace_file(text, path)
 
 
@@ -100,6 +126,20 @@ def _cameras(path: Path) -> list[_Entry]:
     return cameras
 
 
+def _password_files(path: Path) -> set[str]:
+    """Return the names of the cameras' password files, also of earlier cameras."""
+    folder = (path.parent / password_file(path, "any")).parent
+    return {file.name for file in folder.glob("*")}
+
+
+def _host(source: str) -> str:
+    """Return the host of an address; the whole one where it has none."""
+    try:
+        return urlsplit(source).hostname or source
+    except ValueError:
+        return source
+
+
 def _cameras_to_change(path: Path, camera_id: str) -> list[_Entry]:
     """Return all cameras; one of them will get another name or none.
 
@@ -115,7 +155,7 @@ def _cameras_to_change(path: Path, camera_id: str) -> list[_Entry]:
 
 
 def _checked_text(path: Path, cameras: list[_Entry]) -> str:
-    text = changed_text(path, "cameras", cameras)
+    text = changed_lists_text(path, {"cameras": cameras})
     check_text(text, path)
     return text
 

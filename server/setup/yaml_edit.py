@@ -49,6 +49,30 @@ def changed_lists_text(path: Path, lists: Mapping[str, Sequence[Mapping[str, Any
     return _checked(text, {**content, **{section: list(entries) for section, entries in lists.items()}})
 
 
+def changed_values_text(path: Path, section: str, values: Mapping[str, Any]) -> str:
+    """Return the text of a configuration file with other values of some settings of one section.
+
+    Lines of a section in block style keep their comments. Otherwise as :func:`changed_text`.
+
+    Raises:
+        UserError: the file cannot be read, or is not valid YAML.
+    """
+    content = read_content(path)
+    wanted = {**content, section: {**(content.get(section) or {}), **values}}
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    span = _span(lines, section) or range(0)
+    for key, value in values.items():
+        line = re.compile(rf"([ \t]+{key}:)[^#\n]*?([ \t]+#.*)?\n?")
+        for number in span[1:]:
+            if found := line.fullmatch(lines[number]):
+                lines[number] = f"{found[1]} {dump_yaml_inline(value)}{found[2] or ''}\n"
+    text = "".join(lines)
+    with contextlib.suppress(yaml.YAMLError):
+        if yaml.safe_load(text) == wanted:
+            return text
+    return changed_text(path, section, wanted[section])
+
+
 def _checked(text: str, wanted: Mapping[str, Any]) -> str:
     """Return a text if it means what is wanted, else another one that does."""
     with contextlib.suppress(yaml.YAMLError):

@@ -37,6 +37,8 @@
  * @property {string} camera
  * @property {string} address without passwords
  *
+ * @typedef {{name: string, fps: number, width: number, height: number}} SiteFormat /api/operator/site_settings
+ *
  * @typedef {object} RestartStatus /api/operator/restart
  * @property {boolean} possible
  * @property {string} error why the configuration file cannot be used; empty: it can

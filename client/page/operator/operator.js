@@ -17,6 +17,7 @@ import { CalibrationWalk } from './calibration/walk.js';
 import { CalibrationPoints } from './calibration/points.js';
 import { Palette } from '../people/palette.js';
 import { CamerasSection, SiteCameras } from './site_cameras.js';
+import { SiteSettings } from './site_settings.js';
 import { SiteRestart } from './site_restart.js';
 import { SignIn } from '../shared/sign_in.js';
 
@@ -71,7 +72,8 @@ function createSections(site) {
   const flags = new FlagList(site, showError);
   const downloads = new Downloads(site);
   const restart = new SiteRestart(showError);
-  sections.set('cameras', new CamerasSection(new CameraTiles(palette, showError), new SiteCameras(showError, () => restart.check())));
+  const configured = new SiteCameras(showError, () => restart.check());
+  sections.set('cameras', new CamerasSection(new CameraTiles(palette, showError), configured, new SiteSettings(showError, () => restart.check())));
   sections.set('floor', floor);
   sections.set('people', people);
   sections.set('flags', flags);

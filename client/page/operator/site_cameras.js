@@ -6,11 +6,16 @@ import { element, make, setText } from '../shared/dom.js';
 /** @import {SiteCamera} from './api_types.js' */
 /** @import {CameraTiles} from './camera_tiles.js' */
 /** @import {Section, ShowError} from './section.js' */
+/** @import {SiteSettings} from './site_settings.js' */
 
 const TRIAL_TIMEOUT_MS = 120_000; // a camera may take long to answer
 
 export class SiteCameras {
   #state = element('add-state');
+  /** @type {HTMLSelectElement} */
+  #instead = element('add-instead'); // the camera that gets the address; empty: a new one
+  /** @type {HTMLInputElement} */
+  #name = element('add-name');
 
   /**
    * @param {ShowError} showError
@@ -25,10 +30,14 @@ export class SiteCameras {
       event.preventDefault();
       setText(this.#state, 'Trying…');
       const [address, user, password, name] = ['address', 'user', 'password', 'name'].map(fieldValue);
-      const added = await this.#change('POST', { address, user, password, name });
-      setText(this.#state, added ? 'It sends pictures and was added.' : '');
-      if (added) form.reset();
+      const camera = this.#instead.value;
+      const done = await this.#change('POST', { address, user, password, name, camera });
+      const message = camera ? `It sends pictures: ${camera} has this address now.` : 'It sends pictures and was added.';
+      setText(this.#state, done ? message : '');
+      if (done) form.reset();
+      this.#name.disabled = this.#instead.value !== '';
     });
+    this.#instead.addEventListener('change', () => (this.#name.disabled = this.#instead.value !== ''));
   }
 
   async load() {
@@ -41,6 +50,9 @@ export class SiteCameras {
 
   /** @param {SiteCamera[]} cameras */
   #show(cameras) {
+    const chosen = this.#instead.value;
+    const options = cameras.map(({ camera }) => make('option', { value: camera, textContent: camera, selected: camera === chosen }));
+    this.#instead.replaceChildren(make('option', { value: '', textContent: 'a new camera' }), ...options);
     element('site-cameras').replaceChildren(...cameras.map((camera) => this.#item(camera)));
   }
 
@@ -93,15 +105,18 @@ export class CamerasSection {
   /**
    * @param {CameraTiles} tiles
    * @param {SiteCameras} configured
+   * @param {SiteSettings} settings
    */
-  constructor(tiles, configured) {
+  constructor(tiles, configured, settings) {
     this.tiles = tiles;
     this.configured = configured;
+    this.settings = settings;
   }
 
   open() {
     this.tiles.open();
     void this.configured.load();
+    void this.settings.load();
   }
 
   close() {

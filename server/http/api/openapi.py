@@ -96,6 +96,7 @@ _MAY_BE_UNAVAILABLE_FOR_OPERATORS = {
 _NO_FILE = "The site has no configuration file, or refuses the change."
 _CONFLICTS = {
     "/api/operator/site_cameras": _NO_FILE,
+    "/api/operator/site_settings": _NO_FILE,
     "/api/operator/marked_points": _NO_FILE,
     "/api/operator/zones": _NO_FILE,
     _DELETION: "Another deletion is not complete yet.",

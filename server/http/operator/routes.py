@@ -16,6 +16,7 @@ from server.http.operator import (
     restart,
     settings,
     site_cameras,
+    site_settings,
     walk,
     zones,
 )
@@ -60,5 +61,6 @@ routes = [
     *marked_points.routes,
     *restart.routes,
     *site_cameras.routes,
+    *site_settings.routes,
     *zones.routes,
 ]

@@ -65,6 +65,16 @@ class SiteCameras(msgspec.Struct, frozen=True):
     cameras: list[SiteCamera]
 
 
+class SiteFormat(msgspec.Struct, frozen=True):
+    """Settings of the site in the configuration file, which may differ from those in force."""
+
+    name: str
+    fps: float
+    width: int
+    """Of the streams' pictures, pixels."""
+    height: int
+
+
 class ZoneRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A rule, on a zone or anywhere on the site."""
 
@@ -214,6 +224,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/config": Settings,
     "/api/operator/restart": RestartStatus,
     "/api/operator/site_cameras": SiteCameras,
+    "/api/operator/site_settings": SiteFormat,
     "/api/operator/view_selection": SelectionSettings,
     "/api/operator/zones": SiteZones,
 }

@@ -16,7 +16,7 @@ from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteCamera, SiteCameras
 from server.http.operator.setup import Login, Name
-from server.setup.site_cameras import add_camera, list_cameras, remove_camera, rename_camera
+from server.setup.site_cameras import add_camera, list_cameras, readdress_camera, remove_camera, rename_camera
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
@@ -25,12 +25,14 @@ _PATH = f"{OPERATOR_PATH}/site_cameras"
 
 
 class CameraToAdd(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A camera to try, and to add if it sends pictures."""
+    """A camera to try, and to add if it sends pictures, or to give its address to a camera of the site."""
 
     address: Annotated[str, msgspec.Meta(max_length=1000)]
     user: Login = ""
     password: Login = ""
     name: Name = ""
+    camera: Name = ""
+    """The camera that gets the address; empty: it is a new one."""
 
 
 class CameraToRename(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -54,7 +56,7 @@ async def get_site_cameras(request: web.Request) -> web.Response:
 
 @routes.post(_PATH)
 async def post_site_camera(request: web.Request) -> web.Response:
-    """Try a camera, and add it to the configuration file if it sends pictures."""
+    """Try a camera; if it sends pictures, add it to the file, or give another one its address."""
     wanted = await read_json(request, CameraToAdd)
     try:
         config_path(request)
@@ -66,6 +68,8 @@ async def post_site_camera(request: web.Request) -> web.Response:
         )
     except UserError as error:
         return error_response(400, str(error))
+    if wanted.camera:
+        return await _answer(request, lambda path: readdress_camera(path, wanted.camera, tried))
     return await _answer(request, lambda path: add_camera(path, tried))
 
 

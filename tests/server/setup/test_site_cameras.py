@@ -12,7 +12,13 @@ from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
 from server.setup.camera_address import parse_address
 from server.setup.session import TriedCamera, TriedStream
-from server.setup.site_cameras import add_camera, list_cameras, remove_camera, rename_camera
+from server.setup.site_cameras import (
+    add_camera,
+    list_cameras,
+    readdress_camera,
+    remove_camera,
+    rename_camera,
+)
 from server.setup.trial_messages import StreamTrial
 from server.system.errors import UserError
 
@@ -86,6 +92,48 @@ def test_a_camera_is_not_added_twice(path: Path) -> None:
     add_camera(path, tried())
     with pytest.raises(UserError, match="already"):
         add_camera(path, tried("other"))
+
+
+def test_a_camera_gets_another_address_and_keeps_its_settings_and_the_comments(path: Path) -> None:
+    text = TEXT.replace("cameras:\n", "cameras:\n# at the door\n").replace(
+        "hidden'}", "hidden'}  # in the hall"
+    )
+    path.write_text(text)
+    readdress_camera(path, "c0", tried())
+    config = load_config(path)
+    assert config.camera("c0").offset_s == 0.5
+    assert config.camera("c0").ground is not None
+    assert fill_in_password(config, "c0").camera("c0").source == tried().address.with_password
+    assert path.read_text().startswith(text[: text.index("- {id: c0")])
+    assert path.read_text().endswith(text[text.index("- {id: c1") :])
+    before = path.read_text()
+    readdress_camera(
+        path,
+        "c0",
+        TriedCamera(
+            1, "", TriedStream(parse_address("rtsp://10.0.0.9/live", "viewer", "n3w"), StreamTrial())
+        ),
+    )
+    assert (path.parent / "site.passwords" / "c0").read_text() == f"{SECRET}\n"  # of the earlier file
+    assert fill_in_password(load_config(path), "c0").camera("c0").source == "rtsp://viewer:n3w@10.0.0.9/live"
+    (path.parent / "again.yaml").write_text(before)
+    assert (
+        load_config(path.parent / "again.yaml").camera("c0").password
+        != load_config(path).camera("c0").password
+    )
+    with pytest.raises(UserError, match=r"rtsp://10.0.0.9/...: another camera of the configuration has this"):
+        readdress_camera(path, "c1", tried())
+    with pytest.raises(UserError, match="there is no camera 'c7'"):
+        readdress_camera(path, "c7", tried())
+
+
+def test_a_substream_stays_with_its_device(path: Path) -> None:
+    small = "rtsp://10.0.0.1/small"
+    path.write_text(TEXT.replace("p=hidden'", f"p=hidden', substream: '{small}'"))
+    readdress_camera(path, "c1", tried(source="rtsp://10.0.0.1/other"))
+    assert load_config(path).camera("c1").substream == small
+    readdress_camera(path, "c1", tried())
+    assert load_config(path).camera("c1").substream is None
 
 
 def test_a_renamed_camera_keeps_its_settings_calibration_and_password(path: Path) -> None:

@@ -152,9 +152,33 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
             await page.get_by_role("button", name="Rename camera door").click()
             await expect(page.get_by_label("Name of camera hall")).to_have_value("hall")
             assert load_config(path).camera_ids == ("c0", "hall")
-            await page.get_by_role("button", name="Remove camera c0").click()
+            await page.get_by_label("or as the address of").select_option("c0")
+            await expect(page.get_by_label("Name", exact=True)).to_be_disabled()
+            await page.get_by_label("Add a camera").fill(stream.url)
+            await page.get_by_label("User").fill("viewer")
+            await page.get_by_label("Password").fill("s3cret")
+            await page.get_by_role("button", name="Try and add").click()
+            await expect(page.locator("#error-message")).to_contain_text(
+                "another camera of the configuration"
+            )
+            await page.get_by_role("button", name="Remove camera hall").click()
             await expect(names).to_have_count(1)
-            assert load_config(path).camera_ids == ("hall",)
+            await page.get_by_role("button", name="Try and add").click()
+            await expect(page.locator("#add-state")).to_have_text(
+                "It sends pictures: c0 has this address now."
+            )
+            await expect(page.get_by_label("Name", exact=True)).to_be_enabled()
+            config = load_config(path)
+            assert (config.camera_ids, config.camera("c0").password) == (
+                ("c0",),
+                path.parent / "site.passwords/c0",
+            )
+            await page.get_by_label("Frames a second").fill("12.5")
+            await page.get_by_label("Name of the site").fill("shop")
+            await page.get_by_role("button", name="Change the site").click()
+            await expect(page.locator("#site-state")).to_have_text("Saved; the earlier file is kept.")
+            assert load_config(path).site.model_dump(include={"name", "fps"}) == {"name": "shop", "fps": 12.5}
+            await expect(page.locator("#restart-state")).to_contain_text("Streams end for some seconds")
 
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:

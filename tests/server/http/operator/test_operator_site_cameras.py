@@ -68,6 +68,16 @@ async def test_a_camera_is_tried_added_renamed_and_removed(site: ServedSite, str
     assert await send(site, "DELETE", {"camera": "door"}) == (200, {"cameras": BEFORE})
 
 
+async def test_a_camera_gets_the_address_of_one_that_was_tried(site: ServedSite, stream: RtspCamera) -> None:
+    wanted = {"address": stream.url, "user": LOGIN[0], "password": LOGIN[1], "camera": "c0"}
+    shown = stream.url.replace("live", "...")
+    assert await send(site, "POST", wanted) == (
+        200,
+        {"cameras": [{"camera": "c0", "address": shown}, BEFORE[1]]},
+    )
+    assert await send(site, "POST", {**wanted, "camera": "c7"}) == (409, {"error": "there is no camera 'c7'"})
+
+
 async def test_a_camera_that_sends_no_pictures_is_not_added(
     site: ServedSite, stream: RtspCamera, path: Path
 ) -> None:

@@ -1,0 +1,49 @@
+"""The site's name, frame rate and picture size in a configuration file; a restart brings them into force."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from server.config.loader import check_section, load_config, read_content
+from server.config.sections import SiteSettings
+from server.setup.site_file import check_text, replace_file
+from server.setup.yaml_edit import changed_values_text
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFormatChoice:
+    """What set-up asks for besides the cameras: the site's name, and the rate and size of its streams."""
+
+    name: str
+    fps: float
+    width: int
+    height: int
+
+
+def read_choice(path: Path) -> StreamFormatChoice:
+    """Return the settings in a configuration file.
+
+    Raises:
+        UserError: it is invalid.
+    """
+    site = load_config(path).site
+    return StreamFormatChoice(site.name, site.fps, site.width, site.height)
+
+
+def save_choice(path: Path, choice: StreamFormatChoice) -> None:
+    """Change the settings in a configuration file; the earlier file is kept.
+
+    Raises:
+        UserError: the file or what it would become is invalid, or it cannot be written.
+    """
+    before = asdict(read_choice(path))
+    changed = {key: value for key, value in asdict(choice).items() if value != before[key]}
+    if not changed:
+        return
+    if "fps" in changed and choice.fps.is_integer():
+        changed["fps"] = int(choice.fps)
+    check_section(SiteSettings, {**(read_content(path).get("site") or {}), **changed}, "site")
+    text = changed_values_text(path, "site", changed)
+    check_text(text, path)
+    replace_file(text, path)

@@ -1,0 +1,64 @@
+"""Operators change the site's name, rate and size in the configuration; nobody else does."""
+
+from __future__ import annotations
+
+import json
+from contextlib import aclosing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.http.tokens import bearer, serve_with_tokens
+from fakes.service.fed_site import ServedSite, serve_site
+from server.config.loader import load_config
+from server.http.access.csrf import CSRF_HEADER
+from server.http.app_keys import SiteControl
+
+PATH = "/api/operator/site_settings"
+CHANGES = {CSRF_HEADER: "1"}
+TEXT = "site: {name: hall}\ncameras: [{id: c0, source: 'scene:room'}]\n"
+WANTED = {"name": "shop", "fps": 12.5, "width": 320, "height": 180}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "site.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+async def put(site: ServedSite, body: Any, headers: dict[str, str] = CHANGES) -> tuple[int, Any]:
+    async with site.session.put(PATH, json=body, headers=headers) as answer:
+        return answer.status, json.loads(await answer.text())
+
+
+async def test_the_site_is_changed_in_the_file(path: Path) -> None:
+    async with aclosing(serve_site(control=SiteControl(path))) as sites:
+        site = await anext(sites)
+        assert await site.get_json(PATH) == {"name": "hall", "fps": 25.0, "width": 640, "height": 360}
+        assert await put(site, WANTED) == (200, WANTED)
+        assert load_config(path).site.size == (320, 180)
+        status, answer = await put(site, {**WANTED, "width": 321})
+        assert (status, answer["error"]) == (
+            409,
+            "site: width: must be even: H.264 stores color at half the size",
+        )
+        assert (await put(site, {**WANTED, "codec": "x"}))[0] == 400
+
+
+async def test_only_operators_see_or_change_it(path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "tokens"
+    folder.mkdir()
+    async with serve_with_tokens(folder, control=SiteControl(path)) as site:
+        for token in ("desk", "family", "door"):
+            assert (await put(site, WANTED, {**CHANGES, **bearer(token)}))[0] == 403
+        assert (await put(site, WANTED, bearer("lead")))[0] == 403  # without the header
+        assert (await put(site, WANTED))[0] == 401
+        assert path.read_text() == TEXT
+
+
+async def test_without_a_file_it_cannot_be_changed() -> None:
+    async with aclosing(serve_site()) as sites:
+        site = await anext(sites)
+        assert await put(site, WANTED) == (409, {"error": "this service has no configuration file"})
