@@ -1,8 +1,8 @@
 """Feeds: each takes one stream from the service and pushes its samples into the pipeline of an RTSP media.
 
 A feed goes on through everything that passes: a restart of the service, a camera's death, other parameter
-sets. It ends when the service refuses the stream for good (a revoked token), when the stream is gone for a
-minute (a forgotten person), or when its client leaves.
+sets, and a client's pause, after which it is live. It ends when the service refuses the stream for good (a
+revoked token), when the stream is gone for a minute (a forgotten person), or when its client leaves.
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ class Feed:
         self._sources: dict[str, GstApp.AppSrc] = {}
         """By codec, once a media has taken the feed."""
         self._last_due_s: dict[str, float] = {}
-        self._clock = StreamClock(_SLACK_S if address.is_paced else 0.0)
+        self._clock = self._new_clock()
+        self._is_paused = self._is_resuming = False
         self._stopped = threading.Event()
 
     def connect(self, media: Gst.Element) -> None:
@@ -93,10 +94,22 @@ class Feed:
         """Whether it pushes nothing more."""
         return self._stopped.is_set()
 
+    def pause(self) -> None:
+        """Drop what comes from now on: later it would be late, and come all at once."""
+        self._is_paused = True
+
+    def resume(self) -> None:
+        """Go on with the next keyframe, as the media's time does."""
+        if self._is_paused:
+            self._is_paused, self._is_resuming = False, True
+
     def stop(self) -> None:
         """End it, from any thread."""
         self._stopped.set()
         self._stream.close()
+
+    def _new_clock(self) -> StreamClock:
+        return StreamClock(_SLACK_S if self.address.is_paced else 0.0)
 
     def _first_head(self) -> Head:
         with contextlib.suppress(Mp4Error):
@@ -159,7 +172,13 @@ class Feed:
         if source is None:
             return
         is_keyframe = part.track.is_video and part.is_key
-        due_s = self._clock.due(part.time_s, _running_s(media), is_key=is_keyframe)
+        if self._is_paused or (self._is_resuming and not is_keyframe):
+            return
+        running_s = _running_s(media)
+        if self._is_resuming:
+            self._is_resuming, self._clock = False, self._new_clock()
+            running_s = max(running_s, *self._last_due_s.values())  # after what waited as it was paused
+        due_s = self._clock.due(part.time_s, running_s, is_key=is_keyframe)
         due_s = max(due_s, self._last_due_s.get(part.track.codec, 0.0) + _LEAST_STEP_S)
         self._last_due_s[part.track.codec] = due_s
         data = with_parameter_sets(part.data, part.track) if is_keyframe else part.data

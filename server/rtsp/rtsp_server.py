@@ -256,7 +256,22 @@ class Gateway:
             self._connections[client] = _Connection(client.get_connection().get_ip())
         client.connect("pre-describe-request", self._answer)
         client.connect("pre-setup-request", self._answer)
+        client.connect("pause-request", self._on_pause)
+        client.connect("play-request", self._on_play)
         client.connect("closed", self._on_closed)
+
+    def _on_pause(self, client: Any, _: Any) -> None:
+        if (feed := self._feed_of(client)) is not None:
+            feed.pause()
+
+    def _on_play(self, client: Any, _: Any) -> None:
+        if (feed := self._feed_of(client)) is not None:
+            feed.resume()
+
+    def _feed_of(self, client: Any) -> Feed | None:
+        with self._lock:
+            connection = self._connections.get(client)
+        return None if connection is None else connection.feed
 
     def _on_closed(self, client: Any) -> None:
         with self._lock:

@@ -17,6 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fakes.http.tokens import TOKEN_ENTRIES, serve_with_tokens, token_entry, token_of, write_tokens
+from fakes.rtsp.client import rtsp_client
 from fakes.rtsp.gateway import RunningGateway, basic, needs_gstreamer, run_gateway
 from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import (
@@ -245,25 +246,38 @@ async def test_clients_that_come_as_others_leave_get_pictures(site: ServedSite, 
 
 
 async def test_a_client_that_has_torn_down_its_stream_gets_it_again(gateway: RunningGateway) -> None:
-    reader, writer = await asyncio.open_connection("127.0.0.1", gateway.port)
-    address = f"rtsp://127.0.0.1:{gateway.port}/cameras/c0"
-    login = f"Authorization: {basic('any', token_of('door'))}"
+    async with rtsp_client(gateway, "/cameras/c0", basic("any", token_of("door"))) as client:
+        for _ in range(2):
+            await client.set_up()
+            await client.tear_down()
 
-    async def answer(request: str, *lines: str) -> str:
-        writer.write("\r\n".join([f"{request} RTSP/1.0", "CSeq: 1", login, *lines, "", ""]).encode())
-        head = (await reader.readuntil(b"\r\n\r\n")).decode()
-        assert head.startswith("RTSP/1.0 200"), head
-        for line in head.splitlines():
-            if line.startswith("Content-Length:"):
-                await reader.readexactly(int(line.split()[1]))
-        return head
 
-    for _ in range(2):
-        await answer(f"DESCRIBE {address}")
-        head = await answer(f"SETUP {address}/stream=0", "Transport: RTP/AVP/TCP;unicast;interleaved=0-1")
-        session = next(line.partition(";")[0] for line in head.splitlines() if line.startswith("Session:"))
-        await answer(f"TEARDOWN {address}", session)
-    writer.close()
+@pytest.mark.parametrize(
+    ("path", "token", "pause", "waiting"), [("/cameras/c0", "door", 2, 0), ("/objects/1", "family", 4, 1)]
+)
+async def test_a_client_that_pauses_and_plays_again_is_live(
+    site: ServedSite, gateway: RunningGateway, path: str, token: str, pause: int, waiting: int
+) -> None:
+    """`waiting`: seconds of a best view that wait for their time when it is paused."""
+
+    async def passed(pulses: int) -> None:
+        end = site.service.pulses.newest + pulses
+        await until(lambda: site.service.pulses.newest >= end)
+
+    async with rtsp_client(gateway, path, basic("any", token_of(token))) as client:
+        await client.set_up()
+        await client.request("PLAY")
+        await until(lambda: client.pictures >= FPS)
+        await client.request("PAUSE")
+        paused = client.pictures
+        await passed(pause * FPS)
+        assert client.pictures == paused
+        resumed = site.service.pulses.newest
+        await client.request("PLAY")
+        await passed((pause + 1) * FPS)
+        await until(lambda: client.pictures >= paused + pause * FPS)
+        came, sent = client.pictures - paused, site.service.pulses.newest - resumed
+        assert came <= sent + waiting * FPS + 2 * STRIDE, "nothing of the pause"
 
 
 async def test_a_client_goes_on_when_the_connection_to_the_service_breaks(site: ServedSite) -> None:
