@@ -43,6 +43,12 @@ def intersections(first: Floats, second: Floats) -> Floats:
     return np.asarray(sides[..., 0] * sides[..., 1])
 
 
+def shares_within(boxes: Floats, others: Floats) -> Floats:
+    """Return the share of each box's area that lies within each other box, in [0, 1], shape (N, K)."""
+    area = areas(boxes)
+    return intersections(boxes[:, None], others[None]) / np.where(area > 0.0, area, 1.0)[:, None]
+
+
 def dice_overlap(first: Floats, second: Floats) -> Floats:
     """Return the shared over the average area (Dice), in [0, 1], shape (...) (paper II.B, conflict sets)."""
     average = (areas(first) + areas(second)) / 2.0

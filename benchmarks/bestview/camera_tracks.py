@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.detectors.compared_detectors import CONFIDENT, rows_of
-from server.camera.observations import ObservationCollector
+from server.camera.observations import ObservationCollector, most_confident
 from server.camera.peers.cross_view_scorer import CrossViewScorer
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import SourceEndedError
@@ -137,7 +137,7 @@ class _Camera:
     def observe(self, pulse: int) -> None:
         """Keep the detections of a frame for joint tracking, where the scene is tracked so."""
         if self._observations is not None and self._frames.searched[pulse]:
-            self._observations.add(pulse, self._frames.detections[pulse], STILL)
+            self._observations.add(pulse, most_confident(self._frames.detections[pulse]), STILL)
 
     def with_observations(self, message: CameraTracks) -> CameraTracks:
         """Return a message with the detections since the one before."""

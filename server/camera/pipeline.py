@@ -19,7 +19,7 @@ from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
 from server.camera.knocks import motion_message, noticeable
 from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
-from server.camera.observations import ObservationCollector, RawDetectionCollector
+from server.camera.observations import ObservationCollector, RawDetectionCollector, most_confident
 from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
@@ -262,10 +262,8 @@ class CameraPipeline:
             self._messages.add_without_detection([pulse])
         if frame.image is None and pulse >= self.first_pulse:
             self._messages.add_without_image([pulse])
-        if self._raw_detections is not None and frame.has_detection:
-            self._raw_detections.add(pulse, detections)
-        if self._observations is not None and frame.has_detection and frame.shows_its_place:
-            self._observations.add(pulse, detections, frame.motion)
+        if frame.has_detection:
+            self._collect(frame)
         if self.cross_view is not None and frame.depends_on_peers:
             detections = self.cross_view.rescore(detections, peers.messages, frame.motion)
             if peers.is_incomplete:
@@ -293,6 +291,14 @@ class CameraPipeline:
         """
         last = end - 1 if self._last is None else self._last
         return self._add_picture(self._messages.closing(self._tracker.flush(), last), None)
+
+    def _collect(self, frame: DetectedFrame) -> None:
+        """Keep the detections of a frame for the epoch's message, as far as the site uses them."""
+        strongest = most_confident(frame.detections)
+        if self._raw_detections is not None:
+            self._raw_detections.add(frame.pulse, strongest)
+        if self._observations is not None and frame.shows_its_place:
+            self._observations.add(frame.pulse, strongest, frame.motion)
 
     def _add_picture(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
         """Add the picture's condition and motion, and what the site uses: detections and sharpness."""

@@ -15,6 +15,7 @@ from server.messaging.packed_arrays import (
     unpack_histograms,
 )
 from tracking import Detections
+from tracking.boxes import areas
 
 _HISTOGRAMS_BYTES_MAX = 1 << 18
 
@@ -42,5 +43,5 @@ def unpack_observations(frame: FrameObservations) -> Detections:
     """Return a frame's detections, without boxes that have no size."""
     boxes, scores = unpack_detections(frame.boxes)
     histograms = unpack_histograms(frame.histograms, len(scores))
-    kept = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
+    kept = areas(boxes) > 0.0
     return Detections(boxes[kept], scores[kept], histograms[kept])

@@ -7,9 +7,6 @@ import os
 import resource
 import sys
 
-# Before libraries are imported: one camera needs one core.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import msgspec
 
 from server.setup.trial_messages import ProfilesRequest, StreamRequest

@@ -70,7 +70,7 @@ async def start_worker(module: str) -> asyncio.subprocess.Process:
         module,
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the other cores are the cameras'
         process_group=0,  # only the service receives Ctrl-C
     )
     lower_priority(process.pid, _WORKER_NICENESS)

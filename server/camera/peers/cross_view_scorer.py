@@ -14,6 +14,7 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import FrameDetections
 from server.messaging.packed_arrays import PackedDetections, unpack_detections
 from tracking import Detections
+from tracking.boxes import areas
 from tracking.detectors.background.motion import STILL, Motion
 
 
@@ -45,7 +46,7 @@ class CrossViewScorer:
         """
         boxes = None
         if detections is not None:
-            boxes = packed_detections(detections, most_confident(detections), self._letterbox, motion)
+            boxes = packed_detections(most_confident(detections), self._letterbox, motion)
         return FrameDetections(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
@@ -91,7 +92,7 @@ def _geometry(config: Config, camera_id: str, size: tuple[int, int]) -> CameraGe
 
 
 def _camera_detections(packed: PackedDetections) -> CameraDetections:
-    """Return boxes and scores as arrays, without empty boxes."""
+    """Return boxes and scores as arrays, without boxes that have no size."""
     boxes, scores = unpack_detections(packed)
-    kept = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
+    kept = areas(boxes) > 0.0
     return CameraDetections(boxes[kept], scores[kept])

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
 import sys
-
-# Before NumPy is imported: leave the cores to the cameras.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import msgspec
 import numpy as np

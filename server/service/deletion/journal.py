@@ -11,6 +11,7 @@ import msgspec
 
 from server.messaging.camera_identity_snapshot import PersonNumber, UnixTime
 from server.messaging.messages import DECODE_ERRORS
+from server.messaging.service_record import DeletedPerson
 from server.service.recording.person_removal import SegmentFile
 from server.system.errors import reason_of
 from server.system.private_files import write_private
@@ -36,6 +37,15 @@ class Deletion(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     files: Annotated[dict[str, list[SegmentFile]], msgspec.Meta(max_length=_FILES_MAX)] | None = None
     """By session, these files; null: not found yet."""
     is_done: bool = False
+
+    @property
+    def message(self) -> DeletedPerson | None:
+        """What other services are told; None: nothing, for their numbers are not known to be the same."""
+        if self.numbers_since is None:
+            return None
+        return DeletedPerson(
+            numbers=self.numbers, numbers_since=self.numbers_since, deletes_media=self.deletes_media
+        )
 
 
 class DeletionJournal:

@@ -48,15 +48,8 @@ class RecordingDeletion:
         except OSError as error:
             log.error("record.folder: interrupted deletions cannot be completed: %s", error)  # noqa: TRY400
             return []
-        return [
-            DeletedPerson(
-                numbers=deletion.numbers,
-                numbers_since=deletion.numbers_since,
-                deletes_media=deletion.deletes_media,
-            )
-            for deletion in journal.all
-            if deletion.numbers_since is not None
-        ]
+        messages = (deletion.message for deletion in journal.all)
+        return [message for message in messages if message is not None]
 
     async def complete_interrupted(self) -> None:
         """Complete what a crash has interrupted, one after another, after `read_journal`.

@@ -128,14 +128,8 @@ class DeletionService:
             person = replace(person, numbers=numbers)
         if person.is_of_today:
             self._forget(traces.numbers)
-        if person.numbers_since is not None:
-            self._pipeline.replication.add_deletion(
-                DeletedPerson(
-                    numbers=deletion.numbers,
-                    numbers_since=person.numbers_since,
-                    deletes_media=deletion.deletes_media,
-                )
-            )
+        if (message := deletion.message) is not None:
+            self._pipeline.replication.add_deletion(message)
         return planned, deletion
 
     def _forget(self, numbers: Collection[int]) -> None:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from typing import BinaryIO
-
-# Before NumPy is imported: leave the cores to the cameras.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from server.service.joint_tracking.joint_messages import JointSetup, JointTask
 from server.service.joint_tracking.joint_tracker import JointTracker

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.camera.observations import ObservationCollector
+from server.camera.observations import ObservationCollector, most_confident
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
@@ -53,7 +53,7 @@ def test_boxes_are_where_they_were_before_the_camera_was_knocked() -> None:
 def test_of_too_many_detections_the_most_confident_are_sent() -> None:
     found = some_detections(FRAME_DETECTIONS_MAX + 20, 4)
     collector = ObservationCollector(Letterbox(SIZE, SIZE))
-    collector.add(0, found, STILL)
+    collector.add(0, most_confident(found), STILL)
     arrived = unpack_observations(collector.take()[0])
     assert len(arrived) == FRAME_DETECTIONS_MAX
     assert arrived.scores.min() >= np.sort(found.scores)[20] - 0.001

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tracking.boxes import Floats, areas, intersections, iou
+from tracking.boxes import BOX_SIDES, Floats, iou, shares_within
 
 _SAME = 0.5
 """Least overlap (IoU) of a silhouette with where it was first."""
@@ -60,7 +60,7 @@ class StillSilhouettes:
         if not doubted:
             return np.zeros(len(boxes))
         seconds = np.array([known.doubt_s for known in doubted])
-        here = np.where(_are_within(boxes, doubted), seconds, 0.0).max(axis=1)
+        here = np.where(_are_within(boxes, _places(doubted)), seconds, 0.0).max(axis=1)
         return np.asarray(np.minimum(_LOG_ODDS_PER_S * here, _MOST))
 
     def update(
@@ -70,7 +70,7 @@ class StillSilhouettes:
 
         `seconds`: since the last run; `reliance`: how much the silence of the network says, 0 to 1.
         """
-        same, kept = _are_same(boxes, self._known), []
+        same, kept = _are_same(boxes, _places(self._known)), []
         for known, is_same in zip(self._known, same.T, strict=True):
             if is_same.any():
                 weight = -_CONFIRMATION if is_confirmed[is_same].any() else 1.0
@@ -81,14 +81,15 @@ class StillSilhouettes:
         self._known = [*kept, *map(_Silhouette, boxes[~same.any(axis=1)])]
 
 
-def _are_same(boxes: Floats, known: Sequence[_Silhouette]) -> npt.NDArray[np.bool_]:
-    """Return which boxes (K, 4) are at the places of known silhouettes, (K, N)."""
-    places = np.array([silhouette.box for silhouette in known]).reshape(-1, 4)
+def _places(known: Sequence[_Silhouette]) -> Floats:
+    return np.array([silhouette.box for silhouette in known]).reshape(-1, BOX_SIDES)
+
+
+def _are_same(boxes: Floats, places: Floats) -> npt.NDArray[np.bool_]:
+    """Return which boxes (K, 4) are at some places (N, 4), (K, N)."""
     return np.asarray(iou(boxes[:, None], places[None]) >= _SAME)
 
 
-def _are_within(boxes: Floats, known: Sequence[_Silhouette]) -> npt.NDArray[np.bool_]:
-    """Return which boxes (K, 4) are, or are mostly inside of, known silhouettes, (K, N)."""
-    places = np.array([silhouette.box for silhouette in known]).reshape(-1, 4)
-    shares = intersections(boxes[:, None], places[None]) / np.maximum(areas(boxes), 1e-9)[:, None]
-    return np.asarray(_are_same(boxes, known) | (shares >= _WITHIN))
+def _are_within(boxes: Floats, places: Floats) -> npt.NDArray[np.bool_]:
+    """Return which boxes (K, 4) are at some places (N, 4), or mostly inside of them, (K, N)."""
+    return np.asarray(_are_same(boxes, places) | (shares_within(boxes, places) >= _WITHIN))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import Floats, areas, heights, intersections
+from tracking.boxes import Floats, heights, shares_within
 from tracking.ground_plane.camera import GroundCamera, feet
 from tracking.ground_plane.gaussians import determinants
 from tracking.ground_plane.settings import GroundSettings
@@ -130,7 +130,7 @@ def covered_by_better(boxes: Floats, log_odds: Floats) -> Floats:
     """
     if not len(boxes):
         return np.zeros(0)
-    shares = intersections(boxes[:, None], boxes[None]) / np.maximum(areas(boxes), 1.0)[:, None]
+    shares = shares_within(boxes, boxes)
     np.fill_diagonal(shares, 0.0)
     covers = np.clip((shares - _NOT_COVERED) / (_COVERED - _NOT_COVERED), 0.0, 1.0)
     better = 1.0 / (1.0 + np.exp(log_odds[:, None] - log_odds[None]))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import Floats, areas, heights, intersections
+from tracking.boxes import Floats, heights, shares_within
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.places.measurements import Measurements
 
@@ -63,6 +63,6 @@ def _hidden_shares(boxes: Floats, others: Floats, own: NDArray[np.bool_]) -> Flo
     if not len(others):
         return np.zeros(len(boxes))
     with np.errstate(invalid="ignore"):
-        shares = intersections(boxes[:, None], others[None]) / np.maximum(areas(boxes), 1.0)[:, None]
+        shares = shares_within(boxes, others)
         nearer = others[None, :, 3] > (boxes[:, 3] + _NEARER * heights(boxes))[:, None]
     return np.asarray(np.nan_to_num(np.where(nearer & ~own, shares, 0.0)).max(axis=1))

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from typing import BinaryIO
-
-# Before NumPy is imported: each stream has a process already, and needs no more threads.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import cv2
 
