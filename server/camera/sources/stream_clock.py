@@ -11,7 +11,7 @@ from av.video.stream import VideoStream
 
 _SPAN_S = 5.0
 """Seconds over which the least delay is taken."""
-_SAME_CLOCK_S = 3.0
+_SAME_CLOCK_S = 1.0
 """Streams whose delays, by their cameras' clocks, differ by more do not have the same clock."""
 _WALL_CLOCK = struct.Struct("<q")
 """The beginning of FFmpeg's AVProducerReferenceTime: unix microseconds."""

@@ -154,7 +154,7 @@ class LiveSubstreamPictures:
 
 
 class RecordedSubstreamPictures:
-    """Tracks in a second recording, frame by frame; after its end, nowhere.
+    """Tracks in a second recording, frame by frame; after its end in the first one, where that is decoded.
 
     Args:
         camera: the camera's id, for the log.
@@ -184,7 +184,7 @@ class RecordedSubstreamPictures:
         return None
 
     def image(self, frame: CapturedFrame) -> Image | None:
-        """Return the second recording's picture of the frame's moment."""
+        """Return the second recording's picture of the frame's moment, or else the frame's own, if any."""
         pulse = frame.pulse
         if isinstance(self._main, Recording | PassthroughRecording | ImageFolder):
             pulse = self._main.pulse_in_first_pass(pulse)
@@ -192,10 +192,9 @@ class RecordedSubstreamPictures:
             image = self._source.take(pulse)
         except SourceEndedError:
             if self.state == "live":
-                text = "camera %s: its substream ends before its source: nobody is tracked after that"
-                log.warning(text, self._camera)
+                log.warning("camera %s: its substream ends before its source", self._camera)
             self.state = "away"
-            return None
+            return None if frame.image is None else self.scale.image(frame.image)
         self.state = "live"
         return None if image is None else self._placed(image)
 

@@ -56,7 +56,7 @@ def test_nothing_is_waited_for_where_no_picture_arrives() -> None:
 @given(
     times=st.lists(st.floats(0.0, 10.0), min_size=1, max_size=40),
     moment=st.floats(0.0, 10.0),
-    difference=st.floats(-2.0, 2.0),
+    difference=st.floats(-0.9, 0.9),
     has_clock=st.booleans(),
 )
 def test_the_closest_picture_is_found(
