@@ -122,6 +122,7 @@
  * @property {string} unit of coordinates on the floor
  * @property {SiteZone[]} zones
  * @property {ZoneRule[]} rules that are on no zone
+ * @property {string} digest of zones and rules
  *
  * @typedef {object} Setting an entry of /api/operator/config
  * @property {string} key

@@ -128,6 +128,8 @@ class SiteZones(msgspec.Struct, frozen=True):
     zones: list[SiteZone]
     rules: list[ZoneRule]
     """Those that are on no zone: they apply anywhere on the site."""
+    digest: str
+    """Tells whether zones or rules have changed."""
 
 
 class PointError(msgspec.Struct, frozen=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -26,6 +27,7 @@ from server.system.errors import UserError
 routes = web.RouteTableDef()
 
 _PATH = f"{OPERATOR_PATH}/zones"
+_CHANGED = "zones or rules were changed in the configuration meanwhile: cancel, and open this again"
 _SEVERAL = "the site has several services (view.share): change zones in the file, and reload all of them"
 
 
@@ -41,12 +43,16 @@ class ZoneToSave(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rules: list[ZoneRule] = []
     replaces: str | None = None
     """The id of the zone that it replaces; null: it is a new one."""
+    digest: str | None = None
+    """Of the zones and rules that this change is based on; null: it is made whatever they are."""
 
 
 class ZoneToRemove(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A zone's id."""
 
     zone: str
+    digest: str | None = None
+    """As in ZoneToSave."""
 
 
 @routes.get(_PATH)
@@ -61,24 +67,30 @@ async def put_zone(request: web.Request) -> web.Response:
     wanted = await read_json(request, ZoneToSave)
     rules = [{**msgspec.structs.asdict(rule), "id": rule.rule} for rule in wanted.rules]
     if wanted.zone is None:
-        return await _change(request, partial(save_site_rules, wanted=rules))
+        return await _change(request, partial(save_site_rules, wanted=rules), wanted.digest)
     zone = {"id": wanted.zone, "camera": wanted.camera, "area": wanted.area, "line": wanted.line}
     change = ZoneChange({**zone, "inner": wanted.inner}, rules, wanted.replaces)
-    return await _change(request, partial(save_zone, change=change))
+    return await _change(request, partial(save_zone, change=change), wanted.digest)
 
 
 @routes.delete(_PATH)
 async def delete_zone(request: web.Request) -> web.Response:
     """Remove a zone and its rules from the configuration file, and apply that."""
     wanted = await read_json(request, ZoneToRemove)
-    return await _change(request, partial(remove_zone, zone_id=wanted.zone))
+    return await _change(request, partial(remove_zone, zone_id=wanted.zone), wanted.digest)
 
 
-async def _change(request: web.Request, change: Callable[[Path], None]) -> web.Response:
-    """Change the file, let it be read again, and return its zones."""
+async def _change(request: web.Request, change: Callable[[Path], None], digest: str | None) -> web.Response:
+    """Change the file unless it has changed meanwhile, let it be read again, and return its zones."""
+
+    def change_unchanged(path: Path) -> None:
+        if digest is not None and _digest(load_config(path)) != digest:
+            raise UserError(_CHANGED)
+        change(path)
+
     try:
         path = _editable_path(request)
-        await change_config(path, change)
+        await change_config(path, change_unchanged)
     except UserError as error:
         return error_response(409, str(error))
     reload = request.app[CONTROL].reload
@@ -110,7 +122,12 @@ async def _zones(request: web.Request) -> SiteZones:
 
 
 def _answer(config: Config, unavailable: str, *, in_force: bool, unit: str) -> SiteZones:
-    return SiteZones(unavailable, in_force, unit, _zones_of(config), _rules_on(None, config))
+    return SiteZones(unavailable, in_force, unit, _zones_of(config), _rules_on(None, config), _digest(config))
+
+
+def _digest(config: Config) -> str:
+    sections = config.model_dump_json(include={"zones", "rules"})
+    return hashlib.sha256(sections.encode()).hexdigest()
 
 
 def _zones_of(config: Config) -> list[SiteZone]:

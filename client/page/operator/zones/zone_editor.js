@@ -34,6 +34,8 @@ export class ZoneEditor {
   #zones = [];
   /** @type {ZoneRule[]} on no zone */
   #rules = [];
+  #digest = ''; // of zones and rules, as they are listed
+  #openedDigest = ''; // as they were when the form was opened
   #unit = ''; // on the floor
   #editable = false;
   /** @type {Map<string, CameraDiagnostics['picture']>} by camera */
@@ -121,8 +123,9 @@ export class ZoneEditor {
   }
 
   /** @param {SiteZones} zones */
-  #take({ unavailable, unit, zones, rules }) {
+  #take({ unavailable, unit, zones, rules, digest }) {
     this.#unit = unit;
+    this.#digest = digest;
     this.#zones = zones;
     this.#rules = rules;
     this.#editable = unavailable === '';
@@ -182,6 +185,7 @@ export class ZoneEditor {
     }
     if (!this.#place) return;
     this.#selected = zone;
+    this.#openedDigest = this.#digest;
     const shape = shapeOf(zone);
     this.#form.open(zone, shape, this.#place, this.#ruleNames(zone));
     setText(element('zone-help'), HELP[shape.kind]);
@@ -192,6 +196,7 @@ export class ZoneEditor {
 
   #editSiteRules() {
     this.#deselect('');
+    this.#openedDigest = this.#digest;
     this.#form.openSiteRules(this.#rules, this.#ruleNames(null));
     setText(element('zone-help'), 'These rules apply anywhere on the site.');
   }
@@ -262,7 +267,7 @@ export class ZoneEditor {
    */
   async #change(method, content) {
     try {
-      const answer = await requestOperator('zones', method, content);
+      const answer = await requestOperator('zones', method, { ...content, digest: this.#openedDigest });
       this.#deselect('Saved; the earlier file is kept beside it.');
       this.#take(answer);
       this.#draw();
@@ -270,6 +275,7 @@ export class ZoneEditor {
     } catch (error) {
       const message = error instanceof Error ? error.message : '';
       setText(this.#state, this.#form.showRefusal(message) ? '' : message);
+      await requestOperator('zones').then((zones) => this.#take(zones), this.showError); // others may have changed them
     }
   }
 

@@ -238,6 +238,16 @@ async def test_rules_have_schedules_people_and_clear_cameras_on_a_zone_and_anywh
         close = served.service.config.rules[2]
         assert (close.id, close.zone, close.closer_than_m, close.hold_s) == ("site-close", None, 1.5, 2.5)
         await page.get_by_role("button", name="Rules anywhere").click()
+        path.write_text(
+            path.read_text().replace("closer_than_m: 1.5", "closer_than_m: 2")
+        )  # by another operator
+        await page.get_by_role("button", name="Save").click()
+        await expect(state).to_contain_text(
+            "were changed in the configuration meanwhile: cancel, and open this"
+        )
+        await page.get_by_role("button", name="Cancel").click()
+        await page.get_by_role("button", name="Rules anywhere").click()
+        await expect(page.get_by_label("Limit of rule 1, meters")).to_have_value("2")
         await restrict(page, 1)
         await page.get_by_role("button", name="Remove rule 1").click()
         await page.get_by_role("button", name="Save").click()
