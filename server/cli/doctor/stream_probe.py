@@ -16,6 +16,8 @@ from server.camera.sources.orientation import pixel_aspect
 
 _SMALL = (64, 36)
 """Size to which pictures are scaled for their mean, which shows what stands still."""
+_EVERY = 5
+"""Pictures of which one enters the mean: scaling all of them would count as decoding."""
 _MIN_PICTURES = 5
 """Fewest pictures from which a rate is computed."""
 
@@ -74,7 +76,7 @@ def file_fps(file: str) -> float:
 
 def _measure(opened: OpenedVideo, until: float) -> StreamStats:
     times, stamps = list[float](), list[float]()
-    total = np.zeros((_SMALL[1], _SMALL[0]))
+    small: list[NDArray[np.float64]] = []
     damaged, began = 0, time.thread_time()
     try:
         for packet in opened.container.demux(opened.stream):
@@ -82,8 +84,9 @@ def _measure(opened: OpenedVideo, until: float) -> StreamStats:
                 pictures = [frame for frame in packet.decode() if isinstance(frame, VideoFrame)]
             except av.error.FFmpegError:
                 damaged, pictures = damaged + 1, []
-            for picture in pictures:
-                total += picture.reformat(*_SMALL, format="gray").to_ndarray()
+            if pictures and len(times) >= _EVERY * len(small):
+                gray = pictures[-1].reformat(*_SMALL, format="gray")
+                small.append(gray.to_ndarray().astype(np.float64))
             times += [time.monotonic() for _ in pictures]
             stamps += [frame.time for frame in pictures if frame.time is not None]
             if time.monotonic() >= until:
@@ -102,5 +105,5 @@ def _measure(opened: OpenedVideo, until: float) -> StreamStats:
         damaged,
         cpu_s / max(1, len(times)),
         pixel_aspect(opened.stream),
-        total / len(times) if times else None,
+        np.mean(small, axis=0) if small else None,
     )
