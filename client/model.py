@@ -30,6 +30,8 @@ class Site(msgspec.Struct, frozen=True):
     cameras: tuple[str, ...]
     container: str = "mp4"
     """Container of the streams: mp4, or webm if the codec is vp8."""
+    h264: str | None = None
+    """Codec string of best.mp4?codec=h264; None: the streams are H.264 themselves."""
     sound: str | None = None
     """Audio codec; None: the site has no sound."""
     others: tuple[str, ...] = ()

@@ -49,7 +49,7 @@ export class Viewer {
   connected = false;
   supported = true;
   /** @type {StreamFormat} */
-  format = { container: 'mp4', codec: '', pulse0: null, gopS: 0 };
+  format = { container: 'mp4', codec: '', transcoded: false, pulse0: null, gopS: 0 };
   boxesOn = true;
   #selectedByUser = this.object !== null; // or by default
   #selectedAt = -Infinity; // performance.now()
@@ -92,12 +92,26 @@ export class Viewer {
     this.preference.configure(site.blur ? [] : site.cameras);
     this.site = this.probe.site = site;
     this.palette = new Palette(site.cameras);
-    const codec = [site.codec, site.sound].filter(Boolean).join(',');
-    this.format = { container: site.container ?? 'mp4', codec, pulse0: site.pulse0, gopS: site.gop / site.fps };
-    // Before the first keyframe the codec is unknown.
-    this.supported = site.codec === null || this.player.configure(this.format);
+    this.supported = this.#configurePlayer(site);
     this.#updatePlayer();
     this.changed();
+  }
+
+  /**
+   * Configure the player for the site's streams, or for what the server encodes anew where it cannot play them.
+   *
+   * @param {Site} site
+   * @returns {boolean} whether it can play either
+   */
+  #configurePlayer(site) {
+    const common = { pulse0: site.pulse0, gopS: site.gop / site.fps };
+    const codecs = (/** @type {string | null | undefined} */ video) => [video, site.sound].filter(Boolean).join(',');
+    this.format = { container: site.container ?? 'mp4', codec: codecs(site.codec), transcoded: false, ...common };
+    // Before the first keyframe the codec is unknown.
+    if (site.codec === null || this.player.configure(this.format)) return true;
+    if (!site.h264) return false;
+    this.format = { container: 'mp4', codec: codecs(site.h264), transcoded: true, ...common };
+    return this.player.configure(this.format);
   }
 
   /** @param {Person[]} people */

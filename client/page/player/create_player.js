@@ -11,6 +11,7 @@ import { wantsWebRtc, WebRtcPlayer } from './webrtc_player.js';
  * @typedef {object} StreamFormat of all streams of a site
  * @property {string} container mp4 or webm
  * @property {string} codec RFC 6381: of the video, followed by a comma and that of the audio if there is any
+ * @property {boolean} transcoded whether the server encodes the streams anew, as H.264: only live ones
  * @property {number | null} pulse0 Unix seconds of media time 0
  * @property {number} gopS seconds of a GOP, which may arrive in one burst
  */

@@ -47,6 +47,7 @@ export class MsePlayer {
   #codec = '';
   #gopS = 0;
   #container = 'mp4';
+  #transcoded = false;
   #playback;
   #backoff = new Backoff();
   #failedAt = -Infinity; // performance.now() of the last error
@@ -78,11 +79,12 @@ export class MsePlayer {
    * @param {StreamFormat} format
    * @returns {boolean} whether this browser can play the format
    */
-  configure({ container, codec, gopS }) {
+  configure({ container, codec, transcoded, gopS }) {
     if (!canPlay(container, codec)) return false;
     this.#gopS = this.#latency.gopS = gopS;
-    if (container !== this.#container || codec !== this.#codec) {
+    if (container !== this.#container || codec !== this.#codec || transcoded !== this.#transcoded) {
       this.#container = container;
+      this.#transcoded = transcoded;
       this.#codec = codec;
       this.#reopen();
     }
@@ -96,7 +98,7 @@ export class MsePlayer {
     this.#suspended = null;
     this.#download?.cancel();
     this.#download = new StreamDownload(selection, this.#gopS);
-    void this.#download.run(this.#container, {
+    void this.#download.run(this.#container, this.#transcoded, {
       received: (download, segments) => this.#append(download, segments),
       ended: (refused) => this.listener.ended(refused),
       bufferedEnd: () => this.#openedBuffer?.ranges.at(-1)?.[1] ?? 0,

@@ -15,14 +15,16 @@
  * @param {StreamSelection} selection
  * @param {string} container mp4 or webm
  * @param {Moment | null} from start of a past stream, later than `past` after a failure; null: live
+ * @param {boolean} transcoded whether live pictures are encoded anew, as H.264
  * @returns {string} address relative to the page
  */
-export function streamUrl({ object, camera, prefer, delay }, container, from) {
+export function streamUrl({ object, camera, prefer, delay }, container, from, transcoded) {
   const name = encodeURIComponent(camera ?? prefer ?? '');
   if (from && camera !== null) return `cameras/${name}/live.${container}?from=p${from.pulse}`;
   if (from) return `objects/${object}/best.${container}?from=p${from.pulse}`;
   const query = new URLSearchParams(camera !== null ? { camera } : prefer !== null ? { prefer } : {});
   if (delay && prefer === null) query.set('delay', delay);
+  if (transcoded) query.set('codec', 'h264');
   return `objects/${object}/best.${container}${query.size ? `?${query}` : ''}`;
 }
 

@@ -47,8 +47,8 @@ export class WebRtcPlayer {
    * @param {StreamFormat} format
    * @returns {boolean} whether this browser can play the format
    */
-  configure({ container }) {
-    return container === 'mp4';
+  configure({ codec, transcoded }) {
+    return codec.startsWith('avc') && !transcoded;
   }
 
   /** @param {StreamSelection} selection to play from now on */

@@ -12,6 +12,7 @@
  * @property {number} lookahead_s
  * @property {string | null} codec RFC 6381, such as avc1.42C01F, or vp8; null: no keyframe has arrived yet
  * @property {'mp4' | 'webm'} [container] of the streams; mp4 if missing
+ * @property {string | null} [h264] codec of best.mp4?codec=h264; null: the streams are H.264 themselves
  * @property {string | null} [sound] codec of the audio, such as mp4a.40.2; null: the site has none
  * @property {number | null} pulse0 Unix seconds at which pulse 0 was due; null before the first pulse
  * @property {number} now Unix seconds of the server's clock

@@ -48,9 +48,10 @@ export class PastSearch {
     });
   }
 
-  /** VP8 is not recorded. */
+  /** VP8 is not recorded, and nothing of the past is encoded anew. */
   update() {
-    this.#details.hidden = this.viewer.format.container === 'webm' || Boolean(this.viewer.site?.blur);
+    const { format, site } = this.viewer;
+    this.#details.hidden = format.container === 'webm' || format.transcoded || Boolean(site?.blur);
   }
 
   async #opened() {

@@ -47,6 +47,10 @@ export class TimeShift {
     }
     if (this.stale || pulse >= decisions.end - LIVE_S * site.fps) return this.live();
     if (format.container === 'webm') return this.#notRecorded(); // VP8 is not recorded
+    if (format.transcoded) {
+      if (!resumedPause) this.viewer.showNotice('This browser cannot play the recordings’ codec, only live pictures.');
+      return this.live();
+    }
     this.moment = { pulse, time: pulse / site.fps };
     this.#resumedPause = resumedPause;
     this.viewer.play();

@@ -18,7 +18,7 @@ from server.http.api.past_search import PAST_SEARCH_QUERIES
 from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
 from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
-from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT
+from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT, TRANSCODED
 from server.service.facade.past_search import PastSearchResult
 from server.service.facade.rules import Rules
 from server.service.facade.streams import DelayMode
@@ -124,6 +124,7 @@ _SCHEMAS: dict[str, Any] = {
         "description": "How much is known of what follows when a view is selected; HLS is never live.",
     },
     "overlay": {"enum": [0, 1], "default": 0, "description": "1: with boxes burnt in."},
+    "codec": {"enum": ["h264"], "description": "Encode H.265 or VP8 anew, for players that have neither."},
     "from": {**_MOMENT, "description": "The start: seconds back, a pulse, or a time."},
     "to": {**_MOMENT, "description": "The end, likewise; for HLS also live: no end."},
     "at": {
@@ -213,6 +214,7 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
         responses["503"] = {"description": "Temporarily unavailable; try again later."}
     parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
     queries = ["prefer"] * (path in CAMERA_QUERY) + ["delay"] * (path in DELAY)
+    queries += ["codec"] * (path in TRANSCODED)
     queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
     queries += ["from", "to"] * (path in TIME_SHIFT | _RECORDED_SPANS | OPERATOR_FILES.keys())
     queries += ["from", "to", *PAST_SEARCH_QUERIES] * (path == _SEARCH)

@@ -9,6 +9,9 @@ from server.http.api.schema import Cameras, Delays, Elsewhere, ObjectInfo, Objec
 from server.service.facade.streams import DelayMode
 from server.service.service import BestViewService
 
+_RENDERED_CODEC = "avc1.42C028"
+"""Of what the server encodes anew: H.264, Constrained Baseline."""
+
 
 def site_info(service: BestViewService) -> SiteInfo:
     """Return the site's settings."""
@@ -22,6 +25,7 @@ def site_info(service: BestViewService) -> SiteInfo:
         lookahead_s=config.lookahead_of(service.operations.view_settings) / config.site.fps,
         codec=streams.codec,
         container=streams.container,
+        h264=None if config.encode.codec == "h264" else _RENDERED_CODEC,
         sound=streams.audio_codec,
         pulse0=service.pulse0,
         now=time.time(),

@@ -23,6 +23,8 @@ class SiteInfo(msgspec.Struct, frozen=True):
     """RFC 6381 codec string of every stream; null before the first keyframe."""
     container: str
     """Container of the streams: mp4, or webm if the codec is vp8."""
+    h264: str | None
+    """Codec string of best.mp4?codec=h264; null: the streams are H.264 themselves."""
     sound: str | None
     """RFC 6381 codec string of the sound; null: the site has no sound."""
     pulse0: float | None

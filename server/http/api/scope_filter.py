@@ -13,9 +13,6 @@ from server.messaging.messages import GopChoices
 from server.service.facade.assist import Flag
 from server.service.facade.rules import EventRecord
 
-_DRAWN_CODEC = "avc1.42C028"
-"""Of what the server draws where the cameras send VP8: H.264, Constrained Baseline."""
-
 Resolve = Callable[[int], int]
 """Returns the current number of a person whose number may have been merged."""
 
@@ -26,8 +23,10 @@ def filter_site(site: SiteInfo, scope: Scope) -> SiteInfo:
     What is drawn blurred is H.264 without sound.
     """
     if scope.blur is not None:
-        codec = site.codec if site.container == "mp4" else site.codec and _DRAWN_CODEC
-        site = msgspec.structs.replace(site, codec=codec, container="mp4", sound=None, blur=scope.blur)
+        codec = site.codec and (site.h264 or site.codec)
+        site = msgspec.structs.replace(
+            site, codec=codec, container="mp4", h264=None, sound=None, blur=scope.blur
+        )
     if scope.camera is None:
         return site
     return msgspec.structs.replace(

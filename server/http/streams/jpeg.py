@@ -1,4 +1,4 @@
-"""Rendered streams over HTTP: MJPEG, single JPEGs, and the best view with boxes or people pixelated."""
+"""Rendered streams over HTTP: MJPEG, single JPEGs, and MP4 with boxes, with people pixelated, or as H.264."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from server.service.facade.rendering import (
     Subject,
     part_and_boundary,
 )
+from server.service.facade.streams import DelayMode
 
 routes = web.RouteTableDef()
 
@@ -84,12 +85,10 @@ def wants_boxes(request: web.Request) -> bool:
 
 
 @_rendering
-async def stream_drawn_mp4(request: web.Request) -> web.StreamResponse:
-    """Stream the best view of a person as fragmented MP4, with boxes or with people pixelated."""
+async def stream_rendered_mp4(request: web.Request) -> web.StreamResponse:
+    """Stream as fragmented MP4 of H.264: with boxes, with people pixelated, or only encoded anew."""
     headers = {"Content-Type": "video/mp4"}
-    subject = _person(request)
-    if wants_boxes(request):
-        subject = replace(subject, video="boxed")
+    subject = _video_subject(request)
     _newest(request, subject)
     if request.method == "HEAD":
         return _headers_only(headers)
@@ -142,6 +141,21 @@ def _subject(request: web.Request) -> Subject:
     return _camera(request) if "camera" in request.match_info else _person(request)
 
 
+def _video_subject(request: web.Request) -> Subject:
+    if "camera" in request.match_info:
+        return replace(_camera(request), video="plain")
+    person = _person(request)
+    if wants_boxes(request):
+        return replace(person, video="boxed")
+    fixed, preferred = request.query.get("camera"), request.query.get("prefer")
+    for camera in (fixed, preferred):
+        if camera is not None:
+            request.app[SERVICE].cameras.require(camera)
+    if fixed is not None:
+        return CameraView(fixed, decided=person.delay is not DelayMode.LIVE, video="plain")
+    return replace(person, video="plain", prefer=preferred)
+
+
 def _person(request: web.Request) -> PersonView:
     service, number = request.app[SERVICE], int(request.match_info["object"])
     current, scoped = service.people.current_number(number), is_scoped_to_person(request)
@@ -153,7 +167,7 @@ def _person(request: web.Request) -> PersonView:
     return PersonView(current, scoped, requested_delay(request), blur, "boxed" if blur is None else "plain")
 
 
-def _camera(request: web.Request) -> Subject:
+def _camera(request: web.Request) -> CameraView:
     camera = request.match_info["camera"]
     request.app[SERVICE].cameras.require(camera)
     blur = blur_of(request)

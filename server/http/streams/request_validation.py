@@ -23,6 +23,8 @@ OVERLAY = {
     "/cameras/{camera}/live.jpg",
 }
 """Routes that support overlay=, which burns boxes in."""
+TRANSCODED = {"/objects/{object}/best.mp4", "/cameras/{camera}/live.mp4"}
+"""Routes that support codec=, H.264 where the site's streams are of another codec."""
 TIME_SHIFT = {
     "/objects/{object}/best.mp4",
     "/objects/{object}/best.ts",
@@ -73,18 +75,25 @@ async def validate_query(
 async def check_container(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer 404 where a stream is requested in a container of another codec: nothing is transcoded."""
-    if _CONTAINER_PATH.fullmatch(request.path) and blur_of(request) is None:  # otherwise all are drawn
+    """Answer 404 where a stream is requested in a container of another codec, and is not encoded anew."""
+    is_drawn = blur_of(request) is not None or wants_h264(request)
+    if _CONTAINER_PATH.fullmatch(request.path) and not is_drawn:
         container, is_webm = request.app[SERVICE].streams.container, request.path.endswith(".webm")
         if container == "webm" and not request.path.endswith((".webm", ".mjpeg", ".jpg")):
             return error_response(
                 404, "these streams are VP8 (encode.codec): there is best.webm, live.webm and JPEG"
             )
         if container == "mp4" and is_webm:
+            name = "H.265" if request.app[SERVICE].config.encode.codec == "h265" else "H.264"
             return error_response(
-                404, "these streams are H.264 (encode.codec): there is best.mp4 and live.mp4"
+                404, f"these streams are {name} (encode.codec): there is best.mp4 and live.mp4"
             )
     return await handler(request)
+
+
+def wants_h264(request: web.Request) -> bool:
+    """Return whether a request is for a stream that must be encoded anew as H.264."""
+    return "codec" in request.query and request.app[SERVICE].config.encode.codec != "h264"
 
 
 def requested_delay(request: web.Request) -> DelayMode:
@@ -127,15 +136,26 @@ def invalid_event_query(request: web.Request) -> str | None:
     return _invalid_delay(request, "/api/events")
 
 
+def _invalid_codec(request: web.Request, path: str) -> str | None:
+    codec = request.query.get("codec")
+    if codec is None:
+        return None
+    if path not in TRANSCODED:
+        return "codec: only best.mp4 and live.mp4 are encoded anew"
+    if codec != "h264":
+        return f"codec={codec}: must be h264"
+    return "codec: the past is not encoded anew" if request.query.keys() & {"from", "to"} else None
+
+
 def _invalid_query(request: web.Request, path: str) -> str | None:
     overlay = request.query.get("overlay", "0")
     if overlay not in {"0", "1"}:
         return f"overlay={overlay}: must be 0 or 1"
     if overlay == "1" and path not in OVERLAY:
         return "overlay: boxes are burnt into a person's best.mp4, and into .mjpeg and .jpg; not into this"
-    delay_error = _invalid_delay(request, path)
-    if delay_error is not None:
-        return delay_error
+    error = _invalid_codec(request, path) or _invalid_delay(request, path)
+    if error is not None:
+        return error
     for name, effect in (("camera", "be fixed to one"), ("prefer", "prefer a camera")):
         excluded = {"overlay", "from", "to", "camera", "prefer"} - {name}
         if name in request.query and (path not in CAMERA_QUERY or request.query.keys() & excluded):

@@ -8,8 +8,8 @@ from server.http.access.authorization import blur_of, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import unavailable
 from server.http.streams.containers import MP4, TS, WEBM, Container
-from server.http.streams.jpeg import stream_drawn_mp4, wants_boxes
-from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay
+from server.http.streams.jpeg import stream_rendered_mp4, wants_boxes
+from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay, wants_h264
 from server.http.streams.sending import send_stream
 from server.http.streams.time_range import is_time_shifted
 from server.http.streams.time_shift import time_shifted_best, time_shifted_camera
@@ -30,8 +30,9 @@ routes = web.RouteTableDef()
 @routes.get("/objects/{object:[0-9]{1,9}}/best.mp4")
 async def get_best(request: web.Request) -> web.StreamResponse:
     """Stream the best view of a person as fragmented MP4, without a break at cuts."""
-    if blur_of(request) is not None or (wants_boxes(request) and not is_time_shifted(request)):
-        return await stream_drawn_mp4(request)
+    is_drawn = blur_of(request) is not None or (wants_boxes(request) and not is_time_shifted(request))
+    if is_drawn or wants_h264(request):
+        return await stream_rendered_mp4(request)
     return await _best(request, MP4)
 
 
@@ -50,6 +51,8 @@ async def get_best_webm(request: web.Request) -> web.StreamResponse:
 @routes.get("/cameras/{camera}/live.mp4")
 async def get_live(request: web.Request) -> web.StreamResponse:
     """Stream one camera as fragmented MP4."""
+    if wants_h264(request):
+        return await stream_rendered_mp4(request)
     return await _live(request, MP4)
 
 

@@ -34,7 +34,8 @@ class RenderPoolFullError(Exception):
 class PersonView:
     """A person's best view; ``scoped_to_person``: for viewers with access to that person alone.
 
-    ``blur``: whom its viewers see pixelated; ``video``: whether boxes are burnt into its video.
+    ``blur``: whom its viewers see pixelated; ``video``: whether boxes are burnt into its video; ``prefer``:
+    the camera that is shown while it sees the person.
     """
 
     number: int
@@ -42,22 +43,26 @@ class PersonView:
     delay: DelayMode = DelayMode.BALANCED
     blur: Blur | None = None
     video: PictureKind = "boxed"
+    prefer: str | None = None
 
     def __str__(self) -> str:
-        delay = "" if self.delay is DelayMode.BALANCED else f" {self.delay}"
-        return f"object {self.number}{' scoped' * self.scoped_to_person}{delay}{_blur_text(self.blur)}"
+        name = f"object {self.number}{' scoped' * self.scoped_to_person}"
+        name += "" if self.delay is DelayMode.BALANCED else f" {self.delay}"
+        name += "" if self.prefer is None else f" preferring {self.prefer}"
+        return name + _blur_text(self.blur)
 
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
     """A camera's live stream; ``decided``: with all boxes, and as late as a best view.
 
-    ``blur``: everybody is pixelated, whatever it is; only where ``decided``.
+    ``blur``: everybody is pixelated, whatever it is; only where ``decided``. ``video``: as of a person.
     """
 
     camera: str
     decided: bool = False
     blur: Blur | None = None
+    video: PictureKind = "boxed"
 
     def __str__(self) -> str:
         return f"camera {self.camera}{_blur_text(self.blur)}"
@@ -204,6 +209,9 @@ class RenderPool:
         splicer, decided = self._pipeline.splicer, self._decided
         overlay_of: Callable[[bytes], GopOverlay]
         match subject:
+            case PersonView(number, scoped_to_person, prefer=str(camera)):
+                preferring = splicer.preferred_scoped if scoped_to_person else splicer.preferred
+                broadcaster, overlay_of = preferring.broadcaster(number, camera), _no_overlay
             case PersonView(number, delay=DelayMode.LIVE):
                 broadcaster, overlay_of = splicer.live_persons.broadcaster(number), _no_overlay
             case PersonView(number, scoped_to_person, DelayMode.SMOOTH):
@@ -232,7 +240,7 @@ class RenderPool:
             queue_gops=self._queue_gops,
             # People are recognized by their voices, too.
             audio_buffer=None if subject.blur is not None else self._pipeline.audio_buffer,
-            video_kind=subject.video if isinstance(subject, PersonView) else "boxed",
+            video_kind=subject.video,
             # The person may not have been present in a gap.
             mute_gaps=isinstance(subject, PersonView) and subject.scoped_to_person,
         )

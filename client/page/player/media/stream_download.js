@@ -56,9 +56,10 @@ export class StreamDownload {
    * Download until cancelled, or until a past stream ends.
    *
    * @param {string} container
+   * @param {boolean} transcoded whether to ask for H.264 that is encoded anew
    * @param {DownloadListener} listener
    */
-  async run(container, { received, ended, bufferedEnd }) {
+  async run(container, transcoded, { received, ended, bufferedEnd }) {
     const { signal } = this.#controller;
     const backoff = new Backoff();
     let from = this.selection.past;
@@ -68,7 +69,8 @@ export class StreamDownload {
       let replaced = false;
       const server = currentServer();
       try {
-        for await (const segments of downloadSegments(streamUrl(this.selection, container, from), signal, this.gopS)) {
+        const address = streamUrl(this.selection, container, from, transcoded);
+        for await (const segments of downloadSegments(address, signal, this.gopS)) {
           await received(this, segments);
           if (this.cancelled) return;
           backoff.reset();
