@@ -15,7 +15,7 @@ import { loadStill } from '../camera_stills.js';
  * @typedef {object} MarkActions
  * @property {(point: Point) => void} mark a point
  * @property {() => void} undo
- * @property {() => void} chosen called when another camera was chosen
+ * @property {() => void} chosen called when another camera was chosen, or has become known
  */
 
 export class MarkedPicture {
@@ -27,6 +27,7 @@ export class MarkedPicture {
   /** @type {HTMLImageElement} */
   #image;
   #message;
+  #chosen;
 
   /**
    * @param {string} prefix of the ids of its elements
@@ -37,6 +38,7 @@ export class MarkedPicture {
     this.#select = element(`${prefix}-camera`);
     this.#image = element(`${prefix}-image`);
     this.#message = element(`${prefix}-message`);
+    this.#chosen = actions.chosen;
     const mark = (/** @type {Point} */ point) => {
       if (this.#picture) actions.mark(toCameraPixels(point, this.#picture));
     };
@@ -59,10 +61,14 @@ export class MarkedPicture {
 
   /** Load what is known of the cameras' pictures, and show one. */
   async open() {
+    await this.#loadSizes();
+    this.#show();
+  }
+
+  async #loadSizes() {
     /** @type {{cameras: CameraDiagnostics[]}} */
     const { cameras } = await requestOperator('cameras');
     for (const { camera, picture } of cameras) this.#pictures.set(camera, picture);
-    this.#show();
   }
 
   /** @param {Point[][]} areas */
@@ -91,9 +97,13 @@ export class MarkedPicture {
   async #load() {
     const { camera } = this;
     const loaded = await loadStill(this.#image, `cameras/${camera}/live.jpg`);
+    if (loaded && !this.#picture) {
+      await this.#loadSizes().catch(() => undefined); // it has started since
+      this.#chosen();
+    }
     if (camera !== this.camera) return;
     if (!loaded) this.say(`There is no picture of ${camera} now.`);
-    else if (!this.#picture) this.say(`The size of ${camera}'s picture is not known yet. Open this section again.`);
+    else if (!this.#picture) this.say(`The size of ${camera}'s picture is not known yet. Take a new picture in a moment.`);
     else this.say('');
   }
 }

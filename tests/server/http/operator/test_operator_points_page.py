@@ -227,8 +227,11 @@ async def test_what_is_no_number_is_refused_at_its_field_and_many_places_are_sho
         served,
         page,
     ):
+        message = page.locator("#points-message")
+        await expect(message).to_have_text("There is no picture of c0 now.")
         show_people(served)
-        await page.reload()
+        await page.locator("#points-picture").click()
+        await expect(message).to_be_empty()
         state, stage = page.locator("#points-state"), page.locator("#points-stage")
         await stage.click(position={"x": 3, "y": 3})
         field = page.get_by_label("Place 1, x on the floor")
