@@ -6,6 +6,9 @@ from pathlib import Path
 
 import av
 import av.logging
+from av.video.codeccontext import VideoCodecContext
+
+from server.media.picture import Codec
 
 
 def decodes_without_errors(path: Path) -> None:
@@ -19,3 +22,10 @@ def decodes_without_errors(path: Path) -> None:
         av.logging.set_level(before)
     assert not log, f"{path}: {log}"
     assert frames, f"{path}: no pictures"
+
+
+def video_decoder(codec: Codec) -> VideoCodecContext:
+    """Return a decoder of a site's codec."""
+    decoder = av.CodecContext.create("hevc" if codec == "h265" else codec, "r")
+    assert isinstance(decoder, VideoCodecContext)
+    return decoder

@@ -17,6 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fakes.http.tokens import TOKEN_ENTRIES, serve_with_tokens, token_entry, token_of, write_tokens
+from fakes.media.decoding import video_decoder
 from fakes.rtsp.client import rtsp_client
 from fakes.rtsp.gateway import RunningGateway, basic, needs_gstreamer, run_gateway
 from fakes.service.fed_site import ServedSite
@@ -33,6 +34,7 @@ from fakes.service.scripted_cameras import (
 )
 from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
+from server.media.picture import Codec
 from server.messaging.epochs import end_of_epoch
 
 pytestmark = needs_gstreamer
@@ -45,12 +47,13 @@ PICTURES = 100 * STRIDE
 async def live(served: ServedSite) -> AsyncIterator[None]:
     """Let a site run in real time or slower; its person is larger in the other camera every other GOP."""
     served.service.connect_cameras(*CAMERAS)
+    codec = served.service.config.encode.codec
 
     async def run() -> None:
         for epoch in count():
             for seed, camera in enumerate(CAMERAS):
                 for pulse in range(epoch * STRIDE, (epoch + 1) * STRIDE):
-                    unit = replace(encoded(seed, PICTURES)[pulse % PICTURES], pulse=pulse)
+                    unit = replace(encoded(seed, PICTURES, codec=codec)[pulse % PICTURES], pulse=pulse)
                     served.service.ingest.video(video(camera, unit))
                 size = LARGE if (epoch + seed) % 2 else SMALL
                 served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: size})))
@@ -68,10 +71,10 @@ async def live(served: ServedSite) -> AsyncIterator[None]:
         await asyncio.gather(running, return_exceptions=True)
 
 
-def own_pictures(camera: int) -> dict[bytes, int]:
+def own_pictures(camera: int, codec: Codec = "h264") -> dict[bytes, int]:
     """Return the number of each of a camera's pictures, by its decoded pixels."""
-    decoder = av.CodecContext.create("h264", "r")
-    units = encoded(camera, PICTURES)
+    decoder = video_decoder(codec)
+    units = encoded(camera, PICTURES, codec=codec)
     frames = [frame for unit in units for frame in decoder.decode(av.Packet(unit.data))]
     frames += decoder.decode(None)
     return {pixels(frame): number for number, frame in enumerate(frames)}
@@ -148,6 +151,18 @@ async def test_a_camera_has_its_own_pictures_in_order(gateway: RunningGateway, t
     else:  # a machine that is too busy may lose packets, and what is predicted from them
         assert shown
         assert all(0 < step < PICTURES / 2 for step in steps(shown))
+
+
+async def test_h265_has_the_cameras_own_pictures(tmp_path: Path) -> None:
+    own = [await asyncio.to_thread(own_pictures, camera, "h265") for camera in range(len(CAMERAS))]
+    async with (
+        serve_with_tokens(tmp_path, encode={"codec": "h265"}) as served,
+        live(served),
+        run_gateway(served.port) as gateway,
+    ):
+        frames = await frames_of(gateway.url("/objects/1", token_of("family")), 20)
+    shown = [next(one[pixels(frame)] for one in own if pixels(frame) in one) for frame in frames]
+    assert steps(shown) == [1] * 19
 
 
 async def test_a_best_view_goes_on_through_cuts_with_the_cameras_own_pictures(

@@ -20,6 +20,7 @@ from fakes.media.audio import (
     write_flashes,
 )
 from fakes.media.audio import FRAMES as SOUNDING
+from fakes.media.decoding import video_decoder
 from fakes.service.decisions import choice, decision
 from fakes.service.scripted_cameras import (
     CAMERAS,
@@ -37,6 +38,7 @@ from server.cli.render.soundtrack import Soundtrack
 from server.config.sections import SiteSettings
 from server.media.codec import stream_format_for
 from server.media.letterbox import Letterbox
+from server.media.picture import Codec
 from server.messaging.messages import NumberedBox
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.rules.engine import SiteEvent
@@ -44,7 +46,6 @@ from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
 SITE = SiteSettings(width=WIDTH, height=HEIGHT, fps=FPS)
-Codec = Literal["h264", "vp8"]
 
 
 def test_decision_files_have_these_bytes(tmp_path: Path) -> None:
@@ -93,14 +94,14 @@ def films(folder: Path, codec: Codec = "h264") -> tuple[FilmWriter, dict[str, Fr
 
 
 def own_pictures(seed: int, codec: Codec) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
-    decoder = av.VideoCodecContext.create(codec, "r")
+    decoder = video_decoder(codec)
     units = encoded(seed, codec=codec)
     decoded = [picture for unit in units for picture in decoder.decode(av.Packet(unit.data))]
     decoded += decoder.decode(None)
     return [np.asarray(picture.to_ndarray(format="yuv420p"), dtype=np.uint8) for picture in decoded]
 
 
-@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
+@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("h265", "mp4"), ("vp8", "webm")])
 def test_a_film_begins_at_time_0_and_shows_the_chosen_cameras_pixels(
     tmp_path: Path, codec: Codec, container: str
 ) -> None:
@@ -172,7 +173,7 @@ def test_a_number_with_sightings_of_its_own_keeps_its_film(
     assert len(list((tmp_path / "best").iterdir())) == 2
 
 
-@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("vp8", "webm")])
+@pytest.mark.parametrize(("codec", "container"), [("h264", "mp4"), ("h265", "mp4"), ("vp8", "webm")])
 def test_gaps_in_films_are_filled_as_in_live_streams(tmp_path: Path, codec: Codec, container: str) -> None:
     writer, frame_buffers = films(tmp_path / "best", codec)
     for pulse in (3 * GOP + 2, *range(5 * GOP, 6 * GOP)):

@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.common.browser import chromium
+from fakes.media.decoding import video_decoder
 from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
 from fakes.service.fed_site import ServedSite, serve_site
@@ -154,8 +155,7 @@ async def test_streams_are_encoded_anew_as_h264(h265_site: ServedSite, path: str
 
 
 def decoded_alone(seed: int) -> list[NDArray[np.uint8]]:
-    decoder = av.CodecContext.create("hevc", "r")
-    assert isinstance(decoder, av.VideoCodecContext)
+    decoder = video_decoder("h265")
     units = encoded(seed, FRAMES, codec="h265")[:100]
     return [
         frame.to_ndarray(format="bgr24") for unit in units for frame in decoder.decode(av.Packet(unit.data))

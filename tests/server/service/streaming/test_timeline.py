@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from fakes.media.decoding import video_decoder
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, HEIGHT, NO_REASON, WIDTH, small_config
 from fakes.timeouts import PATIENCE
 from server.camera.encoder import AccessUnit, Encoder
@@ -53,8 +54,7 @@ def captured_units(
 
 def decoded_alone(units: tuple[AccessUnit, ...], codec: Codec = "h264") -> dict[int, NDArray[np.uint8]]:
     """Decode a camera's own stream."""
-    decoder = av.CodecContext.create({"h265": "hevc"}.get(codec, codec), "r")
-    assert isinstance(decoder, av.VideoCodecContext)
+    decoder = video_decoder(codec)
     frames = [
         frame for data in [*units, None] for frame in decoder.decode(av.Packet(data.data) if data else None)
     ]
