@@ -14,6 +14,9 @@ from tracking.solvers.arc_lists import StepArcs, existing_arcs, group_by_step
 from tracking.solvers.objective import Ints
 from tracking.solvers.viterbi import Paths
 
+_WORTH_SORTING = 0.1
+"""Fewer arcs than this share of all are sorted anew rather than picked from the known order."""
+
 
 @dataclass(frozen=True, eq=False)
 class SparseTrellis:
@@ -53,10 +56,14 @@ class SparseTrellis:
         """Return the trellis of the arcs where `kept` (E,) is true, at least one in each step."""
         if kept.all():
             return self
-        step, origin, target = self.step[kept], self.origin[kept], self.target[kept]
-        order = (np.cumsum(kept) - 1)[self.by_origin[kept[self.by_origin]]]
+        index = np.flatnonzero(kept)
+        step, origin, target = self.step[index], self.origin[index], self.target[index]
+        order = None
+        if len(index) > _WORTH_SORTING * len(kept):
+            order = (np.cumsum(kept) - 1)[self.by_origin[kept[self.by_origin]]]
         steps = group_by_step(len(self.steps), step, origin, target, order)
-        return SparseTrellis(self.states, self.sets, step, origin, target, self.costs[:, kept], steps)
+        costs = self.costs.take(index, axis=1)
+        return SparseTrellis(self.states, self.sets, step, origin, target, costs, steps)
 
     def __len__(self) -> int:
         """The number E of arcs."""

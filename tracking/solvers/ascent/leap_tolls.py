@@ -31,29 +31,36 @@ def leap_tolls(network: Network, trellis: SparseTrellis, leap: float) -> Floats:
     exclusions = network.exclusions()
     hidden = network.max_places
     for m, step in enumerate(trellis.steps):
-        hides = np.flatnonzero((step.origin < hidden) & (step.target == hidden))
-        appears = np.flatnonzero((step.origin == hidden) & (step.target < hidden))
-        others = np.flatnonzero((step.origin == hidden) == (step.target == hidden))
-        lengths = beyond[step.span]
-        own = tolls[step.span]
-        for leaps, opposite, boxes, frame in (
-            (hides, appears, step.origin[hides], m),
-            (appears, hides, step.target[appears], m + 1),
-        ):
-            if not len(leaps):
-                continue
-            apart = _differences(lengths[leaps], lengths[leaps])
-            apart[exclusions[frame][np.ix_(boxes, boxes)] | (boxes[:, None] == boxes)] = np.inf
-            to_leaps = np.minimum(apart.min(axis=1), _least(lengths[leaps], lengths[opposite]))
-            own[leaps] = np.minimum(0.5 * to_leaps, _least(lengths[leaps], lengths[others]))
+        hides, appears = (step.origin < hidden) & (step.target == hidden), (step.origin == hidden)
+        appears &= step.target < hidden
+        leaps = np.flatnonzero(hides | appears)
+        if not len(leaps):
+            continue
+        own, hiding = beyond[step.span], hides[leaps]
+        apart = cdist(own[leaps], own[leaps], "cityblock")
+        for group, boxes, frame in ((hiding, step.origin[leaps], m), (~hiding, step.target[leaps], m + 1)):
+            chosen = np.flatnonzero(group)
+            box = boxes[chosen]
+            together = exclusions[frame][np.ix_(box, box)] | (box[:, None] == box)
+            apart[np.ix_(chosen, chosen)] += np.where(together, np.inf, 0.0)
+        charges = np.asarray(0.5 * apart.min(axis=1))
+        rest = own[~(hides | appears)]
+        near = np.flatnonzero(_least_apart(own[leaps], rest) < charges)
+        to_rest = cdist(own[leaps[near]], rest, "cityblock").min(axis=1, initial=np.inf)
+        charges[near] = np.minimum(charges[near], to_rest)
+        tolls[step.span.start + leaps] = charges
     return tolls * (network.objects - 1)
 
 
-def _differences(first: Floats, second: Floats) -> Floats:
-    """Return the city-block distances of vectors (A, 4) and (B, 4), (A, B)."""
-    return np.asarray(cdist(first, second, "cityblock"))
+def _least_apart(movements: Floats, others: Floats) -> Floats:
+    """Return a lower bound of the city-block distances of movements (A, 4) from all others (B, 4), (A,).
 
-
-def _least(first: Floats, second: Floats) -> Floats:
-    """Return the least of these distances for each of the first, (A,); infinite if there is no second."""
-    return np.asarray(_differences(first, second).min(axis=1, initial=np.inf))
+    Hiding boxes lose their width and height; of the boxes that stay, few change theirs.
+    """
+    apart = np.zeros(len(movements))
+    for first, second in ((0, 2), (1, 3)):
+        sizes = others[:, first] - others[:, second]
+        low, high = sizes.min(initial=np.inf), sizes.max(initial=-np.inf)
+        size = movements[:, first] - movements[:, second]
+        apart += np.maximum(np.maximum(low - size, size - high), 0.0)
+    return apart

@@ -123,9 +123,9 @@ class MovementPrices:
         """Return those of the arcs where `kept` (E,) is true."""
         if kept.all():
             return self
-        return MovementPrices(
-            self.cells, self.trellis.select(kept), self.movements[:, :, kept], self.places[:, :, kept]
-        )
+        index = np.flatnonzero(kept)
+        movements, places = self.movements.take(index, axis=2), self.places.take(index, axis=2)
+        return MovementPrices(self.cells, self.trellis.select(kept), movements, places)
 
     def of_slopes(self, slopes: Slopes) -> Floats:
         """Return the price of each arc, (n, E), from the slopes (n, M - 1, 4 C)."""
