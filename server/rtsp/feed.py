@@ -217,8 +217,7 @@ def caps_of(track: Track) -> Gst.Caps:
         case "h264":
             text = "video/x-h264,stream-format=avc,alignment=au"
         case "h265":
-            kind = "hev1" if track.may_change else "hvc1"
-            text = f"video/x-h265,stream-format={kind},alignment=au"
+            text = "video/x-h265,stream-format=hvc1,alignment=au"  # the payloader does not know hev1
         case "aac":
             text = f"audio/mpeg,mpegversion=4,stream-format=raw,rate={track.rate},channels={track.channels}"
         case _:

@@ -42,8 +42,6 @@ class Track:
     rate: int = 0
     """Audio: samples a second."""
     channels: int = 0
-    may_change: bool = False
-    """Whether keyframes carry parameter sets of their own, which the configuration then lacks."""
 
     @property
     def is_video(self) -> bool:
@@ -215,8 +213,7 @@ def _track(trak: bytes) -> Track:
     if kind in {b"avc1", b"avc3"}:
         return Track(number, timescale, "h264", _child(entry[_SAMPLE_ENTRY_VIDEO:], b"avcC"))
     if kind in {b"hvc1", b"hev1"}:
-        configuration = _child(entry[_SAMPLE_ENTRY_VIDEO:], b"hvcC")
-        return Track(number, timescale, "h265", configuration, may_change=kind == b"hev1")
+        return Track(number, timescale, "h265", _child(entry[_SAMPLE_ENTRY_VIDEO:], b"hvcC"))
     channels, _, _, _, rate = struct.unpack_from(">4HI", entry, 16)
     codec = {b"mp4a": "aac", b"Opus": "opus"}.get(kind)
     if codec is None:

@@ -153,10 +153,11 @@ async def test_a_camera_has_its_own_pictures_in_order(gateway: RunningGateway, t
         assert all(0 < step < PICTURES / 2 for step in steps(shown))
 
 
-async def test_h265_has_the_cameras_own_pictures(tmp_path: Path) -> None:
+@pytest.mark.parametrize("parameters", ["equal", "own"])
+async def test_h265_has_the_cameras_own_pictures(tmp_path: Path, parameters: str) -> None:
     own = [await asyncio.to_thread(own_pictures, camera, "h265") for camera in range(len(CAMERAS))]
     async with (
-        serve_with_tokens(tmp_path, encode={"codec": "h265"}) as served,
+        serve_with_tokens(tmp_path, encode={"codec": "h265", "parameters": parameters}) as served,
         live(served),
         run_gateway(served.port) as gateway,
     ):

@@ -106,7 +106,7 @@ def test_a_keyframe_of_h265_has_its_parameter_sets_once() -> None:
     head, *_ = Mp4Reader().feed(init_segment(sets, 64, 48))
     assert isinstance(head, Head)
     (track,) = head.tracks
-    assert (track.codec, track.is_video, track.may_change) == ("h265", True, False)
+    assert (track.codec, track.is_video) == ("h265", True)
     picture = join_units([one for one in nal_units(unit) if is_idr(one)])
     whole = with_parameter_sets(picture, track)
     assert split_sample(whole)[:3] == [sets.vps, sets.sps, sets.pps]
