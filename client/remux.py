@@ -17,6 +17,8 @@ from client.media_stream import MediaStreamError
 # Without `ignidx` FFmpeg's MP4 demuxer takes time quadratic in the number of fragments.
 _READ = {"fflags": "+ignidx"}
 _INDEX_FIRST = {"mp4": {"movflags": "faststart"}, "webm": {"cues_to_front": "1"}}
+_APPLE_H265 = "hvc1"
+"""The sample entry of H.265 that Apple's players need; FFmpeg would write another."""
 
 
 def remux(stream: Path, out: Path, container: str) -> None:
@@ -37,8 +39,11 @@ def remux(stream: Path, out: Path, container: str) -> None:
             if not source.streams.video:
                 raise MediaStreamError("there are no pictures")
             tracks = {track.index: target.add_stream_from_template(track) for track in source.streams}
+            pictures = source.streams.video[0]
+            if pictures.codec_context.codec_tag == _APPLE_H265:
+                tracks[pictures.index].codec_tag = _APPLE_H265
             begin: Fraction | None = None
-            for pts, packet in _until_last_picture(source.demux(), source.streams.video[0]):
+            for pts, packet in _until_last_picture(source.demux(), pictures):
                 begin = pts * packet.time_base if begin is None else begin
                 # The server's streams have no reordered pictures: they are decoded when they are shown.
                 packet.pts = packet.dts = pts - round(begin / packet.time_base)

@@ -10,11 +10,13 @@ import pytest
 from client.media_stream import MediaStreamError
 from client.remux import remux
 from fakes.media.audio import access_units, decode_audio, packets, write_flashes
+from fakes.service.scripted_cameras import HEIGHT, WIDTH, encoded
 from fakes.system.full_disk import files_of_at_most
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
 from server.media.containers.mp4_audio import audio_fragment
-from server.media.stream_format import StreamFormat
+from server.media.h265.codec import H265
+from server.media.stream_format import PerCameraStreamFormat, StreamFormat
 
 FPS, RATE = 25, 48_000
 START = 8000
@@ -101,3 +103,22 @@ def test_an_invalid_stream_is_refused(tmp_path: Path, content: bytes) -> None:
     for container in ("mp4", "webm"):
         with pytest.raises(MediaStreamError):
             remux(part, tmp_path / "film", container)
+
+
+@pytest.mark.parametrize("entry", ["hvc1", "hev1"])
+def test_h265_keeps_its_pictures_and_its_sample_entry(tmp_path: Path, entry: str) -> None:
+    stream_format = StreamFormat(H265) if entry == "hvc1" else PerCameraStreamFormat(H265)
+    units = encoded(0, codec="h265")
+    stream_format.accept(units[0].data)
+    head = stream_format.init_segment((WIDTH, HEIGHT), FPS)
+    assert head is not None
+    part, out = tmp_path / "part", tmp_path / "film.mp4"
+    part.write_bytes(
+        head
+        + b"".join(stream_format.pack(unit.data, START + unit.pulse, FPS, key=unit.key) for unit in units)
+    )
+    remux(part, out, "mp4")
+    with av.open(str(part)) as stream, av.open(str(out)) as film:
+        before, after = ([bytes(packet) for packet in file.demux(video=0)] for file in (stream, film))
+        assert film.streams.video[0].codec_context.codec_tag == entry
+    assert after == before

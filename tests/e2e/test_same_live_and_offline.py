@@ -46,8 +46,15 @@ async def rendered(config: Path, recording: Path, out: Path) -> None:
     assert await with_timeout(process.wait()) == 0
 
 
-@pytest.mark.parametrize("joint", [False, pytest.param(True, marks=pytest.mark.slow)])
-async def test_live_equals_offline_to_the_byte(tmp_path: Path, *, joint: bool) -> None:
+@pytest.mark.parametrize(
+    ("joint", "codec"),
+    [
+        (False, "h264"),
+        pytest.param(True, "h264", marks=pytest.mark.slow),
+        pytest.param(False, "h265", marks=pytest.mark.slow),
+    ],
+)
+async def test_live_equals_offline_to_the_byte(tmp_path: Path, codec: str, *, joint: bool) -> None:
     recording = tmp_path / "room"
     write_recording(Scene("room", len(CAMERAS), 4, 1, 320, 180, FPS), recording, SECONDS)
     # Long timeouts, so that no frame is skipped on a busy machine.
@@ -58,6 +65,7 @@ async def test_live_equals_offline_to_the_byte(tmp_path: Path, *, joint: bool) -
         track={"cross_view_wait_s": 60, "joint": joint},
         view={"late_after_s": 60},
         zenoh={"lease_s": 60},
+        encode={"codec": codec},
         zones=[ZONE],
         rules=RULES,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 
 import av
 import cv2
@@ -178,6 +179,19 @@ async def test_mp4_addresses_of_a_vp8_site_are_refused_with_one_line(vp8_site: S
     code, content = await vp8_site.get(path)
     assert code == 404
     assert "VP8 (encode.codec): there is best.webm" in content["error"]
+
+
+async def test_vp8_is_encoded_anew_as_h264(vp8_site: ServedSite) -> None:
+    feeding = asyncio.create_task(feed_in_real_time(vp8_site))
+    async with vp8_site.session.get("/objects/1/best.mp4?codec=h264") as answer:
+        assert answer.status == 200
+        data = b""
+        while data.count(b"moof") < GOP:
+            data += await answer.content.readany()
+    feeding.cancel()
+    with av.open(io.BytesIO(data[: data.rindex(b"moof") - 4])) as container:
+        assert container.streams.video[0].codec_context.name == "h264"
+        assert len(list(container.decode(video=0))) >= GOP - 1
 
 
 async def test_jpeg_is_rendered_from_vp8_with_and_without_boxes(vp8_site: ServedSite) -> None:
