@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import aiohttp
 import av
@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fakes.http.tokens import bearer, serve_with_tokens
+from fakes.media.decoding import video_decoder
 from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE, SMALL, encoded
+from server.media.picture import Codec
 from server.messaging.messages import Box, GopChoices
 
 Picture = NDArray[np.uint8]
-Codec = Literal["h264", "vp8"]
 
 EPOCHS, ABSENT = 24, range(4, 16)
 """The number of epochs, and those in which no camera shows object 1."""
@@ -88,7 +89,7 @@ def expected_pictures(
 @cache
 def camera_pictures(camera: str, codec: Codec = "h264") -> list[Picture]:
     """Decode a camera's own pictures, in YUV 4:2:0."""
-    decoder = av.VideoCodecContext.create(codec, "r")
+    decoder = video_decoder(codec)
     units = encoded(CAMERAS.index(camera), EPOCHS * GOP, codec=codec)
     packets = [*(av.Packet(unit.data) for unit in units), None]
     return [frame.to_ndarray(format="yuv420p") for packet in packets for frame in decoder.decode(packet)]

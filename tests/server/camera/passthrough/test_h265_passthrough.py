@@ -174,6 +174,10 @@ def test_parameter_sets_whose_pictures_cannot_be_repeated_are_refused(
     assert pipeline.is_passthrough == passes
     reason = "" if passes else "its parameter sets are not supported: neither Main nor Main 10 profile"
     assert pipeline.why_encoded == reason
+    frame = pipeline.take(0)
+    assert frame is not None
+    assert frame.image is not None
+    assert (frame.image.shape, frame.image.dtype) == ((HEIGHT, WIDTH, 3), np.uint8)
     pipeline.close()
 
 

@@ -30,15 +30,20 @@ from fakes.service.departure import (
 )
 from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import CAMERAS, FPS, GOP, LARGE
+from server.media.picture import Codec
 from server.service.streaming.subscriber_queue import Chunk
 
 HLS = {**PATIENT_HTTP, "hls_segment_s": 0.4, "hls_window_s": 8.0}
 """Two GOPs in a segment, and all that there is in the playlist."""
 
 
-@pytest.mark.parametrize("form", ["mp4", "ts", "webm"])
-async def test_the_picture_is_held_then_gray_until_the_person_returns(tmp_path: Path, form: str) -> None:
-    codec = "vp8" if form == "webm" else "h264"
+@pytest.mark.parametrize(
+    ("form", "codec"),
+    [("mp4", "h264"), ("ts", "h264"), ("mp4", "h265"), ("ts", "h265"), ("webm", "vp8")],
+)
+async def test_the_picture_is_held_then_gray_until_the_person_returns(
+    tmp_path: Path, form: str, codec: Codec
+) -> None:
     async with departure_site(tmp_path, encode={"codec": codec}) as served:
         decisions = feed_epochs(served, range(3))
         scoped, all_of_it = [
