@@ -21,7 +21,6 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
 from tracking import Detections, OnlineTracker
 from tracking.detectors import MotFileDetector
-from tracking.detectors.background.motion import STILL
 from tracking.motchallenge import MotRow
 
 Messages = Mapping[str, list[CameraTracks]]
@@ -137,7 +136,7 @@ class _Camera:
     def observe(self, pulse: int) -> None:
         """Keep the detections of a frame for joint tracking, where the scene is tracked so."""
         if self._observations is not None and self._frames.searched[pulse]:
-            self._observations.add(pulse, most_confident(self._frames.detections[pulse]), STILL)
+            self._observations.add(pulse, most_confident(self._frames.detections[pulse]), None)
 
     def with_observations(self, message: CameraTracks) -> CameraTracks:
         """Return a message with the detections since the one before."""

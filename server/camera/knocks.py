@@ -1,11 +1,16 @@
-"""How far a camera has been moved, as messages and log lines say it."""
+"""How far a camera was knocked or turned, as messages and log lines say it."""
 
 from __future__ import annotations
 
 import logging
 
+import numpy as np
+from numpy.typing import NDArray
+
 from server.messaging.camera_status import PictureMotion, motion_text
-from tracking.detectors.background.motion import STILL, Motion
+from server.messaging.picture_motion import picture_motion
+
+Floats = NDArray[np.float64]
 
 log = logging.getLogger(__name__)
 
@@ -13,16 +18,15 @@ _NOTICEABLE = 0.005
 """Motion, as a share of the picture's width, below which floor positions hardly change."""
 
 
-def noticeable(motion: Motion, size: tuple[int, int]) -> Motion:
-    """Return a motion of a picture of ``size`` (width, height), or `STILL` if it is not noticeable."""
-    return motion if motion.distance(STILL, size) >= _NOTICEABLE * size[0] else STILL
-
-
-def motion_message(motion: Motion) -> PictureMotion | None:
-    """Return a motion as a message; None: the camera has not moved."""
-    if motion == STILL:
+def noticeable_motion(motion: Floats, size: tuple[int, int]) -> PictureMotion | None:
+    """Return a homography (3, 3) of a picture of ``size`` (w, h) as a message; None: it hardly moves."""
+    across, down = np.meshgrid(np.linspace(0.0, size[0], 5), np.linspace(0.0, size[1], 5))
+    points = np.stack([across.ravel(), down.ravel(), np.ones(across.size)])
+    mapped = motion @ points
+    offsets = mapped[:2] / mapped[2] - points[:2]
+    if np.sqrt((offsets**2).sum(axis=0).mean()) < _NOTICEABLE * size[0]:
         return None
-    return PictureMotion(x=motion.x, y=motion.y, grow=motion.grow, turn=motion.turn)
+    return picture_motion(motion, size)
 
 
 class KnockLog:

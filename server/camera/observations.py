@@ -8,27 +8,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.media.letterbox import Letterbox
+from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import RawDetections
 from server.messaging.observations import FrameObservations
 from server.messaging.packed_arrays import (
     FRAME_DETECTIONS_MAX,
-    PackedDetections,
     pack_detections,
     pack_histograms,
 )
+from server.messaging.picture_motion import calibrated_boxes
 from tracking import Detections
-from tracking.detectors.background.motion import STILL, Motion
 
 Frame = TypeVar("Frame", RawDetections, FrameObservations)
 
 
 def calibrated_camera_boxes(
-    boxes: NDArray[np.float64], letterbox: Letterbox, motion: Motion
+    boxes: NDArray[np.float64], letterbox: Letterbox, motion: PictureMotion | None
 ) -> NDArray[np.float64]:
-    """Return boxes (K, 4) of the site's image in the camera's pixels, where they were before it moved."""
-    if motion != STILL:
-        boxes = motion.move_boxes_back(boxes, letterbox.site_size)
-    return letterbox.boxes_site_to_camera(boxes)
+    """Return boxes (K, 4) of the site's image in the camera's pixels, where they were before it moved.
+
+    NaN: that was beyond the horizon.
+    """
+    return letterbox.boxes_site_to_camera(calibrated_boxes(boxes, motion))
+
+
+def calibrated_detections(
+    detections: Detections, letterbox: Letterbox, motion: PictureMotion | None
+) -> Detections:
+    """Return the detections of the site's image whose boxes were somewhere before the camera moved, there."""
+    boxes = calibrated_camera_boxes(detections.boxes, letterbox, motion)
+    kept = np.isfinite(boxes).all(axis=1)
+    return Detections(boxes[kept], detections.scores[kept], detections.histograms[kept])
 
 
 def most_confident(detections: Detections) -> Detections:
@@ -37,11 +47,6 @@ def most_confident(detections: Detections) -> Detections:
         return detections
     chosen = np.sort(np.argsort(-detections.scores, kind="stable")[:FRAME_DETECTIONS_MAX])
     return Detections(detections.boxes[chosen], detections.scores[chosen], detections.histograms[chosen])
-
-
-def packed_detections(detections: Detections, letterbox: Letterbox, motion: Motion) -> PackedDetections:
-    """Return detections as a message has them."""
-    return pack_detections(calibrated_camera_boxes(detections.boxes, letterbox, motion), detections.scores)
 
 
 class _EpochCollector(Generic[Frame]):
@@ -72,8 +77,10 @@ class ObservationCollector(_EpochCollector[FrameObservations]):
         super().__init__()
         self._letterbox = letterbox
 
-    def add(self, pulse: int, detections: Detections, motion: Motion) -> None:
+    def add(self, pulse: int, detections: Detections, motion: PictureMotion | None) -> None:
         """Add the most confident detections of a frame that was searched."""
-        boxes = packed_detections(detections, self._letterbox, motion)
-        histograms = pack_histograms(detections.histograms)
-        self._frames.append(FrameObservations(pulse=pulse, boxes=boxes, histograms=histograms))
+        found = calibrated_detections(detections, self._letterbox, motion)
+        boxes = pack_detections(found.boxes, found.scores)
+        self._frames.append(
+            FrameObservations(pulse=pulse, boxes=boxes, histograms=pack_histograms(found.histograms))
+        )

@@ -17,13 +17,13 @@ from server.camera.audio import LiveAudioSource
 from server.camera.captured_frame import CapturedFrame
 from server.camera.detector_setup import make_detector, make_prescanned_detector
 from server.camera.encoder import AccessUnit, Encoder
-from server.camera.knocks import motion_message, noticeable
 from server.camera.load.skipped_frame_interpolator import SkippedFrameInterpolator
 from server.camera.observations import ObservationCollector, RawDetectionCollector, most_confident
 from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
 from server.camera.sharpness import SharpnessMemory
+from server.camera.shown_view import ShownView
 from server.camera.sources import FrameSource, Image, open_source
 from server.camera.sources.live_stream import LiveStream
 from server.camera.substream.opening import open_tracked_pictures
@@ -32,14 +32,13 @@ from server.camera.tracker_setup import set_up_tracker
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
+from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
 from server.system.errors import UserError
 from tracking import Detections
 from tracking.detectors import FusedDetector
-from tracking.detectors.background.motion import STILL, Motion
 from tracking.interactive import PositionCorrection
-from tracking.picture_condition import PictureMonitor
 
 _NO_PEERS = PeerDetections()
 _REPORTED_GAP_MAX = 50_000
@@ -68,7 +67,7 @@ class DetectedFrame:
     has_detection: bool
     shows_its_place: bool
     message: FrameDetections | None
-    motion: Motion = STILL
+    motion: PictureMotion | None = None
     skipped: bool = False
     waited_s: float = 0.0
 
@@ -147,8 +146,8 @@ class CameraPipeline:
             tracker, self._detector.appearance_bins, config.window.stride
         )
         self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, config.window.stride)
-        self.picture = PictureMonitor(site.fps)
-        """Watches what the camera shows."""
+        self.view = ShownView(site.fps, self._detector, self.tracked.scale)
+        """What the camera shows."""
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
             CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None
@@ -185,12 +184,6 @@ class CameraPipeline:
         """Whether a live camera delivers no frames; passthrough may have to wait for a GOP to begin."""
         return not self.source.recorded and self._missing > (self._away_after if self.is_passthrough else 0)
 
-    @property
-    def motion(self) -> Motion:
-        """How the picture has moved since the background was learned, pixels of the site's image."""
-        motion = self.tracked.scale.motion_to_site(getattr(self._detector, "camera_motion", STILL))
-        return noticeable(motion, self._letterbox.site_size)
-
     def encode(self, pulse: int, frame: CapturedFrame) -> AccessUnit:
         """Encode the frame of a pulse, which was the last one taken."""
         if isinstance(self._encoder, PassthroughEncoder):
@@ -224,12 +217,12 @@ class CameraPipeline:
         if image is None:
             detections, has_detection = Detections.empty(self._detector.appearance_bins), False
         else:
-            self.picture.observe(image, pulse)
+            self.view.observe(image, pulse)
             detections = self._detector.detect(image, pulse)
             boxes = self.tracked.scale.boxes_to_site(detections.boxes)
             detections = Detections(boxes, detections.scores, detections.histograms)
             has_detection = not self._detector.warming_up
-        shown, motion = self.picture.shows_its_place, self.motion
+        shown, motion = self.view.shows_its_place, self.view.motion
         message = (
             self.cross_view.build_message(pulse, detections if has_detection and shown else None, motion)
             if self.cross_view
@@ -305,8 +298,8 @@ class CameraPipeline:
         observations = [] if self._observations is None else self._observations.take()
         tracks = msgspec.structs.replace(
             tracks,
-            condition=self.picture.condition,
-            motion=motion_message(self.motion),
+            condition=self.view.condition,
+            motion=self.view.motion,
             observations=observations,
             detections=[] if self._raw_detections is None else self._raw_detections.take(),
         )

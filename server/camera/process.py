@@ -19,7 +19,7 @@ from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, open_site_audio
 from server.camera.end_confirmation import EndConfirmation
-from server.camera.knocks import KnockLog, motion_message
+from server.camera.knocks import KnockLog
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_exchange import PeerDetectionExchange
@@ -282,7 +282,7 @@ class CameraProcess:
 
     def _publish_status(self) -> None:
         condition, since = self._condition()
-        motion = motion_message(self._pipeline.motion)
+        motion = self._pipeline.view.motion
         if self._knocks.update(motion):
             self._moved_since = self._clock()
         status = self._meter.status(self._id, self._boot, self._state, len(self._backlog), self._load)
@@ -301,11 +301,11 @@ class CameraProcess:
 
     def _condition(self) -> tuple[PictureCondition, float]:
         """Return what is wrong with the picture and since when, unix seconds; log a change."""
-        picture, pulse = self._pipeline.picture, self._meter.pulse
-        condition = picture.condition
+        view, pulse = self._pipeline.view, self._meter.pulse
+        condition = view.condition
         if condition != self._last_condition:
             self._last_condition = condition
-            self._condition_since = self._clock() - (pulse - picture.since) / self._config.site.fps
+            self._condition_since = self._clock() - (pulse - view.since) / self._config.site.fps
             level = logging.INFO if condition == "clear" else logging.WARNING
             log.log(level, "camera %s: %s", self._id, CONDITION_TEXTS[condition])
         return condition, 0.0 if condition == "clear" else self._condition_since

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
@@ -34,22 +33,31 @@ SUBSTREAM_AWAY = "its substream delivers no pictures: people are tracked in its 
 """The text for people."""
 
 
-class PictureMotion(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a picture lies since its camera was knocked: moved, enlarged and turned at its center."""
+Row = tuple[Coordinate, Coordinate, Coordinate]
 
-    x: Coordinate
-    """Pixels of the site's image."""
-    y: Coordinate
-    grow: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)]
-    """The scale less 1."""
-    turn: Annotated[float, msgspec.Meta(ge=-0.5, le=0.5)]
-    """Sine of the angle, clockwise."""
+
+class PictureMotion(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a picture lies since its camera was knocked or turned."""
+
+    matrix: tuple[Row, Row, Row]
+    """Homography from the site's image before to that of now, pixels."""
+    pixels: Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
+    """How far the middle of the picture has moved."""
+    degrees: Annotated[float, msgspec.Meta(ge=0.0, le=180.0)]
+    """By how much it is turned there."""
+
+    def __post_init__(self) -> None:
+        (a, b, c), (d, e, f), (g, h, i) = self.matrix
+        if not abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)) > _LEAST_DETERMINANT:
+            raise ValueError("a motion is a homography that can be inverted")
+
+
+_LEAST_DETERMINANT = 1e-6
 
 
 def motion_text(motion: PictureMotion) -> str:
     """Return a motion in words."""
-    degrees = abs(math.degrees(math.asin(motion.turn)))
-    return f"it has moved by {math.hypot(motion.x, motion.y):.0f} pixels and {degrees:.1f} degrees"
+    return f"it has moved by {motion.pixels:.0f} pixels and {motion.degrees:.1f} degrees"
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):

@@ -1,37 +1,75 @@
-"""Where a camera's picture was before the camera was knocked: there its homography holds."""
+"""Where a camera's picture was before the camera was knocked or turned: there its homography holds."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
-from tracking.detectors.background.motion import Motion
 
 Floats = NDArray[np.float64]
 
+_TURNED = 0.1
+"""Motion, as a share of the picture's width, from which a camera shows another part of the scene."""
 
-def calibrated_boxes(boxes: Floats, motion: PictureMotion | None, size: tuple[int, int]) -> Floats:
+
+def picture_motion(matrix: Floats, size: tuple[int, int]) -> PictureMotion:
+    """Return the message of a homography (3, 3) of the site's image, of a size (w, h)."""
+    rows = (matrix / matrix[2, 2]).tolist()
+    middle = np.array([[size[0] / 2.0, size[1] / 2.0], [size[0] / 2.0 + 1.0, size[1] / 2.0]])
+    there, beside = _mapped(matrix, middle)
+    across, down = (beside - there).tolist()
+    return PictureMotion(
+        matrix=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])),
+        pixels=min(float(np.linalg.norm(there - middle[0])), 1e6),
+        degrees=abs(math.degrees(math.atan2(down, across))),
+    )
+
+
+def is_turned(motion: PictureMotion | None, size: tuple[int, int]) -> bool:
+    """Return whether the camera of a site's image of a size (w, h) shows another part of the scene."""
+    return motion is not None and motion.pixels > _TURNED * size[0]
+
+
+def calibrated_boxes(boxes: Floats, motion: PictureMotion | None) -> Floats:
     """Return boxes ``(..., 4)``, pixels of the site's image, where they were before a camera moved."""
-    if motion is None:
-        return boxes
-    return _motion(motion).move_boxes_back(boxes.reshape(-1, 4), size).reshape(boxes.shape)
+    return boxes if motion is None else moved_boxes(np.linalg.inv(np.array(motion.matrix)), boxes)
 
 
-def shown_boxes(boxes: Floats, motion: PictureMotion | None, size: tuple[int, int]) -> Floats:
+def shown_boxes(boxes: Floats, motion: PictureMotion | None) -> Floats:
     """Return boxes ``(..., 4)`` of before a camera moved where the site's image shows them now, pixels."""
-    if motion is None:
-        return boxes
-    return _motion(motion).move_boxes(boxes.reshape(-1, 4), size).reshape(boxes.shape)
+    return boxes if motion is None else moved_boxes(np.array(motion.matrix), boxes)
 
 
-def moved_homography(homography: Floats, motion: PictureMotion | None, size: tuple[int, int]) -> Floats:
-    """Return the homography `(3, 3)` of a camera that has moved, from the site's image of a size."""
-    if motion is None:
-        return homography
-    moved = np.vstack([_motion(motion).matrix(size), [0.0, 0.0, 1.0]])
-    return np.asarray(homography @ np.linalg.inv(moved))
+def moved_homography(homography: Floats, motion: PictureMotion | None) -> Floats:
+    """Return the homography `(3, 3)` from the site's image to the ground of a camera that has moved."""
+    return homography if motion is None else np.asarray(homography @ np.linalg.inv(np.array(motion.matrix)))
 
 
-def _motion(motion: PictureMotion) -> Motion:
-    return Motion(motion.x, motion.y, motion.grow, motion.turn)
+def camera_motion(motion: PictureMotion, letterbox: Letterbox) -> Floats:
+    """Return a motion of the site's image as one of the camera's own, (3, 3)."""
+    left, top, _, _ = letterbox.content
+    to_site = np.array([[letterbox.scale, 0.0, left], [0.0, letterbox.scale, top], [0.0, 0.0, 1.0]])
+    return np.asarray(np.linalg.inv(to_site) @ np.array(motion.matrix) @ to_site)
+
+
+def moved_boxes(matrix: Floats, boxes: Floats) -> Floats:
+    """Return upright boxes ``(..., 4)`` under a homography (3, 3), which maps their feet and heads."""
+    flat = boxes.reshape(-1, 4)
+    middle = (flat[:, 0] + flat[:, 2]) / 2.0
+    heads, feet = (_mapped(matrix, np.stack([middle, flat[:, row]], axis=1)) for row in (1, 3))
+    tall = np.linalg.norm(heads - feet, axis=1)
+    before = np.maximum(flat[:, 3] - flat[:, 1], np.finfo(float).tiny)
+    half = (flat[:, 2] - flat[:, 0]) / 2.0 * tall / before
+    moved = np.stack([feet[:, 0] - half, feet[:, 1] - tall, feet[:, 0] + half, feet[:, 1]], axis=1)
+    return np.asarray(moved.reshape(boxes.shape))
+
+
+def _mapped(matrix: Floats, points: Floats) -> Floats:
+    """Return points (N, 2) under a homography; NaN where it maps them beyond the horizon."""
+    mapped = points @ matrix[:, :2].T + matrix[:, 2]
+    depths = np.where(mapped[:, 2:] * np.sign(matrix[2, 2]) > 0.0, mapped[:, 2:], np.nan)
+    return np.asarray(mapped[:, :2] / depths)

@@ -39,6 +39,17 @@ def visible_mask(height: int, width: int, polygons: Sequence[Polygon], scale: fl
     return mask
 
 
+def move_polygons(polygons: Polygons, matrix: Floats) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """Return polygons under a homography (3, 3); those that it maps beyond the horizon are left out."""
+    moved = []
+    for polygon in polygons:
+        mapped = np.column_stack([np.asarray(polygon, dtype=np.float64), np.ones(len(polygon))]) @ matrix.T
+        if (mapped[:, 2] * matrix[2, 2] > 0.0).all():
+            corners = (mapped[:, :2] / mapped[:, 2:]).tolist()
+            moved.append(tuple((float(x), float(y)) for x, y in corners))
+    return tuple(moved)
+
+
 class IgnoreFilter:
     """Filters out boxes that lie mostly inside ignored polygons."""
 

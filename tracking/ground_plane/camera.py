@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,8 @@ class GroundCamera:
         homography: (3, 3), from image points in pixels to the ground plane.
         width: of the picture, pixels.
         height: of the picture, pixels.
+        turned: (3, 3) from image points to where the picture shows them since the camera was turned; None:
+            it was not.
 
     Raises:
         ValueError: the homography is not invertible, or not a matrix (3, 3) of finite numbers.
@@ -34,6 +36,7 @@ class GroundCamera:
     homography: Floats
     width: float
     height: float
+    turned: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.homography.shape != (3, 3) or not np.isfinite(self.homography).all():
@@ -44,13 +47,13 @@ class GroundCamera:
     def scaled(self, units_per_meter: float) -> GroundCamera:
         """Return the camera with a homography to meters."""
         scale = np.diag([1.0, 1.0, units_per_meter])
-        return GroundCamera(scale @ self.homography, self.width, self.height)
+        return replace(self, homography=scale @ self.homography)
 
     def shifted(self, offset: Floats) -> GroundCamera:
         """Return the camera with all places moved by an offset (2,)."""
         move = np.eye(3)
         move[:2, 2] = offset
-        return GroundCamera(move @ self.homography, self.width, self.height)
+        return replace(self, homography=move @ self.homography)
 
     def to_ground(self, points: Floats) -> Floats:
         """Map image points (K, 2) to the ground plane, (K, 2)."""
@@ -77,8 +80,16 @@ class GroundCamera:
         numerators = self.homography[:2, :2] - ground[:, :, None] * self.homography[2, :2]
         return np.asarray(numerators / mapped[:, 2, None, None])
 
+    def shown(self, points: Floats) -> Floats:
+        """Return where the picture shows image points (K, 2) since the camera was turned; NaN: nowhere."""
+        if self.turned is None:
+            return points
+        mapped = _homogeneous(points) @ self.turned.T
+        return np.asarray(mapped[:, :2] / np.where(mapped[:, 2:] > 0.0, mapped[:, 2:], np.nan))
+
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Return which image points (K, 2) are in the picture; NaN is not."""
+        points = self.shown(points)
         return np.asarray(
             (points[:, 0] >= 0.0)
             & (points[:, 0] < self.width)

@@ -23,8 +23,8 @@ _ACCEPT_S = 300.0
 # Seconds of signs until a condition is reported, and without them until it is taken back; the share of the
 # pictures that must agree.
 _REPORT_S, _RECOVER_S, _AGREE = 3.0, 2.0, 0.9
-# The picture does not show what happens where the camera is calibrated.
-_ELSEWHERE = {"covered", "turned", "frozen"}
+# The picture does not show what happens now.
+_HIDDEN = {"covered", "frozen"}
 # What covers a lens may look like another scene: the first report of either stands.
 _HIDING = {"covered", "turned"}
 # Seconds between the pictures that show whether something stands still.
@@ -51,11 +51,13 @@ class PictureMonitor:
         """What is wrong with the picture."""
         self.since = 0
         """The frame in which that began."""
+        self.shows_another_scene = False
+        """Whether the camera was turned away and has not come back, even if what it shows was accepted."""
 
     @property
-    def shows_its_place(self) -> bool:
-        """Whether what is seen is now, and where the camera is calibrated."""
-        return self.condition not in _ELSEWHERE
+    def shows_now(self) -> bool:
+        """Whether what is seen is what happens now."""
+        return self.condition not in _HIDDEN
 
     def observe(self, image: Image, frame: int | None = None) -> PictureCondition:
         """Return the camera's condition up to the next frame.
@@ -75,8 +77,20 @@ class PictureMonitor:
             self._signs.popleft()
         self._decide(seconds)
         if self.condition == "turned" and seconds - self.since / self._fps >= _ACCEPT_S:
-            self._reference, self._learned_s = None, 0.0
+            self._begin_again()
         return self.condition
+
+    def accept_scene(self) -> None:
+        """Take what the camera shows from now on for what it should: where that is, is known."""
+        self._begin_again()
+        self.shows_another_scene = False
+
+    def _begin_again(self) -> None:
+        """Learn the reference anew; nothing is wrong until then."""
+        self._reference, self._learned_s = None, 0.0
+        self._signs.clear()
+        if self.condition != "clear":
+            self.condition, self.since = "clear", self._frame
 
     def _sign(self, image: Image, seconds: float, elapsed: float) -> PictureCondition:
         """Return what seems to be wrong with a picture."""
@@ -114,9 +128,12 @@ class PictureMonitor:
             if whole and len(wrong) >= _AGREE * len(signs):
                 self.condition = Counter(sign for _, sign in wrong).most_common(1)[0][0]
                 self.since = wrong[0][0]
+                self.shows_another_scene |= self.condition == "turned"
         else:
             recent = [(frame, sign) for time, frame, sign in self._signs if time >= seconds - _RECOVER_S]
             other, count = Counter(sign for _, sign in recent).most_common(1)[0]
             changed = other == "clear" or (whole and {other, self.condition} != _HIDING)
             if other != self.condition and changed and count >= _AGREE * len(recent):
+                if "turned" in {other, self.condition}:
+                    self.shows_another_scene = other != "clear"
                 self.condition, self.since = other, recent[0][0]

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bestview import CameraDetections, CameraGeometry, rescore_detections, views_overlap
-from server.camera.observations import calibrated_camera_boxes, most_confident, packed_detections
+from server.camera.observations import calibrated_camera_boxes, calibrated_detections, most_confident
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
+from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import FrameDetections
-from server.messaging.packed_arrays import PackedDetections, unpack_detections
+from server.messaging.packed_arrays import PackedDetections, pack_detections, unpack_detections
+from server.messaging.picture_motion import is_turned
 from tracking import Detections
 from tracking.boxes import areas
-from tracking.detectors.background.motion import STILL, Motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +39,22 @@ class CrossViewScorer:
         """By peer: its image size, and its geometry; None: it sees none of this camera's ground."""
 
     def build_message(
-        self, pulse: int, detections: Detections | None, motion: Motion = STILL, *, ended: bool = False
+        self,
+        pulse: int,
+        detections: Detections | None,
+        motion: PictureMotion | None = None,
+        *,
+        ended: bool = False,
     ) -> FrameDetections:
         """Build the message about a frame, in the camera's pixels; None: detection did not run.
 
-        ``motion``: of the camera since it was calibrated; boxes are where they were before.
+        ``motion``: of the camera since it was calibrated; boxes are where they were before. A camera that was
+        turned away says nothing, since nobody knows whom it should see.
         """
         boxes = None
-        if detections is not None:
-            boxes = packed_detections(most_confident(detections), self._letterbox, motion)
+        if detections is not None and not is_turned(motion, self._letterbox.site_size):
+            found = calibrated_detections(most_confident(detections), self._letterbox, motion)
+            boxes = pack_detections(found.boxes, found.scores)
         return FrameDetections(
             camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
         )
@@ -56,9 +64,11 @@ class CrossViewScorer:
         return self._geometry_of(message) is not None
 
     def rescore(
-        self, detections: Detections, messages: Sequence[FrameDetections], motion: Motion = STILL
+        self, detections: Detections, messages: Sequence[FrameDetections], motion: PictureMotion | None = None
     ) -> Detections:
         """Return the detections with scores corrected by the peers' detections of the same frame."""
+        if is_turned(motion, self._letterbox.site_size):
+            return detections
         peers = [
             (geometry, _camera_detections(message.boxes))
             for message in messages

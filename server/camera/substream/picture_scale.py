@@ -12,7 +12,6 @@ from server.camera.sources.base import Image
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import Box
-from tracking.detectors.background.motion import STILL, Motion
 
 _USUAL_WIDTH = 640
 """Width in pixels of a substream that has not answered yet."""
@@ -46,12 +45,12 @@ class PictureScale:
         left, top, right, bottom = (np.asarray(box) / np.tile(self._factors, 2)).tolist()
         return left, top, right, bottom
 
-    def motion_to_site(self, motion: Motion) -> Motion:
-        """Return a motion of the tracked picture as one of the site's."""
-        if self.is_identity or motion == STILL:
+    def motion_to_site(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a homography (3, 3) between tracked pictures as one between the site's."""
+        if self.is_identity:
             return motion
-        across, down = self._factors.tolist()
-        return replace(motion, x=motion.x * across, y=motion.y * down)
+        scale = np.diag([*self._factors, 1.0])
+        return np.asarray(scale @ motion @ np.linalg.inv(scale))
 
     def config(self, config: Config) -> Config:
         """Return the configuration of a site whose pictures have the tracked size, for the detector."""

@@ -128,9 +128,8 @@ class CameraService:
                 site = (config.site.width, config.site.height)
                 coverage = floor_coverage(ground, size, site)
                 status = self._pipeline.ingest.states[camera.id].status
-                homography = moved_homography(
-                    coverage.site_homography, status.motion if status else None, site
-                )
+                motion = status.motion if status else None
+                homography = moved_homography(coverage.site_homography, motion)
                 cameras.append(FloorCamera(camera.id, homography.tolist(), coverage.outline.tolist()))
         return Floor(cameras, [camera.id for camera in config.cameras if camera.ground is None])
 

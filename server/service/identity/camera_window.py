@@ -53,7 +53,7 @@ class CameraWindow:
         _, height = self.message.size
         final = slice(self.fresh - self.first, max(0, self.message.final_to - self.first + 1))
         hidden = np.isnan(self.boxes[:, final, 0])
-        boxes = calibrated_boxes(self.boxes[:, final], self.message.motion, self.letterbox.site_size)
+        boxes = calibrated_boxes(self.boxes[:, final], self.message.motion)
         camera_boxes = self.letterbox.boxes_site_to_camera(boxes)
         return [
             TrackUpdate(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.messaging.messages import CameraTracks
+from server.messaging.picture_motion import is_turned
 from server.service.identity.camera_window import CameraWindow
 
 
@@ -30,11 +31,15 @@ class UndetectedFrames:
     def detecting_cameras(
         self, windows: Iterable[CameraWindow], first: int, last: int
     ) -> dict[str, tuple[int, int]]:
-        """Return the image sizes of the cameras that ran detection in any of these frames."""
+        """Return the image sizes of the cameras that ran detection in any of these frames.
+
+        Cameras that were turned away are left out: their homographies do not say whom they should see.
+        """
         return {
             window.message.camera: window.message.size
             for window in windows
-            if not self.over(window.message.camera, first, last + 1 - first).all()
+            if not is_turned(window.message.motion, window.letterbox.site_size)
+            and not self.over(window.message.camera, first, last + 1 - first).all()
         }
 
     def forget_before(self, pulse: int) -> None:

@@ -60,7 +60,7 @@ class CameraTrackBuilder:
                     boxes[row, at] = found.box
         oldest = frames[0].frame - self._shown_undetected if frames else 0.0
         self._detected = {number: frame for number, frame in self._detected.items() if frame >= oldest}
-        placed = shown_boxes(letterbox.boxes_camera_to_site(boxes), motion, letterbox.site_size)
+        placed = shown_boxes(letterbox.boxes_camera_to_site(boxes), motion)
         shown = [row for row in range(len(people)) if not np.isnan(placed[row]).all()]
         tracks = [
             WindowTrack(people[row], placed[row], placed[row], np.zeros(0), float(scores[row].mean()))

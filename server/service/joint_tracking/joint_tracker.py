@@ -5,13 +5,23 @@ It has no clock: the same epochs give the same tracks.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from server.media.letterbox import Letterbox
+from server.messaging.camera_status import PictureMotion
 from server.messaging.observations import unpack_observations
+from server.messaging.picture_motion import camera_motion
 from server.messaging.track_conversion import solver_report
 from server.service.joint_tracking.camera_track_builder import CameraTrackBuilder
-from server.service.joint_tracking.joint_messages import GroundPath, JointSetup, JointTask, JointTracks
+from server.service.joint_tracking.joint_messages import (
+    CameraObservations,
+    GroundPath,
+    JointSetup,
+    JointTask,
+    JointTracks,
+)
 from tracking import Detections, SolverBudget, create_solver
 from tracking.ground_plane import (
     GroundCamera,
@@ -30,12 +40,14 @@ class JointTracker:
         self._homographies = {camera: np.array(rows) for camera, rows in setup.homographies.items()}
         self._calibrations: dict[str, GroundCamera] = {}
         """Of the cameras that have reported."""
+        self._motions: dict[str, PictureMotion | None] = {}
+        """How those cameras were knocked or turned."""
         self._joint: frozenset[str] = frozenset()
         """Those of them that overlap."""
         self._tracker = GroundPlaneTracker(
             # A camera's own size follows with its first observations.
             {
-                camera: GroundCamera(homography, *map(float, setup.site_size))
+                camera: GroundCamera(homography, float(setup.site_size[0]), float(setup.site_size[1]))
                 for camera, homography in self._homographies.items()
             },
             GroundSettings(lag_s=setup.lag_s, stride_s=setup.stride_s),
@@ -92,12 +104,23 @@ class JointTracker:
                 calibration = GroundCamera(self._homographies[camera], width, height)
                 self._calibrations[camera] = calibration
                 self._tracker.set_camera(camera, calibration)
+                self._motions[camera] = None
                 self._joint = overlapping_cameras(self._calibrations)
+            self._turn(camera, part)
             (self._ended.add if part.ended else self._ended.discard)(camera)
         for camera, part in task.cameras.items():
             if camera in self._joint:
                 for frame in part.frames:
                     self._detections[camera][frame.pulse] = unpack_observations(frame)
+
+    def _turn(self, camera: str, part: CameraObservations) -> None:
+        """Take over how a camera was turned: it sees another part of the floor, in other places."""
+        if part.motion == self._motions[camera]:
+            return
+        self._motions[camera] = part.motion
+        letterbox = Letterbox(part.size, self._site_size)
+        turned = None if part.motion is None else camera_motion(part.motion, letterbox)
+        self._tracker.set_camera(camera, replace(self._calibrations[camera], turned=turned))
 
     def _track_to(self, last: int, *, all_ended: bool) -> tuple[list[GroundFrame], list[GroundFrame]]:
         """Track up to frame `last`; return the frames that have become final, and those after them."""

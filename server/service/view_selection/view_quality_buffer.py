@@ -142,8 +142,7 @@ class ViewQualityBuffer:
             self.letterboxes[camera].scale,
         )
         to_camera = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, scale]]) / scale
-        size = self.letterboxes[camera].site_size
-        return moved_homography(np.asarray(homography @ to_camera), self._motion[camera], size)
+        return moved_homography(np.asarray(homography @ to_camera), self._motion[camera])
 
 
 def _clarity(window: CameraWindow) -> float:

@@ -19,7 +19,6 @@ from server.messaging.packed_arrays import pack_boxes
 from server.service.ingest.epoch_aligner import Epoch
 from tracking import Detections
 from tracking.boxes import Floats
-from tracking.detectors.background.motion import STILL
 
 FPS, STRIDE = 5.0, 2
 SIZE = (int(WIDTH), int(HEIGHT))
@@ -89,7 +88,7 @@ def walked_epochs(
             collector = ObservationCollector(Letterbox(SIZE, SIZE))
             for frame in range(start, last + 1):
                 collector.add(
-                    frame, _with_looks(detections[frame - first][name], walks[frame - first], name), STILL
+                    frame, _with_looks(detections[frame - first][name], walks[frame - first], name), None
                 )
             tracks[name] = CameraTracks(
                 camera=name,

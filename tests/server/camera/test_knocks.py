@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from server.camera.knocks import KnockLog, motion_message, noticeable
+from server.camera.knocks import KnockLog, noticeable_motion
 from server.camera.pipeline import CameraPipeline
 from server.camera.sources import Image, SourceEndedError
 from server.cli.render.camera_workers import run_camera
@@ -49,6 +49,41 @@ class KnockedCamera:
         """Nothing is open."""
 
 
+class TurnedCamera:
+    """A camera of a furnished hall that is turned within a second and stays so."""
+
+    size, recorded = SIZE, True
+    frames = 300
+
+    def __init__(self) -> None:
+        random = np.random.default_rng(4)
+        self._hall = np.full((400, 900, 3), 120, dtype=np.uint8)
+        for _ in range(500):
+            x, y, w, h = (random.random(4) * (900, 400, 50, 50)).astype(int).tolist()
+            color = random.integers(30, 225, 3).tolist()
+            cv2.rectangle(self._hall, (x, y), (x + 4 + w, y + 4 + h), color, -1)
+        self.turned = self._turn(22.0)
+
+    @staticmethod
+    def _turn(degrees: float) -> np.ndarray:
+        lens = np.array([[300.0, 0.0, SIZE[0] / 2], [0.0, 300.0, SIZE[1] / 2], [0.0, 0.0, 1.0]])
+        rotation, _ = cv2.Rodrigues(np.radians([0.0, degrees, 0.0]))
+        return np.asarray(lens @ rotation @ np.linalg.inv(lens))
+
+    def take(self, pulse: int) -> Image:
+        if pulse >= self.frames:
+            raise SourceEndedError
+        matrix = self._turn(22.0 * float(np.clip((pulse - KNOCKED_FROM) / 25, 0.0, 1.0)))
+        place = np.array([[1.0, 0.0, SIZE[0] / 2 - 450], [0.0, 1.0, SIZE[1] / 2 - 200], [0.0, 0.0, 1.0]])
+        return np.asarray(cv2.warpPerspective(self._hall, matrix @ place, SIZE), dtype=np.uint8)
+
+    def prescan_images(self, indices: Sequence[int]) -> Iterator[Image]:
+        return (self.take(index) for index in indices if index < KNOCKED_FROM)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
 def test_track_messages_say_how_the_picture_has_moved() -> None:
     content = {
         "site": {"fps": 25, "width": SIZE[0], "height": SIZE[1]},
@@ -61,18 +96,39 @@ def test_track_messages_say_how_the_picture_has_moved() -> None:
     assert {motion for last, motion in motions.items() if last < KNOCKED_FROM} == {None}
     found = motions[max(motions)]
     assert found is not None
-    assert Motion(found.x, found.y, found.grow, found.turn).distance(KNOCK, SIZE) < 0.5
+    np.testing.assert_allclose(np.array(found.matrix)[:2, 2], KNOCK.matrix(SIZE)[:, 2], atol=1.0)
+    assert (found.pixels, found.degrees) == pytest.approx((np.hypot(5.0, 3.0), 1.0), abs=0.3)
+
+
+def test_a_turned_camera_is_located_and_its_picture_is_as_good_as_before() -> None:
+    """It is turned by 22 degrees: less than half of what it shows was seen before."""
+    content = {
+        "site": {"fps": 25, "width": SIZE[0], "height": SIZE[1]},
+        "cameras": [{"id": "c0", "source": "scene:room"}],
+    }
+    camera = TurnedCamera()
+    pipeline = CameraPipeline(build_config(content, where="site", folder=Path()), "c0", source=camera)
+    assert pipeline.view.shows_its_place
+    batches = list(run_camera(pipeline, "c0"))
+    found = batches[-1].tracks.motion
+    assert found is not None
+    at = np.array([[60.0, 60.0, 1.0], [100.0, 120.0, 1.0]]).T
+    there, true = (matrix @ at for matrix in (np.array(found.matrix), camera.turned))
+    np.testing.assert_allclose(there[:2] / there[2], true[:2] / true[2], atol=3.0)
+    assert batches[-1].tracks.condition == "clear"
+    assert pipeline.view.shows_its_place
 
 
 def test_a_motion_that_changes_no_position_on_the_floor_is_not_reported() -> None:
-    assert motion_message(noticeable(Motion(0.5, 0.5), SIZE)) is None
-    assert motion_message(noticeable(KNOCK, SIZE)) is not None
+    assert noticeable_motion(Motion(0.5, 0.5).homography(SIZE), SIZE) is None
+    assert noticeable_motion(KNOCK.homography(SIZE), SIZE) is not None
 
 
 def test_a_knock_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
     log = KnockLog("c1")
-    began = [log.update(motion_message(motion)) for motion in (STILL, KNOCK, Motion(5.5, -3.0), STILL)]
+    motions = (STILL, KNOCK, Motion(5.5, -3.0), STILL)
+    began = [log.update(noticeable_motion(motion.homography(SIZE), SIZE)) for motion in motions]
     assert began == [False, True, False, False]
     assert [record.getMessage() for record in caplog.records] == [
         "camera c1: it has moved by 6 pixels and 1.0 degrees; floor positions are corrected",

@@ -13,9 +13,10 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
 from server.messaging.packed_arrays import FRAME_DETECTIONS_MAX, pack_detections, pack_histograms
+from server.messaging.picture_motion import picture_motion
 from server.service.ingest.validation import is_plausible
 from tracking import Detections
-from tracking.detectors.background.motion import STILL, Motion
+from tracking.detectors.background.motion import Motion
 
 SIZE = (640, 360)
 
@@ -30,7 +31,7 @@ def some_detections(count: int, bins: int, seed: int = 0) -> Detections:
 @given(st.integers(0, 6), st.sampled_from([0, 1, 96]), st.integers(0, 99))
 def test_detections_arrive_as_they_were_found(count: int, bins: int, seed: int) -> None:
     found, collector = some_detections(count, bins, seed), ObservationCollector(Letterbox(SIZE, SIZE))
-    collector.add(7, found, STILL)
+    collector.add(7, found, None)
     (sent,) = collector.take()
     received = msgspec.msgpack.decode(msgspec.msgpack.encode(sent), type=FrameObservations)
     assert received.pulse == 7
@@ -43,17 +44,31 @@ def test_detections_arrive_as_they_were_found(count: int, bins: int, seed: int) 
 
 
 def test_boxes_are_where_they_were_before_the_camera_was_knocked() -> None:
-    found, motion = some_detections(3, 0), Motion(x=10.0, y=-4.0)
+    found, motion = some_detections(3, 0), picture_motion(Motion(x=10.0, y=-4.0).homography(SIZE), SIZE)
     collector = ObservationCollector(Letterbox((1280, 720), SIZE))
     collector.add(0, found, motion)
     arrived = unpack_observations(collector.take()[0])
     np.testing.assert_allclose(arrived.boxes, 2.0 * (found.boxes - [10.0, -4.0, 10.0, -4.0]), atol=0.051)
 
 
+def test_boxes_that_were_beyond_the_horizon_are_left_out() -> None:
+    """Sent as they are they would make the whole message invalid."""
+    found = Detections(
+        np.array([[10.0, 20.0, 30.0, 60.0], [10.0, 220.0, 30.0, 300.0]]), np.array([0.5, 0.7]), np.eye(2)
+    )
+    before = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -0.005, 1.0]])
+    collector = ObservationCollector(Letterbox(SIZE, SIZE))
+    collector.add(0, found, picture_motion(np.linalg.inv(before), SIZE))
+    (sent,) = collector.take()
+    arrived = unpack_observations(sent)
+    assert arrived.scores == pytest.approx([0.5], abs=1e-3)
+    assert is_plausible(message(msgspec.structs.replace(sent, pulse=6)), 5)
+
+
 def test_of_too_many_detections_the_most_confident_are_sent() -> None:
     found = some_detections(FRAME_DETECTIONS_MAX + 20, 4)
     collector = ObservationCollector(Letterbox(SIZE, SIZE))
-    collector.add(0, most_confident(found), STILL)
+    collector.add(0, most_confident(found), None)
     arrived = unpack_observations(collector.take()[0])
     assert len(arrived) == FRAME_DETECTIONS_MAX
     assert arrived.scores.min() >= np.sort(found.scores)[20] - 0.001

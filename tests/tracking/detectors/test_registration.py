@@ -71,10 +71,13 @@ def test_people_are_detected_where_they_are_in_a_knocked_picture() -> None:
         centers = (sure[:, :2] + sure[:, 2:]) / 2.0
         assert ((centers > truth[:2]) & (centers < truth[2:])).all(), "nothing else is a person"
     assert np.mean(np.array(overlaps) >= 0.5) >= 0.95
-    assert detector.camera_motion == STILL, "it may come back"
+    assert detector.camera_motion == pytest.approx(np.eye(3)), "it may come back"
     for frame in range(130, 175):
         detector.detect(moved(picture([walker], frame), motion))
-    assert detector.camera_motion.distance(motion, SIZE) < 0.5
+    corners = np.array([[0.0, 0.0, 1.0], [SIZE[0], 0.0, 1.0], [0.0, SIZE[1], 1.0], [*SIZE, 1.0]])
+    assert detector.camera_motion is not None
+    errors = corners @ (detector.camera_motion - motion.homography(SIZE)).T
+    assert np.linalg.norm(errors, axis=1).mean() < 0.8
 
 
 def test_an_empty_or_plain_background_has_no_motion() -> None:

@@ -33,6 +33,7 @@ from tracking.detectors.background.segmentation import (
 from tracking.detectors.background.settings import BackgroundSettings
 from tracking.detectors.base import Image, Mask, Plane, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
+from tracking.detectors.ignore_mask import move_polygons
 from tracking.frame_rate import DEFAULT_FPS
 from tracking.types import Detections
 
@@ -93,12 +94,14 @@ class BackgroundDetector:
             if self.settings.model == "median"
             else Mog2Background(self.settings.mog2, fps)
         )
-        self._shape: tuple[int, ...] | None = None
+        self._shape = (0, 0)
         self._grid: CellGrid | None = None
         self._filter: BoxFilter | None = None
         self._height_model: HeightModel | None = None
         self._height_range: HeightRange | None = None
         self._views = 0
+        self._turned: npt.NDArray[np.float64] | None = None
+        """How the present view, if it is not the first one, was turned; of the working image."""
         self.warming_up = True
         """Whether the last frame could not be searched because the background was unknown."""
 
@@ -148,10 +151,10 @@ class BackgroundDetector:
 
     def scan(self, work_image: Image) -> ForegroundScan | None:
         """Segment and scan the next frame, which `learn` completes; `None`: the background is unknown."""
+        self._follow_view()
         grid = self.grid
         segmentation = self._background.segment(work_image)
         self.warming_up = segmentation is None
-        self._forget_other_view()
         if segmentation is None:
             return None
         mask = clean_mask(segmentation.foreground & grid.visible)
@@ -210,19 +213,49 @@ class BackgroundDetector:
             raise ValueError("the size of the images is not known yet")
         return self._grid
 
-    def _forget_other_view(self) -> None:
-        """Forget the heights of people, and the floor, when the background begins to learn another view."""
-        views = self._background.views if isinstance(self._background, MedianBackground) else 0
-        if views != self._views:
-            self._views = views
+    def _follow_view(self) -> None:
+        """Begin anew with a view that is learned; move ignored areas and floor there once it is located."""
+        background = self._background
+        if not isinstance(background, MedianBackground):
+            return
+        if background.views != self._views:
+            self._views = background.views
             self._height_estimator = HeightModelEstimator(self.settings.height_model, self.fps)
+        turned = background.turned
+        if self._views and turned is not None and turned is not self._turned:
+            self._turned = turned
+            self._lay_grid(turned)
+
+    def _lay_grid(self, turned: npt.NDArray[np.float64] | None) -> CellGrid:
+        """Lay the cells over the images, and take over what the floor says of heights.
+
+        `turned`: how the camera was turned since it was calibrated, (3, 3), working image; None: it was not.
+        """
+        settings, floor, ignore = self.settings, self._floor, self.settings.ignore
+        if turned is not None:
+            scale = np.diag([self.grid.work_scale, self.grid.work_scale, 1.0])
+            in_image = np.asarray(np.linalg.inv(scale) @ turned @ scale)
+            ignore = move_polygons(ignore, in_image)
+            floor = None if floor is None else floor.turned(in_image, self._shape[1])
+            self._filter = self._height_model = None
+        grid = self._grid = CellGrid(self._shape, settings.work_width, CELL, settings.border_margin, ignore)
+        if floor is not None:
+            self._height_estimator = HeightModelEstimator(
+                settings.height_model, self.fps, floor.scaled_by(grid.work_scale), grid.work_height
+            )
+        return grid
 
     @property
-    def camera_motion(self) -> Motion:
-        """Where the camera has come to rest since the background was learned, in pixels of the images."""
+    def camera_motion(self) -> npt.NDArray[np.float64] | None:
+        """How the picture has moved to where the camera rests: a homography (3, 3) of pixels of the images.
+
+        None: the camera was turned to a view that could not be located.
+        """
         if self._grid is None or not isinstance(self._background, MedianBackground):
-            return STILL
-        return self._background.rest.scaled(1.0 / self._grid.work_scale)
+            return np.eye(3)
+        moved = self._background.moved(self._grid.work_size)
+        scale = np.diag([self._grid.work_scale, self._grid.work_scale, 1.0])
+        return None if moved is None else np.asarray(np.linalg.inv(scale) @ moved @ scale)
 
     @property
     def appearance_bins(self) -> int:
@@ -265,19 +298,8 @@ class BackgroundDetector:
     def _grid_for(self, image: Image) -> CellGrid:
         validate_image(image)
         if self._grid is None:
-            self._shape = image.shape
-            self._grid = CellGrid(
-                image.shape[:2],
-                self.settings.work_width,
-                CELL,
-                self.settings.border_margin,
-                self.settings.ignore,
-            )
-            if self._floor is not None:
-                floor = self._floor.scaled_by(self._grid.work_scale)
-                self._height_estimator = HeightModelEstimator(
-                    self.settings.height_model, self.fps, floor, self._grid.work_height
-                )
-        if image.shape != self._shape:
-            raise ValueError(f"the frames' size changed from {self._shape} to {image.shape}")
+            self._shape = (image.shape[0], image.shape[1])
+            return self._lay_grid(None)
+        if image.shape[:2] != self._shape:
+            raise ValueError(f"the frames' size changed from {self._shape} to {image.shape[:2]}")
         return self._grid

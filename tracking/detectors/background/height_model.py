@@ -59,6 +59,15 @@ class FloorGeometry:
         """Return the geometry in an image scaled by `scale`."""
         return FloorGeometry(self.horizon * scale, self.slope)
 
+    def turned(self, matrix: Floats, width: float) -> FloorGeometry:
+        """Return the geometry after a turn: a homography (3, 3) of an image so many pixels wide."""
+        (x0, y0), (x1, y1) = (
+            (mapped[:2] / mapped[2]).tolist()
+            for mapped in (matrix @ [0.0, self.horizon, 1.0], matrix @ [width, self.horizon, 1.0])
+        )
+        share = (width / 2.0 - x0) / (x1 - x0)
+        return FloorGeometry(y0 + share * (y1 - y0), self.slope)
+
 
 @dataclass(frozen=True, slots=True)
 class HeightModel:

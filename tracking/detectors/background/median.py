@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from tracking.boxes import Floats
 from tracking.detectors.background.flicker import FlickerFinder
 from tracking.detectors.background.light.frame_light import FrameLight, fit_frame_light
 from tracking.detectors.background.light.local_light import reduce_to_cells
@@ -23,6 +24,9 @@ from tracking.detectors.background.segmentation import (
     shadow_mask,
 )
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
+from tracking.detectors.background.views.known_views import KnownViews
+from tracking.detectors.background.views.turn_finder import TurnFinder
+from tracking.detectors.background.views.view_matching import ViewMatch
 from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, require_positive
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 
@@ -87,24 +91,32 @@ class MedianBackground:
         self._light: FrameLight | None = None
         """Of the last frame."""
         self._unlikely: Mask | None = None
-        self._retired: Image | None = None
-        """The background before this one."""
+        self._known, self._turns = KnownViews(), TurnFinder(fps)
         self.views = 0
         """How many times another view was learned."""
         self._last: Image | None = None
         """The last frame, where the background is."""
 
     @property
-    def rest(self) -> Motion:
-        """Where the camera has come to rest since the background was learned."""
-        return self._registration.rest
+    def turned(self) -> Floats | None:
+        """How the present view was turned from the first one, (3, 3), its own pixels; None: unknown."""
+        return self._known.homography
+
+    def moved(self, size: tuple[int, int]) -> Floats | None:
+        """Return how the first view has moved to where the camera rests, (3, 3); pictures have a size (w, h).
+
+        None: the camera shows another view, which could not be located.
+        """
+        if self._known.homography is None:
+            return None
+        return np.asarray(self._registration.rest.homography(size) @ self._known.homography)
 
     def prepare(self, images: Sequence[Image]) -> None:
         """Learn the background from images before the first frame; without any, learn it live."""
         for image in images:
             self._samples.add(image)
         if self._samples:
-            self._use(self._samples.median(self._retired))
+            self._use(self._background_of_samples())
             self._frames, self._samples = self._bootstrap_frames, MedianSamples()
 
     def segment_still(self, image: Image) -> Segmentation | None:
@@ -130,6 +142,9 @@ class MedianBackground:
             if motion != self._registration.rest:
                 light = self._fit_light(aligned, background, before)
         self._last, self._light = aligned, light
+        if (turn := self._turns.find(self._registration.agreement, background, image)) is not None:
+            self._learn_view(background, turn)
+            return None
         if light.curves.contrast_of(self._cells_of(background)) < _BLIND:
             return None
         segmentation = self._compare(aligned, motion, background, light)
@@ -172,6 +187,8 @@ class MedianBackground:
         self._rounded = np.rint(self._exact).astype(np.uint8)
         if self._frames % self._points_every == 0:
             self._registration.set_background(self._rounded)
+            if self._known.homography is None:
+                self._known.locate(self._rounded)
 
     def _align(
         self, image: Image, background: Image, before: FrameLight | None, *, looks: bool
@@ -227,11 +244,30 @@ class MedianBackground:
             return
         # Spread the samples evenly, the last one on the last frame.
         if done * samples // frames > self._frames * samples // frames:
+            if self.views and self._samples.have_moved(image):  # the camera still turns
+                self._frames, self._samples, done = 0, MedianSamples(), 1
             self._samples.add(image)
         if done in {(frames + 1) // 2, frames} and self._samples:
-            self._use(self._samples.median(self._retired))
+            self._use(self._background_of_samples())
         if done == frames:
             self._samples = MedianSamples()
+
+    def _background_of_samples(self) -> Image:
+        """Return the background that the samples show, less people who hide what was known of the view."""
+        background = self._samples.median(None)
+        if not self.views:
+            return background
+        self._known.locate(background)
+        before = self._known.last_turned()
+        if before is None and self._known.last is not None and self._is_view(self._known.last, background):
+            before = self._known.last
+        return background if before is None else self._samples.median(before)
+
+    def _is_view(self, background: Image, image: Image) -> bool:
+        """Return whether an image shows a background's edges where they are, at whatever light."""
+        registration = Registration(self._fps)
+        registration.set_background(background)
+        return registration.agrees(image)
 
     def _use(self, background: Image) -> None:
         """Compare frames with this background from now on."""
@@ -252,15 +288,23 @@ class MedianBackground:
         """
         if count_edges(image) < _COVERED * count_edges(background):
             return
-        self._flooded = 0
-        retired, self._retired = self._retired, background
-        if retired is not None:
-            light = self._fit_light(image, retired)
-            if not self._is_flooded(self._compare(image, STILL, retired, light)):
-                self._use(retired)
+        last = self._known.last
+        if last is not None:
+            light = self._fit_light(image, last)
+            explains = not self._is_flooded(self._compare(image, STILL, last, light))
+            if explains and self._is_view(last, image):
+                self._known.go_back(background)
+                self._use(last)
+                self._flooded = 0
                 return
+        self._learn_view(background)
+
+    def _learn_view(self, background: Image, turn: ViewMatch | None = None) -> None:
+        """Learn the background of another view; `turn`: where the present one lies in it, if known."""
+        self._known.leave(background, turn)
         self._frames, self._samples = 0, MedianSamples()
         self._exact = self._rounded = self._light = self._unlikely = None
+        self._flooded = 0
         self.views += 1
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.detectors.background.light.tone_curve import fit_tone_curves
-from tracking.detectors.background.registration import Registration
+from tracking.detectors.background.registration import Registration, coarse_shift
 from tracking.detectors.background.segmentation import largest_difference
 from tracking.detectors.base import Image
 
 # Share of the samples that have to show the old background where it is kept, and within how many gray levels.
 _SEEN, _SAME = 0.2, 12
+# Motion from one frame to the next, as a share of the width, from which a camera turns.
+_TURNS = 0.01
 
 
 class MedianSamples:
@@ -19,6 +21,7 @@ class MedianSamples:
     def __init__(self) -> None:
         self._images: list[Image] = []
         self._registration = Registration()
+        self._last: Image = np.empty((0, 0, 3), dtype=np.uint8)
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -26,6 +29,7 @@ class MedianSamples:
 
     def add(self, image: Image) -> None:
         """Add a frame `(H, W, 3)`."""
+        self._last = image
         if not self._images:
             self._registration.set_background(image)
             self._images.append(image)
@@ -33,6 +37,10 @@ class MedianSamples:
         first = self._images[0]
         aligned = self._registration.find_still(image).align(image, first)
         self._images.append(fit_tone_curves(aligned, first).invert(aligned, first))
+
+    def have_moved(self, image: Image) -> bool:
+        """Return whether a picture lies elsewhere than the last one, since the camera turns."""
+        return bool(self._images) and coarse_shift(self._last, image) > _TURNS
 
     def median(self, retired: Image | None) -> Image:
         """Return the median of the frames, at least one.

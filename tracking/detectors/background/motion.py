@@ -39,6 +39,10 @@ class Motion:
             ]
         )
 
+    def homography(self, size: tuple[int, int]) -> Floats:
+        """Return `matrix` with a third row, `(3, 3)`."""
+        return np.vstack([self.matrix(size), [0.0, 0.0, 1.0]])
+
     def distance(self, other: Motion, size: tuple[int, int]) -> float:
         """Return the root mean square difference over a picture of `size` (w, h), pixels."""
         shift = (self.x - other.x) ** 2 + (self.y - other.y) ** 2

@@ -8,6 +8,7 @@ coarse pictures and by phase correlation.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -48,7 +49,8 @@ class Registration:
         self._fps = fps
         self._points: _Points | None = None
         self._motion = self._mean = STILL
-        self._agreement = 0.0
+        self.agreement = 0.0
+        """Share of the background's edges that the last frames have shown, at their light."""
         self._moved_for = self._rested_for = 0.0
         self._age, self._search_age = 0.0, 1.0
         self.rest = STILL
@@ -80,7 +82,7 @@ class Registration:
         motion, agreement = aligned.refine(gray, self._motion, _STEPS)
         elapsed, self._age = self._age, 0.0
         self._search_age += elapsed
-        if agreement < self._agreement - _LOST and self._search_age >= _LOOK_EVERY_S:
+        if agreement < self.agreement - _LOST and self._search_age >= _LOOK_EVERY_S:
             self._search_age = 0.0
             for start in aligned.coarse_starts(gray, self._motion, self.rest):
                 other, other_agreement = aligned.refine(gray, start, _STEPS_OF_SEARCH)
@@ -88,7 +90,7 @@ class Registration:
                     motion, agreement = other, other_agreement
         if agreement < _MIN_AGREEMENT or not _is_plausible(motion, size):
             motion = self.rest
-        self._agreement += (agreement - self._agreement) * min(elapsed / _AVERAGE_S, 1.0)
+        self.agreement += (agreement - self.agreement) * min(elapsed / _AVERAGE_S, 1.0)
         return self._settle(motion, size, elapsed)
 
     def find_still(self, image: Image) -> Motion:
@@ -100,6 +102,14 @@ class Registration:
         size = (image.shape[1], image.shape[0])
         moved = agreement >= _MIN_AGREEMENT and _is_plausible(motion, size)
         return motion if moved and motion.distance(STILL, size) >= _SAME * size[0] / 360.0 else STILL
+
+    def agrees(self, image: Image) -> bool:
+        """Return whether an image shows most edges of the background where they are, at whatever light."""
+        points = self._points
+        if points is None or points.count < _MIN_POINTS:
+            return True
+        _, agreement = points.under(IDENTITY, None).refine(_smooth_gray(image), STILL, _STEPS_OF_SEARCH)
+        return agreement >= _MIN_AGREEMENT
 
     def search(self, image: Image) -> Motion | None:
         """Return the likeliest motion of an image at any light, from anywhere; None: none is plausible."""
@@ -153,6 +163,14 @@ def _is_plausible(motion: Motion, size: tuple[int, int]) -> bool:
 def _smooth_gray(image: Image) -> Plane:
     gray = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), _BLUR, _BLUR_SIGMA)
     return gray.astype(np.float32)
+
+
+def coarse_shift(one: Image, other: Image) -> float:
+    """Return by how much most of a picture has moved to another, as a share of its width."""
+    first, second = (_edges(_quarter(_smooth_gray(image))) for image in (one, other))
+    window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
+    shift, _ = cv2.phaseCorrelate(first, second, window)
+    return math.hypot(*shift) / float(first.shape[1])
 
 
 def count_edges(image: Image) -> int:

@@ -117,8 +117,8 @@ class FusedDetector:
         self._run_s = self._schedule.every / self._background.fps
 
     @property
-    def camera_motion(self) -> Motion:
-        """Where the camera has come to rest since the background was learned, in pixels of the images."""
+    def camera_motion(self) -> Floats | None:
+        """How the picture has moved, as :attr:`BackgroundDetector.camera_motion`."""
         return self._background.camera_motion
 
     @property

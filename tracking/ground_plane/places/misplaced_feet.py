@@ -81,7 +81,9 @@ def _costs(
 ) -> Floats:
     """Return the costs (K, D) of detections being of people with the usual boxes (K, 4), and not false."""
     tall = heights(usual)[:, None]
-    shown = np.clip(usual, 0.0, [camera.width, camera.height] * 2)[:, None]
+    # A camera that was turned shows what was outside of its picture.
+    cut = usual if camera.turned is not None else np.clip(usual, 0.0, [camera.width, camera.height] * 2)
+    shown = cut[:, None]
     boxes = measurements.boxes[seen][None]
     deviations = np.stack(
         [

@@ -51,11 +51,14 @@ def detection_probabilities(
 
 def in_picture(boxes: Floats, camera: GroundCamera) -> NDArray[np.bool_]:
     """Return which boxes (N, 4) are in the picture to a large part; NaN is not."""
-    tall = heights(boxes)
-    middle = (boxes[:, 0] + boxes[:, 2]) / 2.0
-    inside = np.minimum(boxes[:, 3], camera.height) - np.maximum(boxes[:, 1], 0.0)
+    middles = (boxes[:, 0] + boxes[:, 2]) / 2.0
+    heads, feet = (camera.shown(np.stack([middles, boxes[:, row]], axis=1)) for row in (1, 3))
+    tall = feet[:, 1] - heads[:, 1]
+    inside = np.minimum(feet[:, 1], camera.height) - np.maximum(heads[:, 1], 0.0)
     with np.errstate(invalid="ignore"):
-        return np.asarray((middle >= 0) & (middle < camera.width) & (inside > (1.0 - _MAX_CUT) * tall))
+        return np.asarray(
+            (feet[:, 0] >= 0) & (feet[:, 0] < camera.width) & (inside > (1.0 - _MAX_CUT) * tall)
+        )
 
 
 def _hidden_shares(boxes: Floats, others: Floats, own: NDArray[np.bool_]) -> Floats:

@@ -238,9 +238,9 @@ def test_the_tracked_picture_has_the_substreams_resolution_and_the_sites_shape(
     whole = scale.boxes_to_site(np.array([[0.0, 0.0, *map(float, tracked)]]))
     assert whole.tolist() == [[0.0, 0.0, *map(float, site_size)]]
     assert np.allclose(scale.box_from_site((0.0, 0.0, *map(float, site_size))), (0, 0, *tracked))
-    moved = scale.motion_to_site(Motion(2.0, -4.0, 0.01, 0.02))
-    assert moved.x == pytest.approx(2 * site_size[0] / tracked[0])
-    assert (moved.grow, moved.turn) == (0.01, 0.02)
+    moved = scale.motion_to_site(Motion(2.0, -4.0).homography(tracked))
+    assert moved[0, 2] == pytest.approx(2 * site_size[0] / tracked[0])
+    np.testing.assert_allclose(moved[:, :2], np.eye(3)[:, :2])
 
 
 def test_a_substream_with_declared_pixels_shows_the_middle() -> None:

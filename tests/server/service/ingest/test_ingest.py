@@ -28,13 +28,14 @@ from fakes.service.scripted_cameras import (
     video,
 )
 from server.media.stream_format import StreamFormat
-from server.messaging.camera_status import PictureMotion
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
+from server.messaging.picture_motion import picture_motion
 from server.service.identity.people import PersonTracker
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.streaming.frame_buffer import FrameBuffer
+from tracking.detectors.background.motion import Motion
 
 KEYS = ZenohKeys("hall")
 
@@ -135,7 +136,7 @@ def test_a_substream_without_pictures_is_the_cameras_message_and_its_last_error(
 
 def test_a_camera_that_was_knocked_is_to_be_calibrated_again() -> None:
     served = IngestWithBuffers()
-    motion = PictureMotion(x=6.0, y=0.0, grow=0.0, turn=0.0175)
+    motion = picture_motion(Motion(6.0, 0.0, turn=0.0175).homography((640, 360)), (640, 360))
     served.handle("status", status("c0", motion=motion, motion_since=60.0))
     message = served.ingest.states["c0"].message
     assert message.startswith("it has moved by 6 pixels and 1.0 degrees since ")

@@ -8,11 +8,12 @@ import pytest
 
 from fakes.service.joint_floor import SIZE, STRIDE, VIEWS, joint_config, walk_past, walked_epochs
 from fakes.tracking.walked_floor import FloorNoise
-from server.messaging.camera_status import PictureMotion
 from server.messaging.packed_arrays import are_boxes, unpack_boxes, unpack_histograms
+from server.messaging.picture_motion import picture_motion
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.joint_tracking.stage import JointStage
 from tracking.boxes import iou
+from tracking.detectors.background.motion import Motion
 
 LAG = 4
 
@@ -85,7 +86,7 @@ def test_after_skipped_epochs_only_frames_since_then_are_reported() -> None:
 
 
 def test_a_camera_that_was_knocked_shows_boxes_where_its_picture_is_now() -> None:
-    walks, motion = walk_past(), PictureMotion(x=12.0, y=-7.0, grow=0.0, turn=0.0)
+    walks, motion = walk_past(), picture_motion(Motion(12.0, -7.0).homography(SIZE), SIZE)
     epochs = [
         Epoch(
             epoch.number,

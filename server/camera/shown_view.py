@@ -1,0 +1,100 @@
+"""What a camera shows, and where that lies since the camera was knocked or turned."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.camera.knocks import noticeable_motion
+from server.camera.sources.base import Image
+from server.camera.substream.picture_scale import PictureScale
+from server.messaging.camera_status import PictureMotion
+from tracking.detectors import BackgroundDetector, Detector, FusedDetector
+from tracking.frame_rate import frames_in
+from tracking.picture_condition import PictureMonitor
+from tracking.types import PictureCondition
+
+_TURNED = 0.1
+"""Motion, as a share of the picture's width, from which a camera shows something else."""
+
+_SEEK_S = 3.0
+"""Seconds in which a view whose background is learned anew is located if it can be."""
+
+
+class ShownView:
+    """Watches a camera's pictures.
+
+    Args:
+        fps: frames per second.
+        detector: whose background says how the picture has moved, if it has one.
+        scale: of the tracked pictures.
+    """
+
+    def __init__(self, fps: float, detector: Detector, scale: PictureScale) -> None:
+        self._monitor = PictureMonitor(fps)
+        self._detector, self._scale = detector, scale
+        self._known = np.eye(3)
+        """How the picture had moved when that was noticed last."""
+        self._seek = frames_in(_SEEK_S, fps)
+        self._pulse = 0
+        self._lost_at: int | None = None
+        """The pulse from which on it is unknown where the picture lies; None: it is known."""
+
+    def observe(self, image: Image, pulse: int) -> None:
+        """Watch the tracked picture of a pulse, before it is searched."""
+        moved = self._moved
+        if moved is None:
+            self._lost_at = pulse if self._lost_at is None else self._lost_at
+        else:
+            self._lost_at = None
+            if self._is_elsewhere(moved, image):
+                self._known = moved
+                self._monitor.accept_scene()
+        self._pulse = pulse
+        self._monitor.observe(image, pulse)
+
+    def _is_elsewhere(self, moved: NDArray[np.float64], image: Image) -> bool:
+        """Return whether the middle of the picture lies elsewhere than when that was noticed last."""
+        height, width = image.shape[:2]
+        middle = [width / 2.0, height / 2.0, 1.0]
+        here, there = moved @ middle, self._known @ middle
+        return bool(np.linalg.norm(here[:2] / here[2] - there[:2] / there[2]) > _TURNED * width)
+
+    @property
+    def condition(self) -> PictureCondition:
+        """What is wrong with the picture."""
+        return self._monitor.condition
+
+    @property
+    def since(self) -> int:
+        """The frame in which that began."""
+        return self._monitor.since
+
+    @property
+    def motion(self) -> PictureMotion | None:
+        """How the site's picture has moved since the start; None: not noticeably, or it is unknown."""
+        moved = self._moved
+        if moved is None:
+            return None
+        return noticeable_motion(self._scale.motion_to_site(moved), self._scale.site)
+
+    @property
+    def shows_its_place(self) -> bool:
+        """Whether what is seen is now, and where the homography, moved by `motion`, says.
+
+        A view that could not be located for a while is the former one in another light, unless the camera
+        seems to be turned away.
+        """
+        if not self._monitor.shows_now:
+            return False
+        if self._lost_at is None:
+            return True
+        return not self._monitor.shows_another_scene and self._pulse - self._lost_at >= self._seek
+
+    @property
+    def _moved(self) -> NDArray[np.float64] | None:
+        """How the tracked picture has moved, (3, 3); None: it shows a view that could not be located."""
+        detector = self._detector
+        if isinstance(detector, BackgroundDetector | FusedDetector):
+            return detector.camera_motion
+        return np.eye(3)

@@ -1,0 +1,58 @@
+"""Notices that a camera was turned, where the picture no longer fits its background."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.boxes import Floats
+from tracking.detectors.background.views.view_matching import ViewMatch, find_view
+from tracking.detectors.base import Image
+
+# Share of the background's edges that are where they were, from which the camera is not turned.
+_AGREEMENT = 0.7
+# Seconds until the first search, and between the two that must agree; each one without a result waits longer,
+# up to the longest time.
+_FIRST_S, _AGAIN_S, _LONGEST_S = 0.6, 0.4, 5.0
+# Motions of the picture's middle, as shares of its width: of a turned camera at least, and of one that has
+# come to rest at most.
+_TURNED, _RESTS = 0.1, 0.01
+
+
+class TurnFinder:
+    """Looks for the background in pictures of one camera while they do not agree with it."""
+
+    def __init__(self, fps: float) -> None:
+        self._frame_s = 1.0 / fps
+        self._wait_s = self._left_s = _FIRST_S
+        self._found: ViewMatch | None = None
+
+    def find(self, agreement: float, background: Image, image: Image) -> ViewMatch | None:
+        """Return where the background lies in the next frame of a camera that was turned, and rests; or None.
+
+        `agreement`: share of the background's edges that the last frames have shown.
+        """
+        if agreement >= _AGREEMENT:
+            self._wait_s = self._left_s = _FIRST_S
+            self._found = None
+            return None
+        self._left_s -= self._frame_s
+        if self._left_s > 0.0:
+            return None
+        before, self._found = self._found, None
+        found = find_view(background, image)
+        if found is None or _moved(np.eye(3), found.homography, image) < _TURNED:
+            self._wait_s = min(2.0 * self._wait_s, _LONGEST_S)
+            self._left_s = self._wait_s
+        elif before is not None and _moved(before.homography, found.homography, image) <= _RESTS:
+            self._wait_s = self._left_s = _FIRST_S
+            return found
+        else:
+            self._found, self._left_s = found, _AGAIN_S
+        return None
+
+
+def _moved(one: Floats, other: Floats, image: Image) -> float:
+    """Return how far the picture's middle lies from one to another homography, as a share of its width."""
+    height, width = image.shape[:2]
+    here, there = (matrix @ [width / 2.0, height / 2.0, 1.0] for matrix in (one, other))
+    return float(np.linalg.norm(here[:2] / here[2] - there[:2] / there[2]) / width)
