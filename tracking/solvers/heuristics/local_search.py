@@ -100,7 +100,8 @@ class _TogetherDescent:
             by_others = np.asarray(occupied.sum(axis=0) - occupied > 0)
             found = self._cheapest_around(self._places.own(everybody, by_others))
             costs = path_costs(self._network, nodes)
-            gains = np.where(np.isfinite(found.costs), costs - found.costs, 0.0)
+            gains = np.zeros(len(costs))
+            np.subtract(costs, found.costs, out=gains, where=np.isfinite(found.costs))
             gains[gains < _MIN_IMPROVEMENT * np.maximum(1.0, np.abs(found.costs))] = 0.0
             if not gains.any():
                 break
