@@ -105,11 +105,11 @@ class PassthroughStream(LiveStream):
             self._is_decoding = self.decodes
         image = decode_unit(packet) if self._is_decoding else None
         self._sized.set()  # the orientation was checked before, and may not change
+        # A decoder conceals lost pictures of H.264: what depends on them must not be sent either.
+        is_intact = self._continuity.follows(data) and not packet.is_corrupt
         if self._is_decoding:
             # The size may not change within a connection.
-            is_intact = image is not None and image.shape[1::-1] == self._required.size
-        else:
-            is_intact = self._continuity.follows(data) and not packet.is_corrupt
+            is_intact = is_intact and image is not None and image.shape[1::-1] == self._required.size
         self._is_decodable = is_intact and bool(data) and (self._is_decodable or key)
         if self._is_decodable:
             time = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import time
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -17,14 +18,17 @@ from fakes.media.h265 import sets_of, x265_units
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.programs import needs_ffmpeg
 from fakes.service.scripted_cameras import FPS, GOP, HEIGHT, WIDTH, encoded, small_config
+from fakes.timeouts import PATIENCE
 from server.camera.encoder import AccessUnit
 from server.camera.passthrough.access_units import parse_packing
+from server.camera.passthrough.stream_source import PassthroughStream
 from server.camera.pipeline import CameraPipeline
 from server.config.site_config import Config
 from server.media.containers.mpegts import ContinuityCounters, pack
 from server.media.h265.codec import H265
 from server.media.h265.nal import NAL_AUD, nal_type
 from server.media.nal_units import join_units, nal_units
+from server.media.picture import Codec
 from server.media.stream_format import PerCameraStreamFormat, StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.system.errors import UserError
@@ -132,6 +136,32 @@ def test_a_network_cameras_video_is_passed_through_in_whole_gops(
         place = known[tuple(nals(unit.data))]
         assert unit.key == (place % GOP == 0)
         assert unit.pulse % GOP == place % GOP
+
+
+@pytest.mark.parametrize("codec", ["h264", "h265"])
+def test_what_depends_on_a_lost_picture_is_not_sent(codec: Codec) -> None:
+    """FFmpeg conceals that an H.264 picture is missing."""
+    units = encoded(0, 200, codec=codec)
+    gops = [units[first : first + GOP] for first in range(0, 200, GOP)]
+    damaged = [gop[:2] + gop[3:] if place > 4 and place % 3 == 0 else gop for place, gop in enumerate(gops)]
+    camera = RtspCamera(damaged, FPS, codec=codec)
+    pipeline = CameraPipeline(site(camera.url, encode={"codec": codec}), "c0")
+    known = {tuple(nals(unit.data)): unit.pulse for unit in units}
+    source, queued, deadline = pipeline.source, list[int](), time.monotonic() + PATIENCE
+    assert isinstance(source, PassthroughStream)
+    try:
+        while len(queued) < 60:
+            with source._waiting_lock:
+                queued += [known[tuple(nals(unit.data))] for unit in source._waiting._units]
+                source._waiting._units.clear()
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+    finally:
+        camera.close()
+        pipeline.close()
+    lost = {pulse for pulse in queued if pulse // GOP > 4 and pulse // GOP % 3 == 0 and pulse % GOP >= 2}
+    assert any(pulse // GOP > 4 and pulse // GOP % 3 == 0 for pulse in queued), "GOPs with a loss came"
+    assert lost == set()
 
 
 @pytest.mark.parametrize(
