@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracking.detectors import BackgroundDetector, BackgroundSettings, FloorGeometry
 from tracking.detectors.background.views.known_views import KnownViews
 from tracking.detectors.background.views.turn_finder import TurnFinder
 from tracking.detectors.background.views.view_matching import find_view
@@ -110,3 +111,32 @@ def test_a_camera_that_stays_and_one_in_fog_are_not_turned() -> None:
     fog = np.clip(0.3 * view() + 150.0, 0.0, 255.0).astype(np.uint8)
     for image in (view(noise=3), fog, np.full_like(view(), 90)):
         assert noticed([image] * 75, agreement=0.3) is None
+
+
+def test_what_a_turned_camera_ignores_and_its_horizon_move_along() -> None:
+    detector = BackgroundDetector(
+        BackgroundSettings(ignore=(((0.0, 0.0), (90.0, 0.0), (90.0, 239.0), (0.0, 239.0)),)),
+        FloorGeometry(horizon=20.0, slope=None),
+        fps=10.0,
+    )
+    for frame in range(30):
+        detector.detect(view(noise=frame))
+    assert detector.grid.visible[:, :88].max() == 0
+    for frame in range(60):
+        detector.detect(view(20.0, noise=100 + frame))
+    moved = detector.camera_motion
+    assert moved is not None
+    assert largest_error(moved, 20.0, 0.0) < 3.0
+    corner = moved @ [90.0, 120.0, 1.0]
+    edge = round(corner[0] / corner[2])
+    assert 150 < edge < 300
+    assert detector.grid.visible[120, edge - 6] == 0
+    assert detector.grid.visible[120, edge + 6 :].min() == 255
+
+
+def test_the_horizon_is_where_it_was_in_the_scene() -> None:
+    level = FloorGeometry(horizon=SIZE[1] / 2, slope=0.4)
+    assert level.turned(turn(20.0, 0.0), SIZE[0]).horizon == pytest.approx(SIZE[1] / 2)
+    tilted = level.turned(turn(0.0, 5.0), SIZE[0])
+    assert abs(tilted.horizon - SIZE[1] / 2) == pytest.approx(FOCAL * np.tan(np.radians(5.0)))
+    assert tilted.slope == 0.4

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,6 +14,7 @@ from tracking.boxes import heights
 from tracking.ground_plane import GroundCamera
 from tracking.ground_plane.camera import BoxSizes, feet
 from tracking.ground_plane.places.measurements import estimate_units_per_meter
+from tracking.ground_plane.places.visibility import in_picture
 
 VIEWS = floor_views()
 CAMERA = VIEWS["c0"].camera
@@ -35,6 +38,19 @@ def test_jacobians_are_derivatives(x: float, y: float) -> None:
     steps = 1e-4 * np.eye(2)
     differences = (CAMERA.to_ground(point + steps) - CAMERA.to_ground(point - steps)) / 2e-4
     assert CAMERA.jacobians(point)[0] == pytest.approx(differences.T, rel=1e-3, abs=1e-6)
+
+
+def test_a_turned_camera_sees_what_has_come_into_its_picture() -> None:
+    """Its picture has moved to the right by half of its width."""
+    moved = np.array([[1.0, 0.0, CAMERA.width / 2], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    camera = replace(CAMERA, turned=moved)
+    across, down = np.array([0.25, 0.75, -0.25]) * CAMERA.width, np.full(3, CAMERA.height / 2)
+    points = np.stack([across, down], axis=1)
+    boxes = np.stack([across - 20.0, down - 90.0, across + 20.0, down], axis=1)
+    for one, shown in ((CAMERA, [True, True, False]), (camera, [True, False, True])):
+        assert one.contains(points).tolist() == in_picture(boxes, one).tolist() == shown
+    assert camera.to_ground(points) == pytest.approx(CAMERA.to_ground(points)), "places are those of before"
+    assert camera.scaled(2.0).shifted(np.ones(2)).turned is moved
 
 
 def test_places_behind_the_camera_have_no_image() -> None:

@@ -186,5 +186,18 @@ def test_a_camera_that_stays_turned_is_accepted_after_minutes() -> None:
     assert 300.0 <= reports[1][0] <= 310.0
 
 
+@pytest.mark.parametrize("is_located", [False, True])
+def test_an_accepted_scene_is_another_one_until_it_is_located(*, is_located: bool) -> None:
+    monitor, fps = PictureMonitor(2.0), 2.0
+    for frame in range(round((KNOWN_S + 310.0) * fps)):
+        image = with_noise(with_people(ROOM, frame / fps, 3), frame)
+        monitor.observe(image if frame < KNOWN_S * fps else turned(image, frame / fps), frame)
+        if is_located and monitor.condition == "turned":
+            monitor.accept_scene()
+            assert monitor.condition == "clear"
+    assert (monitor.condition, monitor.shows_now) == ("clear", True)
+    assert monitor.shows_another_scene is not is_located
+
+
 def test_the_conditions_are_those_of_the_messages() -> None:
     assert tuple(CONDITION_TEXTS) == CONDITIONS
