@@ -113,7 +113,7 @@ class RoomStream:
 async def measure(room: RoomStream, load: ViewerLoad, gops: int) -> RenderingCost:
     """Let a worker render GOPs, each published when the previous one is rendered."""
     stream = Broadcaster()
-    source = RenderedStream("the room", stream, room.overlay, room.settings, live=True, queue_gops=8)
+    source = RenderedStream("the room", lambda: stream, room.overlay, room.settings, live=True, queue_gops=8)
     source.acquire()
     source.video.users = load.video_viewers
     viewers = [source.video.broadcaster.subscribe() for _ in range(load.video_viewers)]

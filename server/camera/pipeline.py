@@ -217,8 +217,8 @@ class CameraPipeline:
         if image is None:
             detections, has_detection = Detections.empty(self._detector.appearance_bins), False
         else:
-            self.view.observe(image, pulse)
             detections = self._detector.detect(image, pulse)
+            self.view.observe(image, pulse)
             boxes = self.tracked.scale.boxes_to_site(detections.boxes)
             detections = Detections(boxes, detections.scores, detections.histograms)
             has_detection = not self._detector.warming_up

@@ -31,70 +31,73 @@ class ShownView:
     """
 
     def __init__(self, fps: float, detector: Detector, scale: PictureScale) -> None:
-        self._monitor = PictureMonitor(fps)
+        self.monitor = PictureMonitor(fps)
+        """Says what is wrong with the pictures."""
         self._detector, self._scale = detector, scale
-        self._known = np.eye(3)
-        """How the picture had moved when that was noticed last."""
         self._seek = frames_in(_SEEK_S, fps)
+        self._noticed = np.eye(3)
+        """How the picture had moved when that was noticed last."""
         self._pulse = 0
         self._lost_at: int | None = None
         """The pulse from which on it is unknown where the picture lies; None: it is known."""
+        self.motion: PictureMotion | None = None
+        """How the site's picture has moved since the start, as far as known; None: not noticeably."""
 
     def observe(self, image: Image, pulse: int) -> None:
-        """Watch the tracked picture of a pulse, before it is searched."""
-        moved = self._moved
+        """Watch the tracked picture of a pulse after it was searched."""
+        was_lost, self._pulse = self._lost_at is not None, pulse
+        moved = self._moved()
         if moved is None:
             self._lost_at = pulse if self._lost_at is None else self._lost_at
         else:
             self._lost_at = None
-            if self._is_elsewhere(moved, image):
-                self._known = moved
-                self._monitor.accept_scene()
-        self._pulse = pulse
-        self._monitor.observe(image, pulse)
+            came_back = was_lost and self.monitor.shows_another_scene
+            if came_back or self._is_elsewhere(moved, image):
+                self._noticed = moved
+                self.monitor.accept_scene()
+        self.monitor.observe(image, pulse)
 
     def _is_elsewhere(self, moved: NDArray[np.float64], image: Image) -> bool:
         """Return whether the middle of the picture lies elsewhere than when that was noticed last."""
         height, width = image.shape[:2]
         middle = [width / 2.0, height / 2.0, 1.0]
-        here, there = moved @ middle, self._known @ middle
+        here, there = moved @ middle, self._noticed @ middle
         return bool(np.linalg.norm(here[:2] / here[2] - there[:2] / there[2]) > _TURNED * width)
 
     @property
     def condition(self) -> PictureCondition:
         """What is wrong with the picture."""
-        return self._monitor.condition
+        return self.monitor.condition
 
     @property
     def since(self) -> int:
         """The frame in which that began."""
-        return self._monitor.since
-
-    @property
-    def motion(self) -> PictureMotion | None:
-        """How the site's picture has moved since the start; None: not noticeably, or it is unknown."""
-        moved = self._moved
-        if moved is None:
-            return None
-        return noticeable_motion(self._scale.motion_to_site(moved), self._scale.site)
+        return self.monitor.since
 
     @property
     def shows_its_place(self) -> bool:
         """Whether what is seen is now, and where the homography, moved by `motion`, says.
 
-        A view that could not be located for a while is the former one in another light, unless the camera
+        A view that could not be located for a while is the one before in another light, unless the camera
         seems to be turned away.
         """
-        if not self._monitor.shows_now:
+        if not self.monitor.shows_now or self.monitor.shows_another_scene:
             return False
-        if self._lost_at is None:
-            return True
-        return not self._monitor.shows_another_scene and self._pulse - self._lost_at >= self._seek
+        return self._lost_at is None or self._pulse - self._lost_at >= self._seek
 
-    @property
     def _moved(self) -> NDArray[np.float64] | None:
-        """How the tracked picture has moved, (3, 3); None: it shows a view that could not be located."""
+        """Return how the tracked picture has moved, (3, 3), and update `motion`.
+
+        None: it shows a view that could not be located; the motion stays that of the view before.
+        """
         detector = self._detector
-        if isinstance(detector, BackgroundDetector | FusedDetector):
-            return detector.camera_motion
-        return np.eye(3)
+        if not isinstance(detector, BackgroundDetector | FusedDetector):
+            return np.eye(3)
+        moved = detector.camera_motion
+        if moved is None:
+            return None
+        try:
+            self.motion = noticeable_motion(self._scale.motion_to_site(moved), self._scale.site)
+        except ValueError:  # so far that nothing of the first view is in front of the camera
+            return None
+        return moved

@@ -177,9 +177,9 @@ class Config(BaseSettings):
     def _streams_can_be_of_this_codec(self) -> Self:
         for place, wanted in (("record.folder", self.record.folder), ("sound.source", self.sound.source)):
             if self.encode.codec == "vp8" and wanted is not None:
-                raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; use h264")
+                raise ValueError(f"{place}: a site whose encode.codec is vp8 has none; use h264 or h265")
         if self.encode.codec == "vp8" and self.rtsp.enabled:
-            raise ValueError("rtsp.enabled: a site whose encode.codec is vp8 has no RTSP; use h264")
+            raise ValueError("rtsp.enabled: a site whose encode.codec is vp8 has no RTSP; use h264 or h265")
         for camera in self.cameras:
             if self.encode.codec == "vp8" and camera.passthrough != "off":
                 raise ValueError(

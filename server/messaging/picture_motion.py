@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
+from server.messaging.number_types import COORDINATE_MAX
 
 Floats = NDArray[np.float64]
 
@@ -17,14 +18,21 @@ _TURNED = 0.1
 
 
 def picture_motion(matrix: Floats, size: tuple[int, int]) -> PictureMotion:
-    """Return the message of a homography (3, 3) of the site's image, of a size (w, h)."""
-    rows = (matrix / matrix[2, 2]).tolist()
+    """Return the message of a homography (3, 3) of the site's image, of a size (w, h).
+
+    Raises:
+        ValueError: what was in the middle is not in front of the camera any more, or a number is too large.
+    """
+    matrix = matrix / np.cbrt(np.linalg.det(matrix))  # what is in front of the camera has a positive depth
+    rows = matrix.tolist()
     middle = np.array([[size[0] / 2.0, size[1] / 2.0], [size[0] / 2.0 + 1.0, size[1] / 2.0]])
     there, beside = _mapped(matrix, middle)
     across, down = (beside - there).tolist()
+    if not (np.isfinite(beside).all() and np.abs([*matrix.ravel(), *there]).max() <= COORDINATE_MAX):
+        raise ValueError("the middle of the picture has moved out of sight")
     return PictureMotion(
         matrix=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])),
-        pixels=min(float(np.linalg.norm(there - middle[0])), 1e6),
+        pixels=float(np.linalg.norm(there - middle[0])),
         degrees=abs(math.degrees(math.atan2(down, across))),
     )
 
@@ -71,5 +79,5 @@ def moved_boxes(matrix: Floats, boxes: Floats) -> Floats:
 def _mapped(matrix: Floats, points: Floats) -> Floats:
     """Return points (N, 2) under a homography; NaN where it maps them beyond the horizon."""
     mapped = points @ matrix[:, :2].T + matrix[:, 2]
-    depths = np.where(mapped[:, 2:] * np.sign(matrix[2, 2]) > 0.0, mapped[:, 2:], np.nan)
+    depths = np.where(mapped[:, 2:] > 0.0, mapped[:, 2:], np.nan)
     return np.asarray(mapped[:, :2] / depths)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from server.config.loader import read_content
 from server.setup.camera_address import check_name, free_name
@@ -79,8 +78,9 @@ def readdress_camera(path: Path, camera_id: str, tried: TriedCamera) -> None:
         raise UserError(f"{tried.address.shown}: another camera of the configuration has this address")
     new = tried.as_new(free_name(camera_id, _password_files(path)))
     entry = camera_entry(new, path)
-    is_same_host = _host(str(earlier.get("source"))) == _host(tried.address.source)
-    replaced = {"source", "password", "options"} | (set() if is_same_host else {"substream"})
+    # A substream of another channel, or with the earlier login, would be searched for the wrong people.
+    is_same_view = str(earlier.get("source")) == tried.address.source
+    replaced = {"source", "password", "options"} | (set() if is_same_view else {"substream"})
     other = {key: value for key, value in earlier.items() if key not in replaced}
     changed = {**other, **entry, "id": camera_id}
     text = _checked_text(path, [changed if camera is earlier else camera for camera in cameras])
@@ -130,14 +130,6 @@ def _password_files(path: Path) -> set[str]:
     """Return the names of the cameras' password files, also of earlier cameras."""
     folder = (path.parent / password_file(path, "any")).parent
     return {file.name for file in folder.glob("*")}
-
-
-def _host(source: str) -> str:
-    """Return the host of an address; the whole one where it has none."""
-    try:
-        return urlsplit(source).hostname or source
-    except ValueError:
-        return source
 
 
 def _cameras_to_change(path: Path, camera_id: str) -> list[_Entry]:

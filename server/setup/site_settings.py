@@ -9,6 +9,7 @@ from server.config.loader import check_section, load_config, read_content
 from server.config.sections import SiteSettings
 from server.setup.site_file import check_text, replace_file
 from server.setup.yaml_edit import changed_values_text
+from server.system.errors import UserError
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +36,19 @@ def save_choice(path: Path, choice: StreamFormatChoice) -> None:
     """Change the settings in a configuration file; the earlier file is kept.
 
     Raises:
-        UserError: the file or what it would become is invalid, or it cannot be written.
+        UserError: the file or what it would become is invalid, a camera's own video would no longer fit, or
+            it cannot be written.
     """
     before = asdict(read_choice(path))
     changed = {key: value for key, value in asdict(choice).items() if value != before[key]}
     if not changed:
         return
+    passed = [camera.id for camera in load_config(path).cameras if camera.passthrough == "pass"]
+    if passed and changed.keys() != {"name"}:
+        raise UserError(
+            f"camera {passed[0]}: passthrough: pass: its own video has the site's present rate and size; "
+            "set passthrough: auto first"
+        )
     if "fps" in changed and choice.fps.is_integer():
         changed["fps"] = int(choice.fps)
     check_section(SiteSettings, {**(read_content(path).get("site") or {}), **changed}, "site")

@@ -44,7 +44,7 @@ def move_polygons(polygons: Polygons, matrix: Floats) -> tuple[tuple[tuple[float
     moved = []
     for polygon in polygons:
         mapped = np.column_stack([np.asarray(polygon, dtype=np.float64), np.ones(len(polygon))]) @ matrix.T
-        if (mapped[:, 2] * matrix[2, 2] > 0.0).all():
+        if (mapped[:, 2] > 0.0).all():
             corners = (mapped[:, :2] / mapped[:, 2:]).tolist()
             moved.append(tuple((float(x), float(y)) for x, y in corners))
     return tuple(moved)

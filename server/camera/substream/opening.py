@@ -52,7 +52,9 @@ def open_tracked_pictures(
     if source_kind(camera.substream) is SourceKind.STREAM:
         return _open_live(config, camera, camera.substream, letterbox, passthrough)
     try:
-        source = open_source(camera.model_copy(update={"source": camera.substream}), config.site)
+        source = open_source(
+            camera.model_copy(update={"source": camera.substream, "at_end": "stop"}), config.site
+        )
     except UserError as error:
         text = str(error).removeprefix(f"camera {camera.id}: ")
         raise UserError(f"camera {camera.id}: substream: {text}") from error

@@ -76,7 +76,9 @@ async def check_container(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
     """Answer 404 where a stream is requested in a container of another codec, and is not encoded anew."""
-    is_drawn = blur_of(request) is not None or wants_h264(request)
+    resource = request.match_info.route.resource
+    is_encoded = wants_h264(request) and resource is not None and resource.canonical in TRANSCODED
+    is_drawn = blur_of(request) is not None or is_encoded
     if _CONTAINER_PATH.fullmatch(request.path) and not is_drawn:
         container, is_webm = request.app[SERVICE].streams.container, request.path.endswith(".webm")
         if container == "webm" and not request.path.endswith((".webm", ".mjpeg", ".jpg")):
@@ -93,7 +95,7 @@ async def check_container(
 
 def wants_h264(request: web.Request) -> bool:
     """Return whether a request is for a stream that must be encoded anew as H.264."""
-    return "codec" in request.query and request.app[SERVICE].config.encode.codec != "h264"
+    return request.query.get("codec") == "h264" and request.app[SERVICE].config.encode.codec != "h264"
 
 
 def requested_delay(request: web.Request) -> DelayMode:

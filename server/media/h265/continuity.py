@@ -49,7 +49,9 @@ class ReferenceContinuity:
             self._arrived = {0}
             return True
         counts = 1 << self._syntax.sequence.order_bits
-        kept = {(order.count + reference.distance) % counts for reference in order.references}
-        is_whole = kept <= self._arrived  # also if it refers to a later picture, which has not arrived
-        self._arrived = (self._arrived & kept) | {order.count}
+        kept = {reference: (order.count + reference.distance) % counts for reference in order.references}
+        # Pictures that are only kept may be missing (H.265, 8.3.2); those that are used may not.
+        used = {count for reference, count in kept.items() if reference.used}
+        is_whole = used <= self._arrived  # also if it refers to a later picture, which has not arrived
+        self._arrived = (self._arrived & set(kept.values())) | {order.count}
         return is_whole

@@ -16,6 +16,7 @@ from server.messaging.messages import GopChoices
 from server.service.pipeline import BestViewPipeline
 from server.service.rendering.decided_boxes import NO_OVERLAY, DecidedBoxes, GopOverlay, hide_people
 from server.service.rendering.rendered_stream import RenderedStream
+from server.service.streaming.broadcaster import Broadcaster
 from server.service.view_selection.delay_modes import DelayMode
 
 log = logging.getLogger(__name__)
@@ -208,32 +209,34 @@ class RenderPool:
     def _new_stream(self, subject: Subject) -> RenderedStream:
         splicer, decided = self._pipeline.splicer, self._decided
         overlay_of: Callable[[bytes], GopOverlay]
+        find: Callable[[], Broadcaster]
+        # Streams of a preferred camera and without delay end with their last viewer.
         match subject:
             case PersonView(number, scoped_to_person, prefer=str(camera)):
                 preferring = splicer.preferred_scoped if scoped_to_person else splicer.preferred
-                broadcaster, overlay_of = preferring.broadcaster(number, camera), _no_overlay
+                find, overlay_of = partial(preferring.broadcaster, number, camera), _no_overlay
             case PersonView(number, delay=DelayMode.LIVE):
-                broadcaster, overlay_of = splicer.live_persons.broadcaster(number), _no_overlay
+                find, overlay_of = partial(splicer.live_persons.broadcaster, number), _no_overlay
             case PersonView(number, scoped_to_person, DelayMode.SMOOTH):
-                broadcaster = splicer.smooth_person(number, scoped_to_person=scoped_to_person)
+                find = _always(splicer.smooth_person(number, scoped_to_person=scoped_to_person))
                 overlay_of = partial(
                     self._smooth.overlay_of_person, number, scoped_to_person=scoped_to_person
                 )
             case PersonView(number, scoped_to_person):
-                broadcaster = (splicer.scoped_persons if scoped_to_person else splicer.persons)[number]
+                find = _always((splicer.scoped_persons if scoped_to_person else splicer.persons)[number])
                 overlay_of = partial(decided.overlay_of_person, number, scoped_to_person=scoped_to_person)
             case CameraView(camera, decided=True):
-                broadcaster = splicer.decided_cameras[camera]
+                find = _always(splicer.decided_cameras[camera])
                 overlay_of = partial(decided.overlay_of_camera, camera)
             case CameraView(camera):
-                broadcaster, overlay_of = splicer.cameras[camera], _no_overlay
+                find, overlay_of = _always(splicer.cameras[camera]), _no_overlay
         if subject.blur is not None:
             shown = subject.number if isinstance(subject, PersonView) and subject.blur == "others" else None
             overlay_of = partial(self._hiding, overlay_of, shown)
         live = subject.delay is DelayMode.LIVE if isinstance(subject, PersonView) else not subject.decided
         return RenderedStream(
             str(subject),
-            broadcaster,
+            find,
             overlay_of,
             self._settings,
             live=live,
@@ -274,6 +277,11 @@ class RenderPool:
         del self._running[subject]
         self._restarts += running.stream.restarts
         self._lost += running.stream.lost
+
+
+def _always(broadcaster: Broadcaster) -> Callable[[], Broadcaster]:
+    """Return what finds a stream that is there as long as its subject is."""
+    return lambda: broadcaster
 
 
 def _no_overlay(fragments: bytes) -> GopOverlay:

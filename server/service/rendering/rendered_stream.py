@@ -99,7 +99,7 @@ class RenderedStream:
     def __init__(
         self,
         name: str,
-        broadcaster: Broadcaster,
+        find_broadcaster: Callable[[], Broadcaster],
         overlay_of: Callable[[bytes], GopOverlay],
         settings: RenderSettings,
         *,
@@ -110,7 +110,7 @@ class RenderedStream:
         video_kind: PictureKind = "boxed",
     ) -> None:
         self._video_kind: PictureKind = video_kind
-        self._name, self._broadcaster, self._overlay_of = name, broadcaster, overlay_of
+        self._name, self._find_broadcaster, self._overlay_of = name, find_broadcaster, overlay_of
         self._settings, self._live, self._queue_gops = settings, live, queue_gops
         self._audio_buffer, self._mute_gaps = audio_buffer, mute_gaps
         self._reset_outputs()
@@ -254,7 +254,8 @@ class RenderedStream:
         """Render the stream's chunks while there are users, until the stream ends."""
         while True:
             await self._has_users.wait()
-            subscriber = self._subscriber = self._broadcaster.subscribe()
+            broadcaster = self._find_broadcaster()
+            subscriber = self._subscriber = broadcaster.subscribe()
             try:
                 async for chunk in subscriber.chunks():
                     await self._render(worker, chunk)
@@ -263,7 +264,7 @@ class RenderedStream:
                 else:
                     return
             finally:
-                self._broadcaster.unsubscribe(subscriber)
+                broadcaster.unsubscribe(subscriber)
                 self._lost, self._subscriber = self.lost, None
 
     async def _render(self, worker: WorkerProcess[RenderResult], chunk: Chunk) -> None:

@@ -43,7 +43,7 @@ async def fail_once(page: Page, path: str, method: str) -> list[str]:
         ("", "page/people/names.js"),
         ("operator", "page/style.css"),
         ("operator", "page/operator/section.js"),
-        ("operator", "page/operator/calibration.js"),
+        ("operator", "page/operator/calibration/walk.js"),
         ("operator", "api/session"),
         ("operator", "api/site"),
     ],

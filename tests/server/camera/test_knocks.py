@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -11,14 +12,18 @@ import pytest
 
 from server.camera.knocks import KnockLog, noticeable_motion
 from server.camera.pipeline import CameraPipeline
+from server.camera.shown_view import ShownView
 from server.camera.sources import Image, SourceEndedError
+from server.camera.substream.picture_scale import PictureScale
 from server.cli.render.camera_workers import run_camera
 from server.config.loader import build_config
+from tracking.detectors import BackgroundDetector, Detector, HogDetector
 from tracking.detectors.background.motion import STILL, Motion
 
 SIZE = (320, 180)
 KNOCK = Motion(5.0, -3.0, turn=0.0175)
 KNOCKED_FROM, FRAMES = 60, 150
+SCALE = PictureScale(SIZE, SIZE)
 
 
 class KnockedCamera:
@@ -117,6 +122,37 @@ def test_a_turned_camera_is_located_and_its_picture_is_as_good_as_before() -> No
     np.testing.assert_allclose(there[:2] / there[2], true[:2] / true[2], atol=3.0)
     assert batches[-1].tracks.condition == "clear"
     assert pipeline.view.shows_its_place
+
+
+@pytest.mark.parametrize("detector", [HogDetector(), BackgroundDetector()])
+def test_a_camera_that_is_turned_away_shows_its_place_only_once_it_is_located(
+    detector: Detector, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A detector may have no background, or one that still explains most of the picture."""
+    view, picture = ShownView(10.0, detector, SCALE), KnockedCamera().take(0)
+    view.observe(picture, 0)
+    assert view.shows_its_place
+    monkeypatch.setattr(view.monitor, "shows_another_scene", True)
+    view.observe(picture, 1)
+    assert not view.shows_its_place
+
+
+def test_a_view_that_is_lost_for_long_without_a_turn_lies_where_it_lay() -> None:
+    """A camera that was turned, and then changed to infrared."""
+    turned = np.array([[1.0, 0.0, 60.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    detector, room = BackgroundDetector(), KnockedCamera()
+    view = ShownView(10.0, detector, SCALE)
+    motions, shown = [], []
+    for frame in range(100):
+        moved = np.eye(3) if frame < 20 else turned if frame < 50 else None
+        with patch.object(BackgroundDetector, "camera_motion", moved):
+            view.observe(room.take(0), frame)
+        motions.append(view.motion)
+        shown.append(view.shows_its_place)
+    assert motions[10] is None
+    assert motions[30] is not None
+    assert motions[-1] == motions[30]
+    assert (shown[30], shown[60], shown[-1]) == (True, False, True)
 
 
 def test_a_motion_that_changes_no_position_on_the_floor_is_not_reported() -> None:

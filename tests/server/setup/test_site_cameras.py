@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 
 import pytest
+import yaml
 
 from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
@@ -127,12 +128,16 @@ def test_a_camera_gets_another_address_and_keeps_its_settings_and_the_comments(p
         readdress_camera(path, "c7", tried())
 
 
-def test_a_substream_stays_with_its_device(path: Path) -> None:
+def test_a_substream_stays_with_its_address(path: Path) -> None:
+    """Of another channel of the same recorder, other people would be tracked."""
     small = "rtsp://10.0.0.1/small"
-    path.write_text(TEXT.replace("p=hidden'", f"p=hidden', substream: '{small}'"))
-    readdress_camera(path, "c1", tried(source="rtsp://10.0.0.1/other"))
-    assert load_config(path).camera("c1").substream == small
     readdress_camera(path, "c1", tried())
+    content = yaml.safe_load(path.read_text())
+    content["cameras"][1]["substream"] = small
+    path.write_text(yaml.safe_dump(content))
+    readdress_camera(path, "c1", tried())
+    assert load_config(path).camera("c1").substream == small
+    readdress_camera(path, "c1", tried(source="rtsp://10.0.0.1/other"))
     assert load_config(path).camera("c1").substream is None
 
 

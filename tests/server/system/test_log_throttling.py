@@ -182,7 +182,7 @@ async def test_render_workers_that_die_repeatedly_are_counted_and_logged_once(
     monkeypatch.setattr(stream_source, "_RETRY_FIRST_S", 0.0)
     monkeypatch.setattr(stream_source, "_RETRY_MAX_S", 0.0)
     rendering = stream_source.RenderedStream(
-        "object 1", Broadcaster(), lambda _: NO_OVERLAY, RENDER_SETTINGS, live=True, queue_gops=4
+        "object 1", Broadcaster, lambda _: NO_OVERLAY, RENDER_SETTINGS, live=True, queue_gops=4
     )
 
     async def dies() -> None:

@@ -222,9 +222,10 @@ class BackgroundDetector:
             self._views = background.views
             self._height_estimator = HeightModelEstimator(self.settings.height_model, self.fps)
         turned = background.turned
-        if self._views and turned is not None and turned is not self._turned:
+        if self._views and turned is not self._turned:
             self._turned = turned
-            self._lay_grid(turned)
+            if turned is not None:
+                self._lay_grid(turned)
 
     def _lay_grid(self, turned: npt.NDArray[np.float64] | None) -> CellGrid:
         """Lay the cells over the images, and take over what the floor says of heights.
@@ -237,7 +238,7 @@ class BackgroundDetector:
             in_image = np.asarray(np.linalg.inv(scale) @ turned @ scale)
             ignore = move_polygons(ignore, in_image)
             floor = None if floor is None else floor.turned(in_image, self._shape[1])
-            self._filter = self._height_model = None
+            self._filter = self._height_model = self._height_range = None
         grid = self._grid = CellGrid(self._shape, settings.work_width, CELL, settings.border_margin, ignore)
         if floor is not None:
             self._height_estimator = HeightModelEstimator(

@@ -107,9 +107,8 @@ class MedianBackground:
 
         None: the camera shows another view, which could not be located.
         """
-        if self._known.homography is None:
-            return None
-        return np.asarray(self._registration.rest.homography(size) @ self._known.homography)
+        turned = self._known.homography
+        return None if turned is None else np.asarray(self._registration.rest.homography(size) @ turned)
 
     def prepare(self, images: Sequence[Image]) -> None:
         """Learn the background from images before the first frame; without any, learn it live."""
@@ -187,7 +186,7 @@ class MedianBackground:
         self._rounded = np.rint(self._exact).astype(np.uint8)
         if self._frames % self._points_every == 0:
             self._registration.set_background(self._rounded)
-            if self._known.homography is None:
+            if self._known.homography is None and self._frames % (_LOCATE_EVERY * self._points_every) == 0:
                 self._known.locate(self._rounded)
 
     def _align(
@@ -246,6 +245,7 @@ class MedianBackground:
         if done * samples // frames > self._frames * samples // frames:
             if self.views and self._samples.have_moved(image):  # the camera still turns
                 self._frames, self._samples, done = 0, MedianSamples(), 1
+                self._known.forget_place()
             self._samples.add(image)
         if done in {(frames + 1) // 2, frames} and self._samples:
             self._use(self._background_of_samples())
@@ -261,6 +261,7 @@ class MedianBackground:
         before = self._known.last_turned()
         if before is None and self._known.last is not None and self._is_view(self._known.last, background):
             before = self._known.last
+            self._known.stay()
         return background if before is None else self._samples.median(before)
 
     def _is_view(self, background: Image, image: Image) -> bool:
@@ -310,6 +311,8 @@ class MedianBackground:
 
 # Seconds until the background's edges are sought again.
 _POINTS_EVERY_S = 2.0
+# How many times rarer a view that could not be located is sought again.
+_LOCATE_EVERY = 4
 # Fewest frames that show that another background is needed.
 _MIN_RELEARN_FRAMES = 3
 # Drop of the share of pixels that follow the tone curves at which a camera at rest may have moved.

@@ -21,7 +21,7 @@ export class CalibrationPoints {
   #isLoaded = false;
   /** @type {MarkedPoints} */
   #present = { unit: null, points: {}, homographies: {}, digest: '', result: null };
-  /** @type {PointsFile | null} that the shown result is of */
+  /** @type {{points: PointsFile, digest: string} | null} what the shown result is of */
   #calibrated = null;
   /** @type {PointsResult['errors'] | null} */
   #errors = null;
@@ -200,7 +200,7 @@ export class CalibrationPoints {
         setText(this.#state, 'The marks were changed meanwhile: calibrate again.');
       } else {
         this.#present = answer;
-        this.#calibrated = file;
+        this.#calibrated = { points: file, digest: answer.digest };
         this.#wrong.clear();
         this.#showResult(answer.result);
         this.#show();
@@ -249,8 +249,8 @@ export class CalibrationPoints {
   async #write() {
     this.#apply.disabled = true;
     try {
-      const { digest } = this.#present;
-      this.#present = await requestOperator('marked_points', 'POST', { action: 'apply', points: this.#calibrated, digest });
+      // The digest of when the result was shown: what another operator has written since is not overwritten.
+      this.#present = await requestOperator('marked_points', 'POST', { action: 'apply', ...this.#calibrated });
       sessionStorage.removeItem(this.#key);
       setText(this.#state, 'Written into the configuration; the earlier file is kept beside it.');
       await this.fileChanged();

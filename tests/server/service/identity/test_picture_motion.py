@@ -34,7 +34,7 @@ def test_boxes_are_moved_back_to_where_the_homography_holds(matrix: np.ndarray) 
 
 
 def test_a_box_that_is_hidden_or_beyond_the_horizon_is_nowhere() -> None:
-    beyond = picture_motion(np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -0.05, 1.0]]), SIZE)
+    beyond = picture_motion(np.array([[1.0, 0.0, -40.0], [0.0, 1.0, 0.0], [0.05, 0.0, -1.4]]), SIZE)
     hidden = np.full((1, 4), np.nan)
     assert np.isnan(shown_boxes(np.concatenate([hidden, BOX]), beyond)).all()
 
@@ -44,6 +44,13 @@ def test_the_moved_homography_maps_a_moved_point_to_the_same_place(matrix: np.nd
     moved = matrix @ [25.0, 40.0, 1.0]
     there = to_ground(moved_homography(HOMOGRAPHY, picture_motion(matrix, SIZE)), moved[None, :2] / moved[2])
     np.testing.assert_allclose(there, to_ground(HOMOGRAPHY, np.array([[25.0, 40.0]])))
+
+
+def test_a_turn_that_leaves_nothing_in_front_of_the_camera_has_no_message() -> None:
+    with pytest.raises(ValueError, match="out of sight"):
+        picture_motion(np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.05, 0.0, 0.1]]), SIZE)
+    scaled = picture_motion(-3.0 * MOTION.homography(SIZE), SIZE)
+    np.testing.assert_allclose(shown_boxes(BOX, scaled), shown_boxes(BOX, MESSAGE))
 
 
 def test_a_motion_says_how_far_the_middle_has_moved() -> None:

@@ -69,6 +69,14 @@ class KnownViews:
         self.leave(background)
         self._place = None if before is None else before.place
 
+    def stay(self) -> None:
+        """Record that the present view is the one before it in another light."""
+        self._place = None if self._last is None else self._last.place
+
+    def forget_place(self) -> None:
+        """Forget where the present view lies: the camera has turned on."""
+        self._place = None
+
     def locate(self, background: Image) -> None:
         """Find where a background of a view other than the first lies, if more agrees than before."""
         if self._first is None:

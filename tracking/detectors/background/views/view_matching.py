@@ -71,7 +71,8 @@ def find_view(before: Image, after: Image) -> ViewMatch | None:
     height, width = before.shape[:2]
     if cv2.contourArea(hull) < _MIN_SPAN * width * height:
         return None
-    found = np.asarray(matrix / matrix[2, 2], dtype=np.float64)
+    # So that what is in front of the camera has a positive depth.
+    found = np.asarray(matrix / np.cbrt(np.linalg.det(matrix)), dtype=np.float64)
     return ViewMatch(found, int(kept.sum())) if _is_turn(found, origin[kept]) else None
 
 
