@@ -10,12 +10,13 @@ from server.camera.sources.base import Image
 from server.camera.substream.picture_scale import PictureScale
 from server.messaging.camera_status import PictureMotion
 from tracking.detectors import BackgroundDetector, Detector, FusedDetector
+from tracking.detectors.background.views.view_matching import shift_of_middle
 from tracking.frame_rate import frames_in
 from tracking.picture_condition import PictureMonitor
 from tracking.types import PictureCondition
 
 _TURNED = 0.1
-"""Motion, as a share of the picture's width, from which a camera shows something else."""
+"""Motion of the picture's middle, as a share of its width, from which a camera shows something else."""
 
 _SEEK_S = 3.0
 """Seconds in which a view whose background is learned anew is located if it can be."""
@@ -52,17 +53,10 @@ class ShownView:
         else:
             self._lost_at = None
             came_back = was_lost and self.monitor.shows_another_scene
-            if came_back or self._is_elsewhere(moved, image):
+            if came_back or shift_of_middle(moved, image, self._noticed) > _TURNED:
                 self._noticed = moved
                 self.monitor.accept_scene()
         self.monitor.observe(image, pulse)
-
-    def _is_elsewhere(self, moved: NDArray[np.float64], image: Image) -> bool:
-        """Return whether the middle of the picture lies elsewhere than when that was noticed last."""
-        height, width = image.shape[:2]
-        middle = [width / 2.0, height / 2.0, 1.0]
-        here, there = moved @ middle, self._noticed @ middle
-        return bool(np.linalg.norm(here[:2] / here[2] - there[:2] / there[2]) > _TURNED * width)
 
     @property
     def condition(self) -> PictureCondition:

@@ -70,6 +70,29 @@ def test_another_scene_a_mirrored_and_an_empty_one_are_not_located() -> None:
         assert find_view(after, view()) is None
 
 
+def test_a_clock_in_the_picture_does_not_make_another_scene_the_same() -> None:
+    def with_clock(image: np.ndarray) -> np.ndarray:
+        picture = image.copy()
+        for row, text in ((14, "2026-11-27 19:49:12"), (230, "CAMERA 01 ENTRANCE")):
+            cv2.putText(picture, text, (6, row), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1)
+        return picture
+
+    scenes = []
+    for seed in (1, 2):
+        random = np.random.default_rng(seed)
+        scene = np.full((SIZE[1], SIZE[0], 3), 110, dtype=np.uint8)
+        for x, y, w, h in (random.random((8, 4)) * (*SIZE, 70, 70)).astype(int).tolist():
+            cv2.rectangle(scene, (x, y), (x + 8 + w, y + 8 + h), random.integers(20, 235, 3).tolist(), -1)
+        scenes.append(with_clock(scene))
+    assert find_view(*scenes) is not None, "without a wrong match the test proves nothing"
+    known = KnownViews()
+    known.leave(scenes[0])
+    known.locate(scenes[1])
+    assert known.homography is None
+    known.locate(np.clip(0.7 * scenes[0] + 20.0, 0.0, 255.0).astype(np.uint8))
+    assert known.homography == pytest.approx(np.eye(3), abs=0.5)
+
+
 def test_a_view_is_located_by_the_one_before_it() -> None:
     """The third view shows nothing of the first."""
     known = KnownViews()

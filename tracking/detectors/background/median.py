@@ -24,7 +24,7 @@ from tracking.detectors.background.segmentation import (
     shadow_mask,
 )
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
-from tracking.detectors.background.views.known_views import KnownViews
+from tracking.detectors.background.views.known_views import KnownViews, shows_view
 from tracking.detectors.background.views.turn_finder import TurnFinder
 from tracking.detectors.background.views.view_matching import ViewMatch
 from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, require_positive
@@ -259,16 +259,10 @@ class MedianBackground:
             return background
         self._known.locate(background)
         before = self._known.last_turned()
-        if before is None and self._known.last is not None and self._is_view(self._known.last, background):
+        if before is None and self._known.last is not None and shows_view(self._known.last, background):
             before = self._known.last
             self._known.stay()
         return background if before is None else self._samples.median(before)
-
-    def _is_view(self, background: Image, image: Image) -> bool:
-        """Return whether an image shows a background's edges where they are, at whatever light."""
-        registration = Registration(self._fps)
-        registration.set_background(background)
-        return registration.agrees(image)
 
     def _use(self, background: Image) -> None:
         """Compare frames with this background from now on."""
@@ -293,7 +287,7 @@ class MedianBackground:
         if last is not None:
             light = self._fit_light(image, last)
             explains = not self._is_flooded(self._compare(image, STILL, last, light))
-            if explains and self._is_view(last, image):
+            if explains and shows_view(last, image, _SEEN_WITH_PEOPLE):
                 self._known.go_back(background)
                 self._use(last)
                 self._flooded = 0
@@ -311,6 +305,8 @@ class MedianBackground:
 
 # Seconds until the background's edges are sought again.
 _POINTS_EVERY_S = 2.0
+# Share of a background's edges that a picture of its view shows, though people hide some.
+_SEEN_WITH_PEOPLE = 0.4
 # How many times rarer a view that could not be located is sought again.
 _LOCATE_EVERY = 4
 # Fewest frames that show that another background is needed.

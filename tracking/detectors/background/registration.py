@@ -103,13 +103,15 @@ class Registration:
         moved = agreement >= _MIN_AGREEMENT and _is_plausible(motion, size)
         return motion if moved and motion.distance(STILL, size) >= _SAME * size[0] / 360.0 else STILL
 
-    def agrees(self, image: Image) -> bool:
-        """Return whether an image shows most edges of the background where they are, at whatever light."""
+    def share_seen(self, image: Image) -> float:
+        """Return which share of the background's edges an image shows where they are, at whatever light.
+
+        All of those of a background without edges.
+        """
         points = self._points
         if points is None or points.count < _MIN_POINTS:
-            return True
-        _, agreement = points.under(IDENTITY, None).refine(_smooth_gray(image), STILL, _STEPS_OF_SEARCH)
-        return agreement >= _MIN_AGREEMENT
+            return 1.0
+        return points.under(IDENTITY, None).refine(_smooth_gray(image), STILL, _STEPS_OF_SEARCH)[1]
 
     def search(self, image: Image) -> Motion | None:
         """Return the likeliest motion of an image at any light, from anywhere; None: none is plausible."""

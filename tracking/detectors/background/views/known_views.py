@@ -8,8 +8,14 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detectors.background.views.view_matching import ViewMatch, find_view
+from tracking.detectors.background.registration import Registration
+from tracking.detectors.background.views.view_matching import ViewMatch, find_view, shift_of_middle
 from tracking.detectors.base import Image
+
+_SAME = 0.75
+"""Share of a background's edges that another one of the same view shows; other scenes show half by chance."""
+_STAYS = 0.01
+"""Motion of the picture's middle, as a share of its width, up to which a view is the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,9 +87,27 @@ class KnownViews:
         """Find where a background of a view other than the first lies, if more agrees than before."""
         if self._first is None:
             return
-        found, located = find_view(self._first, background), self._located
+        found, located = _find_confirmed(self._first, background), self._located
         if found is None and located is not None and located.place is not None:
-            step = find_view(located.background, background)
+            step = _find_confirmed(located.background, background)
             found = None if step is None else step.after(located.place.homography)
         if found is not None and (self._place is None or found.matches > self._place.matches):
             self._place = found
+
+
+def shows_view(background: Image, image: Image, least: float = _SAME) -> bool:
+    """Return whether an image shows a share of a background's edges where they are, at whatever light."""
+    registration = Registration()
+    registration.set_background(background)
+    return registration.share_seen(image) >= least
+
+
+def _find_confirmed(before: Image, after: Image) -> ViewMatch | None:
+    """Return where a background lies in another; that it lies where it was is confirmed by its edges.
+
+    A clock or a name in the picture stays where it is whatever the camera shows.
+    """
+    found = find_view(before, after)
+    if found is None or shift_of_middle(found.homography, before) > _STAYS:
+        return found
+    return found if shows_view(before, after) else None

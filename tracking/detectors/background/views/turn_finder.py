@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from tracking.boxes import Floats
-from tracking.detectors.background.views.view_matching import ViewMatch, find_view
+from tracking.detectors.background.views.view_matching import ViewMatch, find_view, shift_of_middle
 from tracking.detectors.base import Image
 
 # Share of the background's edges that are where they were, from which the camera is not turned.
@@ -40,19 +37,12 @@ class TurnFinder:
             return None
         before, self._found = self._found, None
         found = find_view(background, image)
-        if found is None or _moved(np.eye(3), found.homography, image) < _TURNED:
+        if found is None or shift_of_middle(found.homography, image) < _TURNED:
             self._wait_s = min(2.0 * self._wait_s, _LONGEST_S)
             self._left_s = self._wait_s
-        elif before is not None and _moved(before.homography, found.homography, image) <= _RESTS:
+        elif before is not None and shift_of_middle(found.homography, image, before.homography) <= _RESTS:
             self._wait_s = self._left_s = _FIRST_S
             return found
         else:
             self._found, self._left_s = found, _AGAIN_S
         return None
-
-
-def _moved(one: Floats, other: Floats, image: Image) -> float:
-    """Return how far the picture's middle lies from one to another homography, as a share of its width."""
-    height, width = image.shape[:2]
-    here, there = (matrix @ [width / 2.0, height / 2.0, 1.0] for matrix in (one, other))
-    return float(np.linalg.norm(here[:2] / here[2] - there[:2] / there[2]) / width)

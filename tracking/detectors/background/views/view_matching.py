@@ -76,6 +76,15 @@ def find_view(before: Image, after: Image) -> ViewMatch | None:
     return ViewMatch(found, int(kept.sum())) if _is_turn(found, origin[kept]) else None
 
 
+def shift_of_middle(homography: Floats, image: Image, other: Floats | None = None) -> float:
+    """Return how far a homography has the middle of a picture from where another has it, in widths."""
+    height, width = image.shape[:2]
+    middle = np.array([width / 2.0, height / 2.0, 1.0])
+    there = homography @ middle
+    here = middle if other is None else other @ middle
+    return float(np.linalg.norm(there[:2] / there[2] - here[:2] / here[2]) / width)
+
+
 def _features(image: Image) -> tuple[Floats, NDArray[np.float32]]:
     """Return the places (N, 2) and descriptors (N, 128) of an image's features."""
     finder = cv2.SIFT.create(_FEATURES, contrastThreshold=_CONTRAST)
