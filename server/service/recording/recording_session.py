@@ -242,7 +242,7 @@ class RecordingSession:
     def decision_files(self, start: int, end: int) -> list[Path]:
         """Return the decision files that may cover pulses ``start … end - 1``, in order."""
         firsts = [segment.first for segment in tuple(self.segments)]
-        nexts = [*firsts[1:], None]
+        nexts = [*firsts[1:], None][: len(firsts)]  # at first there are none
         return [
             self.paths.decision_file(first)
             for first, following in zip(firsts, nexts, strict=True)
