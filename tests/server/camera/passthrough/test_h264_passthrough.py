@@ -8,7 +8,6 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -17,10 +16,10 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from av.video.stream import VideoStream
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fakes.media.camera_video import passed_units, write_units
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.media.videos import write_video
 from fakes.paths import DOCS
@@ -39,6 +38,7 @@ from server.camera.sources import SourceEndedError
 from server.config.site_config import Config
 from server.media.containers.mpegts import ContinuityCounters, pack
 from server.media.h264.annexb import NAL_AUD, nal_type
+from server.media.h264.codec import H264
 from server.media.nal_units import nal_units
 from server.media.stream_format import StreamFormat
 from server.service.streaming.frame_buffer import FrameBuffer
@@ -55,36 +55,9 @@ def site(source: Path | str, passthrough: str = "pass", **changes: Any) -> Confi
 
 def write_h264(folder: Path, form: str, seed: int = 0) -> Path:
     """Write a video with the encoding of this site's cameras into a container."""
-    units, path = encoded(seed)[:FRAMES], folder / f"own.{form}"
-    if form == "h264":
-        path.write_bytes(b"".join(unit.data for unit in units))
-        return path
-    if form == "ts":
-        frame_buffer = FrameBuffer(FPS, FRAMES, StreamFormat())
-        pictures = [frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
-        path.write_bytes(pack(pictures, FPS, ContinuityCounters()))
-        return path
-    with av.open(str(path), "w", format="mp4" if form == "mp4" else "matroska") as container:
-        stream = container.add_stream("h264", rate=FPS)
-        assert isinstance(stream, VideoStream)
-        stream.width, stream.height = WIDTH, HEIGHT
-        stream.codec_context.extradata = units[0].data[: units[0].data.index(b"\x00\x00\x01\x06") - 1]
-        for unit in units:
-            packet = av.Packet(unit.data)
-            packet.stream, packet.pts, packet.dts = stream, unit.pulse, unit.pulse
-            packet.time_base, packet.is_keyframe = Fraction(1, FPS), unit.key
-            container.mux(packet)
-    return path
-
-
-def sent_units(pipeline: CameraPipeline, pulses: range) -> list[AccessUnit]:
-    """Return the access units that a camera's process sends."""
-    sent = []
-    for pulse in pulses:
-        frame = pipeline.take(pulse)
-        if frame is not None:
-            sent.append(pipeline.encode(pulse, frame))
-    return sent
+    units = encoded(seed)[:FRAMES]
+    sets = units[0].data[: units[0].data.index(b"\x00\x00\x01\x06") - 1]
+    return write_units(units, folder / f"own.{form}", H264, "h264", sets)
 
 
 def nals(data: bytes) -> list[bytes]:
@@ -95,7 +68,7 @@ def nals(data: bytes) -> list[bytes]:
 def test_access_units_are_passed_through_unchanged(tmp_path: Path, form: str) -> None:
     pipeline = CameraPipeline(site(write_h264(tmp_path, form)), "c0")
     assert pipeline.is_passthrough
-    sent = sent_units(pipeline, range(FRAMES))
+    sent = passed_units(pipeline, range(FRAMES))
     with pytest.raises(SourceEndedError):
         pipeline.take(FRAMES)
     pipeline.close()
@@ -121,7 +94,7 @@ def test_passthrough_can_be_spliced_with_encoded_video(tmp_path: Path) -> None:
     stream_format = StreamFormat()
     frame_buffers = [FrameBuffer(FPS, FRAMES, stream_format) for _ in range(2)]
     for frame_buffer, units in zip(
-        frame_buffers, (sent_units(pipeline, range(FRAMES)), encoded(1)), strict=True
+        frame_buffers, (passed_units(pipeline, range(FRAMES)), encoded(1)), strict=True
     ):
         for unit in units:
             frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key)
@@ -131,7 +104,7 @@ def test_passthrough_can_be_spliced_with_encoded_video(tmp_path: Path) -> None:
 def test_passthrough_honors_offset_and_loop(tmp_path: Path) -> None:
     camera = {"offset_s": GOP / FPS, "at_end": "loop"}
     pipeline = CameraPipeline(site(write_h264(tmp_path, "ts"), camera=camera), "c0")
-    sent = sent_units(pipeline, range(2 * FRAMES + GOP))
+    sent = passed_units(pipeline, range(2 * FRAMES + GOP))
     pipeline.close()
     assert [unit.pulse for unit in sent] == list(range(GOP, 2 * FRAMES + GOP))
     assert [nals(unit.data) for unit in sent] == 2 * [nals(unit.data) for unit in encoded(0)[:FRAMES]]
@@ -147,7 +120,7 @@ def test_the_documented_camera_settings_are_compatible(tmp_path: Path) -> None:
     subprocess.run(f"ffmpeg -v error {test_picture} {options} {path}".split(), check=True)
     config = site(path, encode={"gop_s": gop / FPS}, view={"lookahead_s": 2 * gop / FPS})
     pipeline = CameraPipeline(config, "c0")
-    assert len(sent_units(pipeline, range(2 * FPS))) == 2 * FPS
+    assert len(passed_units(pipeline, range(2 * FPS))) == 2 * FPS
     pipeline.close()
 
 
@@ -177,7 +150,7 @@ def test_incompatible_video_is_encoded_or_refused_with_the_reason(
     pipeline = CameraPipeline(site(path, "auto", **changes), "c0")
     assert not pipeline.is_passthrough
     assert re.search(reason, pipeline.why_encoded)
-    assert sent_units(pipeline, range(GOP))[-1].data
+    assert passed_units(pipeline, range(GOP))[-1].data
     pipeline.close()
 
 

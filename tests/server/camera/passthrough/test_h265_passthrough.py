@@ -5,15 +5,14 @@ from __future__ import annotations
 import subprocess
 import time
 from collections.abc import Iterator
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
-from av.video.stream import VideoStream
 
+from fakes.media.camera_video import passed_units, write_units
 from fakes.media.h265 import sets_of, x265_units
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.programs import needs_ffmpeg
@@ -48,37 +47,10 @@ def h265_units(seed: int = 0, frames: int = FRAMES) -> tuple[AccessUnit, ...]:
 
 def write_h265(folder: Path, form: str, seed: int = 0) -> Path:
     """Write a video with the encoding of this site's cameras into a container."""
-    units, path = h265_units(seed), folder / f"own.{form}"
-    if form == "h265":
-        path.write_bytes(b"".join(unit.data for unit in units))
-        return path
-    if form == "ts":
-        frame_buffer = FrameBuffer(FPS, FRAMES, StreamFormat(H265))
-        pictures = [frame_buffer.put(unit.pulse, 1, unit.data, key=unit.key) for unit in units]
-        path.write_bytes(pack(pictures, FPS, ContinuityCounters()))
-        return path
-    sets = H265.select_sets(nal_units(units[0].data))
-    with av.open(str(path), "w", format="mp4" if form == "mp4" else "matroska") as container:
-        stream = container.add_stream("libx265", rate=FPS, options={"x265-params": "log-level=none"})
-        assert isinstance(stream, VideoStream)
-        stream.width, stream.height = WIDTH, HEIGHT
-        stream.codec_context.extradata = b"".join(b"\x00\x00\x00\x01" + unit for unit in sets)
-        for unit in units:
-            packet = av.Packet(unit.data)
-            packet.stream, packet.pts, packet.dts = stream, unit.pulse, unit.pulse
-            packet.time_base, packet.is_keyframe = Fraction(1, FPS), unit.key
-            container.mux(packet)
-    return path
-
-
-def sent_units(pipeline: CameraPipeline, pulses: range) -> list[AccessUnit]:
-    """Return the access units that a camera's process sends."""
-    sent = []
-    for pulse in pulses:
-        frame = pipeline.take(pulse)
-        if frame is not None:
-            sent.append(pipeline.encode(pulse, frame))
-    return sent
+    units = h265_units(seed)
+    sets = b"".join(b"\x00\x00\x00\x01" + unit for unit in H265.select_sets(nal_units(units[0].data)))
+    quiet = {"x265-params": "log-level=none"}
+    return write_units(units, folder / f"own.{form}", H265, "libx265", sets, quiet)
 
 
 def nals(data: bytes) -> list[bytes]:
@@ -89,7 +61,7 @@ def nals(data: bytes) -> list[bytes]:
 def test_access_units_are_passed_through_unchanged(tmp_path: Path, form: str) -> None:
     pipeline = CameraPipeline(site(write_h265(tmp_path, form)), "c0")
     assert pipeline.is_passthrough
-    sent = sent_units(pipeline, range(FRAMES))
+    sent = passed_units(pipeline, range(FRAMES))
     pipeline.close()
     for unit, original in zip(sent, h265_units(), strict=True):
         assert (unit.pulse, unit.key, nals(unit.data)) == (original.pulse, original.key, nals(original.data))
@@ -99,7 +71,7 @@ def test_passthrough_can_be_spliced_with_encoded_video(tmp_path: Path) -> None:
     pipeline = CameraPipeline(site(write_h265(tmp_path, "mp4")), "c0")
     stream_format = StreamFormat(H265)
     frame_buffers = [FrameBuffer(FPS, FRAMES, stream_format) for _ in range(2)]
-    sent = sent_units(pipeline, range(FRAMES)), h265_units(1)
+    sent = passed_units(pipeline, range(FRAMES)), h265_units(1)
     pipeline.close()
     for frame_buffer, units in zip(frame_buffers, sent, strict=True):
         for unit in units:
@@ -128,7 +100,7 @@ def test_a_network_cameras_video_is_passed_through_in_whole_gops(
     pulse = 0
     while len(sent) < 4 * GOP:
         rtsp.stop.wait(1 / FPS)
-        sent += sent_units(pipeline, range(pulse, pulse + 1))
+        sent += passed_units(pipeline, range(pulse, pulse + 1))
         pulse += 1
         assert pulse < 60 * FPS
     pipeline.close()
@@ -186,7 +158,7 @@ def test_h264_is_encoded_anew(tmp_path: Path) -> None:
     path.write_bytes(b"".join(unit.data for unit in encoded(0)[:FRAMES]))
     pipeline = CameraPipeline(site(path, "auto"), "c0")
     assert pipeline.why_encoded == "it is H.264, not H.265 (encode.codec)"
-    sent = sent_units(pipeline, range(GOP))
+    sent = passed_units(pipeline, range(GOP))
     pipeline.close()
     assert H265.parameter_sets(nal_units(sent[0].data)) is not None
 

@@ -6,6 +6,7 @@ import asyncio
 import io
 import subprocess
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 
 import av
@@ -19,22 +20,15 @@ from fakes.media.decoding import video_decoder
 from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
 from fakes.service.fed_site import ServedSite, serve_site
+from fakes.service.real_time_feed import FRAMES, feed_epoch, feed_in_real_time
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
     HEIGHT,
-    LARGE,
-    SMALL,
-    STRIDE,
     WIDTH,
-    camera_tracks,
     encoded,
-    tracks,
-    video,
 )
-from server.messaging.epochs import end_of_epoch
 
-FRAMES = 25 * FPS
 PLAYERS = {
     "ffmpeg": "ffmpeg -v warning -xerror -i {} -f null -",
     "mpv": "mpv --no-config --vo=null --no-audio --untimed --msg-level=all=warn --no-terminal {}",
@@ -54,20 +48,7 @@ async def h265_site(tmp_path: Path) -> AsyncIterator[ServedSite]:
 
 
 def feed(served: ServedSite, epoch: int) -> None:
-    sizes = (SMALL, LARGE) if epoch % 4 < 2 else (LARGE, SMALL)
-    for seed, camera in enumerate(CAMERAS):
-        for unit in encoded(seed, FRAMES, codec="h265")[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            served.service.ingest.video(video(camera, unit))
-        boxes = {1: sizes[seed], 2: sizes[1 - seed]}
-        served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
-    served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
-    served.service.decide()
-
-
-async def feed_in_real_time(served: ServedSite) -> None:
-    for epoch in range(3, FRAMES // STRIDE):
-        feed(served, epoch)
-        await asyncio.sleep(STRIDE / FPS)
+    feed_epoch(served, epoch, "h265", first_is_larger_in_first=epoch % 4 >= 2)
 
 
 async def run_players(served: ServedSite, command: str, paths: tuple[str, ...]) -> None:
@@ -124,7 +105,7 @@ async def test_the_site_names_both_codecs(h265_site: ServedSite) -> None:
 
 async def read_frames(served: ServedSite, path: str, frames: int) -> tuple[str, list[NDArray[np.uint8]]]:
     """Return the codec and the first pictures of a stream, while the site runs."""
-    feeding = asyncio.create_task(feed_in_real_time(served))
+    feeding = asyncio.create_task(feed_in_real_time(partial(feed, served)))
     data = b""
     async with served.session.get(path) as answer:
         assert answer.status == 200, await answer.text()
@@ -163,7 +144,7 @@ def decoded_alone(seed: int) -> list[NDArray[np.uint8]]:
 
 
 async def test_many_viewers_share_one_encoder(h265_site: ServedSite) -> None:
-    feeding = asyncio.create_task(feed_in_real_time(h265_site))
+    feeding = asyncio.create_task(feed_in_real_time(partial(feed, h265_site)))
     answers = [await h265_site.session.get("/objects/1/best.mp4?codec=h264") for _ in range(3)]
     heads = [await answer.content.readexactly(500) for answer in answers]
     assert len(set(heads)) == 1
@@ -219,7 +200,7 @@ async def test_chromium_shows_a_site_whose_codec_it_cannot_play(h265_site: Serve
     async with chromium() as browser:
         page = await new_page(browser, bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
-        feeding = asyncio.create_task(feed_in_real_time(h265_site))
+        feeding = asyncio.create_task(feed_in_real_time(partial(feed, h265_site)))
         await page.goto(f"http://127.0.0.1:{h265_site.port}/?object=1")
         codec = "hvc1.1.6.L30.90"
         if await page.evaluate(f"MediaSource.isTypeSupported('video/mp4; codecs=\"{codec}\"')"):

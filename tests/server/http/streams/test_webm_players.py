@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+from functools import partial
 
 import av
 import cv2
@@ -15,23 +16,16 @@ from fakes.media.browser_playback import PLAY_JS, play_in_chromium
 from fakes.page.browser import new_page
 from fakes.programs import needs_chromium, needs_ffmpeg, needs_mpv
 from fakes.service.fed_site import A, B, ServedSite
+from fakes.service.real_time_feed import feed_epoch, feed_in_real_time
 from fakes.service.scripted_cameras import (
-    CAMERAS,
     FPS,
     GOP,
     HEIGHT,
-    LARGE,
     NO_REASON,
-    SMALL,
-    STRIDE,
     WIDTH,
-    camera_tracks,
     encoded,
-    tracks,
-    video,
 )
 from fakes.service.vp8_site import EPOCHS, decoded_alone, feed
-from server.messaging.epochs import end_of_epoch
 from server.service.view_selection.decider import GopDecision, ObjectChoice
 
 PATHS = ("/objects/1/best.webm", "/cameras/c1/live.webm")
@@ -126,19 +120,9 @@ async def test_chromium_plays_across_cuts_and_gaps_to_the_end(vp8_site: ServedSi
     assert played_in_browser["end"] == pytest.approx(GOPS * GOP / FPS, abs=0.01)
 
 
-async def feed_in_real_time(served: ServedSite) -> None:
-    """Send epochs at the site's rate: two people, each larger in the other camera every second."""
-    frames = 25 * FPS
-    for epoch in range(3, frames // STRIDE):
-        sizes = (SMALL, LARGE) if epoch // 5 % 2 else (LARGE, SMALL)
-        for seed, camera in enumerate(CAMERAS):
-            for unit in encoded(seed, frames, codec="vp8")[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                served.service.ingest.video(video(camera, unit))
-            boxes = {1: sizes[seed], 2: sizes[1 - seed]}
-            served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
-        served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
-        served.service.decide()
-        await asyncio.sleep(STRIDE / FPS)
+def feed_two(served: ServedSite, epoch: int) -> None:
+    """Send an epoch of two people, each larger in the other camera every second."""
+    feed_epoch(served, epoch, "vp8", first_is_larger_in_first=not epoch // 5 % 2)
 
 
 @needs_chromium
@@ -148,7 +132,7 @@ async def test_the_page_plays_across_cuts_and_from_one_person_to_another(vp8_sit
     async with chromium() as browser:
         page = await new_page(browser, bypass_csp=True)
         page.on("pageerror", lambda error: errors.append(str(error)))
-        feeding = asyncio.create_task(feed_in_real_time(vp8_site))
+        feeding = asyncio.create_task(feed_in_real_time(partial(feed_two, vp8_site)))
         await page.goto(f"http://127.0.0.1:{vp8_site.port}/?object=1")
         await page.wait_for_function("myview.state === 'playing' && myview.cuts.length > 1")
         await page.evaluate("document.querySelector('video').dataset.same = 'yes'")
@@ -182,7 +166,7 @@ async def test_mp4_addresses_of_a_vp8_site_are_refused_with_one_line(vp8_site: S
 
 
 async def test_vp8_is_encoded_anew_as_h264(vp8_site: ServedSite) -> None:
-    feeding = asyncio.create_task(feed_in_real_time(vp8_site))
+    feeding = asyncio.create_task(feed_in_real_time(partial(feed_two, vp8_site)))
     async with vp8_site.session.get("/objects/1/best.mp4?codec=h264") as answer:
         assert answer.status == 200
         data = b""
