@@ -83,18 +83,7 @@ class Encoder:
 def _open_x264(
     site: SiteSettings | RenderSettings, settings: EncodeSettings | RenderSettings
 ) -> VideoCodecContext:
-    context = _create_context("libx264", site)
-    context.max_b_frames = 0
-    context.options = {
-        "preset": settings.preset,
-        "tune": "zerolatency",
-        "crf": str(settings.crf),
-        "forced-idr": "1",
-        "x264-params": "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m"
-        + _rate_limit(site, settings),
-    }
-    context.open()
-    return context
+    return _open_x26x(_create_context("libx264", site), site, settings, "x264-params", "")
 
 
 def _open_x265(site: SiteSettings, settings: EncodeSettings) -> VideoCodecContext:
@@ -105,15 +94,27 @@ def _open_x265(site: SiteSettings, settings: EncodeSettings) -> VideoCodecContex
             "encode.codec: h265: PyAV has no libx265 here to encode cameras; "
             "let all cameras pass through (passthrough: pass), or use h264"
         ) from None
+    # Pools of threads would delay frames.
+    quiet = ":info=0:log-level=none:pools=none:frame-threads=1"
+    return _open_x26x(context, site, settings, "x265-params", quiet)
+
+
+def _open_x26x(
+    context: VideoCodecContext,
+    site: SiteSettings | RenderSettings,
+    settings: EncodeSettings | RenderSettings,
+    option: str,
+    parameters: str,
+) -> VideoCodecContext:
+    """Open x264 or x265, whose own parameters are an option of FFmpeg's."""
+    common = "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m"
     context.max_b_frames = 0
     context.options = {
         "preset": settings.preset,
         "tune": "zerolatency",
         "crf": str(settings.crf),
         "forced-idr": "1",
-        # Pools of threads would delay frames.
-        "x265-params": "scenecut=0:open-gop=0:repeat-headers=1:colormatrix=smpte170m:info=0:log-level=none"
-        ":pools=none:frame-threads=1" + _rate_limit(site, settings),
+        option: common + parameters + _rate_limit(site, settings),
     }
     context.open()
     return context

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from server.messaging.camera_status import PictureMotion, motion_text
 from server.messaging.picture_motion import picture_motion
+from tracking.homographies import map_points
 
 Floats = NDArray[np.float64]
 
@@ -21,10 +22,9 @@ _NOTICEABLE = 0.005
 def noticeable_motion(motion: Floats, size: tuple[int, int]) -> PictureMotion | None:
     """Return a homography (3, 3) of a picture of ``size`` (w, h) as a message; None: it hardly moves."""
     across, down = np.meshgrid(np.linspace(0.0, size[0], 5), np.linspace(0.0, size[1], 5))
-    points = np.stack([across.ravel(), down.ravel(), np.ones(across.size)])
-    mapped = motion @ points
-    offsets = mapped[:2] / mapped[2] - points[:2]
-    if np.sqrt((offsets**2).sum(axis=0).mean()) < _NOTICEABLE * size[0]:
+    points = np.stack([across.ravel(), down.ravel()], axis=1)
+    offsets = map_points(motion, points) - points
+    if np.sqrt((offsets**2).sum(axis=1).mean()) < _NOTICEABLE * size[0]:
         return None
     return picture_motion(motion, size)
 

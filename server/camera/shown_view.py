@@ -10,13 +10,10 @@ from server.camera.sources.base import Image
 from server.camera.substream.picture_scale import PictureScale
 from server.messaging.camera_status import PictureMotion
 from tracking.detectors import BackgroundDetector, Detector, FusedDetector
-from tracking.detectors.background.views.view_matching import shift_of_middle
+from tracking.detectors.background.views.view_matching import TURNED, shift_of_middle
 from tracking.frame_rate import frames_in
 from tracking.picture_condition import PictureMonitor
 from tracking.types import PictureCondition
-
-_TURNED = 0.1
-"""Motion of the picture's middle, as a share of its width, from which a camera shows something else."""
 
 _SEEK_S = 3.0
 """Seconds in which a view whose background is learned anew is located if it can be."""
@@ -53,7 +50,7 @@ class ShownView:
         else:
             self._lost_at = None
             came_back = was_lost and self.monitor.shows_another_scene
-            if came_back or shift_of_middle(moved, image, self._noticed) > _TURNED:
+            if came_back or shift_of_middle(moved, image, self._noticed) > TURNED:
                 self._noticed = moved
                 self.monitor.accept_scene()
         self.monitor.observe(image, pulse)

@@ -32,6 +32,11 @@ class Letterbox:
         """Left, top, width and height of the camera's image in the site's."""
         return self._left, self._top, *self._inner
 
+    @property
+    def homography(self) -> Floats:
+        """From pixels of the camera's image to the site's, (3, 3)."""
+        return np.array([[self.scale, 0.0, self._left], [0.0, self.scale, self._top], [0.0, 0.0, 1.0]])
+
     def image(self, image: Image) -> Image:
         """Return a camera's image at the site's size."""
         if self._is_identity and image.shape[1::-1] == self.site_size:

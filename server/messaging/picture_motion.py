@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.number_types import COORDINATE_MAX
+from tracking.detectors.background.views.view_matching import TURNED
+from tracking.homographies import map_points
 
 Floats = NDArray[np.float64]
-
-_TURNED = 0.1
-"""Motion, as a share of the picture's width, from which a camera shows another part of the scene."""
 
 
 def picture_motion(matrix: Floats, size: tuple[int, int]) -> PictureMotion:
@@ -26,7 +25,7 @@ def picture_motion(matrix: Floats, size: tuple[int, int]) -> PictureMotion:
     matrix = matrix / np.cbrt(np.linalg.det(matrix))  # what is in front of the camera has a positive depth
     rows = matrix.tolist()
     middle = np.array([[size[0] / 2.0, size[1] / 2.0], [size[0] / 2.0 + 1.0, size[1] / 2.0]])
-    there, beside = _mapped(matrix, middle)
+    there, beside = map_points(matrix, middle)
     across, down = (beside - there).tolist()
     if not (np.isfinite(beside).all() and np.abs([*matrix.ravel(), *there]).max() <= COORDINATE_MAX):
         raise ValueError("the middle of the picture has moved out of sight")
@@ -39,7 +38,7 @@ def picture_motion(matrix: Floats, size: tuple[int, int]) -> PictureMotion:
 
 def is_turned(motion: PictureMotion | None, size: tuple[int, int]) -> bool:
     """Return whether the camera of a site's image of a size (w, h) shows another part of the scene."""
-    return motion is not None and motion.pixels > _TURNED * size[0]
+    return motion is not None and motion.pixels > TURNED * size[0]
 
 
 def calibrated_boxes(boxes: Floats, motion: PictureMotion | None) -> Floats:
@@ -59,8 +58,7 @@ def moved_homography(homography: Floats, motion: PictureMotion | None) -> Floats
 
 def camera_motion(motion: PictureMotion, letterbox: Letterbox) -> Floats:
     """Return a motion of the site's image as one of the camera's own, (3, 3)."""
-    left, top, _, _ = letterbox.content
-    to_site = np.array([[letterbox.scale, 0.0, left], [0.0, letterbox.scale, top], [0.0, 0.0, 1.0]])
+    to_site = letterbox.homography
     return np.asarray(np.linalg.inv(to_site) @ np.array(motion.matrix) @ to_site)
 
 
@@ -68,16 +66,9 @@ def moved_boxes(matrix: Floats, boxes: Floats) -> Floats:
     """Return upright boxes ``(..., 4)`` under a homography (3, 3), which maps their feet and heads."""
     flat = boxes.reshape(-1, 4)
     middle = (flat[:, 0] + flat[:, 2]) / 2.0
-    heads, feet = (_mapped(matrix, np.stack([middle, flat[:, row]], axis=1)) for row in (1, 3))
+    heads, feet = (map_points(matrix, np.stack([middle, flat[:, row]], axis=1)) for row in (1, 3))
     tall = np.linalg.norm(heads - feet, axis=1)
     before = np.maximum(flat[:, 3] - flat[:, 1], np.finfo(float).tiny)
     half = (flat[:, 2] - flat[:, 0]) / 2.0 * tall / before
     moved = np.stack([feet[:, 0] - half, feet[:, 1] - tall, feet[:, 0] + half, feet[:, 1]], axis=1)
     return np.asarray(moved.reshape(boxes.shape))
-
-
-def _mapped(matrix: Floats, points: Floats) -> Floats:
-    """Return points (N, 2) under a homography; NaN where it maps them beyond the horizon."""
-    mapped = points @ matrix[:, :2].T + matrix[:, 2]
-    depths = np.where(mapped[:, 2:] > 0.0, mapped[:, 2:], np.nan)
-    return np.asarray(mapped[:, :2] / depths)

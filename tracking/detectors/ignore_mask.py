@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Mask
+from tracking.homographies import map_points
 
 Polygon: TypeAlias = Sequence[tuple[float, float]]
 """Corners `(x, y)` in pixels of the camera's image, in order; at least three."""
@@ -43,9 +44,8 @@ def move_polygons(polygons: Polygons, matrix: Floats) -> tuple[tuple[tuple[float
     """Return polygons under a homography (3, 3); those that it maps beyond the horizon are left out."""
     moved = []
     for polygon in polygons:
-        mapped = np.column_stack([np.asarray(polygon, dtype=np.float64), np.ones(len(polygon))]) @ matrix.T
-        if (mapped[:, 2] > 0.0).all():
-            corners = (mapped[:, :2] / mapped[:, 2:]).tolist()
+        corners = map_points(matrix, np.asarray(polygon, dtype=np.float64))
+        if np.isfinite(corners).all():
             moved.append(tuple((float(x), float(y)) for x, y in corners))
     return tuple(moved)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.boxes import Floats, heights
+from tracking.homographies import homogeneous, map_points
 
 _MIN_BOXES = 30
 """Boxes after which the heights of people in the picture are known."""
@@ -57,35 +58,30 @@ class GroundCamera:
 
     def to_ground(self, points: Floats) -> Floats:
         """Map image points (K, 2) to the ground plane, (K, 2)."""
-        mapped = _homogeneous(points) @ self.homography.T
+        mapped = homogeneous(points) @ self.homography.T
         return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
     def to_image(self, places: Floats) -> Floats:
         """Map places (K, 2) to image points, (K, 2); NaN behind the camera."""
-        mapped = _homogeneous(places) @ self._inverse.T
-        depths = np.where(mapped[:, 2:] > 0.0, mapped[:, 2:], np.nan)
-        return np.asarray(mapped[:, :2] / depths)
+        return map_points(self._inverse, places)
 
     @cached_property
     def _inverse(self) -> Floats:
         """The homography to the image, whose third coordinate is positive in front of the camera."""
         inverse = np.linalg.inv(self.homography)
         bottom = self.to_ground(np.array([[self.width / 2.0, _BOTTOM * self.height]]))
-        return np.asarray(inverse * np.sign((_homogeneous(bottom) @ inverse.T)[0, 2]))
+        return np.asarray(inverse * np.sign((homogeneous(bottom) @ inverse.T)[0, 2]))
 
     def jacobians(self, points: Floats) -> Floats:
         """Return the derivatives of `to_ground` at image points (K, 2), (K, 2, 2)."""
-        mapped = _homogeneous(points) @ self.homography.T
+        mapped = homogeneous(points) @ self.homography.T
         ground = mapped[:, :2] / mapped[:, 2:]
         numerators = self.homography[:2, :2] - ground[:, :, None] * self.homography[2, :2]
         return np.asarray(numerators / mapped[:, 2, None, None])
 
     def shown(self, points: Floats) -> Floats:
         """Return where the picture shows image points (K, 2) since the camera was turned; NaN: nowhere."""
-        if self.turned is None:
-            return points
-        mapped = _homogeneous(points) @ self.turned.T
-        return np.asarray(mapped[:, :2] / np.where(mapped[:, 2:] > 0.0, mapped[:, 2:], np.nan))
+        return points if self.turned is None else map_points(self.turned, points)
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Return which image points (K, 2) are in the picture; NaN is not."""
@@ -141,10 +137,6 @@ class BoxSizes:
 def feet(boxes: Floats) -> Floats:
     """Return the middles of the lower edges of boxes (K, 4), (K, 2)."""
     return np.stack([(boxes[:, 0] + boxes[:, 2]) / 2.0, boxes[:, 3]], axis=1)
-
-
-def _homogeneous(points: Floats) -> Floats:
-    return np.concatenate([points, np.ones((len(points), 1))], axis=1)
 
 
 def _scaled(points: Floats) -> Floats:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration
+from tracking.detectors.background.views.view_matching import TURNED
 from tracking.detectors.base import Image, Plane
 from tracking.picture_condition.structure import Structure, reduce, structure_of
 from tracking.types import PictureCondition
@@ -37,8 +38,8 @@ _COVERED, _COVERED_WHOLLY = 0.4, 0.75
 _BLURRED, _LEAST_DETAIL = 0.3, 1e-6
 # Squared gradient over that of the noise below which the picture is noisy: edges less than twice the noise.
 _NOISY = 4.0
-# Motion, as a share of the picture's width, from which the camera is turned away; seconds between searches.
-_TURNED, _SEARCH_EVERY_S = 0.1, 1.0
+# Seconds between searches.
+_SEARCH_EVERY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,7 @@ class Reference:
                 aligned = self._aligned(structure, motion)
                 moved = self._shares(aligned, self._aligned(before, motion), noise)
                 if moved.seen >= max(_FOUND, shares.seen):
-                    if motion.distance(STILL, size) > _TURNED * size[0]:
+                    if motion.distance(STILL, size) > TURNED * size[0]:
                         return "turned"
                     structure, shares = aligned, moved
         edges = np.maximum(structure.edges - noise, 0.0)

@@ -51,10 +51,6 @@ class Motion:
             np.sqrt(shift + radius * ((self.grow - other.grow) ** 2 + (self.turn - other.turn) ** 2))
         )
 
-    def scaled(self, factor: float) -> Motion:
-        """Return the motion of a picture that is larger by a factor."""
-        return Motion(self.x * factor, self.y * factor, self.grow, self.turn)
-
     def align(self, image: Image, outside: Image) -> Image:
         """Return a frame `(H, W, 3)` moved to where the background is; where it shows nothing, `outside`."""
         if self == STILL:

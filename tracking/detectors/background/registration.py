@@ -169,10 +169,8 @@ def _smooth_gray(image: Image) -> Plane:
 
 def coarse_shift(one: Image, other: Image) -> float:
     """Return by how much most of a picture has moved to another, as a share of its width."""
-    first, second = (_edges(_quarter(_smooth_gray(image))) for image in (one, other))
-    window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
-    shift, _ = cv2.phaseCorrelate(first, second, window)
-    return math.hypot(*shift) / float(first.shape[1])
+    first, second = (_quarter(_smooth_gray(image)) for image in (one, other))
+    return math.hypot(*_phase_shift(first, second)) / float(first.shape[1])
 
 
 def count_edges(image: Image) -> int:
@@ -276,8 +274,7 @@ class _Alignment:
         level = np.clip(np.rint(self.points.gray), 0, len(self.table) - 1).astype(np.int64)
         expected = _quarter(self.table.astype(np.float32)[level])
         small = _quarter(gray)
-        window = cv2.createHanningWindow((small.shape[1], small.shape[0]), cv2.CV_32F)
-        (x, y), _ = cv2.phaseCorrelate(_edges(expected), _edges(small), window)
+        x, y = _phase_shift(expected, small)
         points = _Points(expected)
         if points.count < _MIN_POINTS // 2:
             return [Motion(4.0 * x, 4.0 * y)]
@@ -293,6 +290,13 @@ _RIDGE = (1.0, 1.0, 10.0, 10.0, 1e4, 10.0)
 
 def _quarter(plane: Plane) -> Plane:
     return np.asarray(cv2.pyrDown(cv2.pyrDown(plane)), dtype=np.float32)
+
+
+def _phase_shift(one: Plane, other: Plane) -> tuple[float, float]:
+    """Return by how many pixels the edges of a plane have moved to another, by their phase correlation."""
+    window = cv2.createHanningWindow((one.shape[1], one.shape[0]), cv2.CV_32F)
+    (x, y), _ = cv2.phaseCorrelate(_edges(one), _edges(other), window)
+    return float(x), float(y)
 
 
 def _edges(plane: Plane) -> Plane:

@@ -33,9 +33,9 @@ class _Arcs:
     target: Ints
     column: Ints
 
-    def where(self, chosen: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints]:
-        """Return row, origin and target of some of the arcs."""
-        return self.row[chosen], self.origin[chosen], self.target[chosen]
+    def select(self, chosen: NDArray[np.bool_]) -> _Arcs:
+        """Return some of the arcs."""
+        return _Arcs(self.row[chosen], self.origin[chosen], self.target[chosen], self.column[chosen])
 
 
 class ProgramFlow:
@@ -152,8 +152,8 @@ class ProgramFlow:
             states[hide.row[used[hide.column]], m + 1] = HIDDEN
         for m in range(self._frames):
             for arcs in (self._enter[m], self._move[m]):
-                row, _, place = arcs.where(used[arcs.column] & (arcs.row < self._known))
-                states[row, m] = place
+                taken = arcs.select(used[arcs.column] & (arcs.row < self._known))
+                states[taken.row, m] = taken.target
         return states
 
     def _arrivals(self, used: NDArray[np.bool_]) -> list[Ints]:
@@ -162,17 +162,15 @@ class ProgramFlow:
         before: dict[int, Ints] = {}  # by place
         for m in range(self._frames):
             here: dict[int, Ints] = {}
-            _, _, entered = self._enter[m].where(
-                used[self._enter[m].column] & (self._enter[m].row == self._known)
+            entered, moved = (
+                arcs.select(used[arcs.column] & (arcs.row == self._known))
+                for arcs in (self._enter[m], self._move[m])
             )
-            for place in sorted(entered.tolist()):
+            for place in sorted(entered.target.tolist()):
                 here[place] = np.full((1, self._frames), GONE)
                 here[place][0, :m] = HIDDEN
                 arrived.append(here[place])
-            _, origins, targets = self._move[m].where(
-                used[self._move[m].column] & (self._move[m].row == self._known)
-            )
-            for origin, target in zip(origins.tolist(), targets.tolist(), strict=True):
+            for origin, target in zip(moved.origin.tolist(), moved.target.tolist(), strict=True):
                 here[target] = before[origin]
             for place, states in here.items():
                 states[0, m] = place

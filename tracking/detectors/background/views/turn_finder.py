@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.detectors.background.views.view_matching import ViewMatch, find_view, shift_of_middle
+from tracking.detectors.background.views.view_matching import TURNED, ViewMatch, find_view, shift_of_middle
 from tracking.detectors.base import Image
 
 # Share of the background's edges that are where they were, from which the camera is not turned.
@@ -10,9 +10,8 @@ _AGREEMENT = 0.7
 # Seconds until the first search, and between the two that must agree; each one without a result waits longer,
 # up to the longest time.
 _FIRST_S, _AGAIN_S, _LONGEST_S = 0.6, 0.4, 5.0
-# Motions of the picture's middle, as shares of its width: of a turned camera at least, and of one that has
-# come to rest at most.
-_TURNED, _RESTS = 0.1, 0.01
+# Largest motion of the picture's middle, as a share of its width, of a camera that has come to rest.
+_RESTS = 0.01
 
 
 class TurnFinder:
@@ -37,7 +36,7 @@ class TurnFinder:
             return None
         before, self._found = self._found, None
         found = find_view(background, image)
-        if found is None or shift_of_middle(found.homography, image) < _TURNED:
+        if found is None or shift_of_middle(found.homography, image) < TURNED:
             self._wait_s = min(2.0 * self._wait_s, _LONGEST_S)
             self._left_s = self._wait_s
         elif before is not None and shift_of_middle(found.homography, image, before.homography) <= _RESTS:

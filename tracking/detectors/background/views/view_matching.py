@@ -23,6 +23,8 @@ _OFF = 2.0
 _TRIES, _CONFIDENCE = 5000, 0.9999
 # Fewest matches that agree, their least share of all, and the least share of the picture that they span.
 _MIN_MATCHES, _MIN_SHARE, _MIN_SPAN = 25, 0.35, 0.03
+TURNED = 0.1
+"""Motion, as a share of the picture's width, from which a camera shows another part of the scene."""
 # Least and largest scale of a picture whose camera was turned, and not moved elsewhere.
 _MIN_SCALE, _MAX_SCALE = 0.5, 2.0
 
