@@ -17,6 +17,7 @@ from server.cli import client_commands, file_commands, site_commands
 from server.cli.calibrate.command import calibrate
 from server.cli.models.command import app as models_app
 from server.supervisor.shutdown import SUPERVISED_VARIABLE
+from server.supervisor.startup_signal import report_refusal
 from server.system.address_redaction import located_reason_of
 from server.system.child_process import terminate_with_parent
 from server.system.descriptors import raise_descriptor_limit
@@ -118,6 +119,7 @@ def _fail(error: Exception) -> None:
     """Print a one-line error and exit; re-raise bugs."""
     if isinstance(error, UserError):
         report_error(str(error))
+        report_refusal(str(error))
         sys.exit(error.code)
     if isinstance(error, BrokenPipeError):  # the reader of the output has exited, as in `… | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from server.config.loader import build_config, load_config, read_content
 from server.config.site_config import Config
 from server.system.errors import UserError
 from server.system.file_state import FileState, file_state
+from server.system.private_files import is_owned_by_this_user
 
 ACTIVE_CONFIG_VARIABLE = "MYVIEW_IN_FORCE"
 """Environment variable with the path of the active configuration, set by `myview up` for its processes.
@@ -78,15 +78,6 @@ class ActiveConfig:
         if isinstance(self._file, UserError):
             return ConfigFileState(str(self._file), ())
         return ConfigFileState("", changed_keys(self.now, self._file))
-
-
-def is_owned_by_this_user(path: Path) -> bool:
-    """Return whether a file or folder exists and belongs to this process's user."""
-    try:
-        status = path.lstat()
-    except OSError:
-        return False
-    return status.st_uid == os.geteuid() and not stat.S_ISLNK(status.st_mode)
 
 
 def serialize_with_absolute_paths(config: Config, folder: Path) -> str:

@@ -25,11 +25,13 @@ class SiteControl:
         restart: set to start all processes again; None: nothing supervises them.
         reload: applies what the configuration file says now, as far as that needs no restart, soon after it
             returns; None: it is not known how.
+        refused: why the last restart went back to the earlier configuration; empty: it did not.
     """
 
     path: Path | None = None
     restart: asyncio.Event | None = None
     reload: Callable[[], None] | None = None
+    refused: str = ""
 
 
 CONTROL = web.AppKey("control", SiteControl)

@@ -176,19 +176,24 @@ class SetupSession:
         self.cameras.append(camera)
         return camera
 
-    async def try_unlisted(self, text: str, user: str, password: str, name: str = "") -> TriedCamera:
+    async def try_unlisted(
+        self, text: str, user: str, password: str, name: str = "", passed_into: Path | None = None
+    ) -> TriedCamera:
         """Try an address without adding the camera to the list.
 
+        Its own video must fit into the streams of the configuration ``passed_into``, if there is one.
+
         Raises:
-            UserError: it is no address, or no picture arrives.
+            UserError: it is no address, no picture arrives, or it does not fit.
         """
-        return await self._tried(parse_address(text, user, password), name)
+        site = "" if passed_into is None else str(passed_into)
+        return await self._tried(parse_address(text, user, password), name, site)
 
-    async def _tried(self, address: CameraAddress, name: str) -> TriedCamera:
-        return TriedCamera(next(self._keys), name, await self._tried_stream(address))
+    async def _tried(self, address: CameraAddress, name: str, site: str = "") -> TriedCamera:
+        return TriedCamera(next(self._keys), name, await self._tried_stream(address, site=site))
 
-    async def _tried_stream(self, address: CameraAddress, which: str = "") -> TriedStream:
-        trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options))
+    async def _tried_stream(self, address: CameraAddress, which: str = "", site: str = "") -> TriedStream:
+        trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options, site))
         if trial.error:
             raise UserError(f"{which}{address.shown}: {trial.error}")
         return TriedStream(address, trial)

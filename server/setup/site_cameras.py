@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from server.config.loader import read_content
+from server.config.loader import load_config, read_content
 from server.setup.camera_address import check_name, free_name
 from server.setup.ground import read_ground
 from server.setup.session import TriedCamera
@@ -38,6 +38,15 @@ def list_cameras(path: Path) -> Sequence[ConfiguredCamera]:
         ConfiguredCamera(str(camera.get("id")), redact_to_host(str(camera.get("source"))))
         for camera in _cameras(path)
     ]
+
+
+def demands_own_video(path: Path, camera_id: str) -> bool:
+    """Return whether a camera of a configuration is only passed through; a new one, without an id, is not.
+
+    Raises:
+        UserError: the configuration is invalid.
+    """
+    return any(camera.passthrough == "pass" for camera in load_config(path).cameras if camera.id == camera_id)
 
 
 def add_camera(path: Path, tried: TriedCamera) -> None:

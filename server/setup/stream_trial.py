@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import av
 import cv2
+import msgspec
 import numpy as np
 from av.video.frame import VideoFrame
 
+from server.camera.passthrough.compatibility import OR_ENCODE, IncompatibleStreamError, required_format
+from server.camera.passthrough.stream_source import check_stream
 from server.camera.sources.opening import OpenedVideo, open_video
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
+from server.config.loader import load_config
 from server.setup.trial_messages import StreamRequest, StreamTrial
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
@@ -35,9 +40,23 @@ def run_trial(request: StreamRequest) -> StreamTrial:
     except UserError as error:
         return StreamTrial(error=str(error).removeprefix(f"{name}: "))
     try:
-        return _watch(opened)
+        trial = _watch(opened)
     finally:
         opened.container.close()
+    if not request.site or trial.error:
+        return trial
+    return msgspec.structs.replace(trial, error=_misfit(request).removeprefix(f"{name}: "))
+
+
+def _misfit(request: StreamRequest) -> str:
+    """Return why a source's own video cannot be passed through into a site's streams; empty: it can."""
+    try:
+        check_stream(request.source, request.options, required_format(load_config(Path(request.site))))
+    except IncompatibleStreamError as error:
+        return f"passthrough: pass: {error}; {OR_ENCODE}"
+    except UserError as error:
+        return str(error)
+    return ""
 
 
 def _watch(opened: OpenedVideo) -> StreamTrial:

@@ -28,6 +28,8 @@ class StreamRequest(msgspec.Struct, frozen=True, tag="stream"):
     source: str
     """With the password."""
     options: dict[str, str] = {}
+    site: str = ""
+    """A configuration file; the source's own video must fit into that site's streams. Empty: it need not."""
 
 
 class ProfilesRequest(msgspec.Struct, frozen=True, tag="profiles"):
@@ -44,7 +46,7 @@ class StreamTrial(msgspec.Struct, frozen=True):
     """What a source sends."""
 
     error: str = ""
-    """Why nothing was received, without passwords; empty: pictures were."""
+    """Why nothing was received, or what does not fit, without passwords; empty: pictures were received."""
     width: int = 0
     height: int = 0
     fps: float = 0.0

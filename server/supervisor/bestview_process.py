@@ -19,7 +19,7 @@ from server.service.service import BestViewService
 from server.supervisor.exposure_checks import check_bus, check_viewers
 from server.supervisor.shutdown import EXIT_RESTART, is_supervised
 from server.supervisor.sighup import reloads
-from server.supervisor.startup_signal import signal_started
+from server.supervisor.startup_signal import REFUSED_RESTART_VARIABLE, signal_started
 from server.supervisor.synthetic_homographies import add_synthetic_homographies
 from server.system.errors import UnavailableError, UserError
 
@@ -48,7 +48,9 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
         pipeline.open_bus()
-        control = SiteControl(running.path, asyncio.Event() if is_supervised() else None, reload)
+        restart = asyncio.Event() if is_supervised() else None
+        refused = os.environ.get(REFUSED_RESTART_VARIABLE, "")
+        control = SiteControl(running.path, restart, reload, refused)
         service = BestViewService(pipeline)
         app = make_app(service, running.on_disk, control)
         async with integrating(service), serving(app, config.http) as port:

@@ -1,4 +1,4 @@
-"""Startup signal: a started process reports that it has loaded, so that the next one can start.
+"""Startup signal: a started process reports that it has loaded, so that the next one can start, or why not.
 
 Loading takes one to two seconds of processor time. Forty processes that load at once would slow each other
 down, and those that serve meanwhile.
@@ -12,6 +12,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+
+from server.system.private_files import is_owned_by_this_user
 
 STARTED_FD_VARIABLE = "MYVIEW_STARTED_FD"
 """Environment variable with the file descriptor that a supervised process closes once it has loaded."""
@@ -21,6 +24,21 @@ def signal_started() -> None:
     """Notify the supervisor, if there is one, that this process has loaded; idempotent."""
     with contextlib.suppress(ValueError, OSError):
         os.close(int(os.environ.pop(STARTED_FD_VARIABLE, "")))
+
+
+REFUSAL_VARIABLE = "MYVIEW_REFUSAL"
+"""Environment variable with a file into which a supervised process writes why it refuses to start."""
+
+REFUSED_RESTART_VARIABLE = "MYVIEW_REFUSED_RESTART"
+"""Environment variable that says why the last restart went back to the earlier configuration, if it did."""
+
+
+def report_refusal(reason: str) -> None:
+    """Report to the supervisor, if there is one, why this process refuses to start."""
+    name = os.environ.get(REFUSAL_VARIABLE)
+    if name is not None and is_owned_by_this_user(Path(name).parent):
+        with contextlib.suppress(OSError):
+            Path(name).write_text(reason, encoding="utf-8")
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,8 @@ class Supervisor:
 
     A camera whose recording is over exits with `EXIT_FINISHED` and is not restarted; when the best-view
     service does, the whole site ends, and so it does when that service exits with `EXIT_RESTART`.
-    ``before_start`` is called whenever a process is about to be started.
+    ``before_start`` is called whenever a process is about to be started. A process that refuses its input at
+    its first start ends the site, unless the site ``has_run`` with this configuration.
 
     The best view and the pulse server start first. Then the cameras, of which only as many load at a time as
     there are processors: the site answers meanwhile.
@@ -68,8 +69,10 @@ class Supervisor:
         environment: Mapping[str, str],
         out: Path | None,
         before_start: Callable[[], None] = lambda: None,
+        *,
+        has_run: bool = False,
     ) -> None:
-        self._before_start = before_start
+        self._before_start, self._has_run = before_start, has_run
         self._environment = {**os.environ, **environment, SUPERVISED_VARIABLE: "1"}
         path = str(config_path)
         self._out = out
@@ -92,8 +95,8 @@ class Supervisor:
             UserError: a process refused its input; its error is in the log above.
         """
         watchers = [asyncio.create_task(self._watch(child), name=child.name) for child in self.children]
+        site_done = asyncio.create_task(self.children[0].done.wait())
         try:
-            site_done = asyncio.create_task(self.children[0].done.wait())
             finished, _ = await asyncio.wait([site_done, *watchers], return_when=asyncio.FIRST_COMPLETED)
             while site_done not in finished:
                 for watcher in finished:
@@ -101,6 +104,7 @@ class Supervisor:
                 pending = [watcher for watcher in watchers if not watcher.done()]
                 finished, _ = await asyncio.wait([site_done, *pending], return_when=asyncio.FIRST_COMPLETED)
         finally:
+            site_done.cancel()
             await self._end(watchers)
 
     def reload(self, name: str) -> None:
@@ -127,7 +131,7 @@ class Supervisor:
                 log.info("%s has ended", child.name)
                 child.done.set()
                 return
-            if code == UserError.code and child.restarts == 0:
+            if code == UserError.code and child.restarts == 0 and not self._has_run:
                 raise UserError(f"{child.name} could not start")
             if loop.time() - started > _STABLE_S:
                 backoff.reset()

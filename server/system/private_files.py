@@ -85,3 +85,12 @@ def close_to_others(path: Path) -> None:
     status = path.stat()
     if status.st_uid == os.geteuid() and status.st_mode & _OTHERS:
         path.chmod(stat.S_IMODE(status.st_mode) & ~_OTHERS)
+
+
+def is_owned_by_this_user(path: Path) -> bool:
+    """Return whether a file or folder exists and belongs to this process's user."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return False
+    return status.st_uid == os.geteuid() and not stat.S_ISLNK(status.st_mode)

@@ -43,6 +43,7 @@
  * @property {boolean} possible
  * @property {string} error why the configuration file cannot be used; empty: it can
  * @property {string[]} changed_keys settings of the file that are not in force
+ * @property {string} refused why the last restart went back to the earlier configuration; empty: it did not
  *
  * @typedef {object} PulseClients /api/operator/pulses
  * @property {string} server

@@ -21,12 +21,13 @@ export class SiteRestart {
   async check() {
     try {
       /** @type {RestartStatus} */
-      const { possible, error, changed_keys: keys } = await requestOperator('restart');
+      const { possible, error, changed_keys: keys, refused } = await requestOperator('restart');
       element('restart').hidden = !keys.length || error !== '';
       this.#button.hidden = !possible;
       this.#button.disabled = false;
       const how = possible ? 'Streams end for some seconds when the site restarts.' : 'Restart its processes where they were started.';
-      setText(this.#state, `Changed in the file, not in force: ${summarize(keys)}. ${how}`);
+      const back = refused && `The last restart went back to the earlier configuration: ${refused}. `;
+      setText(this.#state, `${back}Changed in the file, not in force: ${summarize(keys)}. ${how}`);
     } catch (error) {
       this.showError(error);
     }

@@ -20,6 +20,10 @@ _SAME_RATE = 0.03
 """Relative deviation allowed of a camera's declared rate, which is often rounded."""
 
 
+OR_ENCODE = "change the camera's settings, or let it be encoded (passthrough: auto)"
+"""What to do about a camera that cannot be passed through."""
+
+
 class IncompatibleStreamError(Exception):
     """The camera's stream cannot be passed through; the text says why."""
 

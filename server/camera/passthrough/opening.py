@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from server.camera.audio import LiveAudioSource
-from server.camera.passthrough.compatibility import IncompatibleStreamError, required_format
+from server.camera.passthrough.compatibility import OR_ENCODE, IncompatibleStreamError, required_format
 from server.camera.passthrough.encoder import PassthroughSource
 from server.camera.passthrough.recording_source import PassthroughRecording
 from server.camera.passthrough.stream_source import PassthroughStream
@@ -40,8 +40,7 @@ def open_passthrough(
         return PassthroughOpening(_open(config, camera, listener), "")
     except IncompatibleStreamError as error:
         if camera.passthrough == "pass":
-            hint = "change the camera's settings, or let it be encoded (passthrough: auto)"
-            raise UserError(f"camera {camera.id}: passthrough: pass: {error}; {hint}") from error
+            raise UserError(f"camera {camera.id}: passthrough: pass: {error}; {OR_ENCODE}") from error
         return PassthroughOpening(None, str(error))
     except UserError as error:
         is_stream = source_kind(camera.source) is SourceKind.STREAM

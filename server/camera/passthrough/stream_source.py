@@ -57,7 +57,7 @@ class PassthroughStream(LiveStream):
         *,
         decodes: bool = True,
     ) -> None:
-        _check(url, options, required)
+        check_stream(url, options, required)
         self.decodes = self._is_decoding = decodes
         self._continuity = required.codec.continuity()
         self._required = required
@@ -121,7 +121,7 @@ class PassthroughStream(LiveStream):
         return is_intact
 
 
-def _check(url: str, options: Mapping[str, str], required: RequiredFormat) -> None:
+def check_stream(url: str, options: Mapping[str, str], required: RequiredFormat) -> None:
     """Check a camera's stream, from its first keyframe on.
 
     Raises:

@@ -36,5 +36,6 @@ async def post_restart(request: web.Request) -> web.Response:
 
 def _status(request: web.Request) -> RestartStatus:
     on_disk = request.app[ON_DISK]()
-    possible = request.app[CONTROL].restart is not None
-    return RestartStatus(possible, on_disk.error, list(on_disk.changed_keys))
+    control = request.app[CONTROL]
+    possible = control.restart is not None
+    return RestartStatus(possible, on_disk.error, list(on_disk.changed_keys), control.refused)

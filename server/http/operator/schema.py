@@ -49,6 +49,8 @@ class RestartStatus(msgspec.Struct, frozen=True):
     """Why the configuration file cannot be used; empty: it can."""
     changed_keys: list[str]
     """Settings of the file that are not in force."""
+    refused: str
+    """Why the last restart went back to the earlier configuration; empty: it did not."""
 
 
 class SiteCamera(msgspec.Struct, frozen=True):

@@ -16,7 +16,14 @@ from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteCamera, SiteCameras
 from server.http.operator.setup import Login, Name
-from server.setup.site_cameras import add_camera, list_cameras, readdress_camera, remove_camera, rename_camera
+from server.setup.site_cameras import (
+    add_camera,
+    demands_own_video,
+    list_cameras,
+    readdress_camera,
+    remove_camera,
+    rename_camera,
+)
 from server.system.errors import UserError
 
 routes = web.RouteTableDef()
@@ -59,12 +66,13 @@ async def post_site_camera(request: web.Request) -> web.Response:
     """Try a camera; if it sends pictures, add it to the file, or give another one its address."""
     wanted = await read_json(request, CameraToAdd)
     try:
-        config_path(request)
+        path = config_path(request)
+        is_passed = await asyncio.to_thread(demands_own_video, path, wanted.camera)
     except UserError as error:
         return error_response(409, str(error))
     try:
         tried = await request.app[SETUP].try_unlisted(
-            wanted.address, wanted.user, wanted.password, wanted.name
+            wanted.address, wanted.user, wanted.password, wanted.name, path if is_passed else None
         )
     except UserError as error:
         return error_response(400, str(error))

@@ -3,95 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-import os
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Any
 
 import pytest
+import yaml
 
-from fakes.service.scripted_cameras import CAMERAS, small_config
+from fakes.system.supervised_processes import Machine, Process
 from fakes.timeouts import PATIENCE
+from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
 from server.supervisor import supervisor
 from server.supervisor.shutdown import EXIT_FINISHED, EXIT_RESTART
-from server.supervisor.startup_signal import STARTED_FD_VARIABLE
-from server.supervisor.supervisor import Supervisor
+from server.supervisor.site import run_up
+from server.supervisor.startup_signal import REFUSAL_VARIABLE, REFUSED_RESTART_VARIABLE
 from server.system.errors import UserError
-
-NOBODY = 2**22 + 1  # more than a process's number can be (proc(5), pid_max)
-
-
-class Process:
-    """A simulated process; ``ready`` is the descriptor that it closes once it has loaded."""
-
-    pid = NOBODY
-
-    def __init__(self, arguments: tuple[str, ...], ready: int) -> None:
-        self.arguments = arguments
-        self._ready: int | None = ready
-        self.returncode: int | None = None
-        self._over = asyncio.Event()
-
-    def loaded(self) -> None:
-        if self._ready is not None:
-            os.close(self._ready)
-        self._ready = None
-
-    def end(self, code: int) -> None:
-        self.loaded()
-        self.returncode = code
-        self._over.set()
-
-    async def wait(self) -> int:
-        await self._over.wait()
-        assert self.returncode is not None
-        return self.returncode
-
-    def terminate(self) -> None:
-        self.end(-15)
-
-    kill = terminate
-
-
-class Machine:
-    """A simulated machine for a supervisor; processes load at once, or when the test lets them."""
-
-    def __init__(self) -> None:
-        self.loads_at_once = True
-        self.started: asyncio.Queue[Process] = asyncio.Queue()
-        self.task: asyncio.Task[None] | None = None
-        self.supervisor: Supervisor | None = None
-
-    async def start(self, *command: str, env: dict[str, str], pass_fds: tuple[int], **_: Any) -> Process:
-        assert env[STARTED_FD_VARIABLE] == str(pass_fds[0])
-        process = Process(command[3:], os.dup(pass_fds[0]))
-        if self.loads_at_once:
-            process.loaded()
-        self.started.put_nowait(process)
-        return process
-
-    async def processes(self, count: int) -> dict[str, Process]:
-        """Return the next started processes by role."""
-        found = [await self.started.get() for _ in range(count)]
-        return {
-            process.arguments[-1 if process.arguments[0] == "camera" else 0]: process for process in found
-        }
-
-    async def nothing_more(self) -> None:
-        """Check that no other process is started."""
-        for _ in range(20):  # turns of the event loop
-            await asyncio.sleep(0)
-        assert self.started.empty()
-
-    def run(
-        self,
-        out: Path | None = None,
-        before_start: Callable[[], None] = lambda: None,
-        cameras: tuple[str, ...] = CAMERAS,
-    ) -> asyncio.Task[None]:
-        self.supervisor = Supervisor(Path("site.yaml"), small_config(cameras=cameras), {}, out, before_start)
-        self.task = asyncio.create_task(self.supervisor.run())
-        return self.task
 
 
 @pytest.fixture
@@ -230,6 +155,65 @@ async def test_a_process_that_ran_before_is_restarted_even_if_it_refuses_its_inp
     for code in (-9, 2, 2):
         processes["c0"].end(code)
         processes |= await machine.processes(1)
+
+
+MISFIT = "camera c1: passthrough: pass: its frames are 64x48, the site's 640x360"
+
+
+def write_site(path: Path, source: str) -> None:
+    cameras = [
+        {"id": "c0", "source": "rtsp://10.0.0.1/"},
+        {"id": "c1", "source": source, "passthrough": "pass"},
+    ]
+    path.write_text(yaml.safe_dump({"cameras": cameras}))
+
+
+def refuse(process: Process, reason: str) -> None:
+    Path(process.environment[REFUSAL_VARIABLE]).write_text(f"{reason}\n")
+    process.end(2)
+
+
+def active_source(process: Process) -> str:
+    """Return the source of c1 in the configuration that a process reads."""
+    content = yaml.safe_load(Path(process.environment[ACTIVE_CONFIG_VARIABLE]).read_text())
+    return str(content["cameras"][1]["source"])
+
+
+async def test_a_restart_that_a_process_refuses_goes_back_to_the_earlier_configuration(
+    machine: Machine, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "site.yaml"
+    write_site(path, "rtsp://10.0.0.2/")
+    running = ActiveConfig(path)
+    machine.task = asyncio.create_task(run_up(running, {}, None))
+    processes = await machine.processes(4)
+    write_site(path, "rtsp://10.0.0.3/")
+    processes["bestview"].end(EXIT_RESTART)
+    processes = await machine.processes(4)
+    assert active_source(processes["c1"]) == "rtsp://10.0.0.3/"
+    refuse(processes["c1"], MISFIT)
+    processes = await machine.processes(4)
+    assert active_source(processes["c1"]) == "rtsp://10.0.0.2/"
+    assert f"{MISFIT}; all processes start again with the previous configuration" in caplog.messages
+    assert processes["bestview"].environment[REFUSED_RESTART_VARIABLE] == MISFIT
+    refuse(processes["c1"], "that camera sends something else by now, too")  # but it has run: others go on
+    assert set(await machine.processes(1)) == {"c1"}
+    assert processes["c0"].returncode is processes["bestview"].returncode is None
+    write_site(path, "rtsp://10.0.0.4/")
+    processes["bestview"].end(EXIT_RESTART)
+    processes = await machine.processes(4)
+    assert active_source(processes["c1"]) == "rtsp://10.0.0.4/"
+    assert processes["bestview"].environment[REFUSED_RESTART_VARIABLE] == ""
+
+
+async def test_a_configuration_that_was_never_in_force_ends_the_site_if_refused(
+    machine: Machine, tmp_path: Path
+) -> None:
+    write_site(tmp_path / "site.yaml", "rtsp://10.0.0.2/")
+    machine.task = asyncio.create_task(run_up(ActiveConfig(tmp_path / "site.yaml"), {}, None))
+    refuse((await machine.processes(4))["c1"], MISFIT)
+    with pytest.raises(UserError, match="c1 could not start"):
+        await machine.task
 
 
 async def test_a_restarted_best_view_writes_into_a_new_folder(machine: Machine) -> None:

@@ -32,7 +32,7 @@ from server.service.rendering import rendered_stream as stream_source
 from server.service.rendering.decided_boxes import NO_OVERLAY
 from server.service.rendering.worker import stream_renderer
 from server.service.streaming.broadcaster import Broadcaster
-from server.supervisor.site import _write_active_config
+from server.supervisor.site import SiteProcesses
 from server.system.worker.process import WorkerDiedError
 
 KEYS = ZenohKeys("hall")
@@ -212,9 +212,9 @@ def test_an_unwritable_folder_is_logged_once_for_many_starts(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "file").write_text("")
-    spell = LogThrottle()
     running: Any = SimpleNamespace(path=tmp_path / "site.yaml", now=small_config())
+    processes = SiteProcesses(running, tmp_path / "file" / "folder", {})
     for _ in range(5):
-        _write_active_config(running, tmp_path / "file" / "folder" / "site.yaml", spell)
+        processes.write_active_config()
     assert len(caplog.messages) == 1
     assert "cannot write the running configuration" in caplog.messages[0]

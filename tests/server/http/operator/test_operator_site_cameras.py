@@ -13,7 +13,8 @@ import pytest
 from fakes.http.tokens import bearer, serve_with_tokens
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.service.fed_site import ServedSite, serve_site
-from fakes.service.scripted_cameras import FPS, encoded
+from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
+from server.config.loader import load_config
 from server.http.access.csrf import CSRF_HEADER
 from server.http.app_keys import SiteControl
 
@@ -76,6 +77,34 @@ async def test_a_camera_gets_the_address_of_one_that_was_tried(site: ServedSite,
         {"cameras": [{"camera": "c0", "address": shown}, BEFORE[1]]},
     )
     assert await send(site, "POST", {**wanted, "camera": "c7"}) == (409, {"error": "there is no camera 'c7'"})
+
+
+@pytest.mark.parametrize(
+    ("width", "error"),
+    [
+        (WIDTH, None),
+        (128, "passthrough: pass: its frames are 64x48, the site's 128x48 (site.width, site.height)"),
+    ],
+)
+async def test_a_camera_that_is_passed_through_gets_no_address_whose_video_does_not_fit(
+    site: ServedSite, stream: RtspCamera, path: Path, width: int, error: str | None
+) -> None:
+    text = f"""\
+site: {{width: {width}, height: {HEIGHT}, fps: {FPS}}}
+encode: {{gop_s: 0.2}}
+cameras: [{{id: c0, source: 'rtsp://10.0.0.1/', passthrough: pass}}]
+"""
+    path.write_text(text)
+    wanted = {"address": stream.url, "user": LOGIN[0], "password": LOGIN[1], "camera": "c0"}
+    status, answer = await send(site, "POST", wanted)
+    if error is None:
+        assert (status, load_config(path).camera("c0").passthrough) == (200, "pass")
+        return
+    shown = stream.url.replace("live", "...")
+    advice = "change the camera's settings, or let it be encoded (passthrough: auto)"
+    assert (status, answer) == (400, {"error": f"{shown}: {error}; {advice}"})
+    assert path.read_text() == text
+    assert (await send(site, "POST", {**wanted, "camera": ""}))[0] == 200  # a new one is encoded
 
 
 async def test_a_camera_that_sends_no_pictures_is_not_added(

@@ -52,13 +52,14 @@ async def post(session: aiohttp.ClientSession, path: str, body: Any = None) -> t
 
 
 async def test_a_supervised_site_is_restarted_on_request() -> None:
-    control = SiteControl(Path("site.yaml"), asyncio.Event())
+    control = SiteControl(Path("site.yaml"), asyncio.Event(), refused="c0 does not fit")
     async with served(control) as session:
         async with session.get(RESTART) as answer:
             assert await answer.json() == {
                 "possible": True,
                 "error": "",
                 "changed_keys": ["cameras.c0.ground"],
+                "refused": "c0 does not fit",
             }
         assert not control.restart.is_set()
         assert (await post(session, RESTART))[0] == 200
