@@ -7,6 +7,7 @@ into persons, and `registry` assigns, corrects and remembers person ids.
 
 from bestview.association.registry.corrections import IdentityUpdate, Merge, Split
 from bestview.association.registry.identity_registry import IdentityRegistry
+from bestview.association.registry.other_sites import IdSeries, RemoteSighting
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import AppearanceHistogram, TrackUpdate
@@ -14,11 +15,13 @@ from bestview.association.tracklet import TrackKey, TrackletKey
 
 __all__ = [
     "AppearanceHistogram",
+    "IdSeries",
     "IdentityRegistry",
     "IdentitySettings",
     "IdentityUpdate",
     "Merge",
     "Person",
+    "RemoteSighting",
     "Split",
     "TrackKey",
     "TrackUpdate",

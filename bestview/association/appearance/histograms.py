@@ -91,15 +91,12 @@ class HistogramEqualizer:
         """Return equalized cumulative histograms: (N, B) -> (N, 33), rising to 1."""
         bins = histograms.shape[1]
         prior = np.full(bins, _PRIOR_TRACKS / bins)
-        reference = np.cumsum(prior + self._sums.get((camera, bins), 0.0))
-        edges = np.concatenate([[0.0], reference / reference[-1]])
-        cumulative = np.cumsum(np.pad(histograms, ((0, 0), (1, 0))), axis=1)
-        # The positions of the steps between the edges are the same for all histograms.
-        steps = np.linspace(0.0, 1.0, CDF_POINTS)
-        left = np.minimum(np.searchsorted(edges, steps, side="right") - 1, bins - 1)
-        slope = (cumulative[:, left + 1] - cumulative[:, left]) / (edges[left + 1] - edges[left])
-        inside = slope * (steps - edges[left]) + cumulative[:, left]
-        return np.asarray(np.where(steps < edges[-1], inside, cumulative[:, -1:]))
+        return equalized_by(prior + self._sums.get((camera, bins), 0.0), histograms)
+
+    def population(self, bins: int) -> NDArray[np.float64]:
+        """Return the sum of the normalized (B,) histograms of all tracks, of all cameras."""
+        sums = [total for (_, size), total in self._sums.items() if size == bins]
+        return np.asarray(np.sum([np.zeros(bins), *sums], axis=0))
 
     def add_different_people(self, distances: NDArray[np.float64]) -> None:
         """Store distances between people who were seen simultaneously in one camera."""
@@ -114,6 +111,20 @@ class HistogramEqualizer:
         if len(self._different) < _ENOUGH_PAIRS:
             return maximum
         return min(maximum, quartile_factor * float(np.percentile(np.array(self._different), 25)))
+
+
+def equalized_by(reference: NDArray[np.float64], histograms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return cumulative histograms over the quantiles of a reference: (B,) and (N, B) -> (N, 33)."""
+    bins = histograms.shape[1]
+    total = np.cumsum(reference)
+    edges = np.concatenate([[0.0], total / total[-1]])
+    cumulative = np.cumsum(np.pad(histograms, ((0, 0), (1, 0))), axis=1)
+    # The positions of the steps between the edges are the same for all histograms.
+    steps = np.linspace(0.0, 1.0, CDF_POINTS)
+    left = np.minimum(np.searchsorted(edges, steps, side="right") - 1, bins - 1)
+    slope = (cumulative[:, left + 1] - cumulative[:, left]) / (edges[left + 1] - edges[left])
+    inside = slope * (steps - edges[left]) + cumulative[:, left]
+    return np.asarray(np.where(steps < edges[-1], inside, cumulative[:, -1:]))
 
 
 def cdf_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bestview.association.affinity.affinity_fusion import AffinityFusion
 from bestview.association.affinity.affinity_matrix import SCORED_S, AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
+from bestview.association.appearance.histograms import MeanHistogram
 from bestview.association.co_occurrence import (
     GroundTrajectories,
     pairs_in_one_camera_frame,
@@ -17,6 +18,12 @@ from bestview.association.co_occurrence import (
 )
 from bestview.association.ghost_check import GhostCheck
 from bestview.association.registry.corrections import IdCorrections, IdentityUpdate, Merge, Split, swap_tracks
+from bestview.association.registry.other_sites import (
+    SINGLE_SITE,
+    IdSeries,
+    RemoteSighting,
+    looks_in_all_cameras,
+)
 from bestview.association.registry.people import PersonStore
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
@@ -42,6 +49,7 @@ class IdentityRegistry:
         homographies: by camera name, image pixels -> common ground plane; None: not calibrated.
         overhead: the cameras that look straight down.
         fps: frames per second; bounds the distance walked between frames.
+        ids: those to assign, where several sites share their people.
 
     Raises:
         ValueError: an invalid homography.
@@ -53,6 +61,7 @@ class IdentityRegistry:
         homographies: Mapping[str, NDArray[np.float64] | None],
         overhead: Collection[str] = (),
         fps: float = 25.0,
+        ids: IdSeries = SINGLE_SITE,
     ) -> None:
         self._settings = resolved = settings.resolve(fps)
         self._overhead = frozenset(overhead)
@@ -66,7 +75,7 @@ class IdentityRegistry:
         calibrated = {camera: matrix is not None for camera, matrix in self._homographies.items()}
         self._cross_camera = CrossCameraAppearance(resolved, calibrated)
         self._splitter = TrackletSplitter(resolved)
-        self._people = PersonStore(resolved, len(self._homographies))
+        self._people = PersonStore(resolved, len(self._homographies), ids)
         # Whether a person should be detected is only known for views in which people stand upright.
         self._ghost_check = GhostCheck(
             {
@@ -216,6 +225,28 @@ class IdentityRegistry:
     def restore(self, people: Iterable[Person]) -> None:
         """Add people whom another run remembers, before their first track is observed here."""
         self._people.restore(people)
+
+    def see_elsewhere(
+        self, sightings: Iterable[RemoteSighting], populations: Mapping[str, NDArray[np.float64]]
+    ) -> None:
+        """Add people whom other sites see or have seen: who arrives here can be one who has left there.
+
+        `populations` are what `population` returns at these sites, by their names.
+        """
+        self._people.see_elsewhere(sightings, populations)
+
+    def population(self, bins: int) -> NDArray[np.float64]:
+        """Return the sum of the (B,) histograms of all tracks: how this site's cameras render people."""
+        return self._cross_camera.equalizer.population(bins)
+
+    def looks(self, people: Iterable[int]) -> dict[int, MeanHistogram]:
+        """Return how these people look in this site's cameras, by id, as far as it is known."""
+        parts = {person_id: [self._people.appearance(person_id)] for person_id in people}
+        for tracklet in self._splitter.active:
+            if tracklet.person_id in parts:
+                parts[tracklet.person_id].append(tracklet.appearance)
+        found = {person_id: looks_in_all_cameras(each) for person_id, each in parts.items()}
+        return {person_id: looks for person_id, looks in found.items() if looks is not None}
 
     def renumber(self, ids: Mapping[int, int]) -> None:
         """Replace ids by those of another run, one to one: by id, the new one, which nobody else has."""

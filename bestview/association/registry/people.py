@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
+from bestview.association.appearance.histograms import PersonAppearance
 from bestview.association.registry.corrections import Merge
+from bestview.association.registry.other_sites import SINGLE_SITE, IdSeries, RemoteSighting
 from bestview.association.registry.person import Person
 from bestview.association.registry.reidentification import LostPerson, Reidentifier
 from bestview.association.settings import ResolvedIdentitySettings
@@ -20,12 +23,12 @@ from bestview.association.tracklet_clusters import TrackletCluster
 class PersonStore:
     """The known people by id."""
 
-    def __init__(self, settings: ResolvedIdentitySettings, cameras: int) -> None:
-        self._settings = settings
+    def __init__(self, settings: ResolvedIdentitySettings, cameras: int, ids: IdSeries = SINGLE_SITE) -> None:
+        self._settings, self._ids = settings, ids
         self._reidentifier = Reidentifier(settings, cameras)
         self._by_id: dict[int, Person] = {}
-        self.next_id = 1
-        """The first id that was never assigned."""
+        self.next_id = ids.first_from(1)
+        """The first id of the series that was never assigned."""
 
     def __len__(self) -> int:
         """Return the number of people remembered."""
@@ -41,7 +44,7 @@ class PersonStore:
         return [
             person
             for _, person in sorted(self._by_id.items())
-            if person.settled_frames and person.last_frame >= earliest
+            if person.settled_frames and person.last_frame >= earliest and not person.elsewhere
         ]
 
     def assign_ids(
@@ -98,7 +101,8 @@ class PersonStore:
         lost = [
             LostPerson(person, by_id.get(person_id))
             for person_id, person in sorted(self._by_id.items())
-            if person_id not in by_id or by_id[person_id].last_frame < frame - self._settings.gap_frames
+            if not person.visible_elsewhere
+            and (person_id not in by_id or by_id[person_id].last_frame < frame - self._settings.gap_frames)
         ]
         matches = self._reidentifier.match(new, lost, affinity, cross_camera, frame)
         created = []
@@ -106,11 +110,14 @@ class PersonStore:
             if match >= 0:
                 cluster.person_id = lost[match].person.person_id
                 continue
-            cluster.person_id = self.next_id
-            self._by_id[cluster.person_id] = Person(cluster.person_id)
+            cluster.person_id = self._create().person_id
             created.append(cluster.person_id)
-            self.next_id += 1
         return tuple(created)
+
+    def _create(self) -> Person:
+        person = self._by_id[self.next_id] = Person(self.next_id)
+        self._reserve_after(person.person_id)
+        return person
 
     def _is_confirmed(
         self, new: TrackletCluster, frame: int, count_missing_cameras: Callable[[TrackletCluster], int]
@@ -145,9 +152,7 @@ class PersonStore:
 
     def split_off(self, people: Iterable[int], cameras: Iterable[str], frame: int) -> int:
         """Create a person that these cameras see and that was confused with these people; return the id."""
-        new = Person(self.next_id)
-        self.next_id += 1
-        self._by_id[new.person_id] = new
+        new = self._create()
         for camera in cameras:
             new.add_sighting(camera, frame)
         self.include_in_clustering([new.person_id, *people])
@@ -155,22 +160,42 @@ class PersonStore:
 
     def reserve_below(self, person_id: int) -> None:
         """Assign only ids from this one on."""
-        self.next_id = max(self.next_id, person_id)
+        self.next_id = max(self.next_id, self._ids.first_from(person_id))
+
+    def _reserve_after(self, person_id: int) -> None:
+        """Assign no id up to this one any more; one of another site's series does not count."""
+        if self._ids.has(person_id):
+            self.reserve_below(person_id + 1)
 
     def recall(self, person_id: int, frame: int) -> None:
         """Restore a person last seen in a frame."""
-        self.reserve_below(person_id + 1)
+        self._reserve_after(person_id)
         self._by_id.setdefault(person_id, Person(person_id, frame))
+
+    def see_elsewhere(
+        self, sightings: Iterable[RemoteSighting], populations: Mapping[str, NDArray[np.float64]]
+    ) -> None:
+        """Add what other sites know about people, and how they render them, by site."""
+        for site, population in populations.items():
+            self._reidentifier.populations.put(site, population)
+        for sighting in sightings:
+            unknown = Person(sighting.person_id, departed=True)
+            self._by_id.setdefault(sighting.person_id, unknown).see_elsewhere(sighting)
 
     @property
     def all_people(self) -> list[Person]:
         """All people, by id."""
         return [person for _, person in sorted(self._by_id.items())]
 
+    def appearance(self, person_id: int) -> PersonAppearance:
+        """Return a person's settled appearance; empty: they are not known."""
+        person = self._by_id.get(person_id)
+        return PersonAppearance() if person is None else person.appearance
+
     def restore(self, people: Iterable[Person]) -> None:
         """Add people whom another run knows; those known here stay as they are."""
         for person in people:
-            self.reserve_below(person.person_id + 1)
+            self._reserve_after(person.person_id)
             self._by_id.setdefault(person.person_id, person)
 
     def renumber(self, ids: Mapping[int, int]) -> None:
@@ -178,7 +203,8 @@ class PersonStore:
         self._by_id = {ids.get(person_id, person_id): person for person_id, person in self._by_id.items()}
         for person_id, person in self._by_id.items():
             person.person_id = person_id
-        self.reserve_below(max(ids.values(), default=0) + 1)
+        for person_id in ids.values():
+            self._reserve_after(person_id)
 
     def include_in_clustering(self, person_ids: Iterable[int]) -> None:
         """Make people take part in clustering, so that they can have cannot-links."""
@@ -210,7 +236,7 @@ class PersonStore:
         returned: list[int] = []
         departed: list[int] = []
         for person_id, person in sorted(self._by_id.items()):
-            is_absent = frame - person.last_frame > self._settings.departed_after
+            is_absent = person.elsewhere or frame - person.last_frame > self._settings.departed_after
             if is_absent != person.departed:
                 (departed if is_absent else returned).append(person_id)
                 person.departed = is_absent
@@ -219,7 +245,7 @@ class PersonStore:
     def forget(self, people: Iterable[int]) -> None:
         """Forget people; their ids are not assigned again."""
         for person_id in people:
-            self.reserve_below(person_id + 1)
+            self._reserve_after(person_id)
             self._by_id.pop(person_id, None)
 
     def forget_departed(self, frame: int) -> None:

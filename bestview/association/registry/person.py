@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bestview.association.affinity.travel_times import CameraSighting
-from bestview.association.appearance.histograms import PersonAppearance
+from bestview.association.appearance.histograms import MeanHistogram, PersonAppearance
+from bestview.association.registry.other_sites import RemoteSighting
 
 
 @dataclass(slots=True, eq=False)
@@ -20,6 +21,9 @@ class Person:
         appearance: of the settled tracklets.
         settled_frames: their frames that were published with this id.
         unused_since: frame since which no cluster has the id; -1: one has it.
+        remote_looks: at other sites, by site.
+        elsewhere: another site has seen them last; they take part in no clustering.
+        visible_elsewhere: it sees them now, so that nobody here is them.
     """
 
     person_id: int
@@ -29,6 +33,9 @@ class Person:
     appearance: PersonAppearance = field(default_factory=PersonAppearance)
     settled_frames: int = 0
     unused_since: int = -1
+    remote_looks: dict[str, MeanHistogram] = field(default_factory=dict)
+    elsewhere: bool = False
+    visible_elsewhere: bool = False
 
     @property
     def last_sighting(self) -> CameraSighting:
@@ -39,9 +46,19 @@ class Person:
         """Record a sighting."""
         if frame > self.last_frame or (frame == self.last_frame and camera < self.camera):
             self.last_frame, self.camera = frame, camera
+            self.elsewhere = self.visible_elsewhere = False
+
+    def see_elsewhere(self, sighting: RemoteSighting) -> None:
+        """Record that another site sees the person, unless this one has seen them since."""
+        if sighting.looks is not None:
+            self.remote_looks[sighting.site] = sighting.looks
+        if self.elsewhere or sighting.frame > self.last_frame:
+            self.last_frame, self.camera = sighting.frame, sighting.camera_name
+            self.elsewhere, self.visible_elsewhere = True, sighting.is_visible
 
     def merge(self, other: Person) -> None:
         """Add everything known about `other`: the two are one person."""
         self.appearance.add_all(other.appearance)
         self.add_sighting(other.camera, other.last_frame)
         self.settled_frames += other.settled_frames
+        self.remote_looks = other.remote_looks | self.remote_looks

@@ -19,6 +19,7 @@ from bestview.association.appearance.histograms import (
     PersonAppearance,
     cdf_distance,
 )
+from bestview.association.registry.other_sites import SitePopulations
 from bestview.association.registry.person import Person
 from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet_clusters import TrackletCluster
@@ -27,6 +28,8 @@ Floats = NDArray[np.float64]
 _AMBIGUITY_RATIO = 1.5
 """How many times further the second best must be before appearance alone decides."""
 _FORBIDDEN_COST = 1e6
+_CLOCKS_S = 1.0
+"""Seconds by which the time of another site's sighting may be wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +63,7 @@ class Reidentifier:
         self._travel = TravelTimeModel(settings, cameras)
         self._covisible_cameras: set[tuple[str, str]] = set()
         """Pairs of cameras that have seen one person at the same time."""
+        self.populations = SitePopulations()
 
     def learn_covisible_cameras(self, clusters: Iterable[TrackletCluster], frame: int) -> None:
         """Learn from clusters which cameras see the same people simultaneously: their views overlap."""
@@ -94,13 +98,14 @@ class Reidentifier:
             [lost_person.person.last_sighting for lost_person in lost],
         )
         time = self._travel.evidence(arrivals, departures)
-        by_appearance = match_by_appearance(
-            cross_camera.equalizer, *appearances, possible, cross_camera.same_person_gate
-        )
+        distances = appearance_distances(cross_camera.equalizer, *appearances)
+        remote_looks = [lost_person.person.remote_looks for lost_person in lost]
+        between_sites = self.populations.distances(cross_camera.equalizer, appearances[0], remote_looks)
+        distances = np.where(np.isnan(distances), between_sites, distances)
+        gate = cross_camera.same_person_gate
+        by_appearance = match_by_appearance(distances, possible, gate)
         distance_factor = np.exp(-time / self._settings.travel_appearance_weight)
-        matches = match_by_appearance(
-            cross_camera.equalizer, *appearances, possible, cross_camera.same_person_gate, distance_factor
-        )
+        matches = match_by_appearance(distances * distance_factor, possible, gate)
         for i, match in enumerate(by_appearance):
             if match < 0:
                 continue
@@ -125,6 +130,10 @@ class Reidentifier:
     ) -> bool:
         """Return whether a new cluster may be matched with a lost person by appearance and travel time."""
         known_cluster = lost.cluster
+        if lost.person.elsewhere and known_cluster is None:
+            # Nobody is here before they have left the other site; its frames are known less exactly.
+            margin = _CLOCKS_S * self._settings.fps
+            return _first_sighting(new).frame > lost.person.last_frame - margin
         if known_cluster is None:
             # A person who took part in clustering and has no cluster is in that of another id.
             return lost.person.last_frame < frame - self._settings.comparable_frames
@@ -146,35 +155,25 @@ def _first_sighting(new: TrackletCluster) -> CameraSighting:
     return CameraSighting(camera, frame)
 
 
-def match_by_appearance(
-    equalizer: HistogramEqualizer,
-    new: Sequence[PersonAppearance],
-    lost: Sequence[PersonAppearance],
-    possible: NDArray[np.bool_],
-    gate: float,
-    distance_factor: Floats | float = 1.0,
-) -> list[int]:
+def match_by_appearance(distances: Floats, possible: NDArray[np.bool_], gate: float) -> list[int]:
     """Match new people with lost people by appearance, in one linear assignment.
 
     A match counts only if no other candidate is nearly as similar: a wrong id is worse than a new one.
 
     Args:
-        equalizer: compares histograms of different cameras.
-        new: N of them.
-        lost: L of them.
+        distances: (N, L) of new from lost people, other evidence included; NaN: unknown.
         possible: (N, L); False: certainly not one person.
         gate: distance below which two appearances are likely of one person.
-        distance_factor: (N, L) factor on the distances, for other evidence.
 
     Returns:
         For each new person the index of the lost one, or -1.
     """
-    if not new or not lost:
-        return [-1] * len(new)
-    distance = np.where(possible, appearance_distances(equalizer, new, lost) * distance_factor, np.nan)
+    matches = [-1] * len(distances)
+    if not distances.size:
+        return matches
+    distance = np.where(possible, distances, np.nan)
     acceptable = unambiguous_minima(distance, _AMBIGUITY_RATIO) & (distance <= gate)
     row, column = scipy.optimize.linear_sum_assignment(np.where(acceptable, distance, _FORBIDDEN_COST))
-    matches = [-1] * len(new)
     for i, j in zip(row.tolist(), column.tolist(), strict=True):
         if acceptable[i, j]:
             matches[i] = j

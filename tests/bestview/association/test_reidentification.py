@@ -66,11 +66,11 @@ def test_matches_are_one_to_one_and_possible(
     shape = (len(found), len(lost))
     flat = data.draw(st.lists(st.booleans(), min_size=shape[0] * shape[1], max_size=shape[0] * shape[1]))
     possible = np.array(flat, dtype=np.bool_).reshape(shape)
-    answer = match_by_appearance(HistogramEqualizer(), found, lost, possible, gate)
+    distance = appearance_distances(HistogramEqualizer(), found, lost)
+    answer = match_by_appearance(distance, possible, gate)
     assert len(answer) == len(found)
     again = [index for index in answer if index >= 0]
     assert len(again) == len(dict.fromkeys(again))
-    distance = appearance_distances(HistogramEqualizer(), found, lost)
     for new, old in enumerate(answer):
         if old >= 0:
             assert possible[new, old]
@@ -106,9 +106,8 @@ def test_an_incomparable_histogram_counts_as_none() -> None:
     for histogram in (np.zeros(0), np.zeros(BINS), np.full(BINS, np.nan), np.full(BINS, -1.0)):
         appearance.add("c0", MeanHistogram.of(histogram, 5))
     assert appearance.by_camera == {}
-    assert match_by_appearance(
-        HistogramEqualizer(), [appearance], [appearance], np.ones((1, 1), dtype=np.bool_), 1.0
-    ) == [-1]
+    distances = appearance_distances(HistogramEqualizer(), [appearance], [appearance])
+    assert match_by_appearance(distances, np.ones((1, 1), dtype=np.bool_), 1.0) == [-1]
 
 
 DISTANCES = st.lists(st.floats(0, 1), max_size=8).map(lambda values: np.array(values, dtype=np.float64))
