@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -10,6 +12,8 @@ from server.config.sections import SiteSettings
 from server.setup.site_file import check_text, replace_file
 from server.setup.yaml_edit import changed_values_text
 from server.system.errors import UserError
+
+_CHANGED = "the site's settings were changed in the configuration meanwhile: look, and change them again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +24,11 @@ class StreamFormatChoice:
     fps: float
     width: int
     height: int
+
+    @property
+    def digest(self) -> str:
+        """Tells whether they have changed."""
+        return hashlib.sha256(json.dumps(asdict(self)).encode()).hexdigest()
 
 
 def read_choice(path: Path) -> StreamFormatChoice:
@@ -32,14 +41,19 @@ def read_choice(path: Path) -> StreamFormatChoice:
     return StreamFormatChoice(site.name, site.fps, site.width, site.height)
 
 
-def save_choice(path: Path, choice: StreamFormatChoice) -> None:
+def save_choice(path: Path, choice: StreamFormatChoice, digest: str | None = None) -> None:
     """Change the settings in a configuration file; the earlier file is kept.
 
+    ``digest`` is that of the settings that the change is based on; None: it is made whatever they are.
+
     Raises:
-        UserError: the file or what it would become is invalid, a camera's own video would no longer fit, or
-            it cannot be written.
+        UserError: the settings have changed meanwhile, the file or what it would become is invalid, a
+            camera's own video would no longer fit, or it cannot be written.
     """
-    before = asdict(read_choice(path))
+    present = read_choice(path)
+    if digest is not None and present.digest != digest:
+        raise UserError(_CHANGED)
+    before = asdict(present)
     changed = {key: value for key, value in asdict(choice).items() if value != before[key]}
     if not changed:
         return

@@ -37,7 +37,7 @@
  * @property {string} camera
  * @property {string} address without passwords
  *
- * @typedef {{name: string, fps: number, width: number, height: number}} SiteFormat /api/operator/site_settings
+ * @typedef {{name: string, fps: number, width: number, height: number, digest: string}} SiteFormat /api/operator/site_settings
  *
  * @typedef {object} RestartStatus /api/operator/restart
  * @property {boolean} possible

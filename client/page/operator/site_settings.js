@@ -8,6 +8,7 @@ import { element, setText } from '../shared/dom.js';
 
 export class SiteSettings {
   #state = element('site-state');
+  #digest = ''; // of the settings that are shown, before they are edited
 
   /**
    * @param {ShowError} showError
@@ -31,7 +32,8 @@ export class SiteSettings {
   }
 
   /** @param {SiteFormat} format */
-  #show({ name, fps, width, height }) {
+  #show({ name, fps, width, height, digest }) {
+    this.#digest = digest;
     field('name').value = name;
     field('fps').value = String(fps);
     field('width').value = String(width);
@@ -40,13 +42,22 @@ export class SiteSettings {
 
   async #save() {
     const [fps, width, height] = ['fps', 'width', 'height'].map((name) => field(name).valueAsNumber);
+    const digest = this.#digest;
     try {
-      this.#show(await requestOperator('site_settings', 'PUT', { name: field('name').value, fps, width, height }));
+      this.#show(await requestOperator('site_settings', 'PUT', { name: field('name').value, fps, width, height, digest }));
       setText(this.#state, 'Saved; the earlier file is kept.');
       await this.fileChanged();
     } catch (error) {
+      await this.#showIfChanged();
       setText(this.#state, error instanceof Error ? error.message : '');
     }
+  }
+
+  /** Show the settings if others have changed them; else keep what was entered. */
+  async #showIfChanged() {
+    /** @type {SiteFormat | null} */
+    const now = await requestOperator('site_settings').catch(() => null);
+    if (now && now.digest !== this.#digest) this.#show(now);
   }
 }
 

@@ -75,6 +75,8 @@ class SiteFormat(msgspec.Struct, frozen=True):
     width: int
     """Of the streams' pictures, pixels."""
     height: int
+    digest: str
+    """Tells whether they have changed."""
 
 
 class ZoneRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
-import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
@@ -21,6 +22,13 @@ routes = web.RouteTableDef()
 _PATH = f"{OPERATOR_PATH}/site_settings"
 
 
+class SiteChange(SiteChoice, frozen=True, forbid_unknown_fields=True):
+    """New settings of the site."""
+
+    digest: str | None = None
+    """Of the settings that this change is based on; null: it is made whatever they are."""
+
+
 @routes.get(_PATH)
 async def get_site_settings(request: web.Request) -> web.Response:
     """Return the site's name, rate and size in the configuration file."""
@@ -30,16 +38,17 @@ async def get_site_settings(request: web.Request) -> web.Response:
 @routes.put(_PATH)
 async def put_site_settings(request: web.Request) -> web.Response:
     """Change the site's name, rate and size in the configuration file; a restart brings them into force."""
-    wanted = await read_json(request, SiteChoice)
-    return await _answer(request, StreamFormatChoice(**msgspec.structs.asdict(wanted)))
+    wanted = await read_json(request, SiteChange)
+    choice = StreamFormatChoice(wanted.name, wanted.fps, wanted.width, wanted.height)
+    return await _answer(request, partial(save_choice, choice=choice, digest=wanted.digest))
 
 
-async def _answer(request: web.Request, choice: StreamFormatChoice | None) -> web.Response:
+async def _answer(request: web.Request, change: Callable[[Path], None] | None) -> web.Response:
     try:
         path = config_path(request)
-        if choice is not None:
-            await change_config(path, partial(save_choice, choice=choice))
+        if change is not None:
+            await change_config(path, change)
         now = await asyncio.to_thread(read_choice, path)
     except UserError as error:
         return error_response(409, str(error))
-    return json_response(SiteFormat(now.name, now.fps, now.width, now.height))
+    return json_response(SiteFormat(now.name, now.fps, now.width, now.height, now.digest))

@@ -43,6 +43,7 @@ from server.config.running_config import ConfigFileState
 from server.http.app_keys import SiteControl
 from server.messaging.messages import ZenohKeys
 from server.messaging.operator_messages import RiskEvent
+from server.setup.site_settings import StreamFormatChoice, save_choice
 
 SECTIONS = ["cameras", "floor", "people", "flags", "downloads"]
 SECTIONS += ["zones", "ignored-areas", "calibration", "calibration-points", "view-selection", "configuration"]
@@ -179,6 +180,29 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
             await expect(page.locator("#site-state")).to_have_text("Saved; the earlier file is kept.")
             assert load_config(path).site.model_dump(include={"name", "fps"}) == {"name": "shop", "fps": 12.5}
             await expect(page.locator("#restart-state")).to_contain_text("Streams end for some seconds")
+
+
+async def test_settings_that_another_operator_has_changed_meanwhile_are_shown(
+    browser: Browser, tmp_path: Path
+) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_text("cameras: [{id: c0, source: 'scene:room'}]\n")
+    async with open_operator_page(browser, "#cameras", control=SiteControl(path)) as (_, page):
+        name = page.get_by_label("Name of the site")
+        await expect(name).to_have_value("site")
+        save_choice(path, StreamFormatChoice("mall", 12.5, 640, 360))
+        await page.get_by_label("Width").fill("320")
+        await page.get_by_role("button", name="Change the site").click()
+        await expect(page.locator("#site-state")).to_contain_text(
+            "were changed in the configuration meanwhile"
+        )
+        await expect(name).to_have_value("mall")
+        assert load_config(path).site.size == (640, 360)
+        await page.get_by_label("Width").fill("321")  # what is only invalid stays to be corrected
+        await page.get_by_label("Width").evaluate("field => field.step = 1")
+        await page.get_by_role("button", name="Change the site").click()
+        await expect(page.locator("#site-state")).to_contain_text("must be even")
+        await expect(page.get_by_label("Width")).to_have_value("321")
 
 
 async def test_the_floor_plan_shows_cameras_and_people_at_their_positions(browser: Browser) -> None:

@@ -33,11 +33,18 @@ async def put(site: ServedSite, body: Any, headers: dict[str, str] = CHANGES) ->
         return answer.status, json.loads(await answer.text())
 
 
+def without_digest(answer: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in answer.items() if key != "digest"}
+
+
 async def test_the_site_is_changed_in_the_file(path: Path) -> None:
     async with aclosing(serve_site(control=SiteControl(path))) as sites:
         site = await anext(sites)
-        assert await site.get_json(PATH) == {"name": "hall", "fps": 25.0, "width": 640, "height": 360}
-        assert await put(site, WANTED) == (200, WANTED)
+        before = await site.get_json(PATH)
+        digest = before.pop("digest")
+        assert before == {"name": "hall", "fps": 25.0, "width": 640, "height": 360}
+        status, answer = await put(site, {**WANTED, "digest": digest})
+        assert (status, without_digest(answer)) == (200, WANTED)
         assert load_config(path).site.size == (320, 180)
         status, answer = await put(site, {**WANTED, "width": 321})
         assert (status, answer["error"]) == (
@@ -45,6 +52,20 @@ async def test_the_site_is_changed_in_the_file(path: Path) -> None:
             "site: width: must be even: H.264 stores color at half the size",
         )
         assert (await put(site, {**WANTED, "codec": "x"}))[0] == 400
+
+
+async def test_a_change_is_refused_if_another_operator_has_made_one_meanwhile(path: Path) -> None:
+    async with aclosing(serve_site(control=SiteControl(path))) as sites:
+        site = await anext(sites)
+        digest = (await site.get_json(PATH))["digest"]
+        other = {**WANTED, "width": 640, "height": 480}
+        now = (await put(site, {**other, "digest": digest}))[1]
+        status, answer = await put(site, {**WANTED, "digest": digest})
+        assert status == 409
+        assert "changed in the configuration meanwhile" in answer["error"]
+        assert load_config(path).site.size == (640, 480)
+        assert (await put(site, {**WANTED, "digest": now["digest"]}))[0] == 200
+        assert (await put(site, other))[0] == 200  # a script that does not look
 
 
 async def test_only_operators_see_or_change_it(path: Path, tmp_path: Path) -> None:
