@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from server.config.loader import check_section, load_config, read_content
 from server.config.sections import SiteSettings
 from server.setup.site_file import check_text, replace_file
+from server.setup.site_pixels import Size, moved_settings
 from server.setup.yaml_edit import changed_values_text
 from server.system.errors import UserError
 
@@ -41,14 +43,20 @@ def read_choice(path: Path) -> StreamFormatChoice:
     return StreamFormatChoice(site.name, site.fps, site.width, site.height)
 
 
-def save_choice(path: Path, choice: StreamFormatChoice, digest: str | None = None) -> None:
-    """Change the settings in a configuration file; the earlier file is kept.
+def save_choice(
+    path: Path, choice: StreamFormatChoice, digest: str | None = None, pictures: Collection[Size] = ()
+) -> None:
+    """Change the settings in a configuration file, and those that follow the size; the earlier file is kept.
 
-    ``digest`` is that of the settings that the change is based on; None: it is made whatever they are.
+    Args:
+        path: the file.
+        choice: the new settings.
+        digest: of the settings that the change is based on; None: it is made whatever they are.
+        pictures: sizes of the cameras' own pictures, as far as they are known.
 
     Raises:
         UserError: the settings have changed meanwhile, the file or what it would become is invalid, a
-            camera's own video would no longer fit, or it cannot be written.
+            camera's own video would no longer fit, what is in pixels cannot follow, or it cannot be written.
     """
     present = read_choice(path)
     if digest is not None and present.digest != digest:
@@ -57,7 +65,8 @@ def save_choice(path: Path, choice: StreamFormatChoice, digest: str | None = Non
     changed = {key: value for key, value in asdict(choice).items() if value != before[key]}
     if not changed:
         return
-    passed = [camera.id for camera in load_config(path).cameras if camera.passthrough == "pass"]
+    config, content = load_config(path), read_content(path)
+    passed = [camera.id for camera in config.cameras if camera.passthrough == "pass"]
     if passed and changed.keys() != {"name"}:
         raise UserError(
             f"camera {passed[0]}: passthrough: pass: its own video has the site's present rate and size; "
@@ -65,7 +74,9 @@ def save_choice(path: Path, choice: StreamFormatChoice, digest: str | None = Non
         )
     if "fps" in changed and choice.fps.is_integer():
         changed["fps"] = int(choice.fps)
-    check_section(SiteSettings, {**(read_content(path).get("site") or {}), **changed}, "site")
-    text = changed_values_text(path, "site", changed)
+    check_section(SiteSettings, {**(content.get("site") or {}), **changed}, "site")
+    size = choice.width, choice.height
+    moved = moved_settings(config, content, size, pictures) if size != config.site.size else {}
+    text = changed_values_text(path, {"site": changed, **moved})
     check_text(text, path)
     replace_file(text, path)

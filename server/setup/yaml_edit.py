@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,28 +49,53 @@ def changed_lists_text(path: Path, lists: Mapping[str, Sequence[Mapping[str, Any
     return _checked(text, {**content, **{section: list(entries) for section, entries in lists.items()}})
 
 
-def changed_values_text(path: Path, section: str, values: Mapping[str, Any]) -> str:
-    """Return the text of a configuration file with other values of some settings of one section.
+def changed_values_text(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the text of a configuration file with other values of some settings, by section.
 
-    Lines of a section in block style keep their comments. Otherwise as :func:`changed_text`.
+    Values may be sections themselves. Lines of a section in block style keep their comments. Otherwise as
+    :func:`changed_text`.
 
     Raises:
         UserError: the file cannot be read, or is not valid YAML.
     """
-    content = read_content(path)
-    wanted = {**content, section: {**(content.get(section) or {}), **values}}
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    content, text = dict(read_content(path)), path.read_text(encoding="utf-8")
+    for section, values in sections.items():
+        content[section] = _merged(content.get(section) or {}, values)
+        text = _with_values(text, section, values, content)
+    return text
+
+
+def _with_values(text: str, section: str, values: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    lines = text.splitlines(keepends=True)
     span = _span(lines, section) or range(0)
-    for key, value in values.items():
+    for key, value in _leaves(values):
         line = re.compile(rf"([ \t]+{key}:)[^#\n]*?([ \t]+#.*)?\n?")
         for number in span[1:]:
             if found := line.fullmatch(lines[number]):
                 lines[number] = f"{found[1]} {dump_yaml_inline(value)}{found[2] or ''}\n"
-    text = "".join(lines)
+    changed = "".join(lines)
     with contextlib.suppress(yaml.YAMLError):
-        if yaml.safe_load(text) == wanted:
-            return text
-    return changed_text(path, section, wanted[section])
+        if yaml.safe_load(changed) == wanted:
+            return changed
+    return _checked(_replaced(text, section, dump_yaml({section: wanted[section]})), wanted)
+
+
+def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a section with new values of some of its settings."""
+    inner = {
+        key: _merged(old.get(key) or {}, value) if isinstance(value, Mapping) else value
+        for key, value in new.items()
+    }
+    return {**old, **inner}
+
+
+def _leaves(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the settings that are no sections."""
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value)
+        else:
+            yield key, value
 
 
 def _checked(text: str, wanted: Mapping[str, Any]) -> str:

@@ -62,7 +62,7 @@ async def post_marked_points(request: web.Request) -> web.Response:
         return error_response(409, str(error))
     try:
         calibration = await asyncio.to_thread(
-            calibrate_from_points, command.points, present, _picture_sizes(request)
+            calibrate_from_points, command.points, present, picture_sizes(request)
         )
     except UserError as error:
         return error_response(400, str(error))
@@ -81,7 +81,8 @@ async def _present(request: web.Request) -> PresentCalibration:
     return await asyncio.to_thread(present_calibration, path)
 
 
-def _picture_sizes(request: web.Request) -> dict[str, tuple[int, int]]:
+def picture_sizes(request: web.Request) -> dict[str, tuple[int, int]]:
+    """Return the sizes of cameras' own pictures, as far as they are known."""
     cameras = request.app[SERVICE].cameras.diagnose_cameras()
     return {
         camera.camera: (camera.picture.width, camera.picture.height)

@@ -12,6 +12,7 @@ from aiohttp import web
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.config_file import change_config, config_path
+from server.http.operator.marked_points import picture_sizes
 from server.http.operator.schema import SiteFormat
 from server.http.operator.setup import SiteChoice
 from server.setup.site_settings import StreamFormatChoice, read_choice, save_choice
@@ -40,7 +41,10 @@ async def put_site_settings(request: web.Request) -> web.Response:
     """Change the site's name, rate and size in the configuration file; a restart brings them into force."""
     wanted = await read_json(request, SiteChange)
     choice = StreamFormatChoice(wanted.name, wanted.fps, wanted.width, wanted.height)
-    return await _answer(request, partial(save_choice, choice=choice, digest=wanted.digest))
+    pictures = picture_sizes(request).values()
+    return await _answer(
+        request, partial(save_choice, choice=choice, digest=wanted.digest, pictures=pictures)
+    )
 
 
 async def _answer(request: web.Request, change: Callable[[Path], None] | None) -> web.Response:
