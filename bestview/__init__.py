@@ -6,6 +6,7 @@ Sub-packages: `association` (one person id across cameras), `geometry` (ground p
 """
 
 from bestview.association import (
+    SINGLE_SITE,
     AppearanceHistogram,
     IdentityRegistry,
     IdentitySettings,
@@ -70,6 +71,7 @@ __all__ = [
     "NO_CAMERA",
     "NO_PERSON",
     "NO_VIEW_COST",
+    "SINGLE_SITE",
     "AppearanceHistogram",
     "BodyEstimates",
     "CameraDetections",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from math import gcd
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -25,6 +26,7 @@ from server.config.sections import (
     RtspSettings,
     RuleSettings,
     SiteSettings,
+    SitesSettings,
     SoundSettings,
     SyncSettings,
     TrackSettings,
@@ -60,6 +62,7 @@ class Config(BaseSettings):
     site: SiteSettings = SiteSettings()
     sync: SyncSettings = SyncSettings()
     zenoh: ZenohSettings = ZenohSettings()
+    sites: SitesSettings = SitesSettings()
     encode: EncodeSettings = EncodeSettings()
     cameras: Annotated[list[CameraSettings], Field(min_length=1)]
     ground: Path | None = None
@@ -100,6 +103,17 @@ class Config(BaseSettings):
                 raise ValueError(f"cameras: {camera_id!r} is the name of a best-view service; use another id")
             if ids.count(camera_id) > 1:
                 raise ValueError(f"cameras: two cameras are called {camera_id!r}; ids must be unique")
+        return self
+
+    @model_validator(mode="after")
+    def _sites_fit(self) -> Self:
+        if self.site.name in self.sites.link:
+            raise ValueError(f"sites.link: {self.site.name!r} is this site; name the others")
+        if gcd(self.sites.of, self.view.share.of) > 1:
+            raise ValueError(
+                f"sites.of: {self.sites.of} and view.share.of {self.view.share.of} have a common divisor: "
+                "some shares would have nobody; set a larger sites.of, in all sites"
+            )
         return self
 
     @model_validator(mode="after")

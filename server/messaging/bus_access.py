@@ -7,6 +7,7 @@ from typing import Any
 
 from server.config.password_file import read_users
 from server.config.pulse_access import bestview_client_name
+from server.config.sections import is_site_user
 from server.config.site_config import Config
 from server.messaging.messages import ZenohKeys
 
@@ -42,8 +43,8 @@ def build_access_control(
 
     A camera publishes under its own key, and the site's audio if it is the audio camera. It receives the
     other cameras' detections, and the best-view services' messages to it, but not their choices, which tell
-    where everybody is. Other best-view services may do everything. Any other user may subscribe to everything
-    and send nothing.
+    where everybody is. Other best-view services may do everything. A user `site-NAME` is another site, and
+    receives what it is told about people. Any other user may subscribe to everything and send nothing.
     """
     keys = ZenohKeys(site)
     everything = f"myview/{site}/**"
@@ -68,11 +69,19 @@ def build_access_control(
     ]
     service_names = [bestview_client_name(index) for index in range(_MAX_SERVICES)]
     listeners = [user for user in users if user not in {*cameras, *service_names}]
+    sites = [user for user in listeners if is_site_user(user)]
+    listeners = [user for user in listeners if user not in sites]
     subjects = [{"id": "services", "usernames": service_names}]
     policies = [{"rules": ["services"], "subjects": ["services"]}]
     if listeners:
         subjects.append({"id": "listeners", "usernames": listeners})
         policies.append({"rules": ["may subscribe to all", "receives all"], "subjects": ["listeners"]})
+    if sites:
+        people = [keys.bestview("**/people")]
+        rules.append(_rule("may subscribe to people", "ingress", ["declare_subscriber"], people))
+        rules.append(_rule("receives people", "egress", ["put"], people))
+        subjects.append({"id": "sites", "usernames": sites})
+        policies.append({"rules": ["may subscribe to people", "receives people"], "subjects": ["sites"]})
     for camera in cameras:
         publish_keys = [keys.camera(camera, "**"), *([keys.sound] if camera == audio_sender else [])]
         rules.append(_rule(f"camera {camera}", "ingress", _SEND, publish_keys))

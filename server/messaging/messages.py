@@ -21,6 +21,7 @@ key                                              payload                        
 ``myview/SITE/bestview/choices``                 :class:`GopChoices`
 ``myview/SITE/bestview/INDEX/choices``           of a further service, and so on
 ``myview/SITE/bestview/record``                  ``ServiceRecord``, to the other services
+``myview/SITE/bestview/people``                  ``SitePeople``, to other sites
 ``myview/SITE/bestview/state``                   a query: ``ServiceState``, to a service that starts
 ``myview/SITE/bestview/alive``                   liveliness token
 ``myview/SITE/bestview/INDEX/alive``             of a further service

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import msgspec
 
 from server.config.pulse_access import bestview_client_name
+from server.config.sections import LinkSettings, site_user
 from server.config.site_config import Config
 from server.messaging.bus import Bus
 from server.messaging.bus_access import access_control_of
@@ -26,6 +27,8 @@ class BusConnection:
         self._bus: Bus | None = None
         self._others: Bus | None = None
         """A session to all routers, for what services say to each other."""
+        self._other_sites: list[Bus] = []
+        """A session to each other site's routers."""
         self.other_services: set[int] = set()
         """The indices of the other services that are present."""
         self.inboxes: list[Inbox[Message]] = []
@@ -95,6 +98,22 @@ class BusConnection:
         if self._bus is not None:
             self._bus.publish(self._keys.bestview("record", self._index), payload)
 
+    def link_site(self, name: str, link: LinkSettings, on_people: MessageHandler) -> None:
+        """Receive what another site tells about people.
+
+        Raises:
+            UserError: the password file cannot be read, or the address is not supported.
+        """
+        user = None if link.users is None else site_user(self._config.site.name)
+        bus = Bus.client(link.bus(self._config.zenoh.lease_s), user)
+        self._other_sites.append(bus)
+        self.inboxes.append(bus.subscribe(ZenohKeys(name).bestview("**/people"), on_people))
+
+    def publish_people(self, payload: bytes) -> None:
+        """Publish what other sites are told about people."""
+        if self._bus is not None:
+            self._bus.publish(self._keys.bestview("people", self._index), payload)
+
     @property
     def has_waiting_messages(self) -> bool:
         """Whether a message waits in any inbox."""
@@ -117,6 +136,6 @@ class BusConnection:
 
     def close(self) -> None:
         """Close the bus."""
-        for bus in (self._others, self._bus):
+        for bus in (*self._other_sites, self._others, self._bus):
             if bus is not None:
                 bus.close()

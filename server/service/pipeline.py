@@ -31,6 +31,7 @@ from server.service.metrics.delay_meter import DelayMeter
 from server.service.metrics.stage_timers import StageTimers
 from server.service.mode_publisher import ModePublisher
 from server.service.operator_assist.operator_assist import OperatorAssist
+from server.service.other_sites.other_sites import OtherSites
 from server.service.pulse_follower import PulseFollower
 from server.service.recording.recorder import Recorder
 from server.service.replication.service_replication import ServiceReplication
@@ -94,22 +95,24 @@ class BestViewPipeline:
         )
         self.joint = JointWorker(config)
         self.decision_state = DecisionState(fps)
-        self.assist = OperatorAssist(
-            config, self.decider.people, partial(self.bus.send_to_camera, "position_corrections")
-        )
+        people = self.decider.people
+        self.assist = OperatorAssist(config, people, partial(self.bus.send_to_camera, "position_corrections"))
         self.recorder = Recorder(
             config, self.frame_buffers, self.stream_format, lengths.frames, self.audio_buffer
         )
         self.recording_deletion = RecordingDeletion(self.recorder)
         self.state_replication = StateReplication(
-            self.decider.people,
+            people,
             cameras,
             fps,
             partial(self.bus.send_to_camera, "identities"),
             sends=lambda: self.replication.leads,
             deleted=self.recording_deletion.forgotten,
         )
-        self.replication = ServiceReplication(config, self.decider.people, self.state_replication, self.bus)
+        self.replication = ServiceReplication(config, people, self.state_replication, self.bus)
+        self.other_sites = OtherSites(
+            config, people, self.state_replication, self.replication, self.bus, self.pulses
+        )
         self.walk_session = WalkSession(config)
         self._last_decided = -1
         """The last pulse of the last epoch; later frames have no tracks."""
@@ -157,6 +160,7 @@ class BestViewPipeline:
         for deleted in await self.recording_deletion.read_journal():
             self.replication.add_deletion(deleted)
         await self.replication.take_over()
+        await self.other_sites.open()
         first_pulse_timeout = asyncio.get_running_loop().call_later(_FIRST_PULSE_S, self._run_without_pulses)
         follow = asyncio.create_task(self.pulses.follow(self._changed.set), name="pulses")
         follow.add_done_callback(lambda _: self._changed.set())
@@ -302,6 +306,7 @@ class BestViewPipeline:
             decisions = self.decider.step(epoch)
         self.state_replication.advance(epoch.last)  # before publishing, so that names are restored
         self.replication.step(epoch)
+        self.other_sites.step()
         others = self.decider.modes.take()
         self._publish_modes(others, live=True)
         for decision in decisions:

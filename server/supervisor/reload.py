@@ -47,7 +47,7 @@ _INTEGRATIONS = ("webhooks", "mqtt")
 _TIME_ZONE = "site.time_zone"
 _BY_JOINT = ("tracker", "assist")
 """Of these, settings that may change whether people are tracked jointly, and then need one, too."""
-_BEST_VIEW_SECTIONS = ("view", "http", "access", "record")
+_BEST_VIEW_SECTIONS = ("view", "http", "access", "record", "sites")
 
 
 @dataclass(frozen=True, slots=True)

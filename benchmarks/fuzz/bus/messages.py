@@ -10,6 +10,7 @@ import numpy as np
 from prometheus_client import generate_latest
 
 from benchmarks.fuzz.bus.damaged_messages import damaged_message
+from benchmarks.fuzz.bus.other_sites import OtherSitesMessages
 from benchmarks.fuzz.bus.retained_state import RetainedStates
 from benchmarks.fuzz.engine.fed_site import (
     CAMERAS,
@@ -265,4 +266,4 @@ def _plain(key: str) -> str:
     return key.encode("utf-8", "replace").decode()
 
 
-TARGETS = (IngestMessages, PeerMessages, OperatorPlaces, RetainedStates, SiteSessions)
+TARGETS = (IngestMessages, PeerMessages, OperatorPlaces, RetainedStates, OtherSitesMessages, SiteSessions)

@@ -10,6 +10,7 @@ from server.config.sections.output import HttpSettings, RecordSettings, TlsSetti
 from server.config.sections.rtsp import RtspSettings
 from server.config.sections.rules import RuleSettings, ZoneSettings, check_zones_and_rules
 from server.config.sections.site import ProcessTlsSettings, SiteSettings, SyncSettings, ZenohSettings
+from server.config.sections.sites import LinkSettings, SitesSettings, is_site_user, site_user
 from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShareSettings, ViewSettings
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "FlagSettings",
     "HttpSettings",
     "Identifier",
+    "LinkSettings",
     "MqttSettings",
     "PictureSide",
     "Polygon",
@@ -32,6 +34,7 @@ __all__ = [
     "Section",
     "ShareSettings",
     "SiteSettings",
+    "SitesSettings",
     "SoundSettings",
     "SyncSettings",
     "TlsSettings",
@@ -41,4 +44,6 @@ __all__ = [
     "ZenohSettings",
     "ZoneSettings",
     "check_zones_and_rules",
+    "is_site_user",
+    "site_user",
 ]

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview import IdentityRegistry, IdentitySettings, Merge, Person, Split, TrackKey
+from bestview import SINGLE_SITE, IdentityRegistry, IdentitySettings, IdSeries, Merge, Split, TrackKey
 from server.config.sections import ShareSettings
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
@@ -49,7 +49,7 @@ class PersonTracker:
     this service's shard; identities are computed for all people, identically in every service. Tracks are
     final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
     cameras that look straight down, ``joint_cameras`` those that are tracked jointly where they overlap;
-    ``fps`` are the site's frames a second.
+    ``fps`` are the site's frames a second, ``ids`` the numbers to assign, of several sites.
     """
 
     def __init__(
@@ -63,10 +63,13 @@ class PersonTracker:
         overhead: Collection[str] = (),
         fps: float = 25.0,
         joint_cameras: Sequence[str] = (),
+        ids: IdSeries = SINGLE_SITE,
     ) -> None:
         self._reader = WindowReader(site_size)
         self._ground = CommonGround(joint_cameras, self._reader.local_numbers)
-        self._registry = IdentityRegistry(settings, self._ground.homographies(homographies), overhead, fps)
+        ground = self._ground.homographies(homographies)
+        self._registry = IdentityRegistry(settings, ground, overhead, fps, ids)
+        self.ids = ids
         self.forget_after = settings.resolve(fps).forget_after
         """Frames unseen after which people are forgotten."""
         self.registry = PersonRegistry(settings.maximum_departed_people)
@@ -226,13 +229,9 @@ class PersonTracker:
         return self._newest
 
     @property
-    def remembered(self) -> Sequence[Person]:
-        """What identity knows about each person, by number."""
-        return self._registry.people
-
-    def restore(self, people: Iterable[Person]) -> None:
-        """Add what another service knows about people."""
-        self._registry.restore(people)
+    def identity(self) -> IdentityRegistry:
+        """What is known about each person, by automatic number."""
+        return self._registry
 
     def renumber(self, numbers: Mapping[int, int]) -> None:
         """Replace people's numbers by those of another service, one to one.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from math import inf
 
+from bestview import SINGLE_SITE, IdSeries
 from server.messaging.camera_identity_snapshot import (
     ALIASES_MAX,
     FORGOTTEN_MAX,
@@ -99,16 +100,24 @@ class StateRecovery:
         snapshots: each camera's snapshot; those older than ``max_downtime`` only reserve numbers.
         pulse: the first pulse of this run.
         max_downtime: the longest downtime, in frames.
+        ids: the numbers that this site assigns.
     """
 
-    def __init__(self, snapshots: dict[str, CameraIdentitySnapshot], pulse: int, max_downtime: int) -> None:
+    def __init__(
+        self,
+        snapshots: dict[str, CameraIdentitySnapshot],
+        pulse: int,
+        max_downtime: int,
+        ids: IdSeries = SINGLE_SITE,
+    ) -> None:
         self._until = -1
         self._has_ended = False
         self._tracks: dict[TrackName, int] = {}
         self._pending: list[_PendingPerson] = []
         self._reappeared_at: dict[TrackName, int] = {}
         """The pulse at which each track reappeared."""
-        self.next_number = max((first_free_number(snapshot) for snapshot in snapshots.values()), default=1)
+        firsts = (first_free_number(snapshot, ids) for snapshot in snapshots.values())
+        self.next_number = max(firsts, default=1)
         """The first number to assign in this run, whatever the downtime."""
         recent = {
             camera: snapshot
@@ -181,14 +190,10 @@ class StateRecovery:
         return None if first is None else people.person_of(track.camera, track.boot, track.track, first)
 
 
-def first_free_number(snapshot: CameraIdentitySnapshot) -> int:
-    """Return the first unused number of a snapshot, which may contradict itself."""
-    return max(
-        [
-            snapshot.next_number,
-            *(number + 1 for person in snapshot.people for number in (person.number, *person.aliases)),
-        ]
-    )
+def first_free_number(snapshot: CameraIdentitySnapshot, ids: IdSeries = SINGLE_SITE) -> int:
+    """Return the site's first unused number by a snapshot, which may contradict itself."""
+    numbers = (number for person in snapshot.people for number in (person.number, *person.aliases))
+    return max([snapshot.next_number, *(number + 1 for number in numbers if ids.has(number))])
 
 
 def trusted_first_free(firsts: Iterable[int]) -> int:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import msgspec
 
+from bestview import IdSeries
 from server.messaging.camera_identity_snapshot import SNAPSHOT_BYTES_MAX, CameraIdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import camera_of_key
@@ -107,7 +108,7 @@ class StateReplication:
         if not message.payload:
             return
         snapshot = msgspec.msgpack.decode(message.payload, type=CameraIdentitySnapshot)
-        self._first_free[camera] = first_free_number(snapshot)
+        self._first_free[camera] = first_free_number(snapshot, self._people.ids)
         if is_repeated:
             self._people.reserve_numbers_below(
                 min(snapshot.next_number, trusted_first_free(self._first_free.values()))
@@ -123,7 +124,7 @@ class StateReplication:
                 self._connected_at.pop(camera, None)
                 self._reported.add(camera)
                 self._snapshots[camera] = snapshot
-                self._first_free[camera] = first_free_number(snapshot)
+                self._first_free[camera] = first_free_number(snapshot, self._people.ids)
 
     @property
     def is_waiting(self) -> bool:
@@ -163,11 +164,16 @@ class StateReplication:
             return
         most = trusted_first_free(self._first_free.values())
         for camera in [
-            camera for camera, snapshot in self._snapshots.items() if first_free_number(snapshot) > most
+            camera
+            for camera, snapshot in self._snapshots.items()
+            if first_free_number(snapshot, self._people.ids) > most
         ]:
             log.warning("camera %s: snapshot ignored: it alone has person numbers beyond %d", camera, most)
             del self._snapshots[camera]
-        snapshot = {camera: _below(self._free, snapshot) for camera, snapshot in self._snapshots.items()}
+        snapshot = {
+            camera: _below(self._free, snapshot, self._people.ids)
+            for camera, snapshot in self._snapshots.items()
+        }
         snapshot = self._without_forgotten(snapshot)
         if self._took_over and self._started_at is None:  # the other service may be ahead
             snapshot = {
@@ -175,7 +181,7 @@ class StateReplication:
                 for camera, known in snapshot.items()
             }
         self._snapshots = {}
-        recovery = StateRecovery(snapshot, pulse, round(MAX_DOWNTIME_S * self._fps))
+        recovery = StateRecovery(snapshot, pulse, round(MAX_DOWNTIME_S * self._fps), self._people.ids)
         recovery.begin(self._people, pulse)
         self._recoveries.append(recovery)
         if self._started_at is None:
@@ -251,9 +257,13 @@ class StateReplication:
                 self._send(camera, payload)
 
 
-def _below(free: float, snapshot: CameraIdentitySnapshot) -> CameraIdentitySnapshot:
+def _below(free: float, snapshot: CameraIdentitySnapshot, ids: IdSeries) -> CameraIdentitySnapshot:
     """Remove people whose number this run may have assigned to another person."""
-    known = [person for person in snapshot.people if max([person.number, *person.aliases]) < free]
+    known = [
+        person
+        for person in snapshot.people
+        if all(number < free or not ids.has(number) for number in (person.number, *person.aliases))
+    ]
     return msgspec.structs.replace(snapshot, people=known)
 
 

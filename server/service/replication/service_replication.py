@@ -105,7 +105,9 @@ class ServiceReplication:
         self._deleted: set[tuple[float, int, bool]] = set()
         """All: since when numbers are, a number of these, and whether its media are deleted."""
         self.on_deletion: list[Callable[[DeletedPerson], None]] = []
-        """Called with each deletion of another service."""
+        """Called with each deletion of another service or site."""
+        self.on_added: list[Callable[[DeletedPerson], None]] = []
+        """Called with each deletion that is sent."""
         self._changed = asyncio.Event()
 
     @property
@@ -154,21 +156,24 @@ class ServiceReplication:
             return
         if record.service < self._services and record.service != self._index:
             self._received[record.service] = _Received(record, self._clock())
-            self._follow_deletions(record)
+            for deletion in record.deletions:
+                self.follow_deletion(deletion)
 
     def add_deletion(self, deletion: DeletedPerson) -> None:
         """Send a deletion to the other services, with every record from the next on."""
+        for callback in self.on_added:
+            callback(deletion)
         self._deletions = [*self._deletions, deletion][-DELETIONS_MAX:]
         self._deleted |= _deleted_numbers(deletion)
         if deletion.deletes_media:  # one without is done by it
             self._deleted |= _deleted_numbers(msgspec.structs.replace(deletion, deletes_media=False))
 
-    def _follow_deletions(self, record: ServiceRecord) -> None:
-        for deletion in record.deletions:
-            if not _deleted_numbers(deletion) <= self._deleted:
-                self.add_deletion(deletion)
-                for callback in self.on_deletion:
-                    callback(deletion)
+    def follow_deletion(self, deletion: DeletedPerson) -> None:
+        """Carry out a deletion of another service or site, unless that was done."""
+        if not _deleted_numbers(deletion) <= self._deleted:
+            self.add_deletion(deletion)
+            for callback in self.on_deletion:
+                callback(deletion)
 
     def step(self, epoch: Epoch) -> None:
         """Publish a record where one is due, and follow the leading service, after an epoch was decided."""

@@ -14,7 +14,7 @@ from server.service.identity.people import PersonTracker
 def state_of(people: PersonTracker, record: ServiceRecord) -> ServiceState:
     """Build the state at the pulse of a record."""
     registry = people.registry
-    remembered = {person.person_id: person for person in people.remembered}
+    remembered = {person.person_id: person for person in people.identity.people}
     states = []
     for number in registry.all_numbers:
         if number > PERSON_NUMBER_MAX:
@@ -38,8 +38,9 @@ def state_of(people: PersonTracker, record: ServiceRecord) -> ServiceState:
 
 def restore_people(people: PersonTracker, state: ServiceState) -> None:
     """Add what another service knows about people, before any of their tracks is reported here."""
-    people.reserve_numbers_below(max((person.number for person in state.people), default=0) + 1)
-    people.restore(_person(person) for person in state.people if person.looks)
+    own = [person.number for person in state.people if people.ids.has(person.number)]
+    people.reserve_numbers_below(max(own, default=0) + 1)
+    people.identity.restore(_person(person) for person in state.people if person.looks)
     for person in state.people:
         seen = person.first_seen, person.last_seen
         people.registry.restore(person.number, *seen, departed=person.departed)

@@ -117,6 +117,7 @@ class ViewDecider:
             config.overhead,
             fps,
             config.joint_cameras,
+            config.sites.ids,
         )
         stride, gop = config.window.stride, config.gop
         self._occupied = (

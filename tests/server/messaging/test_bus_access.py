@@ -17,7 +17,7 @@ from fakes.programs import needs_openssl
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 from server.config.password_file import password_of, read_users
-from server.config.sections import ProcessTlsSettings, ZenohSettings
+from server.config.sections import LinkSettings, ProcessTlsSettings, ZenohSettings, site_user
 from server.messaging.bus import Bus
 from server.messaging.bus_access import SETTING, build_access_control
 from server.messaging.inbox import Message
@@ -309,3 +309,43 @@ def test_a_missing_user_is_reported(tmp_path: Path) -> None:
         password_of(_users(tmp_path, "c0:a\n"), "c1", SETTING)
     with pytest.raises(UserError, match=r"zenoh\.users: cannot read .*none"):
         password_of(tmp_path / "none", "c0", SETTING)
+
+
+async def test_another_site_receives_what_it_is_told_about_people_and_nothing_else(
+    settings: ZenohSettings, folder: Path, tmp_path: Path
+) -> None:
+    users = _users(tmp_path, (folder / "zenoh.users").read_text(encoding="utf-8") + "site-yard:far\n")
+    (tmp_path / "yard").mkdir()
+    at_hall = settings.model_copy(update={"users": users})
+    link = LinkSettings(
+        connect=settings.connect,
+        url="http://hall/",
+        users=_users(tmp_path / "yard", "site-yard:far\n"),
+        authority=settings.tls.authority,
+    )
+    received, at_service = ReceivedTexts(), ReceivedTexts()
+    with open_sessions(
+        lambda: router(at_hall),
+        lambda: Bus.client(settings, "c0"),
+        lambda: Bus.client(link.bus(1.0), site_user("yard")),
+    ) as (bestview, c0, yard):
+        for key in ("**", SITE.camera("*", "*"), SITE.bestview("**"), SITE.bestview("**/people")):
+            yard.subscribe(key, received)
+        bestview.subscribe(SITE.bestview("**/people"), at_service)
+        bestview.subscribe(SITE.camera("*", "video"), at_service)
+
+        def send_all() -> None:
+            yard.publish(SITE.bestview("people"), b"false")
+            yard.publish(SITE.camera("c0", "video"), b"false")
+            c0.publish(SITE.camera("c0", "video"), b"video")
+            for topic in ("choices", "record", "people"):
+                bestview.publish(SITE.bestview(topic), topic.encode())
+
+        for _ in range(10):  # time enough for everything to arrive
+            received.texts.clear()
+            await received.until(f"{SITE.bestview('people')} people", send_all)
+        await at_service.until("c0/video video", send_all)
+        assert set(received.texts) - {f"{SITE.bestview('people')} false", "c0/video false"} == {
+            f"{SITE.bestview('people')} people"
+        }, "except its own"
+        assert not [text for text in at_service.texts if "false" in text]

@@ -51,6 +51,8 @@ CHANGES: dict[str, tuple[str, Any]] = {
     "http.port": (BEST_VIEW, 8123),
     "record.keep_s": (BEST_VIEW, 5.0),
     "access.blur": (BEST_VIEW, "others"),
+    "sites.of": (BEST_VIEW, 3),
+    "sites.share_looks": (BEST_VIEW, False),
     "rtsp.port": (GATEWAY, 8600),
     "rtsp.udp": (GATEWAY, False),
     "rtsp.enabled": (SITE, True),

@@ -1,0 +1,1 @@
+"""People who walk from site to site: what this site tells the others, and what it hears from them."""

@@ -1,0 +1,172 @@
+"""Builds the messages to other sites: what has changed first, then the rest in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from bestview.association.appearance.histograms import MeanHistogram
+from server.config.site_config import Config
+from server.messaging.packed_arrays import pack_histograms
+from server.messaging.site_people import (
+    DELETIONS_MAX,
+    LOOKS_MAX,
+    PEOPLE_MAX,
+    Looks,
+    SiteDeletion,
+    SitePeople,
+    SiteSighting,
+    Viewers,
+    pack_population,
+    pack_sightings,
+)
+from server.service.identity.people import PersonTracker
+from server.service.other_sites.people_here import PeopleHere, PersonHere
+
+_LOOKS_BYTES = 1 << 14
+"""Bytes of looks in a message, at most."""
+_LOOKS_EVERY = 3
+"""Messages after which the looks of somebody who is here are sent again, if they are known better."""
+_LOOKS_GROWTH = 1.25
+"""Factor by which their frames must have grown."""
+_REPEATED = 10
+"""People whose looks are repeated in each message, though nothing is new."""
+_VIEWERS_EVERY = 10
+"""Messages between two lists of viewers, if none has changed."""
+
+
+@dataclass(slots=True)
+class _Sent:
+    """What was said about a person: at which message, and how many frames of looks at which."""
+
+    is_visible: bool
+    at: int
+    frames: int = 0
+    looks_at: int = -1
+    """-1: never."""
+    looks_visible: bool = True
+    """Whether they were here when their looks were sent."""
+
+
+class SiteMessageBuilder:
+    """Builds them; each is the next of a row."""
+
+    def __init__(self, config: Config, people: PersonTracker, here: PeopleHere) -> None:
+        self._sites, self._fps = config.sites, config.site.fps
+        self._people, self._here = people, here
+        self._sent: dict[int, _Sent] = {}
+        self._count = 0
+        self._viewers: Viewers | None = None
+        self._bins = 0
+
+    def build(
+        self,
+        found: Sequence[PersonHere],
+        pulse: int,
+        numbered_since: float,
+        deletions: Sequence[SiteDeletion],
+        viewers: Viewers,
+    ) -> bytes:
+        """Return the next message, at a pulse.
+
+        Args:
+            found: everybody here.
+            pulse: the newest.
+            numbered_since: when this site's numbers began.
+            deletions: all, the newest last.
+            viewers: who may know who is here.
+        """
+        self._count += 1
+        numbers = {person.number for person in found}
+        self._sent = {number: sent for number, sent in self._sent.items() if number in numbers}
+        sightings = [self._sighting(person, pulse) for person in self._next_people(found)]
+        cameras = sorted({sighting.camera for sighting in sightings})
+        looks = self._next_looks(found) if self._sites.share_looks else []
+        population = self._people.identity.population(self._bins) if looks else None
+        is_due = viewers != self._viewers or self._count % _VIEWERS_EVERY == 1
+        self._viewers = viewers
+        return msgspec.msgpack.encode(
+            SitePeople(
+                index=self._sites.index,
+                of=self._sites.of,
+                numbered_since=numbered_since,
+                cameras=cameras,
+                people=pack_sightings(sightings, cameras),
+                looks=looks,
+                population=None if population is None else pack_population(population),
+                deletions=self._next_deletions(deletions),
+                viewers=viewers if is_due else None,
+            )
+        )
+
+    def _next_people(self, found: Iterable[PersonHere]) -> list[PersonHere]:
+        def priority(person: PersonHere) -> tuple[bool, int]:
+            sent = self._sent.get(person.number)
+            return (False, -1) if sent is None else (sent.is_visible == person.is_visible, sent.at)
+
+        chosen = sorted(found, key=priority)[:PEOPLE_MAX]
+        for person in chosen:
+            sent = self._sent.setdefault(person.number, _Sent(person.is_visible, self._count))
+            sent.is_visible, sent.at = person.is_visible, self._count
+        return chosen
+
+    def _sighting(self, person: PersonHere, pulse: int) -> SiteSighting:
+        arrived = self._here.arrived(person.number) if person.is_visible else None
+        return SiteSighting(
+            person.number,
+            person.camera,
+            max(0, pulse - person.last_seen) / self._fps,
+            None if arrived is None else max(0, pulse - arrived) / self._fps,
+        )
+
+    def _next_looks(self, found: Iterable[PersonHere]) -> list[Looks]:
+        """Return looks that are new, or of people who have left since they were sent, and some others."""
+        new: list[PersonHere] = []
+        old: list[PersonHere] = []
+        for person in found:
+            sent = self._sent.get(person.number)
+            if sent is None:
+                continue
+            has_left = sent.looks_visible and not person.is_visible
+            is_due = person.is_visible and self._count >= sent.looks_at + _LOOKS_EVERY
+            (new if sent.looks_at < 0 or has_left or is_due else old).append(person)
+
+        def age(person: PersonHere) -> int:
+            return self._sent[person.number].looks_at
+
+        chosen = [*sorted(new, key=age)[: 2 * LOOKS_MAX], *sorted(old, key=age)[:_REPEATED]]
+        known = self._here.looks(chosen)
+        looks: list[Looks] = []
+        size = 0
+        for person in chosen:
+            histogram, sent = known.get(person.number), self._sent[person.number]
+            if histogram is None:
+                continue
+            is_better = histogram.frame_count >= _LOOKS_GROWTH * sent.frames or not person.is_visible
+            if not is_better and person in new:
+                continue
+            looks.append(_pack(person.number, histogram))
+            size += len(looks[-1].histogram)
+            sent.frames, sent.looks_at, sent.looks_visible = (
+                histogram.frame_count,
+                self._count,
+                person.is_visible,
+            )
+            self._bins = histogram.histogram_sum.size
+            if len(looks) == LOOKS_MAX or size > _LOOKS_BYTES:
+                break
+        return looks
+
+    def _next_deletions(self, deletions: Sequence[SiteDeletion]) -> list[SiteDeletion]:
+        """Return the newest ones, and the older ones in turn."""
+        newest = deletions[-(DELETIONS_MAX // 2) :]
+        older = deletions[: -len(newest)] if newest else []
+        turns = max(1, -(-len(older) // (DELETIONS_MAX // 2)))
+        begin = self._count % turns * (DELETIONS_MAX // 2)
+        return [*newest, *older[begin : begin + DELETIONS_MAX // 2]]
+
+
+def _pack(number: int, histogram: MeanHistogram) -> Looks:
+    return Looks(number=number, frames=histogram.frame_count, histogram=pack_histograms(histogram.mean))
