@@ -46,6 +46,7 @@ URL = "http://localhost:8080"
 _BLOCK = re.compile(
     r"^```python runnable\n(.*?)^```\n(?:\n```text output\n(.*?)^```\n)?", re.DOTALL | re.MULTILINE
 )
+_NUMBER = re.compile(r"\d+(?:[./]\d+)?")
 _TEST = re.compile(r"`((?:tests/(?:\w+/)*)?test_\w+\.py)(?:::(test_\w+))?`")
 
 
@@ -225,3 +226,16 @@ def test_every_test_that_a_document_names_exists() -> None:
     for document, file, test in named:
         assert (ROOT / file).is_file(), f"{document}: {file}"
         assert not test or f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), f"{document}: {test}"
+
+
+def test_every_figure_of_the_readme_is_measured() -> None:
+    table = (ROOT / "README.md").read_text(encoding="utf-8").partition("## Figures")[2].partition("\n## ")[0]
+    measured = set(_NUMBER.findall((DOCS / "measurements.md").read_text(encoding="utf-8")))
+    shown = [
+        number
+        for row in table.splitlines()
+        if row.startswith("| ")
+        for number in _NUMBER.findall(row.split("|")[2])
+    ]
+    assert len(shown) > 10
+    assert [number for number in shown if number not in measured] == []
