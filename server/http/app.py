@@ -43,7 +43,7 @@ from server.http.tls import Certificate
 from server.http.viewers.fair_share import FairShare
 from server.http.viewers.hls_sessions import HLS_SESSIONS, HlsSessions
 from server.http.viewers.traffic import TRAFFIC, Traffic
-from server.http.viewers.viewer_limits import EVENT_SLOTS, SEARCH_SLOTS, VIEWER_SLOTS
+from server.http.viewers.viewer_limits import EVENT_SLOTS, RENDER_SLOTS, SEARCH_SLOTS, VIEWER_SLOTS
 from server.service.service import BestViewService
 from server.setup.session import SetupSession
 from server.system.descriptors import descriptor_limit
@@ -97,7 +97,8 @@ def make_app(
     app[CONTROL] = control = control or SiteControl()
     app[SETUP] = SetupSession(control.path or Path())
     app[EVENTS], app[TRAFFIC] = Events(service), Traffic()
-    app[VIEWER_SLOTS], app[EVENT_SLOTS], app[SEARCH_SLOTS] = FairShare(), FairShare(), FairShare()
+    for slots in (VIEWER_SLOTS, EVENT_SLOTS, SEARCH_SLOTS, RENDER_SLOTS):
+        app[slots] = FairShare()
     app[HLS_SESSIONS] = HlsSessions(service.streams.segment_plan.target_s, app[VIEWER_SLOTS])
     app[WHEP_SESSIONS] = WhepSessions()
     app[openapi.DESCRIPTION] = openapi.ApiDescription(app)

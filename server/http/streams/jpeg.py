@@ -15,7 +15,7 @@ from server.http.json_responses import error_response, unavailable
 from server.http.streams.containers import MP4
 from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay
 from server.http.streams.sending import send_stream, send_viewer
-from server.http.viewers.viewer_limits import evict_or_refuse_viewer, viewer_slot
+from server.http.viewers.viewer_limits import evict_or_refuse_viewer, rendered_stream, viewer_slot
 from server.service.facade.rendering import (
     CONTENT_TYPE,
     FIRST_BOUNDARY,
@@ -93,8 +93,7 @@ async def stream_rendered_mp4(request: web.Request) -> web.StreamResponse:
     if request.method == "HEAD":
         return _headers_only(headers)
     _check_slot(request, subject)
-    rendering = request.app[SERVICE].rendering
-    with viewer_slot(request, _slot_name(subject)), rendering.using(subject) as source:
+    with viewer_slot(request, _slot_name(subject)), rendered_stream(request, subject) as source:
         video = source.video
         video.users += 1
         try:
@@ -111,8 +110,7 @@ async def _mjpeg(request: web.Request, subject: Subject) -> web.StreamResponse:
     if request.method == "HEAD":
         return _headers_only(headers)
     _check_slot(request, subject)
-    rendering = request.app[SERVICE].rendering
-    with viewer_slot(request, _slot_name(subject)), rendering.using(subject) as source:
+    with viewer_slot(request, _slot_name(subject)), rendered_stream(request, subject) as source:
         first = await source.still(_kind(request), pulse)
         viewer = source.mjpeg.subscribe(variant)
         try:
@@ -125,7 +123,7 @@ async def _still(request: web.Request, subject: Subject) -> web.StreamResponse:
     pulse = _newest(request, subject)
     if request.method == "HEAD":
         return _headers_only({"Content-Type": "image/jpeg", PULSE_HEADER: str(pulse)})
-    with request.app[SERVICE].rendering.using(subject) as source:
+    with rendered_stream(request, subject) as source:
         picture = await source.still(_kind(request), pulse)
     response = _headers_only({"Content-Type": "image/jpeg", PULSE_HEADER: str(picture.pulse)})
     response.body = picture.data

@@ -7,7 +7,7 @@ While slots are free no client is limited: behind a proxy all clients have the s
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 from server.http.access.permissions import ClientIdentity
@@ -52,6 +52,23 @@ class FairShare:
         self._held.pop(slot, None)
         self._ending.pop(slot, None)
 
+    def evict_stream_for(self, client: ClientIdentity) -> bool:
+        """Evict all slots of one stream in favor of a client; return whether one was evicted.
+
+        As :meth:`evict_for`, with streams instead of slots: a stream is held by the client whose slot is its
+        oldest.
+        """
+        holders: dict[str, ClientIdentity] = {}
+        for slot in self._held:
+            holders.setdefault(slot.stream, slot.client)
+        most = _most_beyond_share(client, Counter(holders.values()))
+        if most is None:
+            return False
+        newest = next(stream for stream in reversed(holders) if holders[stream].key == most)
+        for slot in [slot for slot in self._held if slot.stream == newest]:
+            self._evict(slot)
+        return True
+
     def evict_for(self, client: ClientIdentity, streams: Collection[str] | None = None) -> bool:
         """Evict a slot in favor of a client, of some streams or of any; return whether one was evicted.
 
@@ -60,20 +77,29 @@ class FairShare:
         operators, and evict other clients however many slots they hold.
         """
         held = [slot for slot in self._held if streams is None or slot.stream in streams]
-        counts = Counter[str]()
-        operators = {slot.client.key for slot in held if slot.client.is_operator}
+        counts = Counter[ClientIdentity]()
         for slot in held:
-            counts[slot.client.key] += slot.weight
-        own_count = counts.pop(client.key, 0)
-        candidates = {key: count for key, count in counts.items() if key not in operators}
-        if not (client.is_operator and candidates):
-            evictable = counts if client.is_operator else candidates
-            candidates = {key: count for key, count in evictable.items() if count > own_count + 1}
-        if not candidates:
+            counts[slot.client] += slot.weight
+        most = _most_beyond_share(client, counts)
+        if most is None:
             return False
-        most = max(candidates, key=candidates.__getitem__)
-        newest = next(slot for slot in reversed(held) if slot.client.key == most)
-        del self._held[newest]
-        self._ending[newest] = None
-        newest.end()
+        self._evict(next(slot for slot in reversed(held) if slot.client.key == most))
         return True
+
+    def _evict(self, slot: Slot) -> None:
+        del self._held[slot]
+        self._ending[slot] = None
+        slot.end()
+
+
+def _most_beyond_share(client: ClientIdentity, held: Mapping[ClientIdentity, int]) -> str | None:
+    """Return the client that loses something to another one; None: nobody holds more than their share."""
+    counts, operators = Counter[str](), {holder.key for holder in held if holder.is_operator}
+    for holder, count in held.items():
+        counts[holder.key] += count
+    own_count = counts.pop(client.key, 0)
+    candidates = {key: count for key, count in counts.items() if key not in operators}
+    if not (client.is_operator and candidates):
+        evictable = counts if client.is_operator else candidates
+        candidates = {key: count for key, count in evictable.items() if count > own_count + 1}
+    return max(candidates, key=candidates.__getitem__) if candidates else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from aiohttp import web
 
@@ -13,6 +13,7 @@ from server.http.error_responses import break_off
 from server.http.json_responses import unavailable
 from server.http.viewers.fair_share import FairShare, Slot
 from server.http.viewers.hls_sessions import HLS_SESSIONS
+from server.service.facade.rendering import RenderedStream, RenderPoolFullError, Subject
 
 VIEWER_SLOTS = web.AppKey("viewer slots", FairShare)
 """Slots of viewers, by stream."""
@@ -21,6 +22,8 @@ EVENT_SLOTS = web.AppKey("event slots", FairShare)
 SEARCH_SLOTS = web.AppKey("search slots", FairShare)
 """Slots of searches of the past, of which one works while the others wait."""
 _SEARCHES_MAX = 8
+RENDER_SLOTS = web.AppKey("render slots", FairShare)
+"""Slots of requests for rendered streams, by what is rendered."""
 
 
 def evict_or_refuse_viewer(
@@ -76,6 +79,33 @@ def search_slot(request: web.Request) -> Iterator[None]:
     """Hold a search slot inside."""
     with _slot(request, request.app[SEARCH_SLOTS], ""):
         yield
+
+
+@contextmanager
+def rendered_stream(request: web.Request, subject: Subject) -> Iterator[RenderedStream]:
+    """Use a rendered stream inside; if all are in use, one of a client with more of them ends for it.
+
+    Raises:
+        RenderPoolFullError: all are in use, and no client has more than its fair share.
+        KeyError: there is no such person or camera.
+    """
+    rendering, slots = request.app[SERVICE].rendering, request.app[RENDER_SLOTS]
+    client = request.app[ACCESS].client_of(request)
+
+    def end() -> None:
+        break_off(request)
+        rendering.end(subject)
+
+    with ExitStack() as stack:
+        try:
+            source = stack.enter_context(rendering.using(subject))
+        except RenderPoolFullError:
+            if not slots.evict_stream_for(client):
+                raise
+            source = stack.enter_context(rendering.using(subject))
+        slot = slots.take(Slot(client, repr(subject), end))
+        stack.callback(slots.release, slot)
+        yield source
 
 
 def _evict_or_refuse(request: web.Request, slots: FairShare, most: int, why: str) -> web.Response | None:

@@ -17,7 +17,7 @@ from server.service.rendering.render_pool import (
     RenderPoolFullError,
     Subject,
 )
-from server.service.rendering.rendered_stream import PictureTimeoutError
+from server.service.rendering.rendered_stream import PictureTimeoutError, RenderedStream
 
 __all__ = [
     "CONTENT_TYPE",
@@ -30,6 +30,7 @@ __all__ = [
     "PictureTimeoutError",
     "RenderPool",
     "RenderPoolFullError",
+    "RenderedStream",
     "Subject",
     "part_and_boundary",
 ]

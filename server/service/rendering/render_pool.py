@@ -176,6 +176,12 @@ class RenderPool:
             return self._decided.newest
         return pipeline.frame_buffers[subject.camera].newest
 
+    def end(self, subject: Subject) -> None:
+        """End a stream, whether or not it has users."""
+        running = self._running.get(subject)
+        if running is not None:
+            self._end(subject, running)
+
     async def close(self) -> None:
         """End all streams and their workers."""
         # Those that are ending already are only waited for: cancelled again, they would leave their workers.

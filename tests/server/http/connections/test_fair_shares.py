@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fakes.http.tokens import bearer, serve_with_tokens
+from fakes.http.tokens import TOKEN_ENTRIES, bearer, serve_with_tokens, token_entry, write_tokens
+from fakes.service.drawn_site import drawn_room
 from fakes.service.fed_site import ServedSite, serve_site, show_people
 from server.http.access.permissions import ClientIdentity
 from server.http.viewers.fair_share import FairShare, Slot
@@ -145,6 +146,30 @@ async def test_without_tokens_shares_are_by_address_and_this_machine_operates() 
             assert flood[0].is_open
 
 
+async def test_a_token_with_many_rendered_streams_does_not_take_others_streams(tmp_path: Path) -> None:
+    tokens = write_tokens(tmp_path / "tokens.yaml", *map(token_entry, TOKEN_ENTRIES))
+    door, desk, lead = bearer("door"), bearer("desk"), bearer("lead")
+    async for drawn in drawn_room(access={"tokens": str(tokens)}, http={"pictures_max": 3}):
+        async with AsyncExitStack() as stack:
+            paths = ("/cameras/c1/live.mjpeg?overlay=1", "/cameras/c0/live.mjpeg", "/cameras/c1/live.mjpeg")
+            held = [await open_viewer(stack, drawn, path, **desk) for path in paths]
+            overlaid = "/cameras/c0/live.mjpeg?overlay=1"
+            assert await open_viewer(stack, drawn, overlaid, **desk) == 503
+            door_viewer = await open_viewer(stack, drawn, overlaid, **door)
+            assert isinstance(door_viewer, Viewer), "a place of the token that has the most"
+            assert isinstance(held[2], Viewer)
+            await held[2].wait_for_end()
+            assert await open_viewer(stack, drawn, paths[2], **desk) == 503, "more than the others' share"
+            for path in ("/cameras/c1/live.jpg", "/objects/1/best.jpg"):
+                async with drawn.session.get(path, headers=lead) as answer:
+                    assert answer.status == 200, "operators are always admitted"
+            assert isinstance(held[1], Viewer)
+            await held[1].wait_for_end()
+            assert isinstance(held[0], Viewer)
+            assert held[0].is_open
+            assert door_viewer.is_open
+
+
 CLIENTS = [*map(ClientIdentity, "abc"), ClientIdentity("o", is_operator=True)]
 
 
@@ -186,6 +211,42 @@ def test_shares_become_equal_and_stay_equal(arrivals: list[tuple[ClientIdentity,
             )
     assert shares.all == sum(slot.weight for slot in slots)
     assert not shares.ending()
+
+
+@given(st.lists(st.tuples(st.sampled_from(CLIENTS), st.integers(0, 5)), max_size=40))
+def test_shares_of_rendered_streams_become_equal_and_stay_equal(
+    arrivals: list[tuple[ClientIdentity, int]],
+) -> None:
+    shares, limit, slots = FairShare(), 4, dict[Slot, None]()
+
+    def holders() -> dict[str, str]:
+        found: dict[str, str] = {}
+        for slot in slots:
+            found.setdefault(slot.stream, slot.client.key)
+        return found
+
+    def release(slot: Slot) -> None:
+        del slots[slot]
+        shares.release(slot)
+
+    for client, number in arrivals:
+        before = holders()
+        counts = Counter(before.values())
+        if str(number) not in before and len(before) >= limit and not shares.evict_stream_for(client):
+            others = [count for key, count in counts.items() if key not in {client.key, "o"}]
+            assert not others if client.is_operator else max(others, default=0) <= counts[client.key] + 1
+            continue
+        lost = [before[stream] for stream in before.keys() - holders().keys()]
+        assert len(lost) <= 1
+        assert "o" not in lost
+        if lost and not client.is_operator:
+            assert counts[lost[0]] == max(counts[key] for key in "abc" if key != client.key)
+            assert counts[lost[0]] > counts[client.key] + 1
+        slot = Slot(client, str(number), lambda: None)
+        slot.end = partial(release, slot)
+        slots[slot] = None
+        shares.take(slot)
+        assert len(holders()) <= limit
 
 
 def test_the_limit_of_one_stream_evicts_only_its_viewers() -> None:
