@@ -109,6 +109,8 @@ def make_app(
         numbered_since=lambda: service.people.numbered_since,
     )
     app[ACCESS] = AccessControl(authenticator, service.people.current_number, config.access.blur)
+    is_open = config.access.tokens is None and config.access.open_to_all
+    service.sites.accept_tokens(lambda: None if is_open else authenticator.tokens_of_viewers())
     register_metrics(app)
     for module in _ROUTES:
         app.add_routes(module.routes)

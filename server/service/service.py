@@ -17,6 +17,7 @@ from server.service.facade.people import PeopleService
 from server.service.facade.recordings import RecordingService
 from server.service.facade.rendering import RenderPool
 from server.service.facade.rules import RulesService
+from server.service.facade.sites import SitesService
 from server.service.facade.streams import StreamService
 from server.service.metrics.service_collector import register_collectors
 from server.service.pipeline import BestViewPipeline
@@ -29,6 +30,7 @@ class BestViewService:
         people: people, their views, and manual corrections.
         rules: zones and rules, and what they have found.
         cameras: state and diagnostics of the cameras.
+        sites: other sites.
         streams: live streams.
         recordings: recorded streams.
         deletion: deletion of people's data.
@@ -44,6 +46,7 @@ class BestViewService:
         self.people = PeopleService(pipeline)
         self.rules = RulesService(pipeline, self.people)
         self.cameras = CameraService(pipeline)
+        self.sites = SitesService(pipeline)
         self.streams = StreamService(pipeline)
         self.recordings = RecordingService(pipeline)
         self.deletion = DeletionService(pipeline, self.people, self.rules)

@@ -116,6 +116,15 @@ class Authenticator:
             return None
         return self._void_reason(token) or Grant.of(token)
 
+    def tokens_of_viewers(self) -> list[tuple[str, int]]:
+        """Return the SHA-256 of each token that shows people, and the only person whom it is for, or 0."""
+        tokens = () if self.file is None else self.file.tokens
+        return [
+            (token.sha256, token.object or 0)
+            for token in tokens
+            if token.camera is None and not self._void_reason(token)
+        ]
+
     def _void_reason(self, token: Token) -> VoidReason | None:
         """Return why a token for one person is void: person numbers have restarted since it was made."""
         if token.object is None or token.made is None or token.made.timestamp() >= self._numbered_since():

@@ -78,6 +78,11 @@ class AccessControl:
             return Grant(is_operator=True)
         return Grant(Scope(blur=self._blur))
 
+    def token_of(self, request: web.Request) -> str | None:
+        """Return the SHA-256 of the token of a request that is being answered; None: it has none."""
+        opened = self._open_requests.get(id(request))
+        return None if opened is None else opened.credential.token_digest
+
     def client_of(self, request: web.Request) -> ClientIdentity:
         """Return the client whose share of slots a request that is being answered counts towards."""
         opened = self._open_requests.get(id(request))

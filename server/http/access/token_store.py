@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import logging
+from collections.abc import Collection
 from pathlib import Path
 
 from server.config.tokens_file import Token, read_tokens
@@ -38,6 +39,11 @@ class TokenStore:
             log.warning("%s; the previous %d tokens stay in force", error, len(self._tokens))
         else:
             log.info("%s: %d tokens are in force", self._path, len(self._tokens))
+
+    @property
+    def tokens(self) -> Collection[Token]:
+        """The tokens in force."""
+        return self._tokens.values()
 
     def find_in_constant_time(self, token_digest: str) -> Token | None:
         """Return the token with this SHA-256, comparing it with all of them in constant time."""

@@ -44,11 +44,13 @@ def event(name: str, content: Any, event_id: int | None = None) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class _Audience:
+class Audience:
     """Subscribers who receive the same events."""
 
     scope: Scope
-    delay: DelayMode
+    delay: DelayMode = DelayMode.BALANCED
+    token: str | None = None
+    """SHA-256 of their token, where it matters for what they may know of other sites."""
 
 
 @dataclass(slots=True)
@@ -68,7 +70,7 @@ class Events:
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
-        self._by_scope: dict[_Audience, _ScopedEvents] = {}
+        self._by_scope: dict[Audience, _ScopedEvents] = {}
         self._recent: dict[DelayMode, deque[GopChoices]] = {
             delay: deque(maxlen=_GOPS_KEPT) for delay in DelayMode
         }
@@ -83,22 +85,20 @@ class Events:
         """The number of subscribers."""
         return sum(scoped.channel.viewers for scoped in self._by_scope.values())
 
-    def join(self, scope: Scope, delay: DelayMode = DelayMode.BALANCED) -> Subscriber:
+    def join(self, audience: Audience) -> Subscriber:
         """Add a subscriber to a delay's decisions; it receives the current lists and open flags first."""
-        audience = _Audience(scope, delay)
         scoped = self._by_scope.get(audience) or self._add_audience(audience)
         subscriber = scoped.channel.subscribe()
         for flag in self._service.assist.open_flags:
-            chunk = self._flag_event(scope, flag)
+            chunk = self._flag_event(audience.scope, flag)
             if chunk is not None:
                 subscriber.put_first(chunk)
-        for name, content in self._lists(scope).items():
+        for name, content in self._lists(audience).items():
             subscriber.put_first(BytesChunk(event(name, content), random_access=True))
         return subscriber
 
-    def leave(self, scope: Scope, subscriber: Subscriber, delay: DelayMode = DelayMode.BALANCED) -> None:
+    def leave(self, audience: Audience, subscriber: Subscriber) -> None:
         """Remove a subscriber."""
-        audience = _Audience(scope, delay)
         scoped = self._by_scope[audience]
         scoped.channel.unsubscribe(subscriber)
         if not scoped.channel.viewers:
@@ -114,7 +114,7 @@ class Events:
         for scoped in self._by_scope.values():
             scoped.channel.close()
 
-    def _add_audience(self, audience: _Audience) -> _ScopedEvents:
+    def _add_audience(self, audience: Audience) -> _ScopedEvents:
         scoped = self._by_scope[audience] = _ScopedEvents(
             Broadcaster(backlog_gops=_GOPS_KEPT, queue_gops=_QUEUE)
         )
@@ -126,10 +126,10 @@ class Events:
 
     async def _publish_lists(self) -> None:
         for audience, scoped in self._by_scope.items():
-            self._publish_changed(audience.scope, scoped)
+            self._publish_changed(audience, scoped)
 
-    def _publish_changed(self, scope: Scope, scoped: _ScopedEvents) -> None:
-        lists = self._lists(scope)
+    def _publish_changed(self, audience: Audience, scoped: _ScopedEvents) -> None:
+        lists = self._lists(audience)
         for name, content in lists.items():
             if name == "site":
                 continue  # it has the time of day, so it always differs; only new subscribers need it
@@ -138,7 +138,7 @@ class Events:
                 scoped.last_sent[name] = data
                 scoped.channel.publish_once(BytesChunk(data, random_access=True))
         for subscriber in scoped.channel.subscribers_with_new_loss():
-            for chunk in self._snapshot(scope, lists):
+            for chunk in self._snapshot(audience.scope, lists):
                 subscriber.put(chunk)
         scoped.channel.publish_once(BytesChunk(b": here\n\n", random_access=False))
 
@@ -152,12 +152,13 @@ class Events:
             if chunk is not None:
                 yield chunk
 
-    def _lists(self, scope: Scope) -> dict[str, Any]:
-        service = self._service
+    def _lists(self, audience: Audience) -> dict[str, Any]:
+        service, scope = self._service, audience.scope
+        objects = objects_info(service, audience.token)
         return {
             "delays": delays_info(service, scope),
             "cameras": filter_cameras(cameras_info(service), scope),
-            "objects": filter_objects(objects_info(service), scope, service.people.current_number),
+            "objects": filter_objects(objects, scope, service.people.current_number),
             "site": filter_site(site_info(service), scope),
         }
 

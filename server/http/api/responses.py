@@ -41,8 +41,8 @@ def delays_info(service: BestViewService, scope: Scope) -> Delays:
     return Delays([delay for delay in service.streams.delays() if has_live or delay.delay != DelayMode.LIVE])
 
 
-def objects_info(service: BestViewService) -> Objects:
-    """Return all people who have a stream, by number."""
+def objects_info(service: BestViewService, token: str | None = None) -> Objects:
+    """Return all people who have a stream, by number; ``token`` is the SHA-256 of the viewer's."""
     objects = [
         ObjectInfo(
             object=person.number,
@@ -60,6 +60,10 @@ def objects_info(service: BestViewService) -> Objects:
         for person in service.people.list_people()
     ]
     elsewhere = [Elsewhere(person.number, person.server) for person in service.people.list_remote_people()]
+    elsewhere += [
+        Elsewhere(person.number, person.url, person.site, person.is_visible, person.knows_token)
+        for person in service.sites.list_people(token)
+    ]
     return Objects(objects, elsewhere)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from aiohttp import web
 
 from server.http.access.authorization import ACCESS
-from server.http.api.events import EVENTS
+from server.http.api.events import EVENTS, Audience
 from server.http.api.responses import cameras_info, delays_info, objects_info, site_info
 from server.http.api.schema import FlagList
 from server.http.api.scope_filter import filter_cameras, filter_flag, filter_objects, filter_site
@@ -39,8 +39,9 @@ async def get_delays(request: web.Request) -> web.Response:
 @routes.get("/api/objects")
 async def get_objects(request: web.Request) -> web.Response:
     """List all known people."""
-    service, scope = request.app[SERVICE], request.app[ACCESS].grant(request).scope
-    return json_response(filter_objects(objects_info(service), scope, service.people.current_number))
+    service, access = request.app[SERVICE], request.app[ACCESS]
+    objects = objects_info(service, access.token_of(request))
+    return json_response(filter_objects(objects, access.grant(request).scope, service.people.current_number))
 
 
 @routes.get("/api/cameras")
@@ -62,20 +63,21 @@ async def get_flags(request: web.Request) -> web.Response:
 @routes.get("/api/events")
 async def get_events(request: web.Request) -> web.StreamResponse:
     """Stream events as server-sent events."""
-    events, scope = request.app[EVENTS], request.app[ACCESS].grant(request).scope
+    events, access = request.app[EVENTS], request.app[ACCESS]
     error = invalid_event_query(request)
     if error is not None:
         return error_response(400, error)
     refused = refuse_live_if_scoped(request) or evict_or_refuse_listener(request)
     if refused is not None:
         return refused
-    delay = requested_delay(request)
+    token = request.app[SERVICE].sites.audience(access.token_of(request))
+    audience = Audience(access.grant(request).scope, requested_delay(request), token)
     with event_slot(request):
-        subscriber = events.join(scope, delay)
+        subscriber = events.join(audience)
         try:
             return await send_viewer(request, subscriber, b"", {"Content-Type": "text/event-stream"})
         finally:
-            events.leave(scope, subscriber, delay)
+            events.leave(audience, subscriber)
 
 
 @routes.get("/api/rules")

@@ -67,11 +67,17 @@ class ObjectInfo(msgspec.Struct, frozen=True):
 
 
 class Elsewhere(msgspec.Struct, frozen=True):
-    """A person served by another best-view service of the site."""
+    """A person whom another best-view service of the site serves, or whom another site has seen last."""
 
     object: int
     server: str | None
     """Its base URL; null if not configured."""
+    site: str | None = None
+    """The other site's name; null: it is of this one."""
+    visible: bool | None = None
+    """Whether the other site sees the person now; null: it is of this one."""
+    token: bool = False
+    """Whether it is another site that requires a token, and accepts that of the request."""
 
 
 class Objects(msgspec.Struct, frozen=True):
@@ -79,7 +85,7 @@ class Objects(msgspec.Struct, frozen=True):
 
     objects: list[ObjectInfo]
     elsewhere: list[Elsewhere]
-    """People of the site's other services."""
+    """People of the site's other services, and of other sites that accept the viewer."""
 
 
 class Cameras(msgspec.Struct, frozen=True):

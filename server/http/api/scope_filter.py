@@ -42,7 +42,10 @@ def filter_objects(objects: Objects, scope: Scope, resolve: Resolve) -> Objects:
     if scope.is_everywhere:
         return objects
     person = None if scope.object is None else resolve(scope.object)
-    return Objects([info for info in objects.objects if info.object == person], [])
+    return Objects(
+        [info for info in objects.objects if info.object == person],
+        [info for info in objects.elsewhere if info.object == person],
+    )
 
 
 def filter_cameras(cameras: Cameras, scope: Scope) -> Cameras:

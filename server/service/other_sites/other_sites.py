@@ -163,15 +163,20 @@ class OtherSites:
         if (pulse := self._pulse) >= 0:
             self._take_in(site, told, pulse, now)
 
-    def whereabouts(self, now: float | None = None) -> list[PersonElsewhere]:
+    def whereabouts(self) -> list[PersonElsewhere]:
         """Return who was seen last by another site that is there, by number."""
-        now = self._clock() if now is None else now
-        found = {}
+        now, found = self._clock(), {}
         for person in self.elsewhere.by_number.values():
             number = self._people.registry.current(person.number)
-            if self.sites[person.site].is_there(now) and person.frame > self._last_seen(number):
+            is_here = self._here.arrived(number) is not None or person.frame <= self._last_seen(number)
+            if self.sites[person.site].is_there(now) and not is_here:
                 found[number] = replace(person, number=number)
         return [person for _, person in sorted(found.items())]
+
+    @property
+    def now(self) -> float:
+        """The time, monotonic seconds."""
+        return self._clock()
 
     @property
     def _pulse(self) -> int:

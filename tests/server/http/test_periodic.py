@@ -13,7 +13,7 @@ from fakes.service.scripted_cameras import FedService, small_config
 from server.http.access.authentication import Authenticator
 from server.http.access.authorization import AccessControl
 from server.http.access.permissions import ALL
-from server.http.api.events import Events
+from server.http.api.events import Audience, Events
 from server.http.periodic import run_periodically
 from server.http.tls import Certificate
 from server.service.service import BestViewService
@@ -60,7 +60,7 @@ async def test_lists_are_published_after_a_failed_step(monkeypatch: pytest.Monke
     monkeypatch.setattr("server.http.api.events._LISTS_EVERY_S", 0.001)
     service, failing = FedService(small_config()), Failing(RuntimeError("unexpected error"))
     events = Events(BestViewService(service))
-    events.join(ALL)
+    events.join(Audience(ALL))
     monkeypatch.setattr(events, "_publish_changed", failing)
     assert await is_retried(asyncio.create_task(events.run()), failing)
     service.close()

@@ -12,7 +12,7 @@ from fakes.service.fed_site import A, B, ServedSite
 from fakes.service.scripted_cameras import CAMERAS, GOP, LARGE, SMALL
 from fakes.timeouts import PATIENCE
 from server.http.access.permissions import ALL
-from server.http.api.events import Events
+from server.http.api.events import Audience, Events
 from server.service.service import BestViewService
 
 
@@ -75,7 +75,7 @@ async def test_a_subscriber_that_fell_behind_receives_the_current_state_again(
     site_with_people: ServedSite,
 ) -> None:
     received = Events(BestViewService(site_with_people.service))
-    reader = received.join(ALL)
+    reader = received.join(Audience(ALL))
     for epoch in range(3, 120):
         site_with_people.service.feed(epoch, {A: {1: LARGE, 2: SMALL}, B: {1: None}})
     assert reader.lost_gops, "some events, and perhaps a list"

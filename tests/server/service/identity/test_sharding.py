@@ -161,7 +161,9 @@ async def test_people_of_another_service_are_listed_and_redirected(
 
         _, _, objects = await get("/api/objects")
         assert [person["object"] for person in objects["objects"]] == [1, 3]
-        assert objects["elsewhere"] == [{"object": 2, "server": "http://one:1/" if has_address else None}]
+        server = "http://one:1/" if has_address else None
+        own_site = {"site": None, "visible": None, "token": False}
+        assert objects["elsewhere"] == [{"object": 2, "server": server, **own_site}]
         assert (await get("/api/objects/1/choice"))[0] == 200
         for path in ("objects/2/best.mp4?a=b", "api/objects/2/choice", "objects/2/thumb.jpg"):
             status, location, content = await get(f"/{path}")

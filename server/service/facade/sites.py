@@ -1,0 +1,75 @@
+"""Other sites: who is there, as far as a viewer may know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from server.service.other_sites.other_sites import Tokens
+from server.service.pipeline import BestViewPipeline
+
+
+@dataclass(frozen=True, slots=True)
+class PersonAtSite:
+    """A person whom another site has seen last."""
+
+    number: int
+    site: str
+    """Its name."""
+    url: str
+    """Base URL of its page."""
+    is_visible: bool
+    """Whether it sees them now."""
+    knows_token: bool
+    """Whether it requires a token, and accepts the viewer's."""
+
+
+@dataclass(frozen=True, slots=True)
+class SiteLink:
+    """The link with another site."""
+
+    name: str
+    is_there: bool
+    """Whether it has been heard lately."""
+
+
+class SitesService:
+    """Queries about other sites. A viewer's token is given by its SHA-256; None: they have none."""
+
+    def __init__(self, pipeline: BestViewPipeline) -> None:
+        self._sites = pipeline.other_sites
+
+    def list_people(self, token_sha256: str | None) -> list[PersonAtSite]:
+        """Return whom other sites have seen last, by number, if they accept a viewer."""
+        found = []
+        for person in self._sites.whereabouts():
+            site = self._sites.sites[person.site]
+            if site.may_know(token_sha256, person.number):
+                found.append(
+                    PersonAtSite(
+                        person.number,
+                        site.name,
+                        site.settings.base_url,
+                        person.stay_s is not None,
+                        not site.viewers.is_open,
+                    )
+                )
+        return found
+
+    def find(self, number: int, token_sha256: str | None) -> PersonAtSite | None:
+        """Return where a person was seen last; None: here, nowhere, or the viewer may not know."""
+        people = self.list_people(token_sha256) if self._sites.sites else []
+        return next((person for person in people if person.number == number), None)
+
+    def audience(self, token_sha256: str | None) -> str | None:
+        """Return what distinguishes a viewer from others, as to what they may know of other sites."""
+        return token_sha256 if self._sites.sites else None
+
+    def accept_tokens(self, tokens: Callable[[], Tokens | None]) -> None:
+        """Set who may know who is here: whose tokens, by SHA-256, are returned; None: everybody."""
+        self._sites.accepted_tokens = tokens
+
+    def links(self) -> list[SiteLink]:
+        """Return the links with all other sites."""
+        now = self._sites.now
+        return [SiteLink(name, site.is_there(now)) for name, site in sorted(self._sites.sites.items())]

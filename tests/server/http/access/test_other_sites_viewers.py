@@ -1,0 +1,131 @@
+"""Who is at another site, and where requests are led, is told only to viewers whom that site accepts."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+
+from fakes.http.tokens import IN_FUTURE, bearer, token_entry, token_of, write_tokens
+from fakes.service.linked_sites import LinkedSites, linked_sites
+from fakes.service.scripted_cameras import LARGE, SMALL
+from server.config.sections import HttpSettings
+from server.http.access.authorization import ACCESS
+from server.http.app import make_app, serving
+from server.service.service import BestViewService
+
+A, B = 1, 4
+OPEN = {"open_to_all": True}
+
+
+class Served:
+    """Two sites, and requests to the hall."""
+
+    def __init__(self, sites: LinkedSites, url: str, session: aiohttp.ClientSession) -> None:
+        self.sites, self._url, self._session = sites, url, session
+
+    async def get(self, path: str, name: str | None = None) -> tuple[int, str | None, Any]:
+        headers = {} if name is None else bearer(name)
+        async with self._session.get(self._url + path, allow_redirects=False, headers=headers) as answer:
+            content = await answer.json() if answer.content_type == "application/json" else None
+            return answer.status, answer.headers.get("Location"), content
+
+    async def elsewhere(self, name: str | None = None) -> list[dict[str, Any]]:
+        _, _, content = await self.get("/api/objects", name)
+        return list(content["elsewhere"])
+
+
+@asynccontextmanager
+async def two_sites(hall: dict[str, Any], yard: dict[str, Any]) -> AsyncIterator[Served]:
+    """Serve two sites; a person walks from the hall into the yard, where somebody else was before."""
+    with linked_sites() as sites:
+        for name, access in (("hall", hall), ("yard", yard)):
+            sites.stop(name)
+            sites.start(name, access=access)
+        apps = {name: make_app(BestViewService(service)) for name, service in sites.running.items()}
+        async with AsyncExitStack() as stack:
+            ports = [
+                await stack.enter_async_context(serving(app, HttpSettings(port=0))) for app in apps.values()
+            ]
+            sites.walk(4, hall={A: SMALL}, yard={B: LARGE})
+            sites.walk(2, yard={B: LARGE})
+            sites.walk(4, yard={A: SMALL, B: LARGE})
+            assert (sites.number("yard", A), sites.number("yard", B)) == (1, 2)
+            session = await stack.enter_async_context(aiohttp.ClientSession())
+            served = Served(sites, f"http://127.0.0.1:{ports[0]}", session)
+            served.yard_access = apps["yard"][ACCESS]  # type: ignore[attr-defined]
+            yield served
+
+
+async def test_viewers_are_led_to_the_site_that_sees_the_person() -> None:
+    async with two_sites(OPEN, OPEN) as served:
+        there = {"server": "http://yard/", "site": "yard", "visible": True, "token": False}
+        assert await served.elsewhere() == [{"object": 1, **there}, {"object": 2, **there}]
+        for path in ("objects/1/best.mp4?delay=smooth", "objects/1/hls/index.m3u8", "api/objects/1/choice"):
+            assert (await served.get(f"/{path}"))[:2] == (307, f"http://yard/{path}")
+        status, location, _ = await served.get("/objects/2/best.ts?token=secret")
+        assert (status, location) == (307, "http://yard/objects/2/best.ts"), "a token that is not for it"
+        for path in ("/objects/1/best.mp4?from=-5", "/objects/1/thumb.jpg", "/objects/7/best.mp4"):
+            assert (await served.get(path))[0] != 307
+        served.sites.walk(3)
+        there["visible"] = False
+        assert await served.elsewhere() == [{"object": 1, **there}, {"object": 2, **there}]
+        served.sites.walk(4, hall={A: SMALL})
+        assert await served.elsewhere() == [{"object": 2, **there}]
+        assert (await served.get("/objects/1/best.mp4"))[0] != 307
+
+
+async def test_a_site_with_tokens_tells_nobody_without_one_who_is_there(tmp_path: Path) -> None:
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("desk"))
+    async with two_sites(OPEN, {"tokens": str(tokens)}) as served:
+        assert await served.elsewhere() == []
+        assert (await served.get("/objects/1/best.mp4"))[0] != 307
+        assert (await served.get("/objects/2/best.mp4"))[0] == 404
+        assert all(message.viewers is None or not message.viewers.is_open for _, message in told(served))
+
+
+async def test_a_site_that_is_not_open_to_all_tells_nobody() -> None:
+    async with two_sites(OPEN, {}) as served:
+        assert await served.elsewhere() == []
+
+
+async def test_a_token_that_both_sites_accept_shows_who_is_at_the_other(tmp_path: Path) -> None:
+    child = {"role": "watch", "object": 2, "made": IN_FUTURE}
+    both = [token_entry("desk"), token_entry("family"), token_entry("child", **child)]
+    hall = write_tokens(tmp_path / "hall.yaml", *both, token_entry("lead"), token_entry("door"))
+    yard = write_tokens(tmp_path / "yard.yaml", *both, token_entry("door"))
+    async with two_sites({"tokens": str(hall)}, {"tokens": str(yard)}) as served:
+        for name, numbers in (("desk", [1, 2]), ("family", [1]), ("child", [2]), ("lead", []), ("door", [])):
+            listed = await served.elsewhere(name)
+            assert [person["object"] for person in listed] == numbers, name
+            assert all(person["token"] for person in listed)
+        path = "objects/1/best.mp4"
+        assert (await served.get(f"/{path}", "desk"))[:2] == (307, f"http://yard/{path}")
+        query = f"{path}?token={token_of('family')}"
+        assert (await served.get(f"/{query}"))[:2] == (307, f"http://yard/{query}")
+        assert (await served.get(f"/{path}", "lead"))[0] != 307
+        assert (await served.get(f"/{path}", "child"))[0] == 403
+        assert (await served.get("/objects/2/best.mp4", "family"))[0] == 403
+        sent = [
+            digest.digest
+            for _, message in told(served)
+            if message.viewers
+            for digest in message.viewers.tokens
+        ]
+        assert sent
+        hashes = [bytes.fromhex(entry["sha256"]) for entry in both]
+        assert not any(digest in whole for digest in sent for whole in hashes)
+
+        write_tokens(yard, token_entry("family"))
+        for _ in range(2):  # a changed file is read once it has stayed the same
+            served.yard_access.authenticator.file.reload_if_changed()  # type: ignore[attr-defined]
+        served.sites.walk(2, yard={A: SMALL, B: LARGE})
+        assert await served.elsewhere("desk") == [], "revoked there"
+        assert [person["object"] for person in await served.elsewhere("family")] == [1]
+
+
+def told(served: Served) -> list[tuple[str, Any]]:
+    return [message for message in served.sites.told if message[0] == "yard"]
