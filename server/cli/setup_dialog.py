@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from server.setup.camera_address import free_name
+from server.setup.camera_address import free_name, parse_addresses
 from server.setup.discovery import FoundCamera
 from server.setup.onvif_profiles import INSTALL, is_installed
 from server.setup.proposal import SiteProposal
@@ -93,7 +93,9 @@ class SetupDialog:
         try:
             typer.echo("Trying …")
             small = None if substream is None else keys[substream]
-            self._take(self._runner.run(self._session.try_stream(keys[source], found.name, small)))
+            self._take(
+                self._runner.run(self._session.add(self._session.offered(keys[source], small), found.name))
+            )
         except UserError as error:
             typer.echo(str(error))
 
@@ -117,7 +119,7 @@ class SetupDialog:
         try:
             login = self._ask_login() if "://" in address and "@" not in address else ("", "")
             typer.echo("Trying …")
-            self._take(self._runner.run(self._session.try_address(address, *login)))
+            self._take(self._runner.run(self._session.add(parse_addresses(address, *login))))
         except UserError as error:
             typer.echo(str(error))
         return True

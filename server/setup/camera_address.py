@@ -49,6 +49,37 @@ class CameraAddress:
         return redact_to_host(self.source)
 
 
+@dataclass(frozen=True, slots=True)
+class CameraAddresses:
+    """Where a camera's streams are: that of its viewers, and that in which people are tracked, if another.
+
+    Raises:
+        UserError: both are one, or have different passwords.
+    """
+
+    source: CameraAddress
+    substream: CameraAddress | None = None
+
+    def __post_init__(self) -> None:
+        if self.substream is None:
+            return
+        if self.substream.source == self.source.source:
+            raise UserError("the substream is the stream that viewers get: leave it out")
+        if self.substream.password not in {None, self.source.password}:
+            raise UserError("the substream's password must be that of the camera")
+
+
+def parse_addresses(text: str, user: str = "", password: str = "", substream: str = "") -> CameraAddresses:
+    """Parse the address of a camera, and that of its substream, if any, with one login.
+
+    Raises:
+        UserError: one is not the address of a camera, or they do not go together.
+    """
+    source = parse_address(text, user, password)
+    small = parse_address(substream, user, password) if substream.strip() else None
+    return CameraAddresses(source, small)
+
+
 def parse_address(text: str, user: str = "", password: str = "") -> CameraAddress:
     """Parse an address that a user entered; a login beside it takes precedence over one in it.
 

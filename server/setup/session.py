@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from server.setup import discovery
-from server.setup.camera_address import CameraAddress, check_name, free_name, parse_address
+from server.setup.camera_address import CameraAddress, CameraAddresses, check_name, free_name, parse_address
 from server.setup.discovery import FoundCamera
 from server.setup.proposal import SiteProposal, propose_site
 from server.setup.site_file import NewCamera, NewSite, write_site
@@ -30,6 +30,8 @@ MAX_CAMERAS = 64
 _TRIALS_AT_ONCE = 2
 """Trials that run at a time; each decodes video."""
 _MAX_WAITING = 16
+_MAX_STREAMS = 4096
+"""Offered streams that are remembered, the latest: a site may run for months."""
 Request = TypeVar("Request")
 Answer = TypeVar("Answer")
 
@@ -86,7 +88,10 @@ class TriedCamera:
 
 @dataclass(slots=True)
 class SetupSession:
-    """One set-up, in memory; ``path`` is the configuration file that it will write."""
+    """One set-up, in memory; ``path`` is the configuration file that it will write.
+
+    A running site has one, too, to find and try cameras.
+    """
 
     path: Path
     found: list[FoundCamera] = field(default_factory=list)
@@ -113,7 +118,7 @@ class SetupSession:
     async def profiles(
         self, host: str, port: int, user: str, password: str
     ) -> tuple[ProfileList, Sequence[int]]:
-        """Ask a found camera for its streams; return them, and their keys for :meth:`try_stream`.
+        """Ask a found camera for its streams; return them, and their keys for :meth:`offered`.
 
         Raises:
             UserError: no such camera was found, or too many are asked.
@@ -128,71 +133,51 @@ class SetupSession:
             key = next(self._keys)
             self._streams[key] = parse_address(profile.address, user, password)
             keys.append(key)
+        while len(self._streams) > _MAX_STREAMS:
+            del self._streams[next(iter(self._streams))]
         return answer, keys
 
-    async def try_address(
-        self, text: str, user: str, password: str, name: str = "", substream: str = ""
-    ) -> TriedCamera:
-        """Try an address, and that of a substream, if any; add the camera if both send pictures.
+    def offered(self, source: int, substream: int | None = None) -> CameraAddresses:
+        """Return the addresses of streams that a camera offered, by their keys.
 
         Raises:
-            UserError: one is no address, or no picture arrives.
+            UserError: there is no such stream, or both are one.
         """
-        address = parse_address(text, user, password)
-        if not substream.strip():
-            return await self._try(address, name)
-        small = parse_address(substream, user, password)
-        if small.password is not None and small.password != address.password:
-            raise UserError("the substream's password must be that of the camera")
-        return await self._try(address, name, small)
-
-    async def try_stream(self, key: int, name: str = "", substream: int | None = None) -> TriedCamera:
-        """Try a stream that a camera offers, and another one as its substream, if any; add the camera.
-
-        Raises:
-            UserError: there is no such stream, or no picture arrives.
-        """
-        if key not in self._streams or (substream is not None and substream not in self._streams):
+        if source not in self._streams or (substream is not None and substream not in self._streams):
             raise UserError("no such stream; ask the camera again")
-        return await self._try(
-            self._streams[key], name, None if substream is None else self._streams[substream]
-        )
+        return CameraAddresses(self._streams[source], None if substream is None else self._streams[substream])
 
-    async def _try(
-        self, address: CameraAddress, name: str, substream: CameraAddress | None = None
-    ) -> TriedCamera:
-        if any(camera.address.source == address.source for camera in self.cameras):
-            raise UserError(f"{address.shown}: this camera is in the list already")
+    async def add(self, addresses: CameraAddresses, name: str = "") -> TriedCamera:
+        """Try a camera, and add it if all its streams send pictures.
+
+        Raises:
+            UserError: it is in the list already, or no picture arrives.
+        """
+        if any(camera.address.source == addresses.source.source for camera in self.cameras):
+            raise UserError(f"{addresses.source.shown}: this camera is in the list already")
         if len(self.cameras) >= MAX_CAMERAS:
             raise UserError(f"a site set up here has at most {MAX_CAMERAS} cameras")
-        if substream is not None and substream.source == address.source:
-            raise UserError("the substream is the stream that viewers get: leave it out")
-        camera = await self._tried(address, name)
-        if substream is not None:
-            small = await self._tried_stream(substream, "the substream: ")
-            camera = replace(camera, substream=small)
-        taken = {camera.name for camera in self.cameras}
-        camera = replace(camera, name=free_name(name, taken))
+        camera = await self.try_camera(addresses, name)
+        camera = replace(camera, name=free_name(name, {camera.name for camera in self.cameras}))
         self.cameras.append(camera)
         return camera
 
-    async def try_unlisted(
-        self, text: str, user: str, password: str, name: str = "", passed_into: Path | None = None
+    async def try_camera(
+        self, addresses: CameraAddresses, name: str = "", passed_into: Path | None = None
     ) -> TriedCamera:
-        """Try an address without adding the camera to the list.
+        """Try a camera without adding it to the list.
 
         Its own video must fit into the streams of the configuration ``passed_into``, if there is one.
 
         Raises:
-            UserError: it is no address, no picture arrives, or it does not fit.
+            UserError: no picture arrives, or it does not fit.
         """
-        site = "" if passed_into is None else str(passed_into)
-        return await self._tried(parse_address(text, user, password), name, site)
+        source = await self._tried(addresses.source, site="" if passed_into is None else str(passed_into))
+        small = addresses.substream
+        substream = None if small is None else await self._tried(small, "the substream: ")
+        return TriedCamera(next(self._keys), name, source, substream)
 
-    async def _tried(self, address: CameraAddress, name: str, site: str = "") -> TriedCamera:
-        return TriedCamera(next(self._keys), name, await self._tried_stream(address, site=site))
-
-    async def _tried_stream(self, address: CameraAddress, which: str = "", site: str = "") -> TriedStream:
+    async def _tried(self, address: CameraAddress, which: str = "", site: str = "") -> TriedStream:
         trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options, site))
         if trial.error:
             raise UserError(f"{which}{address.shown}: {trial.error}")

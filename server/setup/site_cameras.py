@@ -22,10 +22,11 @@ _Entry = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class ConfiguredCamera:
-    """A camera in the file: its id, and its source without anything that may be secret."""
+    """A camera in the file: its id, its source and substream, if any, without anything that may be secret."""
 
     id: str
     address: str
+    substream: str = ""
 
 
 def list_cameras(path: Path) -> Sequence[ConfiguredCamera]:
@@ -35,7 +36,11 @@ def list_cameras(path: Path) -> Sequence[ConfiguredCamera]:
         UserError: it cannot be read, or has no list of cameras.
     """
     return [
-        ConfiguredCamera(str(camera.get("id")), redact_to_host(str(camera.get("source"))))
+        ConfiguredCamera(
+            str(camera.get("id")),
+            redact_to_host(str(camera.get("source"))),
+            redact_to_host(str(camera.get("substream") or "")),
+        )
         for camera in _cameras(path)
     ]
 

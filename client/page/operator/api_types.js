@@ -36,6 +36,7 @@
  * @typedef {object} SiteCamera in the configuration file
  * @property {string} camera
  * @property {string} address without passwords
+ * @property {string} substream in which people are tracked, likewise; empty: the camera has none
  *
  * @typedef {{name: string, fps: number, width: number, height: number, digest: string}} SiteFormat /api/operator/site_settings
  *

@@ -1,17 +1,17 @@
 /** The cameras in the configuration file: added after a trial, renamed, removed. A restart brings them into force. */
 
 import { requestOperator } from '../shared/requests.js';
+import { CAMERA_TIMEOUT_MS, CameraSearch } from '../shared/camera_search.js';
 import { element, make, setText } from '../shared/dom.js';
 
+/** @import {CameraTrial} from '../shared/api_types.js' */
 /** @import {SiteCamera} from './api_types.js' */
 /** @import {CameraTiles} from './camera_tiles.js' */
 /** @import {Section, ShowError} from './section.js' */
 /** @import {SiteSettings} from './site_settings.js' */
 
-const TRIAL_TIMEOUT_MS = 120_000; // a camera may take long to answer
-
 export class SiteCameras {
-  #state = element('add-state');
+  #state = element('cameras-state');
   /** @type {HTMLSelectElement} */
   #instead = element('add-instead'); // the camera that gets the address; empty: a new one
   /** @type {HTMLInputElement} */
@@ -24,19 +24,7 @@ export class SiteCameras {
   constructor(showError, fileChanged) {
     this.showError = showError;
     this.fileChanged = fileChanged;
-    /** @type {HTMLFormElement} */
-    const form = element('add-camera');
-    form.addEventListener('submit', async (event) => {
-      event.preventDefault();
-      setText(this.#state, 'Trying…');
-      const [address, user, password, name] = ['address', 'user', 'password', 'name'].map(fieldValue);
-      const camera = this.#instead.value;
-      const done = await this.#change('POST', { address, user, password, name, camera });
-      const message = camera ? `It sends pictures: ${camera} has this address now.` : 'It sends pictures and was added.';
-      setText(this.#state, done ? message : '');
-      if (done) form.reset();
-      this.#name.disabled = this.#instead.value !== '';
-    });
+    this.search = new CameraSearch(element('camera-search'), (trial) => this.#tryCamera(trial), showError);
     this.#instead.addEventListener('change', () => (this.#name.disabled = this.#instead.value !== ''));
   }
 
@@ -48,6 +36,20 @@ export class SiteCameras {
     }
   }
 
+  /**
+   * @param {CameraTrial} trial
+   * @returns {Promise<string>} what has become of it
+   */
+  async #tryCamera(trial) {
+    const camera = this.#instead.value;
+    const wanted = { ...trial, name: this.#name.value.trim() || trial.name, camera };
+    this.#show((await requestOperator('site_cameras', 'POST', wanted, CAMERA_TIMEOUT_MS)).cameras);
+    this.#name.value = this.#instead.value = '';
+    this.#name.disabled = false;
+    await this.fileChanged();
+    return camera ? `is the address of ${camera} now` : 'was added';
+  }
+
   /** @param {SiteCamera[]} cameras */
   #show(cameras) {
     const chosen = this.#instead.value;
@@ -57,7 +59,7 @@ export class SiteCameras {
   }
 
   /** @param {SiteCamera} camera */
-  #item({ camera, address }) {
+  #item({ camera, address, substream }) {
     const field = make('input', { value: camera, maxLength: 32, autocomplete: 'off', spellcheck: false });
     field.setAttribute('aria-label', `Name of camera ${camera}`);
     const rename = make('button', { type: 'submit', textContent: 'Rename' });
@@ -70,30 +72,22 @@ export class SiteCameras {
       event.preventDefault();
       void this.#change('PUT', { camera, name: field.value.trim() });
     });
-    return make('li', { className: 'site-camera' }, form, make('p', { className: 'quiet', textContent: address }));
+    return make('li', { className: 'site-camera' }, form, make('p', { className: 'quiet', textContent: `${address}${substream && `, people tracked in ${substream}`}` }));
   }
 
   /**
-   * @param {'POST' | 'PUT' | 'DELETE'} method
+   * @param {'PUT' | 'DELETE'} method
    * @param {object} content
-   * @returns {Promise<boolean>} whether the file was changed
    */
   async #change(method, content) {
     try {
-      this.#show((await requestOperator('site_cameras', method, content, TRIAL_TIMEOUT_MS)).cameras);
+      this.#show((await requestOperator('site_cameras', method, content)).cameras);
       this.showError(null);
       await this.fileChanged();
-      return true;
     } catch (error) {
       this.showError(error);
-      return false;
     }
   }
-}
-
-/** @param {string} name */
-function fieldValue(name) {
-  return /** @type {HTMLInputElement} */ (element(`add-${name}`)).value;
 }
 
 /**
@@ -121,5 +115,6 @@ export class CamerasSection {
 
   close() {
     this.tiles.close();
+    this.configured.search.forgetLogin();
   }
 }

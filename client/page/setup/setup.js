@@ -1,19 +1,20 @@
 /** Entry point of the set-up page: finds and tries cameras, names them, writes the configuration, and waits for the site. */
 
+import { CAMERA_TIMEOUT_MS, CameraSearch } from '../shared/camera_search.js';
 import { element, setText } from '../shared/dom.js';
 import { pause, requestOperator, untilAnswered } from '../shared/requests.js';
 import { exchangeTokenInLink } from '../shared/sign_in.js';
 import { AddedCameras } from './added_cameras.js';
-import { CameraSearch } from './camera_search.js';
 import { SiteForm } from './site_form.js';
 
+/** @import {CameraTrial} from '../shared/api_types.js' */
 /** @import {SetupState, WrittenSite} from './api_types.js' */
 
 const POLL_MS = 500;
 const TIMEOUT_MS = 3000;
 
 const added = new AddedCameras(show, showError);
-const search = new CameraSearch(show, showError);
+const search = new CameraSearch(element('camera-search'), addCamera, showError);
 const form = new SiteForm(started, showError);
 
 /** @param {unknown} error null: no error */
@@ -27,6 +28,15 @@ function show(state) {
   element('steps').hidden = false;
   added.show(state.cameras);
   form.show(state);
+}
+
+/**
+ * @param {CameraTrial} trial
+ * @returns {Promise<string>} what has become of it
+ */
+async function addCamera(trial) {
+  show(await requestOperator('setup/cameras', 'POST', trial, CAMERA_TIMEOUT_MS));
+  return 'was added';
 }
 
 /** @param {WrittenSite} written */

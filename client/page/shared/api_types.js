@@ -121,6 +121,40 @@
  * @property {number} units_per_meter of the floor plan
  * @property {Zone[]} zones
  * @property {RuleEvent[]} events the newest first
+ *
+ * @typedef {object} SearchedCamera that answered the search
+ * @property {string} host
+ * @property {number} port
+ * @property {string} name
+ * @property {string} hardware
+ *
+ * @typedef {object} SearchResult
+ * @property {SearchedCamera[]} cameras
+ * @property {string} hint why their streams cannot be asked for; empty: they can
+ *
+ * @typedef {object} OfferedStream of a camera
+ * @property {number} key
+ * @property {string} name
+ * @property {string} codec
+ * @property {number} width
+ * @property {number} height
+ * @property {number} fps
+ *
+ * @typedef {object} OfferedStreams the largest first
+ * @property {string} error
+ * @property {boolean} needs_password
+ * @property {OfferedStream[]} streams
+ * @property {number | null} source key of the stream proposed for viewers
+ * @property {number | null} substream key of the stream proposed for tracking; null: the same
+ *
+ * @typedef {object} CameraTrial a camera to try: by the keys of its streams, or by its address and login
+ * @property {number} [stream]
+ * @property {number | null} [substream]
+ * @property {string} [address]
+ * @property {string} [substream_address]
+ * @property {string} [user]
+ * @property {string} [password]
+ * @property {string} [name]
  */
 
 export {};

@@ -8,6 +8,7 @@ from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
 from server.http.json_responses import json_response
 from server.http.operator import (
+    camera_search,
     deletion,
     downloads,
     marked_points,
@@ -60,6 +61,7 @@ routes = [
     *walk.routes,
     *marked_points.routes,
     *restart.routes,
+    *camera_search.routes,
     *site_cameras.routes,
     *site_settings.routes,
     *zones.routes,

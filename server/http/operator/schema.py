@@ -59,6 +59,8 @@ class SiteCamera(msgspec.Struct, frozen=True):
     camera: str
     address: str
     """Without anything that may be secret."""
+    substream: str
+    """The same of the stream in which people are tracked; empty: it is the camera's."""
 
 
 class SiteCameras(msgspec.Struct, frozen=True):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
 from aiohttp import web
@@ -13,9 +12,9 @@ from aiohttp import web
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SETUP
 from server.http.json_responses import error_response, json_response, read_json
+from server.http.operator.camera_search import CameraTrial, Name
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteCamera, SiteCameras
-from server.http.operator.setup import Login, Name
 from server.setup.site_cameras import (
     add_camera,
     demands_own_video,
@@ -31,13 +30,9 @@ routes = web.RouteTableDef()
 _PATH = f"{OPERATOR_PATH}/site_cameras"
 
 
-class CameraToAdd(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class CameraToAdd(CameraTrial, frozen=True, forbid_unknown_fields=True):
     """A camera to try, and to add if it sends pictures, or to give its address to a camera of the site."""
 
-    address: Annotated[str, msgspec.Meta(max_length=1000)]
-    user: Login = ""
-    password: Login = ""
-    name: Name = ""
     camera: Name = ""
     """The camera that gets the address; empty: it is a new one."""
 
@@ -71,9 +66,9 @@ async def post_site_camera(request: web.Request) -> web.Response:
     except UserError as error:
         return error_response(409, str(error))
     try:
-        tried = await request.app[SETUP].try_unlisted(
-            wanted.address, wanted.user, wanted.password, wanted.name, path if is_passed else None
-        )
+        session = request.app[SETUP]
+        passed_into = path if is_passed else None
+        tried = await session.try_camera(wanted.addresses(session), wanted.name, passed_into)
     except UserError as error:
         return error_response(400, str(error))
     if wanted.camera:
@@ -103,4 +98,5 @@ async def _answer(request: web.Request, change: Callable[[Path], None]) -> web.R
         listed = await asyncio.to_thread(list_cameras, path)
     except UserError as error:
         return error_response(409, str(error))
-    return json_response(SiteCameras([SiteCamera(camera.id, camera.address) for camera in listed]))
+    cameras = [SiteCamera(camera.id, camera.address, camera.substream) for camera in listed]
+    return json_response(SiteCameras(cameras))

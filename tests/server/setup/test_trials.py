@@ -18,7 +18,7 @@ from fakes.service.scripted_cameras import encoded
 from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
 from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
-from server.setup.camera_address import parse_address
+from server.setup.camera_address import parse_address, parse_addresses
 from server.setup.onvif_profiles import INSTALL, query_profiles, stream_address
 from server.setup.session import SetupSession
 from server.setup.stream_pair import propose_pair
@@ -56,11 +56,11 @@ async def test_a_found_camera_is_asked_tried_named_and_written(
         assert refused.needs_password
         assert "password" in refused.error
         assert [(profile.name, profile.width) for profile in answer.profiles] == [("main", 64), ("sub", 32)]
-        tried = await session.try_stream(keys[0], found.name)
+        tried = await session.add(session.offered(keys[0]), found.name)
         with pytest.raises(UserError, match="in the list already"):
-            await session.try_stream(keys[1])
+            await session.add(session.offered(keys[1]))
         with pytest.raises(UserError, match="401") as unauthorized:
-            await session.try_address(f"{stream.url}/sub", "viewer", "wr0ng")
+            await session.add(parse_addresses(f"{stream.url}/sub", "viewer", "wr0ng"))
     assert "wr0ng" not in str(unauthorized.value)
     assert (tried.name, tried.sends) == ("front-door", "h264 64x48, 12.5 fps")
     assert tried.trial.picture.startswith(b"\xff\xd8")
@@ -107,13 +107,13 @@ async def test_a_camera_is_written_with_its_substream(tmp_path: Path) -> None:
     session = SetupSession(tmp_path / "site.yaml")
     with rtsp() as main, rtsp() as small:
         with pytest.raises(UserError, match="the substream is the stream that viewers get"):
-            await session.try_address(main.url, *LOGIN, "door", main.url)
+            await session.add(parse_addresses(main.url, *LOGIN, main.url))
         one, other = (url.replace("//", f"//viewer:{n}@") for n, url in enumerate((main.url, small.url)))
         with pytest.raises(UserError, match="the substream's password must be that of the camera"):
-            await session.try_address(one, "", "", "door", other)
+            await session.add(parse_addresses(one, substream=other))
         with pytest.raises(UserError, match=r"the substream: rtsp://.*: cannot open this video"):
-            await session.try_address(main.url, *LOGIN, "door", "rtsp://127.0.0.1:9/live")
-        tried = await session.try_address(main.url, *LOGIN, "door", small.url)
+            await session.add(parse_addresses(main.url, *LOGIN, "rtsp://127.0.0.1:9/live"))
+        tried = await session.add(parse_addresses(main.url, *LOGIN, small.url), "door")
         assert (tried.sends, tried.tracked_in) == ("h264 64x48, 12.5 fps", "h264 64x48, 12.5 fps")
         session.write("hall", session.proposal)
         assert LOGIN[1] not in session.path.read_text()
@@ -178,7 +178,7 @@ async def test_a_source_that_sends_nonsense_is_one_line(tmp_path: Path, sent: by
         threading.Thread(target=_answer, args=(server, sent), daemon=True).start()
         port = server.getsockname()[1]
         with pytest.raises(UserError, match=f"127.0.0.1:{port}/\\.\\.\\.: ") as refused:
-            await session.try_address(f"rtsp://127.0.0.1:{port}/live", "viewer", "s3cret")
+            await session.add(parse_addresses(f"rtsp://127.0.0.1:{port}/live", "viewer", "s3cret"))
     assert "s3cret" not in str(refused.value)
     assert session.cameras == []
 
@@ -202,8 +202,8 @@ async def test_only_found_cameras_get_a_password_and_only_few_are_tried_at_once(
     with pytest.raises(UserError, match="search again"):
         await session.profiles("10.0.0.1", 80, *LOGIN)
     with pytest.raises(UserError, match="ask the camera again"):
-        await session.try_stream(7)
-    addresses = [session.try_address(f"rtsp://127.0.0.1:{port}/", "", "") for port in range(1, 6)]
+        await session.add(session.offered(7))
+    addresses = [session.add(parse_addresses(f"rtsp://127.0.0.1:{port}/")) for port in range(1, 6)]
     problems = await asyncio.gather(*addresses, return_exceptions=True)
     assert sum("too many" in str(problem) for problem in problems) == 3
 

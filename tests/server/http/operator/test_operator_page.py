@@ -37,6 +37,7 @@ from fakes.service.scripted_cameras import (
     status,
     tracks,
 )
+from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
 from fakes.timeouts import PATIENCE
 from server.config.loader import load_config
 from server.config.running_config import ConfigFileState
@@ -115,6 +116,12 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
 
 
+async def log_in(page: Page, user: str, password: str) -> None:
+    """Enter the login of cameras."""
+    await page.get_by_label("Their user").fill(user)
+    await page.get_by_label("and password").fill(password)
+
+
 async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
     browser: Browser, tmp_path: Path
 ) -> None:
@@ -133,18 +140,18 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
         ) as (_, page):
             names = page.get_by_label(re.compile("^Name of camera"))
             await expect(names).to_have_count(1)
-            await page.get_by_label("Add a camera").fill(stream.url)
-            await page.get_by_label("User").fill("viewer")
-            await page.get_by_label("Password").fill("wrong")
-            await page.get_by_label("Name", exact=True).fill("door")
-            await page.get_by_role("button", name="Try and add").click()
-            await expect(page.locator("#error-message")).to_contain_text("401")
+            await page.get_by_label("Or an address").fill(stream.url)
+            await page.get_by_label("and its substream").fill(f"{stream.url}/small")
+            await log_in(page, "viewer", "wrong")
+            await page.get_by_label("Its name").fill("door")
+            await page.get_by_role("button", name="Try", exact=True).click()
+            await expect(page.locator("#trial-state")).to_contain_text("401")
             await expect(page.locator("#restart")).to_be_hidden()
-            await page.get_by_label("Password").fill("s3cret")
-            await page.get_by_role("button", name="Try and add").click()
+            await log_in(page, "viewer", "s3cret")
+            await page.get_by_role("button", name="Try", exact=True).click()
             await expect(names).to_have_count(2)
-            await expect(page.locator("#error-message")).to_be_empty()
-            await expect(page.get_by_label("Password")).to_have_value("")
+            await expect(page.locator("#trial-state")).to_contain_text("sends pictures and was added")
+            await expect(page.locator("#site-cameras li").last).to_contain_text("people tracked in rtsp://")
             await expect(page.locator("#restart-state")).to_contain_text("not in force: cameras.")
             await page.get_by_label("Name of camera door").fill("c0")
             await page.get_by_role("button", name="Rename camera door").click()
@@ -154,21 +161,15 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
             await expect(page.get_by_label("Name of camera hall")).to_have_value("hall")
             assert load_config(path).camera_ids == ("c0", "hall")
             await page.get_by_label("or as the address of").select_option("c0")
-            await expect(page.get_by_label("Name", exact=True)).to_be_disabled()
-            await page.get_by_label("Add a camera").fill(stream.url)
-            await page.get_by_label("User").fill("viewer")
-            await page.get_by_label("Password").fill("s3cret")
-            await page.get_by_role("button", name="Try and add").click()
-            await expect(page.locator("#error-message")).to_contain_text(
-                "another camera of the configuration"
-            )
+            await expect(page.get_by_label("Its name")).to_be_disabled()
+            await page.get_by_label("Or an address").fill(stream.url)
+            await page.get_by_role("button", name="Try", exact=True).click()
+            await expect(page.locator("#trial-state")).to_contain_text("another camera of the configuration")
             await page.get_by_role("button", name="Remove camera hall").click()
             await expect(names).to_have_count(1)
-            await page.get_by_role("button", name="Try and add").click()
-            await expect(page.locator("#add-state")).to_have_text(
-                "It sends pictures: c0 has this address now."
-            )
-            await expect(page.get_by_label("Name", exact=True)).to_be_enabled()
+            await page.get_by_role("button", name="Try", exact=True).click()
+            await expect(page.locator("#trial-state")).to_contain_text("and is the address of c0 now")
+            await expect(page.get_by_label("Its name")).to_be_enabled()
             config = load_config(path)
             assert (config.camera_ids, config.camera("c0").password) == (
                 ("c0",),
@@ -180,6 +181,41 @@ async def test_cameras_are_added_renamed_and_removed_in_the_configuration(
             await expect(page.locator("#site-state")).to_have_text("Saved; the earlier file is kept.")
             assert load_config(path).site.model_dump(include={"name", "fps"}) == {"name": "shop", "fps": 12.5}
             await expect(page.locator("#restart-state")).to_contain_text("Streams end for some seconds")
+
+
+async def test_a_camera_of_the_network_is_found_and_added_with_its_small_stream(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
+    path = tmp_path / "site.yaml"
+    path.write_text("cameras: [{id: c0, source: 'scene:room'}]\n")
+    gops = [encoded(0, 40)[at : at + 5] for at in range(0, 40, 5)]
+    with closing(RtspCamera(gops, FPS, login=("viewer", "s3cret"), live=True)) as stream:
+        profiles = [
+            FakeProfile(name, f"{stream.url}/{name}", width, 360, 25)
+            for name, width in (("main_stream_of_the_camera_in_high_quality", 1280), ("sub", 640))
+        ]
+        with onvif_cameras(OnvifCamera("door", profiles, ("viewer", "s3cret"))) as targets:
+            monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+            async with open_operator_page(
+                browser, "#cameras", patience=PATIENCE, control=SiteControl(path)
+            ) as (_, page):
+                await log_in(page, "viewer", "s3cret")
+                await page.get_by_role("button", name="Search the network").click()
+                await page.get_by_role("button", name=re.compile("Show its streams")).click()
+                await expect(page.get_by_label("in which people are tracked")).to_contain_text("sub")
+                await page.get_by_role("button", name=re.compile("Try main")).click()
+                await expect(page.get_by_label("Name of camera door")).to_be_visible()
+                for width in (360, 1600):
+                    await page.set_viewport_size({"width": width, "height": 800})
+                    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+                await page.get_by_role("link", name="Floor").click()
+                await expect(page.get_by_label("and password")).to_have_value("")
+    source, substream = (f"rtsp://viewer:{{password}}@{profile.address[7:]}" for profile in profiles)
+    assert load_config(path).camera("door").model_dump(include={"source", "substream"}) == {
+        "source": source,
+        "substream": substream,
+    }
 
 
 async def test_settings_that_another_operator_has_changed_meanwhile_are_shown(

@@ -14,14 +14,23 @@ from fakes.http.tokens import bearer, serve_with_tokens
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
+from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
+from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
 from server.http.access.csrf import CSRF_HEADER
 from server.http.app_keys import SiteControl
+from server.setup.camera_address import parse_address
 
 PATH = "/api/operator/site_cameras"
 LOGIN = ("viewer", "p@ss:/w0rd")
 TEXT = "cameras: [{id: c0, source: 'rtsp://viewer:hidden@10.0.0.1/'}, {id: c1, source: 'scene:room'}]\n"
-BEFORE = [{"camera": "c0", "address": "rtsp://10.0.0.1/..."}, {"camera": "c1", "address": "scene:room"}]
+
+
+def listed(camera: str, address: str, substream: str = "") -> dict[str, str]:
+    return {"camera": camera, "address": address, "substream": substream}
+
+
+BEFORE = [listed("c0", "rtsp://10.0.0.1/..."), listed("c1", "scene:room")]
 CHANGES = {CSRF_HEADER: "1"}
 REMOVE = {"camera": "c0"}
 
@@ -48,9 +57,9 @@ async def site(path: Path) -> AsyncIterator[ServedSite]:
 
 
 async def send(
-    site: ServedSite, method: str, body: Any, headers: dict[str, str] = CHANGES
+    site: ServedSite, method: str, body: Any, headers: dict[str, str] = CHANGES, path: str = PATH
 ) -> tuple[int, dict[str, Any]]:
-    async with site.session.request(method, PATH, json=body, headers=headers) as answer:
+    async with site.session.request(method, path, json=body, headers=headers) as answer:
         return answer.status, json.loads(await answer.text())
 
 
@@ -60,11 +69,11 @@ async def test_a_camera_is_tried_added_renamed_and_removed(site: ServedSite, str
     shown = stream.url.replace("live", "...")
     assert await send(site, "POST", wanted) == (
         200,
-        {"cameras": [*BEFORE, {"camera": "Front-door", "address": shown}]},
+        {"cameras": [*BEFORE, listed("Front-door", shown)]},
     )
     assert await send(site, "PUT", {"camera": "Front-door", "name": "door"}) == (
         200,
-        {"cameras": [*BEFORE, {"camera": "door", "address": shown}]},
+        {"cameras": [*BEFORE, listed("door", shown)]},
     )
     assert await send(site, "DELETE", {"camera": "door"}) == (200, {"cameras": BEFORE})
 
@@ -74,7 +83,7 @@ async def test_a_camera_gets_the_address_of_one_that_was_tried(site: ServedSite,
     shown = stream.url.replace("live", "...")
     assert await send(site, "POST", wanted) == (
         200,
-        {"cameras": [{"camera": "c0", "address": shown}, BEFORE[1]]},
+        {"cameras": [listed("c0", shown), BEFORE[1]]},
     )
     assert await send(site, "POST", {**wanted, "camera": "c7"}) == (409, {"error": "there is no camera 'c7'"})
 
@@ -105,6 +114,49 @@ cameras: [{{id: c0, source: 'rtsp://10.0.0.1/', passthrough: pass}}]
     assert (status, answer) == (400, {"error": f"{shown}: {error}; {advice}"})
     assert path.read_text() == text
     assert (await send(site, "POST", {**wanted, "camera": ""}))[0] == 200  # a new one is encoded
+
+
+async def test_a_camera_is_added_with_a_substream_that_is_tried_too(
+    site: ServedSite, stream: RtspCamera, path: Path
+) -> None:
+    wanted = {"address": f"{stream.url}/1", "user": LOGIN[0], "password": LOGIN[1], "name": "door"}
+    status, answer = await send(site, "POST", {**wanted, "substream_address": "rtsp://127.0.0.1:9/live"})
+    assert (status, answer["error"][:14]) == (400, "the substream:")
+    assert path.read_text() == TEXT
+    status, answer = await send(site, "POST", {**wanted, "substream_address": f"{stream.url}/2"})
+    shown = stream.url.replace("live", "...")
+    assert (status, answer["cameras"]) == (200, [*BEFORE, listed("door", shown, shown)])
+    camera = fill_in_password(load_config(path), "door").camera("door")
+    assert camera.substream == parse_address(f"{stream.url}/2", *LOGIN).with_password
+
+
+async def test_a_camera_that_is_found_is_added_with_two_of_its_streams(
+    site: ServedSite, stream: RtspCamera, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
+    profiles = [
+        FakeProfile("main", f"{stream.url}/1", 1920, 1080, 25),
+        FakeProfile("sub", f"{stream.url}/2", 640, 360, 25),
+    ]
+    with onvif_cameras(OnvifCamera("door", profiles, LOGIN)) as targets:
+        monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+        _, answer = await send(site, "POST", None, path="/api/operator/setup/search")
+        (found,) = answer["cameras"]
+        login = {"user": LOGIN[0], "password": LOGIN[1]}
+        asked = {"host": found["host"], "port": found["port"], **login}
+        _, offered = await send(site, "POST", asked, path="/api/operator/setup/streams")
+    wanted = {"stream": offered["source"], "substream": offered["substream"], "camera": "c0"}
+    status, answer = await send(site, "POST", wanted)
+    shown = stream.url.replace("live", "...")
+    assert (status, answer["cameras"]) == (200, [listed("c0", shown, shown), BEFORE[1]])
+    assert LOGIN[1] not in path.read_text()
+    assert (await send(site, "POST", {**wanted, "stream": 99}))[0] == 400
+
+
+async def test_the_wizards_other_requests_are_not_served_by_a_site(site: ServedSite, path: Path) -> None:
+    for place, body in (("cameras", {}), ("site", {"name": "x", "fps": 5, "width": 64, "height": 48})):
+        assert (await send(site, "POST", body, path=f"/api/operator/setup/{place}"))[0] == 404
+    assert path.read_text() == TEXT
 
 
 async def test_a_camera_that_sends_no_pictures_is_not_added(
@@ -158,6 +210,9 @@ async def test_only_operators_see_or_change_the_configured_cameras(path: Path, t
         for token in ("desk", "family", "door"):
             for method in ("GET", "POST", "PUT", "DELETE"):
                 assert (await send(site, method, REMOVE, {**CHANGES, **bearer(token)}))[0] == 403
+            for name in ("search", "streams"):
+                place = f"/api/operator/setup/{name}"
+                assert (await send(site, "POST", {}, {**CHANGES, **bearer(token)}, place))[0] == 403
         assert (await send(site, "DELETE", REMOVE))[0] == 401
         assert path.read_text() == TEXT
         assert await send(site, "DELETE", REMOVE, {**CHANGES, **bearer("lead")}) == (

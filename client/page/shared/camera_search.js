@@ -1,41 +1,56 @@
-/** Cameras found in the network, their streams, and addresses: each is tried before it is added. */
+/** Cameras found in the network, their streams, and addresses: what is chosen is tried. */
 
-import { element, make, setText } from '../shared/dom.js';
-import { requestOperator } from '../shared/requests.js';
+import { element, make, setText } from './dom.js';
+import { HttpError, requestOperator } from './requests.js';
 
-/** @import {OfferedStream, OfferedStreams, SearchResult, SearchedCamera, SetupState} from './api_types.js' */
+/** @import {CameraTrial, OfferedStream, OfferedStreams, SearchResult, SearchedCamera} from './api_types.js' */
 
-const CAMERA_TIMEOUT_MS = 120_000; // a busy machine tries cameras one after the other
+export const CAMERA_TIMEOUT_MS = 120_000; // a busy machine tries cameras one after the other
 
 export class CameraSearch {
-  /** @type {HTMLButtonElement} */
-  #search = element('search');
-  /** @type {HTMLInputElement} */
-  #user = element('camera-user');
-  /** @type {HTMLInputElement} */
-  #password = element('camera-password');
-  /** @type {HTMLInputElement} */
-  #address = element('address');
-  /** @type {HTMLInputElement} */
-  #substream = element('substream-address');
-  #state = element('search-state');
-  #trial = element('trial-state');
+  #user = make('input', { id: 'camera-user', size: 14, maxLength: 200, autocomplete: 'off' });
+  #password = make('input', { id: 'camera-password', type: 'password', size: 14, maxLength: 200, autocomplete: 'new-password' });
+  #search = make('button', { id: 'search', type: 'button', textContent: 'Search the network' });
+  #state = make('span', { id: 'search-state', className: 'quiet' });
+  #address = addressField('address', 'rtsp://10.0.0.11/stream1');
+  #substream = addressField('substream-address', 'none: people are tracked in the same');
+  #trial = make('p', { id: 'trial-state', className: 'message' });
   #hint = '';
 
   /**
-   * @param {(state: SetupState) => void} show
-   * @param {(error: unknown) => void} showError null: no error
+   * @param {HTMLElement} place what is in it applies to every camera, and comes after the login
+   * @param {(trial: CameraTrial) => Promise<string>} tryCamera says what has become of a camera that sends pictures
+   * @param {(error: unknown) => void} showError of the sign-in
    */
-  constructor(show, showError) {
-    this.show = show;
+  constructor(place, tryCamera, showError) {
+    this.tryCamera = tryCamera;
     this.showError = showError;
+    const [login, found, address] = [this.#loginForm(), make('ul', { id: 'found', className: 'found' }), this.#addressForm()];
+    found.setAttribute('aria-label', 'Cameras found');
+    const search = make('p', { className: 'buttons' }, this.#search, ' ', this.#state);
+    place.prepend(login, make('p', { className: 'quiet', textContent: 'Used for every camera below; leave empty where there is none.' }));
+    place.append(search, found, address, this.#trial);
+    for (const state of [this.#state, this.#trial]) state.setAttribute('role', 'status');
     this.#search.addEventListener('click', () => void this.run());
-    element('login').addEventListener('submit', (event) => event.preventDefault());
-    element('address-form').addEventListener('submit', async (event) => {
+  }
+
+  #loginForm() {
+    const form = make('form', { id: 'login', className: 'buttons', autocomplete: 'off' });
+    form.append(label(this.#user, 'Their user'), this.#user, label(this.#password, 'and password'), this.#password);
+    form.addEventListener('submit', (event) => event.preventDefault());
+    return form;
+  }
+
+  #addressForm() {
+    const form = make('form', { id: 'address-form', className: 'buttons', autocomplete: 'off' });
+    const parts = [label(this.#address, 'Or an address'), this.#address, label(this.#substream, 'and its substream'), this.#substream];
+    form.append(...parts, make('button', { type: 'submit', textContent: 'Try' }));
+    form.addEventListener('submit', async (event) => {
       event.preventDefault();
       const trial = { address: this.#address.value, substream_address: this.#substream.value, ...this.#login };
       if (await this.#try(this.#address.value, trial)) this.#address.value = this.#substream.value = '';
     });
+    return form;
   }
 
   /** Search the network, and list the cameras that answer. */
@@ -50,10 +65,14 @@ export class CameraSearch {
       const count = cameras.length ? `${cameras.length} found.` : 'None found by ONVIF. Enter their addresses.';
       setText(this.#state, cameras.length && hint ? `${count} ${hint}.` : count);
     } catch (error) {
-      setText(this.#state, '');
-      this.showError(error);
+      this.#fail(this.#state, error);
     }
     this.#search.disabled = false;
+  }
+
+  /** Forget the login, when the page is left. */
+  forgetLogin() {
+    this.#user.value = this.#password.value = '';
   }
 
   get #login() {
@@ -100,10 +119,8 @@ export class CameraSearch {
       const sorted = [...first, ...streams.filter(({ key }) => key !== source)];
       const buttons = sorted.map((stream) => this.#streamButton(camera, stream, tracked));
       list.replaceChildren(...buttons, ...(streams.length > 1 ? [make('label', {}, 'People are tracked in ', tracked)] : []));
-      this.showError(null);
     } catch (error) {
-      setText(message, '');
-      this.showError(error);
+      this.#fail(message, error);
     }
     ask.disabled = false;
   }
@@ -128,22 +145,47 @@ export class CameraSearch {
 
   /**
    * @param {string} label
-   * @param {object} trial
-   * @returns {Promise<boolean>} whether it was added
+   * @param {CameraTrial} trial
+   * @returns {Promise<boolean>} whether it sends pictures
    */
   async #try(label, trial) {
     const shown = label.replace(/\/\/[^/]*@/, '//'); // a login that was pasted with the address
     setText(this.#trial, `Trying ${shown}…`);
     try {
-      this.show(await requestOperator('setup/cameras', 'POST', trial, CAMERA_TIMEOUT_MS));
-      setText(this.#trial, `${shown} sends pictures and was added.`);
+      setText(this.#trial, `${shown} sends pictures and ${await this.tryCamera(trial)}.`);
       return true;
     } catch (error) {
-      setText(this.#trial, '');
-      this.showError(error);
+      this.#fail(this.#trial, error);
       return false;
     }
   }
+
+  /**
+   * Say where it was tried why something failed: the top of the page may be out of sight.
+   *
+   * @param {Element} where
+   * @param {unknown} error
+   */
+  #fail(where, error) {
+    setText(where, error instanceof Error ? error.message : '');
+    if (error instanceof HttpError && error.status === 401) this.showError(error);
+  }
+}
+
+/**
+ * @param {HTMLInputElement} field
+ * @param {string} text
+ */
+function label(field, text) {
+  return make('label', { htmlFor: field.id, textContent: text });
+}
+
+/**
+ * @param {string} id
+ * @param {string} placeholder
+ */
+function addressField(id, placeholder) {
+  return make('input', { id, placeholder, className: 'address', maxLength: 1000, autocomplete: 'off', spellcheck: false, required: id === 'address' });
 }
 
 /** @param {OfferedStream} stream */
