@@ -221,10 +221,26 @@ class Past(msgspec.Struct, frozen=True):
     spans: tuple[Span, ...]
 
 
+class Elsewhere(msgspec.Struct, frozen=True):
+    """Somebody whom another service of the site serves, or whom another site has seen last."""
+
+    object: int
+    server: str | None
+    """Its address; None if the server does not know it."""
+    site: str | None = None
+    """The other site's name; None: it is of this one."""
+    visible: bool | None = None
+    """Whether the other site sees them now; None: it is of this one."""
+    token: bool = False
+    """Whether it is another site that requires a token, and accepts the client's."""
+
+
 class Objects(msgspec.Struct, frozen=True):
     """Event ``objects``, and the response of ``/api/objects``."""
 
     objects: tuple[SeenObject, ...]
+    elsewhere: tuple[Elsewhere, ...] = ()
+    """People of other services and sites."""
 
 
 class Cameras(msgspec.Struct, frozen=True):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from client.api import site
-from client.http import ClientError, HttpSettings
+from client.http import ClientError, HttpSettings, server_url
+from client.model import Elsewhere
 from client.recording import Recording, recording
 from client.session import Report, Session
 from client.sidecar import write_sidecars
@@ -31,6 +33,8 @@ class WatchResult:
     reconnections: int
     complete: bool
     """Whether all of the requested seconds were received; False if the server stayed away before."""
+    more_files: tuple[Path, ...] = ()
+    """Those of further sites into which the object has gone, in order."""
 
 
 async def watch(
@@ -55,7 +59,8 @@ async def watch(
     ``out.part``, which is remuxed into a progressive MP4 at the end, with the boxes beside it: WebVTT and
     ASS. A name that ends in ``.webm`` makes a WebM; the site's codec must then be VP8. Cancelling keeps what
     was recorded. A server that goes away is replaced by another one of ``settings`` or of the site, or tried
-    again; if none comes back, what was recorded is kept and ``complete`` is False.
+    again; if none comes back, what was recorded is kept and ``complete`` is False. An object that goes to
+    another site is followed there live, into another file (``out-2.mp4``): pictures and clock are the site's.
 
     Raises:
         ValueError: ``url`` is no address.
@@ -65,6 +70,32 @@ async def watch(
         ContractError: the response is not such a stream.
         OSError: the file cannot be written.
     """
+    watched: list[WatchResult] = []
+    left, file = seconds, out
+    while True:
+        result, place = await _watch_site(url, number, file, left, progress, start, end, delay, settings)
+        watched.append(result)
+        if left is not None:
+            left -= result.seconds
+        onward = None if place is None or (left is not None and left <= 0) else _at(place, url, settings)
+        if onward is None:
+            return _sum(watched)
+        url, settings = onward
+        file = None if out is None else out.with_stem(f"{out.stem}-{len(watched) + 1}")
+
+
+async def _watch_site(
+    url: str,
+    number: int,
+    out: Path | None,
+    seconds: float | None,
+    progress: Report | None,
+    start: str | None,
+    end: str | None,
+    delay: str | None,
+    settings: HttpSettings,
+) -> tuple[WatchResult, Elsewhere | None]:
+    """Follow the object at one site; return where it has gone, too."""
     container, settings = await _prepare(url, out, settings)
     record: Recording | None = None
     with closing(Spool(Path() if out is None else out.parent)) as spool:
@@ -82,14 +113,37 @@ async def watch(
         finally:  # after the film itself
             if record is not None:
                 _write_sidecars(out, record, history)
+    file = out if record.fragments else None
+    result = WatchResult(
+        file, record.seconds, record.bytes, record.fragments, session.cuts, session.reconnections, complete
+    )
+    return result, history.elsewhere if session.has_moved and not complete else None
+
+
+def _at(place: Elsewhere, url: str, settings: HttpSettings) -> tuple[str, HttpSettings] | None:
+    """Return another site's address and settings; None: it is none, or not encrypted as this one is."""
+    try:
+        there, here = server_url(place.server or ""), server_url(url)
+    except ValueError:
+        return None
+    if here.scheme == "https" and there.scheme != "https":
+        return None
+    token = settings.token if place.token else None
+    return str(there), replace(settings, others=(), token=token)
+
+
+def _sum(watched: Sequence[WatchResult]) -> WatchResult:
+    """Sum up what was watched at one site after another."""
+    files = [result.out for result in watched if result.out is not None]
     return WatchResult(
-        out,
-        record.seconds,
-        record.bytes,
-        record.fragments,
-        session.cuts,
-        session.reconnections,
-        complete,
+        out=files[0] if files else None,
+        seconds=sum(result.seconds for result in watched),
+        bytes=sum(result.bytes for result in watched),
+        fragments=sum(result.fragments for result in watched),
+        cuts=sum(result.cuts for result in watched),
+        reconnections=sum(result.reconnections for result in watched),
+        complete=watched[-1].complete,
+        more_files=tuple(files[1:]),
     )
 
 

@@ -55,10 +55,11 @@ class Session:
     async def run(self, addresses: Sequence[URL], settings: HttpSettings) -> bool:
         """Stream until the recording is complete (return True) or the servers stay away (return False).
 
-        ``addresses`` are those of the stream at the site's servers, which replace each other.
+        ``addresses`` are those of the stream at the site's servers, which replace each other. It also returns
+        False once the object `has_moved`.
         """
         backoff, attempts = settings.backoff(), 0
-        while True:
+        while not self.has_moved:
             address = addresses[attempts % len(addresses)]
             before = self._record.fragments
             try:
@@ -84,6 +85,12 @@ class Session:
             delay = backoff.next()
             await asyncio.sleep(0.0 if attempts % len(addresses) else delay)  # once every server was tried
             self.reconnections += 1
+        return False
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether the object is at another site, where the live stream continues."""
+        return self._start is None and self._history.elsewhere is not None
 
     def _resume_address(self, address: URL) -> URL:
         """Return the address of the remaining stream, which begins after the last received frame."""
@@ -105,6 +112,8 @@ class Session:
                 try:
                     if not self._accept_parts(write(data)):
                         return True
+                    if self.has_moved:
+                        return False
                 except FormatChangedError:
                     raise
                 except MediaStreamError as error:

@@ -14,7 +14,7 @@ import msgspec
 from client.api import past, site
 from client.events import events
 from client.http import ClientError, HttpSettings
-from client.model import Box, Event, Gop, Site
+from client.model import Box, Elsewhere, Event, Gop, Objects, Site
 from client.spool import Place, Spool
 
 _log = logging.getLogger(__name__)
@@ -45,6 +45,8 @@ class ViewHistory:
     def __init__(self, number: int, *, spool: Spool | None = None) -> None:
         self.number = number
         self.site: Site | None = None
+        self.elsewhere: Elsewhere | None = None
+        """Where they are, if another site sees the object now."""
         self._spool = spool
         self._firsts: list[int] = []
         self._shown: dict[int, _Shown] = {}
@@ -56,7 +58,15 @@ class ViewHistory:
             self.site = event
         elif isinstance(event, Gop):
             self._take_gop(event)
+        elif isinstance(event, Objects):
+            self.elsewhere = self._elsewhere(event)
         self._updated.set()
+
+    def _elsewhere(self, objects: Objects) -> Elsewhere | None:
+        if any(here.visible for here in objects.objects if self.number in {here.object, *here.aliases}):
+            return None
+        places = (place for place in objects.elsewhere if place.object == self.number)
+        return next((place for place in places if place.site and place.server and place.visible), None)
 
     def camera_at(self, media_time: float | None) -> str | None:
         """Return the camera shown at ``media_time`` (seconds: pulse / fps); None if unknown."""

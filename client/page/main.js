@@ -11,6 +11,7 @@ import { longLabel } from './people/names.js';
 import { PastSearch } from './timeline/past_search.js';
 import { Overlay } from './player/overlay.js';
 import { Painter } from './player/painter.js';
+import { PeopleElsewhere } from './people/elsewhere.js';
 import { PersonCards } from './people/person_cards.js';
 import { Pointing } from './operator/assist/pointing.js';
 import { SelectionReason } from './people/selection_reason.js';
@@ -39,6 +40,7 @@ const cards = new PersonCards(
   (object) => viewer.select(object),
   (object) => viewer.toggleTile(object),
 );
+const elsewhere = new PeopleElsewhere(/** @type {HTMLDetailsElement} */ (element('elsewhere')), viewer);
 const tiles = new Tiles(element('tiles'), viewer, (object) => viewer.select(object));
 const legend = new CameraLegend(element('cameras'), (camera) => viewer.hold(camera));
 const overlay = new Overlay(element('boxes'));
@@ -160,8 +162,10 @@ events = new ServerEvents({
   received: (name, data) => {
     if (name === 'gop') viewer.addGop(data);
     else if (name === 'site') viewer.setSite(data);
-    else if (name === 'objects') viewer.setPeople(data.objects);
-    else if (name === 'cameras') viewer.setCameras(data.cameras);
+    else if (name === 'objects') {
+      viewer.setPeople(data.objects);
+      elsewhere.show(data.elsewhere ?? []);
+    } else if (name === 'cameras') viewer.setCameras(data.cameras);
     else if (name === 'delays') viewer.setDelays(data.delays);
     else if (name === 'flag') banner.update(data);
   },

@@ -172,6 +172,11 @@ export class Viewer {
     return this.people?.find((person) => person.object === this.object);
   }
 
+  /** @returns {boolean} whether the page goes with the selected person to another site */
+  get follows() {
+    return this.#selectedByUser && this.timeShift.moment === null && !this.selected?.visible;
+  }
+
   /** @param {number} object selected by the user */
   select(object) {
     if (object !== this.object) this.preference.hold(null);

@@ -65,7 +65,7 @@ async def run_watch(
     except OSError as error:
         suffix = "; the recording up to then is kept" if _file_at(out) != before else ""
         raise UserError(f"{out}: cannot write there: {reason_of(error)}{suffix}") from error
-    where = f" in {out}" if out else ""
+    where = f" in {', '.join(map(str, [out, *watched.more_files]))}" if out else ""
     typer.echo(f"object {number}: {watched.seconds:.1f} s, {watched.cuts} cuts{where}")
     if not watched.complete:
         raise UnavailableError("watch: the server disconnected before the end")

@@ -46,6 +46,12 @@
  * @property {string[]} cameras that see the person now
  * @property {string | null} thumbnail
  *
+ * @typedef {object} Elsewhere an entry of /api/objects: somebody whom another service or site serves
+ * @property {number} object
+ * @property {string | null} server base URL
+ * @property {string | null} [site] name of the other site; null: it is another service of this one
+ * @property {boolean | null} [visible] whether the other site sees them now
+ *
  * @typedef {object} Camera an entry of /api/cameras
  * @property {string} camera
  * @property {'live' | 'gone' | 'ended' | 'starting' | 'refused'} state

@@ -48,6 +48,7 @@ class FakeSite:
         bursts: Send whole GOPs at once instead of frame by frame.
         people: People by number, and whether they are in view.
         aliases: Former ids of people.
+        elsewhere: People at other sites, as the API lists them.
         split: The splits that every GOP reports.
         first_pulse: Pulse at about the time when the site is created.
         skipped: Pulses whose frames are missing from every stream.
@@ -73,6 +74,7 @@ class FakeSite:
     bursts: bool = False
     people: dict[int, bool] = field(default_factory=lambda: {1: True, 2: True})
     aliases: dict[int, list[int]] = field(default_factory=dict)
+    elsewhere: list[dict[str, Any]] = field(default_factory=list)
     split: list[dict[str, Any]] = field(default_factory=list)
     first_pulse: int = FIRST_PULSE
     skipped: range = range(0)
@@ -129,7 +131,8 @@ class FakeSite:
         }
 
     def objects(self) -> dict[str, Any]:
-        return {"objects": [self._object(person, seen) for person, seen in self.people.items()]}
+        objects = [self._object(person, seen) for person, seen in self.people.items()]
+        return {"objects": objects, "elsewhere": self.elsewhere}
 
     def _object(self, person: int, seen: bool) -> dict[str, Any]:
         return {
@@ -424,10 +427,10 @@ class SiteServer:
         with contextlib.suppress(ConnectionError):
             for name in ("site", "objects", "cameras"):
                 await response.write(_event(name, getattr(site, name)()))
-            sent_people, sent_flags = dict(site.people), list[dict[str, Any]]()
+            sent_people, sent_flags = (dict(site.people), site.elsewhere), list[dict[str, Any]]()
             async for pulse in site.released(site.boundary() - 2 * GOP):
-                if site.people != sent_people:
-                    sent_people = dict(site.people)
+                if (site.people, site.elsewhere) != sent_people:
+                    sent_people = (dict(site.people), site.elsewhere)
                     await response.write(_event("objects", site.objects()))
                 if pulse % GOP == 0:
                     await response.write(_event("gop", site.gop(pulse)))

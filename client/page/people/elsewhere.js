@@ -1,0 +1,57 @@
+/** People at other sites, as links to them; the page goes with the selected person. */
+
+import { make } from '../shared/dom.js';
+
+/** @import {Elsewhere} from '../shared/api_types.js' */
+/** @import {Viewer} from '../viewer.js' */
+
+const SETTLED_MS = 3000; // after the page was opened: a person whom two sites see for a moment is not followed to and fro
+
+export class PeopleElsewhere {
+  #shown = '';
+  #opened = performance.now();
+
+  /**
+   * @param {HTMLDetailsElement} section with a list element
+   * @param {Viewer} viewer
+   */
+  constructor(section, viewer) {
+    this.section = section;
+    this.list = /** @type {HTMLElement} */ (section.querySelector('ul'));
+    this.viewer = viewer;
+  }
+
+  /** @param {Elsewhere[]} people known to the server, at other sites or at other services of this one */
+  show(people) {
+    const others = people.flatMap((person) => {
+      const address = addressOf(person);
+      return address === null ? [] : [{ ...person, address }];
+    });
+    const content = JSON.stringify(others);
+    if (content !== this.#shown) {
+      this.#shown = content;
+      this.section.hidden = others.length === 0;
+      this.list.replaceChildren(...others.map(item));
+    }
+    const selected = others.find(({ object, visible }) => visible && object === this.viewer.object);
+    if (selected && this.viewer.follows && performance.now() - this.#opened > SETTLED_MS) location.assign(selected.address);
+  }
+}
+
+/**
+ * @param {Elsewhere} person
+ * @returns {string | null} the address of the other site's page with this person; null: they are not at another site
+ */
+function addressOf({ object, server, site }) {
+  if (!site || !server || !URL.canParse(server)) return null;
+  const address = new URL(server);
+  if (!['http:', 'https:'].includes(address.protocol)) return null;
+  address.searchParams.set('object', String(object));
+  return address.href;
+}
+
+/** @param {Elsewhere & {address: string}} person */
+function item({ object, site, visible, address }) {
+  const link = make('a', { href: address, textContent: `Person ${object}` });
+  return make('li', {}, link, visible ? ` at ${site}` : ` left ${site}`);
+}
