@@ -15,10 +15,11 @@ import client
 from client.http import HttpSettings
 from client.player import _at
 from fakes.http.scripted_server import OBJECTS, ScriptedSite, fragment, header, sse_event
+from fakes.http.tokens import token_of
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
 
-TOKEN = "token-of-desk"
+TOKEN = token_of("desk")
 Serve = Callable[[ScriptedSite], Awaitable[str]]
 
 
