@@ -9,6 +9,8 @@ import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from server.media.containers.decoder_configuration import parse_decoder_configuration
+
 MAX_BOX_BYTES = 16_000_000
 """A fragment of video has some thousand bytes."""
 _HEADER = struct.Struct(">I4s")
@@ -83,30 +85,10 @@ def with_parameter_sets(sample: bytes, track: Track) -> bytes:
             return sample
         at += 4 + int.from_bytes(sample[at : at + 4], "big")
     try:
-        sets = list(_hvcc_sets(track.configuration) if is_h265 else _avcc_sets(track.configuration))
-    except IndexError as error:
-        raise Mp4Error("the description of the video is incomplete") from error
-    return b"".join(len(unit).to_bytes(4, "big") + unit for unit in sets) + sample
-
-
-def _avcc_sets(record: bytes) -> Iterator[bytes]:
-    at = 5
-    for mask in (0x1F, 0xFF):  # SPS, then PPS
-        count, at = record[at] & mask, at + 1
-        for _ in range(count):
-            size = int.from_bytes(record[at : at + 2], "big")
-            yield record[at + 2 : at + 2 + size]
-            at += 2 + size
-
-
-def _hvcc_sets(record: bytes) -> Iterator[bytes]:
-    at = 23
-    for _ in range(record[at - 1]):
-        count, at = int.from_bytes(record[at + 1 : at + 3], "big"), at + 3
-        for _ in range(min(count, len(record))):
-            size = int.from_bytes(record[at : at + 2], "big")
-            yield record[at + 2 : at + 2 + size]
-            at += 2 + size
+        record = parse_decoder_configuration(track.configuration, "h265" if is_h265 else "h264")
+    except ValueError as error:
+        raise Mp4Error(f"the description of the video: {error}") from error
+    return b"".join(len(unit).to_bytes(4, "big") + unit for unit in record.sets) + sample
 
 
 class Mp4Reader:
