@@ -44,7 +44,11 @@ def parser(about: str, name: str) -> argparse.ArgumentParser:
 
 def command_line() -> str:
     """Return the command line of the running benchmark."""
-    module = Path(sys.argv[0]).resolve().relative_to(ROOT).with_suffix("")
+    program = Path(sys.argv[0]).resolve()
+    # Tests may run with a virtual environment that is elsewhere.
+    module = (program.relative_to(ROOT) if program.is_relative_to(ROOT) else Path(program.name)).with_suffix(
+        ""
+    )
     name = ".".join(module.parts).removesuffix(".__main__")
     return " ".join(["python", "-m", name, *sys.argv[1:]])
 

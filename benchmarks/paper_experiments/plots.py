@@ -35,7 +35,7 @@ def plot(
             axis.set(ylabel=f"{name} of the box, pixels" if column == 0 else "")
         axes[0, column].set(title=f"{solver}: {labels.wrong.sum()} wrong labels")
         axes[-1, column].set(xlabel="frame")
-    axes[0, 0].legend(fontsize="small", markerscale=4)
+    axes[0, -1].legend(fontsize="small", markerscale=4, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     figure.suptitle(f"{title} (lines: truth; dots: labels; crosses: wrong ones)", fontsize="medium")
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from benchmarks.common.report import Report
-from benchmarks.paper_experiments.__main__ import run
+from benchmarks.paper_experiments import __main__ as paper_experiments
+from benchmarks.paper_experiments.__main__ import attempt, row, run
 from benchmarks.paper_experiments.drawn_toys import TOYS, play_toys
 from benchmarks.paper_experiments.experiment_list import EXPERIMENTS, Experiment, PaperFigure, TrackerSetting
 from benchmarks.paper_experiments.label_errors import judge, named, per_frame
@@ -18,7 +19,16 @@ from benchmarks.paper_experiments.scene import ExperimentScene, ObjectTruth
 from benchmarks.paper_experiments.walking_people import WalkParameters
 from benchmarks.paper_experiments.windowed_tracking import follow
 from fakes.tracking.windows import window_of_frames
-from tracking import PAPER, PAPER_COSTS, CostSettings, Detections, Template, WindowSettings, create_solver
+from tracking import (
+    PAPER,
+    PAPER_COSTS,
+    CostSettings,
+    Detections,
+    SolverBudget,
+    Template,
+    WindowSettings,
+    create_solver,
+)
 from tracking.boxes import iou
 
 FRAMES = 40
@@ -157,3 +167,20 @@ def test_the_papers_first_example_is_solved_to_the_letter_in_one_segment() -> No
     assert followed.boxes.shape[1] == 340
     [free] = follow(scene, replace(costs, layout=0.0), setting.window, create_solver("arcs")).reports
     assert (free.integral, free.status) == (True, "optimal")
+
+
+@pytest.mark.slow
+def test_the_four_players_are_solved_in_one_segment() -> None:
+    """500 frames: a program of all arcs is beyond the budget; its answer would be that of greedy paths."""
+    [four] = [experiment for experiment in EXPERIMENTS if experiment.name == "four"]
+    setting = four.settings[0]
+    found = attempt(four.play(1), setting, setting.solvers[0])
+    assert (found.stopped, found.integral) == (0, 1)
+    assert found.gap < 1e-9
+
+
+def test_a_table_says_where_the_budget_ended_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    setting = TrackerSetting("paper", PAPER.costs, PAPER.window)
+    monkeypatch.setattr(paper_experiments, "BUDGET", SolverBudget(work_s=1e-6))
+    outcome = attempt(play(CAST, 1), setting, "arcs")
+    assert "3 stopped" in row(setting, "arcs", [outcome])[4]
