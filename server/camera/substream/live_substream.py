@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Mapping
 from time import monotonic
@@ -15,7 +16,14 @@ from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.camera.sources.stream_clock import CaptureTime
 from server.camera.sources.stream_reader import StreamReader
 from server.camera.substream.picture_buffer import BufferedPicture, PictureBuffer, PictureRequest
+from server.system.address_redaction import redact_to_host
 
+log = logging.getLogger(__name__)
+
+_TOO_LARGE = (
+    "%s: pictures of this substream are so large that only %.1f s of them are kept, and those for a later "
+    "main stream may be missing: set it to a smaller size"
+)
 _FIRST_PICTURE_S = 4.0
 """Seconds to wait for the first picture: its size decides at which size people are tracked."""
 
@@ -26,7 +34,7 @@ class LiveSubstream(StreamReader):
     def __init__(self, url: str, options: Mapping[str, str], pictures: PictureBuffer) -> None:
         super().__init__(url, options)
         self._pictures = pictures
-        self._aspect = 1.0
+        self._aspect, self._has_warned = 1.0, False
         self.size: tuple[int, int] | None = None
         """Width and height of its first picture as displayed; None: there has been none yet."""
         self._sized = threading.Event()
@@ -58,4 +66,7 @@ class LiveSubstream(StreamReader):
                 self._sized.set()
             captured = self._clock.at(picture.time, now)
             self._pictures.put(BufferedPicture(picture, self._aspect, captured))
+        if self._pictures.kept_s is not None and not self._has_warned:
+            self._has_warned = True
+            log.warning(_TOO_LARGE, redact_to_host(self._url), self._pictures.kept_s)
         return bool(pictures)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections import deque
@@ -16,6 +17,8 @@ _MATCH_S = 0.25
 _STALE_S = 1.5
 """Seconds without a picture after which the next one is not waited for."""
 _MAX_PICTURES = 600
+_MAX_BYTES = 256_000_000
+"""Of the pictures that are kept: eight seconds at 1280x720 and 25 a second."""
 _MAX_REQUESTS = 200
 """Requests that wait for a picture; older ones are answered when they are asked for."""
 
@@ -34,6 +37,11 @@ class BufferedPicture:
     pixel_aspect: float
     captured: CaptureTime
 
+    @property
+    def size_bytes(self) -> int:
+        """The memory of the picture."""
+        return sum(plane.buffer_size for plane in self.picture.planes)
+
 
 class PictureRequest:
     """A picture that is looked for, and found when it arrives: it may be asked for much later."""
@@ -46,16 +54,20 @@ class PictureRequest:
 
 
 class PictureBuffer:
-    """Keeps pictures of some seconds. One thread adds, others find.
+    """Keeps pictures of some seconds, as far as they fit into memory. One thread adds, others find.
 
     Args:
         keep_s: seconds by which the main stream may be later.
         tolerance_s: a picture so much earlier is of the same moment: the next one need not be waited for.
+        max_bytes: of the pictures; the newest is kept in any case.
     """
 
-    def __init__(self, keep_s: float, tolerance_s: float) -> None:
-        self._keep_s, self._tolerance_s = keep_s, tolerance_s
-        self._pictures: deque[BufferedPicture] = deque(maxlen=_MAX_PICTURES)
+    def __init__(self, keep_s: float, tolerance_s: float, max_bytes: int = _MAX_BYTES) -> None:
+        self._keep_s, self._tolerance_s, self._max_bytes = keep_s, tolerance_s, max_bytes
+        self.kept_s: float | None = None
+        """Seconds of pictures that fitted; None: all that are to be kept do."""
+        self._pictures: deque[BufferedPicture] = deque()
+        self._bytes = 0
         self._open: deque[PictureRequest] = deque(maxlen=_MAX_REQUESTS)
         self._newest_at: float | None = None
         self._changed = threading.Condition()
@@ -65,13 +77,24 @@ class PictureBuffer:
         now = time.monotonic()
         with self._changed:
             self._pictures.append(picture)
+            self._bytes += picture.size_bytes
             self._newest_at = now
             for request in [each for each in self._open if self._is_reached(each)]:
                 self._answer(request)
                 self._open.remove(request)
-            while len(self._pictures) > 1 and self._pictures[0].captured.arrival < now - self._keep_s:
-                self._pictures.popleft()
+            self._drop(now)
             self._changed.notify_all()
+
+    def _drop(self, now: float) -> None:
+        """Drop the oldest pictures that are too old, or do not fit."""
+        while len(self._pictures) > 1:
+            age = now - self._pictures[0].captured.arrival
+            is_full = len(self._pictures) > _MAX_PICTURES or self._bytes > self._max_bytes
+            if not is_full and age <= self._keep_s:
+                return
+            if is_full and age < self._keep_s:
+                self.kept_s = age
+            self._bytes -= self._pictures.popleft().size_bytes
 
     def request(self, captured: CaptureTime) -> PictureRequest:
         """Look for the picture captured at a time."""
@@ -91,6 +114,8 @@ class PictureBuffer:
                 stale_at = 0.0 if self._newest_at is None else self._newest_at + _STALE_S
                 if (wait_s := min(until, stale_at) - now) <= 0:
                     self._answer(request)
+                    with contextlib.suppress(ValueError):  # it was one of too many
+                        self._open.remove(request)
                     break
                 self._changed.wait(wait_s)
             return request.picture

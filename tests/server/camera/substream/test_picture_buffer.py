@@ -52,6 +52,37 @@ def test_nothing_is_waited_for_where_no_picture_arrives() -> None:
     assert time.monotonic() < now + 20
 
 
+def test_pictures_are_bounded_by_their_memory_and_that_is_told() -> None:
+    large = VideoFrame.from_ndarray(np.zeros((1080, 1920, 3), np.uint8), format="bgr24")
+    size = BufferedPicture(large, 1.0, CaptureTime(0.0)).size_bytes
+    assert size >= 1080 * 1920 * 3
+    buffer, now = PictureBuffer(60.0, INTERVAL / 2, max_bytes=5 * size), time.monotonic()
+    for place in range(5):
+        buffer.put(BufferedPicture(large, 1.0, CaptureTime(now - 20 + place)))
+    assert buffer.kept_s is None
+    for place in range(5, 20):
+        buffer.put(BufferedPicture(large, 1.0, CaptureTime(now - 20 + place)))
+    assert len(buffer._pictures) == 5
+    assert buffer.kept_s is not None
+    assert 5 < buffer.kept_s < 60
+    for _ in range(5):
+        buffer.put(picture(now))  # small ones
+    assert len(buffer._pictures) > 5, "the memory of those that went is free again"
+    tiny = PictureBuffer(60.0, INTERVAL / 2, max_bytes=1)
+    tiny.put(BufferedPicture(large, 1.0, CaptureTime(now)))
+    assert tiny.wait(tiny.request(CaptureTime(now)), now) is not None
+
+
+def test_a_request_that_was_waited_for_in_vain_stays_answered_and_is_forgotten() -> None:
+    buffer, now = PictureBuffer(5.0, INTERVAL / 2), time.monotonic()
+    buffer.put(picture(now - 3))
+    request = buffer.request(CaptureTime(now))
+    assert buffer.wait(request, now) is None
+    assert list(buffer._open) == []
+    buffer.put(picture(now))
+    assert buffer.wait(request, now) is None, "its frame was handled without it"
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     times=st.lists(st.floats(0.0, 10.0), min_size=1, max_size=40),
