@@ -62,11 +62,13 @@ class CameraGeometry:
         homography: (3, 3) from its own picture, pixels, to the ground.
         size: width and height of that picture.
         ignored_regions: polygons (C, 2) in it where detection is off.
+        covered: (K, 4) rectangles in it in which people are hidden: the lens is covered, leaves move.
     """
 
     homography: Floats
     size: tuple[float, float]
     ignored_regions: Sequence[Floats] = field(default=())
+    covered: Floats = field(default_factory=lambda: np.empty((0, 4)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,16 +172,15 @@ def _clear_absence(
 ) -> Floats:
     """Compute how clear the other camera's view of each person is: (K,), 0 to 1.
 
-    Tested at points all over the body: inside the picture, outside ignored regions and not behind a detected
-    box. Above the share `clear_view_share` of visible points it rises linearly to 1.
+    Tested at points all over the body: inside the picture, outside ignored and covered regions and not behind
+    a detected box. Above the share `clear_view_share` of visible points it rises linearly to 1.
     """
     points = _body_points(own, detections.boxes, other, settings)
     width, height = other.size
     x, y = points[..., 0], points[..., 1]
     visible = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
-    for left, top, right, bottom in other_detections.boxes[
-        other_detections.scores >= settings.minimum_occluder_score
-    ]:
+    occluders = other_detections.boxes[other_detections.scores >= settings.minimum_occluder_score]
+    for left, top, right, bottom in np.concatenate([occluders, other.covered]):
         visible &= ~((x >= left) & (x <= right) & (y >= top) & (y <= bottom))
     for polygon in other.ignored_regions:
         visible &= ~_inside_polygon(points, polygon)

@@ -35,6 +35,7 @@ from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
+from server.messaging.packed_arrays import pack_boxes
 from server.system.errors import UserError
 from tracking import Detections
 from tracking.detectors import FusedDetector
@@ -224,7 +225,9 @@ class CameraPipeline:
             has_detection = not self._detector.warming_up
         shown, motion = self.view.shows_its_place, self.view.motion
         message = (
-            self.cross_view.build_message(pulse, detections if has_detection and shown else None, motion)
+            self.cross_view.build_message(
+                pulse, detections if has_detection and shown else None, motion, self.view.hidden
+            )
             if self.cross_view
             else None
         )
@@ -300,6 +303,7 @@ class CameraPipeline:
             tracks,
             condition=self.view.condition,
             motion=self.view.motion,
+            covered=pack_boxes(self.view.hidden),
             observations=observations,
             detections=[] if self._raw_detections is None else self._raw_detections.take(),
         )

@@ -9,10 +9,12 @@ from server.camera.knocks import noticeable_motion
 from server.camera.sources.base import Image
 from server.camera.substream.picture_scale import PictureScale
 from server.messaging.camera_status import PictureMotion
+from tracking.boxes import BOX_SIDES
 from tracking.detectors import BackgroundDetector, Detector, FusedDetector
 from tracking.detectors.background.views.view_matching import TURNED, shift_of_middle
+from tracking.detectors.base import Mask
 from tracking.frame_rate import frames_in
-from tracking.picture_condition import PictureMonitor
+from tracking.picture_condition import PictureMonitor, cell_rectangles, cells_of
 from tracking.types import PictureCondition
 
 _SEEK_S = 3.0
@@ -38,6 +40,13 @@ class ShownView:
         self._pulse = 0
         self._lost_at: int | None = None
         """The pulse from which on it is unknown where the picture lies; None: it is known."""
+        self._covered: NDArray[np.bool_] | None = None
+        self._flicker: Mask | None = None
+        self.hidden: NDArray[np.float64] = np.empty((0, BOX_SIDES))
+        """The part of the site's picture in which a cover on the lens, or leaves, hide people.
+
+        Rectangles (K, 4) beside each other.
+        """
         self.motion: PictureMotion | None = None
         """How the site's picture has moved since the start, as far as known; None: not noticeably."""
 
@@ -54,6 +63,24 @@ class ShownView:
                 self._noticed = moved
                 self.monitor.accept_scene()
         self.monitor.observe(image, pulse)
+        self._find_hidden((image.shape[1], image.shape[0]))
+
+    def _find_hidden(self, size: tuple[int, int]) -> None:
+        """Find what is hidden in pictures of a size (w, h); the detector ignores what is covered."""
+        detector, covered = self._detector, self.monitor.covered
+        flicker = None
+        if isinstance(detector, BackgroundDetector | FusedDetector):
+            flicker = detector.flicker
+            if covered is not self._covered:
+                none = np.empty((0, BOX_SIDES))
+                detector.cover(none if covered is None else cell_rectangles(covered, size))
+        if covered is self._covered and flicker is self._flicker:
+            return
+        self._covered, self._flicker = covered, flicker
+        cells = [] if covered is None else [covered]
+        cells += [] if flicker is None else [cells_of(flicker)]
+        hidden = [] if not cells else [cell_rectangles(np.logical_or.reduce(cells), size)]
+        self.hidden = self._scale.boxes_to_site(np.concatenate([np.empty((0, BOX_SIDES)), *hidden]))
 
     @property
     def condition(self) -> PictureCondition:

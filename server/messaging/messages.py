@@ -39,7 +39,14 @@ from server.messaging.camera_status import PictureMotion
 from server.messaging.number_types import PULSE_MAX, Coordinate, Cost, Duration, Number, Pixels, Pulse, Time
 from server.messaging.observations import FrameObservations
 from server.messaging.operator_messages import RISK_EVENTS_MAX, RiskEvent
-from server.messaging.packed_arrays import PackedBoxes, PackedDetections, PackedHistogram, check_detections
+from server.messaging.packed_arrays import (
+    PackedAreas,
+    PackedBoxes,
+    PackedDetections,
+    PackedHistogram,
+    check_areas,
+    check_detections,
+)
 from tracking.types import PictureCondition
 
 DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
@@ -175,6 +182,8 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """What is wrong with the picture at the end of the window."""
     motion: PictureMotion | None = None
     """How it has moved by then; null: not noticeably. Moved back, boxes match the homography."""
+    covered: PackedAreas = b""
+    """The part of the site's picture in which people are hidden by then: the lens is covered, leaves move."""
     risk_events: Annotated[list[RiskEvent], msgspec.Meta(max_length=RISK_EVENTS_MAX)] = []
     """Predicted tracking failures, where `track.assist` is on."""
     revised_from: Pulse | None = None
@@ -183,6 +192,14 @@ class CameraTracks(msgspec.Struct, frozen=True, kw_only=True):
     """The searched frames of this epoch, where cameras of a common ground are tracked jointly."""
     detections: list[RawDetections] = []
     """The searched frames of this epoch, where viewers may see people pixelated."""
+
+    def __post_init__(self) -> None:
+        """Check the covered part.
+
+        Raises:
+            ValueError: it has no rectangles; decoders then raise a `ValidationError`.
+        """
+        check_areas(self.covered)
 
 
 class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
@@ -195,6 +212,8 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
     pulse: Pulse
     boxes: PackedDetections | None
     """Null: detection did not run."""
+    covered: PackedAreas = b""
+    """The part of the camera's image in which people are hidden, as in `CameraTracks`."""
     ended: bool = False
     """Whether the recording has ended before this pulse: this is its last message."""
 
@@ -205,6 +224,7 @@ class FrameDetections(msgspec.Struct, frozen=True, kw_only=True):
             ValueError: they are none; decoders then raise a `ValidationError`.
         """
         check_detections(self.boxes or b"")
+        check_areas(self.covered)
 
 
 class ThumbnailHeader(msgspec.Struct, frozen=True, kw_only=True):

@@ -29,6 +29,12 @@ HISTOGRAM_BINS_MAX = 1024
 PackedBoxes = bytes
 """Boxes one after the other: left, top, right, bottom as little-endian float32; NaN where hidden."""
 
+COVERED_MAX = 600
+"""Rectangles of what is covered in a picture, at most."""
+
+PackedAreas = Annotated[bytes, msgspec.Meta(max_length=COVERED_MAX * _BOX_BYTES)]
+"""Rectangles, packed as boxes, none of them hidden."""
+
 PackedDetections = Annotated[bytes, msgspec.Meta(max_length=FRAME_DETECTIONS_MAX * _DETECTION_BYTES)]
 """Boxes in pixels of the camera's image, each followed by its score, 0 to 1, as little-endian float32."""
 
@@ -70,6 +76,16 @@ def are_boxes(packed: Sequence[PackedBoxes], count: int) -> bool:
     hidden = np.isnan(boxes)
     within = hidden | (np.abs(boxes) <= COORDINATE_MAX)
     return bool(within.all() and (hidden.all(axis=1) == hidden.any(axis=1)).all())
+
+
+def check_areas(packed: PackedAreas) -> None:
+    """Check the rectangles that a sender has packed.
+
+    Raises:
+        ValueError: they are none, or coordinates are outside of their limits.
+    """
+    if len(packed) % _BOX_BYTES or not (np.abs(unpack_boxes([packed])) <= COORDINATE_MAX).all():
+        raise ValueError("rectangles are rows of four coordinates within their limits")
 
 
 def pack_detections(boxes: NDArray[np.float64], scores: NDArray[np.float64]) -> PackedDetections:

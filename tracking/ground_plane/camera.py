@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.boxes import Floats, heights
+from tracking.boxes import BOX_SIDES, Floats, heights, shares_within
 from tracking.homographies import homogeneous, map_points
 
 _MIN_BOXES = 30
@@ -29,6 +29,8 @@ class GroundCamera:
         height: of the picture, pixels.
         turned: (3, 3) from image points to where the picture shows them since the camera was turned; None:
             it was not.
+        covered: (K, 4) rectangles of image points, beside each other, in which people are hidden: the lens is
+            covered, leaves move.
 
     Raises:
         ValueError: the homography is not invertible, or not a matrix (3, 3) of finite numbers.
@@ -38,6 +40,7 @@ class GroundCamera:
     width: float
     height: float
     turned: Floats | None = None
+    covered: Floats = field(default_factory=lambda: np.empty((0, BOX_SIDES)))
 
     def __post_init__(self) -> None:
         if self.homography.shape != (3, 3) or not np.isfinite(self.homography).all():
@@ -82,6 +85,12 @@ class GroundCamera:
     def shown(self, points: Floats) -> Floats:
         """Return where the picture shows image points (K, 2) since the camera was turned; NaN: nowhere."""
         return points if self.turned is None else map_points(self.turned, points)
+
+    def covered_shares(self, boxes: Floats) -> Floats:
+        """Return the share of each box (K, 4) that is hidden, (K,); 0 of NaN."""
+        if not len(self.covered):
+            return np.zeros(len(boxes))
+        return np.asarray(np.nan_to_num(shares_within(boxes, self.covered)).sum(axis=1))
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Return which image points (K, 2) are in the picture; NaN is not."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter, deque
 
 from tracking.detectors.base import Image
+from tracking.picture_condition.cover import Cells, CoverFinder
 from tracking.picture_condition.reference import Reference
 from tracking.picture_condition.stillness import StillnessMonitor, forget_before
 from tracking.picture_condition.structure import Structure, reduce, structure_of
@@ -23,8 +24,6 @@ _ACCEPT_S = 300.0
 # Seconds of signs until a condition is reported, and without them until it is taken back; the share of the
 # pictures that must agree.
 _REPORT_S, _RECOVER_S, _AGREE = 3.0, 2.0, 0.9
-# The picture does not show what happens now.
-_HIDDEN = {"covered", "frozen"}
 # What covers a lens may look like another scene: the first report of either stands.
 _HIDING = {"covered", "turned"}
 # Seconds between the pictures that show whether something stands still.
@@ -44,6 +43,7 @@ class PictureMonitor:
         self._looked: float | None = None
         self._stillness = StillnessMonitor()
         self._recent: deque[tuple[float, Structure]] = deque()
+        self._cover = CoverFinder()
         self._reference: Reference | None = None
         self._learned_s = self._unlearned_s = 0.0
         self._signs: deque[tuple[float, int, PictureCondition]] = deque()
@@ -56,8 +56,15 @@ class PictureMonitor:
 
     @property
     def shows_now(self) -> bool:
-        """Whether what is seen is what happens now."""
-        return self.condition not in _HIDDEN
+        """Whether what is seen is what happens now, in a part of the picture at least."""
+        if self.condition == "covered":
+            return self._cover.cells is not None and self._cover.rest_is_seen
+        return not self._stillness.repeats
+
+    @property
+    def covered(self) -> Cells | None:
+        """The cells `(R, C)` of the pictures in which a cover hides all; None: there is none."""
+        return self._cover.cells
 
     def observe(self, image: Image, frame: int | None = None) -> PictureCondition:
         """Return the camera's condition up to the next frame.
@@ -88,6 +95,7 @@ class PictureMonitor:
     def _begin_again(self) -> None:
         """Learn the reference anew; nothing is wrong until then."""
         self._reference, self._learned_s = None, 0.0
+        self._cover.forget()
         self._signs.clear()
         if self.condition != "clear":
             self.condition, self.since = "clear", self._frame
@@ -105,14 +113,18 @@ class PictureMonitor:
         if still and self._reference.is_seen(structure):
             return "frozen"
         if self._learned_s >= _FIRST_S:
-            sign = self._reference.sign(structure, before, structure.noise(last), seconds)
+            noise = structure.noise(last)
+            self._cover.observe(structure, self._reference.structure, noise, elapsed)
+            sign = self._reference.sign(structure, before, noise, seconds)
             if sign != "clear" or still:
                 return "frozen" if sign == "clear" else sign
         self._unlearned_s += elapsed
         if self._learned_s < _FIRST_S or self._unlearned_s >= _LEARN_EVERY_S:
             self._learned_s += self._unlearned_s
             span = min(max(self._learned_s, self._unlearned_s), _AVERAGE_S)
-            self._reference.learn(structure, self._unlearned_s / span if span else 1.0)
+            self._reference.learn(
+                structure, self._unlearned_s / span if span else 1.0, self._cover.mask(structure.gray.shape)
+            )
             self._unlearned_s = 0.0
         return "clear"
 

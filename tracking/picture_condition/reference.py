@@ -72,9 +72,15 @@ class Reference:
         self._detail = structure.detail
         self._motion, self._search_at = STILL, 0.0
 
-    def learn(self, structure: Structure, share: float) -> None:
-        """Take over a share, up to 1, of a picture."""
-        self._gray += np.float32(share) * (structure.gray - self._gray)
+    @property
+    def structure(self) -> Structure:
+        """What the camera showed."""
+        return self._structure
+
+    def learn(self, structure: Structure, share: float, hidden: npt.NDArray[np.bool_]) -> None:
+        """Take over a share, up to 1, of a picture, except where it is `hidden` `(h, w)`."""
+        shares = np.where(hidden, np.float32(0.0), np.float32(share))
+        self._gray += shares * (structure.gray - self._gray)
         self._detail = self._detail + share * (structure.detail - self._detail)
         self._structure = structure_of(self._gray)
 

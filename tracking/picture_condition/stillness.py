@@ -41,6 +41,8 @@ class StillnessMonitor:
         self._noises: deque[tuple[float, float]] = deque()
         self._quietest = 1.0
         self._known_s = 0.0
+        self.repeats = False
+        """Whether the last picture is that of half a second before: it does not show what happens now."""
 
     def is_frozen(self, image: Image, seconds: float, elapsed: float) -> bool:
         """Return whether pictures have stood still for some seconds up to this one.
@@ -58,13 +60,15 @@ class StillnessMonitor:
         if before > seconds - _APART_S:
             return False
         changed = (cv2.absdiff(pixels, other) > 0).astype(np.float32)
+        is_known = self._quietest > _NOISE and self._known_s >= _KNOWN_S
+        self.repeats = is_known and float(changed.mean()) < _STILL
         cells = cv2.resize(changed, _CELLS, interpolation=cv2.INTER_AREA)
         self._changes.append((seconds, float(changed.mean()), float(np.median(cells))))
         forget_before(self._changes, seconds - _WINDOW_S)
         if self._changes[0][0] > seconds - _WINDOW_S:
             return False
         _, change, noise = np.median(self._changes, axis=0).tolist()
-        if change < _STILL and self._quietest > _NOISE and self._known_s >= _KNOWN_S:
+        if change < _STILL and is_known:
             self._noises.clear()
             return True
         self._known_s += elapsed

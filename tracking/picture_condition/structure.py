@@ -53,12 +53,12 @@ class Structure:
         across, down = self.across - other.across, self.down - other.down
         gradient = float(np.median(cell_means(across * across + down * down))) / 2.0
         fine = float(np.median(cell_means((self.fine - other.fine) ** 2))) / 2.0
-        return min(gradient, fine / _FINE_NOISE)
+        return min(gradient, fine / FINE_NOISE)
 
 
 _LEAST_PRODUCT = 1e-6
 # Squared fine detail of white noise over its squared coarse gradient.
-_FINE_NOISE = 8.0
+FINE_NOISE = 8.0
 
 
 def structure_of(gray: Plane) -> Structure:
@@ -81,9 +81,9 @@ def reduce(image: Image) -> Plane:
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
 
 
-def cell_means(plane: Plane) -> Floats:
-    """Return the mean of each cell of a plane, `(R, C)`."""
+def cell_means(plane: Plane, cells: int = _CELLS) -> Floats:
+    """Return the mean of each cell of a plane, `(R, C)`; so many `cells` lie along its longer side."""
     height, width = plane.shape
-    cell = max(height, width) / _CELLS
+    cell = max(height, width) / cells
     size = (max(round(width / cell), 1), max(round(height / cell), 1))
     return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), dtype=np.float64)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bestview import CameraDetections, CameraGeometry, rescore_detections, views_overlap
 from server.camera.observations import calibrated_camera_boxes, calibrated_detections, most_confident
@@ -13,7 +14,13 @@ from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import FrameDetections
-from server.messaging.packed_arrays import PackedDetections, pack_detections, unpack_detections
+from server.messaging.packed_arrays import (
+    PackedDetections,
+    pack_boxes,
+    pack_detections,
+    unpack_boxes,
+    unpack_detections,
+)
 from server.messaging.picture_motion import is_turned
 from tracking import Detections
 from tracking.boxes import areas
@@ -43,20 +50,30 @@ class CrossViewScorer:
         pulse: int,
         detections: Detections | None,
         motion: PictureMotion | None = None,
+        covered: NDArray[np.float64] | None = None,
         *,
         ended: bool = False,
     ) -> FrameDetections:
         """Build the message about a frame, in the camera's pixels; None: detection did not run.
 
         ``motion``: of the camera since it was calibrated; boxes are where they were before. A camera that was
-        turned away says nothing, since nobody knows whom it should see.
+        turned away says nothing, since nobody knows whom it should see. ``covered``: rectangles (K, 4) of the
+        site's image in which it sees nobody.
         """
-        boxes = None
+        boxes, hidden = None, b""
         if detections is not None and not is_turned(motion, self._letterbox.site_size):
             found = calibrated_detections(most_confident(detections), self._letterbox, motion)
             boxes = pack_detections(found.boxes, found.scores)
+            if covered is not None:
+                hidden = pack_boxes(calibrated_camera_boxes(covered, self._letterbox, motion))
         return FrameDetections(
-            camera=self._camera, boot=self._boot, size=self._size, pulse=pulse, boxes=boxes, ended=ended
+            camera=self._camera,
+            boot=self._boot,
+            size=self._size,
+            pulse=pulse,
+            boxes=boxes,
+            covered=hidden,
+            ended=ended,
         )
 
     def view_overlaps(self, message: FrameDetections) -> bool:
@@ -70,7 +87,10 @@ class CrossViewScorer:
         if is_turned(motion, self._letterbox.site_size):
             return detections
         peers = [
-            (geometry, _camera_detections(message.boxes))
+            (
+                replace(geometry, covered=unpack_boxes([message.covered])),
+                _camera_detections(message.boxes),
+            )
             for message in messages
             if message.boxes is not None and (geometry := self._geometry_of(message)) is not None
         ]

@@ -9,8 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.messaging.messages import CameraTracks
+from server.messaging.packed_arrays import unpack_boxes
 from server.messaging.picture_motion import is_turned
 from server.service.identity.camera_window import CameraWindow
+from tracking.boxes import areas
+
+_MUCH_HIDDEN = 0.25
+"""Share of a picture."""
 
 
 class UndetectedFrames:
@@ -33,12 +38,14 @@ class UndetectedFrames:
     ) -> dict[str, tuple[int, int]]:
         """Return the image sizes of the cameras that ran detection in any of these frames.
 
-        Cameras that were turned away are left out: their homographies do not say whom they should see.
+        Cameras that were turned away, or in which much is hidden, are left out: their homographies do not say
+        whom they should see.
         """
         return {
             window.message.camera: window.message.size
             for window in windows
             if not is_turned(window.message.motion, window.letterbox.site_size)
+            and _hidden_share(window) < _MUCH_HIDDEN
             and not self.over(window.message.camera, first, last + 1 - first).all()
         }
 
@@ -46,3 +53,9 @@ class UndetectedFrames:
         """Forget the frames before a pulse."""
         for camera, frames in self._frames.items():
             self._frames[camera] = {frame for frame in frames if frame >= pulse}
+
+
+def _hidden_share(window: CameraWindow) -> float:
+    """Return the share of a camera's picture in which people are hidden."""
+    width, height = window.letterbox.site_size
+    return float(areas(unpack_boxes([window.message.covered])).sum()) / (width * height)

@@ -50,6 +50,7 @@ def joint_task(epoch: Epoch, cameras: Sequence[str]) -> JointTask:
                 size=message.size,
                 frames=message.observations,
                 motion=message.motion,
+                covered=message.covered,
                 last=message.last,
                 ended=message.ended,
             )

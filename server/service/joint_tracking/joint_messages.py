@@ -9,6 +9,7 @@ import msgspec
 from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import SolverReport, TrackMessage
 from server.messaging.observations import FrameObservations
+from server.messaging.packed_arrays import PackedAreas
 
 Row = tuple[float, float, float]
 
@@ -38,6 +39,8 @@ class CameraObservations(msgspec.Struct, frozen=True, kw_only=True):
     """Width and height of its image, pixels."""
     frames: list[FrameObservations]
     motion: PictureMotion | None
+    covered: PackedAreas
+    """The part of the site's picture in which people are hidden."""
     last: int
     """Its last frame in this epoch."""
     ended: bool

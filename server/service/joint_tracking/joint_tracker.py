@@ -12,7 +12,8 @@ import numpy as np
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.observations import unpack_observations
-from server.messaging.picture_motion import camera_motion
+from server.messaging.packed_arrays import PackedAreas, unpack_boxes
+from server.messaging.picture_motion import calibrated_boxes, camera_motion
 from server.messaging.track_conversion import solver_report
 from server.service.joint_tracking.camera_track_builder import CameraTrackBuilder
 from server.service.joint_tracking.joint_messages import (
@@ -42,6 +43,8 @@ class JointTracker:
         """Of the cameras that have reported."""
         self._motions: dict[str, PictureMotion | None] = {}
         """How those cameras were knocked or turned."""
+        self._covered: dict[str, PackedAreas] = {}
+        """Where people are hidden in their pictures."""
         self._joint: frozenset[str] = frozenset()
         """Those of them that overlap."""
         self._tracker = GroundPlaneTracker(
@@ -104,7 +107,7 @@ class JointTracker:
                 calibration = GroundCamera(self._homographies[camera], width, height)
                 self._calibrations[camera] = calibration
                 self._tracker.set_camera(camera, calibration)
-                self._motions[camera] = None
+                self._motions[camera], self._covered[camera] = None, b""
                 self._joint = overlapping_cameras(self._calibrations)
             self._turn(camera, part)
             (self._ended.add if part.ended else self._ended.discard)(camera)
@@ -114,13 +117,14 @@ class JointTracker:
                     self._detections[camera][frame.pulse] = unpack_observations(frame)
 
     def _turn(self, camera: str, part: CameraObservations) -> None:
-        """Take over how a camera was turned: it sees another part of the floor, in other places."""
-        if part.motion == self._motions[camera]:
+        """Take over how a camera was turned or covered: it sees another part of the floor."""
+        if (part.motion, part.covered) == (self._motions[camera], self._covered[camera]):
             return
-        self._motions[camera] = part.motion
+        self._motions[camera], self._covered[camera] = part.motion, part.covered
         letterbox = Letterbox(part.size, self._site_size)
         turned = None if part.motion is None else camera_motion(part.motion, letterbox)
-        self._tracker.set_camera(camera, replace(self._calibrations[camera], turned=turned))
+        covered = letterbox.boxes_site_to_camera(calibrated_boxes(unpack_boxes([part.covered]), part.motion))
+        self._tracker.set_camera(camera, replace(self._calibrations[camera], turned=turned, covered=covered))
 
     def _track_to(self, last: int, *, all_ended: bool) -> tuple[list[GroundFrame], list[GroundFrame]]:
         """Track up to frame `last`; return the frames that have become final, and those after them."""

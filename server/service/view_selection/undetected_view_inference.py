@@ -95,8 +95,11 @@ class UndetectedViewInference:
         touched = boxes_touching_others(
             expected, picture, samples.boxes, sample_picture, shape[1] * shape[2], self._size
         )
-        clarity = np.array([self._quality_buffer.clarity(self._cameras[at]) for at in floor.cameras])
-        quality = _quality(expected, camera, clarity[camera], floor.layout, self._quality_buffer.settings)
+        clarity = np.zeros(len(expected))
+        for column, at in enumerate(floor.cameras):
+            here = camera == column
+            clarity[here] = self._quality_buffer.clarity(self._cameras[at], expected[here])
+        quality = _quality(expected, camera, clarity, floor.layout, self._quality_buffer.settings)
         quality *= probability[is_probable] * np.where(touched, 1.0, _NO_BOX_FACTOR)
         # Each view holds for the frames up to the next inference.
         frame = time * self._interval + np.arange(self._interval)[:, None]

@@ -12,9 +12,11 @@ from bestview.quality import CameraLayout, QualitySettings, TrackWindow, ViewQua
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
+from server.messaging.packed_arrays import PackedAreas, unpack_boxes
 from server.messaging.picture_motion import moved_homography
 from server.service.identity.camera_window import CameraWindow
 from server.service.ingest.window_history import HistorySpan, WindowHistory
+from tracking.boxes import BOX_SIDES, shares_within
 from tracking.types import PictureCondition
 
 Floats = NDArray[np.float64]
@@ -54,6 +56,7 @@ class ViewQualityBuffer:
         self._overhead = config.overhead
         self.conditions: dict[str, PictureCondition] = dict.fromkeys(config.camera_ids, "clear")
         """What is wrong with each camera's newest picture."""
+        self._covered: dict[str, PackedAreas] = dict.fromkeys(config.camera_ids, b"")
         self._motion: dict[str, PictureMotion | None] = dict.fromkeys(config.camera_ids)
         self._histories = {camera: WindowHistory[WindowQuality]() for camera in config.camera_ids}
 
@@ -61,6 +64,7 @@ class ViewQualityBuffer:
         """Add the windows of an epoch."""
         for window in windows:
             self.conditions[window.message.camera] = window.message.condition
+            self._covered[window.message.camera] = window.message.covered
             self._motion[window.message.camera] = window.message.motion
         for quality in self._qualities(windows):
             first, frames = quality.window.first, len(quality.quality)
@@ -78,9 +82,12 @@ class ViewQualityBuffer:
         """Return the newest quality of a camera's frames from `first` to `last`."""
         return self._histories[camera].over(first, last)
 
-    def clarity(self, camera: str) -> float:
-        """Return 1 if a camera's newest picture is clear, else 0."""
-        return float(self.conditions[camera] == "clear")
+    def clarity(self, camera: str, boxes: Floats) -> Floats:
+        """Return how clear a camera's newest picture is in boxes (K, 4), (K,), from 0 to 1."""
+        covered, condition = self._covered[camera], self.conditions[camera]
+        if not covered or condition not in {"clear", "covered"}:
+            return np.full(len(boxes), float(condition == "clear"))
+        return 1.0 - _covered_shares(boxes[:, None], covered)
 
     def forget_before(self, pulse: int) -> None:
         """Drop the frames before a pulse."""
@@ -112,7 +119,7 @@ class ViewQualityBuffer:
                 np.clip(np.array([track.confidence for track in tracks], dtype=np.float64), 0.0, 1.0),
                 # None, not measured, becomes NaN.
                 np.array([track.sharpness for track in tracks], dtype=np.float64),
-                np.repeat([_clarity(window) for window in windows], [len(window.keys) for window in windows]),
+                np.concatenate([np.empty(0), *map(_clarity, windows)]),
             ),
             self.layout([window.message.camera for window in windows]),
             self.settings,
@@ -145,8 +152,22 @@ class ViewQualityBuffer:
         return moved_homography(np.asarray(homography @ to_camera), self._motion[camera])
 
 
-def _clarity(window: CameraWindow) -> float:
-    return float(window.message.condition == "clear")
+def _clarity(window: CameraWindow) -> Floats:
+    """Return how clear the picture is where each track's boxes are, (T,): 0 behind a cover."""
+    message = window.message
+    if not message.covered:
+        return np.full(len(window.keys), float(message.condition == "clear"))
+    if message.condition not in {"clear", "covered"}:
+        return np.zeros(len(window.keys))
+    return 1.0 - _covered_shares(window.boxes, message.covered)
+
+
+def _covered_shares(boxes: Floats, covered: PackedAreas) -> Floats:
+    """Return the mean share of each track's boxes (T, F, 4) that is covered, (T,); 0 where all are hidden."""
+    shares = shares_within(boxes.reshape(-1, BOX_SIDES), unpack_boxes([covered])).sum(axis=1)
+    shares = shares.reshape(boxes.shape[:2])
+    known = ~np.isnan(shares)
+    return np.asarray(np.where(known, shares, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1))
 
 
 def _stacked_boxes(windows: Sequence[CameraWindow], start: int) -> Floats:

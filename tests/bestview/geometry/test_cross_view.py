@@ -107,6 +107,12 @@ def test_a_camera_without_a_clear_view_lowers_no_score() -> None:
     assert score_of(detections_of(SIDE), elsewhere) < 0.5
 
 
+def test_behind_a_cover_there_is_no_evidence_of_absence() -> None:
+    cover = boxes_of(SIDE, (0, 10)) + np.array([-9, -9, 9, 9])
+    assert score_of(detections_of(SIDE), replace(SIDE, covered=cover)) == 0.5
+    assert score_of(detections_of(SIDE), replace(SIDE, covered=cover + np.array([300, 0, 300, 0]))) < 0.5
+
+
 def test_detections_without_ground_point_are_not_rescored() -> None:
     [left, top, right, _] = boxes_of(FRONT, (0, 10))[0]
     for bottom in (SIZE[1], 200.0):  # cut off by the picture's lower edge, and above the horizon

@@ -58,6 +58,18 @@ def test_a_gain_change_causes_no_detections() -> None:
     assert all((frame.scores < SURE).all() for frame in brighter)
 
 
+def test_people_are_found_in_the_dark_in_spite_of_the_noise() -> None:
+    detector, random = BackgroundDetector(), np.random.default_rng(0)
+    pale = Figure(10, 200, speed=2.0, begin=40, color=(80, 85, 100))
+    detect_all(detector, [], range(50))
+    seen = []
+    for frame in range(50, 120):
+        dark = picture([pale], frame, 0.3) + 8.0 * random.standard_normal((HEIGHT, WIDTH, 3))
+        seen.append(detector.detect(np.clip(dark, 0, 255).astype(np.uint8)))
+    found = [best_overlap(each, pale, frame) >= 0.5 for frame, each in enumerate(seen, 50)]
+    assert np.mean(found[20:]) > 0.9
+
+
 def test_a_standing_person_is_not_absorbed_into_the_background() -> None:
     arrived = [Figure(10, 200, speed=2.0, begin=40, end=100), Figure(210, 200, begin=100)]
     seen = detect_all(BackgroundDetector(), arrived, range(200))
@@ -98,6 +110,32 @@ def test_ignored_regions_have_no_detections() -> None:
     hidden = Figure(260, 200, speed=-0.5, begin=40)
     seen = detect_all(BackgroundDetector(BackgroundSettings(ignore=(right,))), [hidden], range(100))
     assert all((frame.scores < SURE).all() for frame in seen)
+
+
+def test_what_is_covered_is_nobody_and_neither_hides_the_rest_nor_is_learned() -> None:
+    covered = np.array([[WIDTH / 2 + 20, 0.0, WIDTH, HEIGHT]])
+    walker = Figure(10, 200, speed=1.5, begin=40)
+    detector = BackgroundDetector()
+    detector.prepare([picture([], frame) for frame in range(3)], every_s=0.04)
+
+    def seen(frame: int, *, painted: bool) -> Detections:
+        image = picture([walker], frame)
+        if painted:
+            image[:, WIDTH // 2 + 20 :] = (40, 60, 150)
+        return detector.detect(image)
+
+    for frame in range(40):
+        seen(frame, painted=False)
+    detector.cover(covered)
+    behind = [seen(frame, painted=True) for frame in range(40, 120)]
+    assert (
+        np.mean([best_overlap(found, walker, 40 + at) >= 0.5 for at, found in enumerate(behind[10:], 10)])
+        > 0.9
+    )
+    assert not any((found.boxes[found.scores >= SURE][:, 0] > WIDTH / 2).any() for found in behind)
+    detector.cover(np.empty((0, 4)))
+    after = [seen(frame, painted=False) for frame in range(120, 130)]
+    assert all(len(found.boxes[found.scores >= SURE]) == 1 for found in after)
 
 
 @pytest.mark.parametrize(("color", "length"), [(True, 96), (False, 64)])

@@ -66,6 +66,25 @@ def test_network_and_silhouette_together_are_surer_than_each_alone() -> None:
     assert 0.3 < mean_score(silhouette, WALKER, frames) < 0.8
 
 
+@pytest.mark.parametrize("light", [1.0, 0.3])
+def test_the_network_is_shown_pictures_of_the_dark_in_the_usual_light(light: float) -> None:
+    shown: list[Image] = []
+
+    class WatchedNetwork(ListedNetwork):
+        def find(self, image: Image) -> Detections:
+            shown.append(image)
+            return super().find(image)
+
+    detector = FusedDetector(BackgroundDetector(), WatchedNetwork(lambda _: []))
+    for frame in range(90):
+        image = picture([WALKER], frame, 1.0 if frame < 60 else light)
+        detector.detect(image, frame)
+    error = np.abs(shown[-1].astype(np.float64) - picture([WALKER], 85, 1.0)).mean()
+    assert error < 10.0
+    # In the usual light it is shown what the camera shows.
+    assert light < 1.0 or any(np.array_equal(shown[-1], picture([WALKER], frame)) for frame in range(90))
+
+
 def test_a_network_box_without_foreground_is_doubted() -> None:
     found = detect_all(lambda _: [(POSTER, 0.8)], [WALKER], range(120))
     assert max(score_at(found[frame], POSTER) for frame in range(60, 120)) < 0.5

@@ -98,11 +98,15 @@ class BoxFilter:
         """Prepare for planes like `weight` `(H, W)`, 1 in visible cells; the image has `rows` rows."""
         self._settings = settings
         self._parts = BODY_PARTS[settings.body]
-        self._weights = integral_image(weight)
+        self.see(weight)
         self._shape = (weight.shape[0], weight.shape[1])
         self._rows = rows
         self._range: HeightRange | None = None
         self._plans: list[HeightPlan] | None = None
+
+    def see(self, weight: Plane) -> None:
+        """Change which cells are visible, `(H, W)`, 1 where they are."""
+        self._weights = integral_image(weight)
 
     def peaks(self, gain: Plane, height_range: HeightRange | None) -> ScanPeaks:
         """Scan all positions and heights; return the local maxima, best first.

@@ -35,7 +35,14 @@ class CellGrid:
         self._work = (max(round(height * scale), cell_pixels), max(round(width * scale), cell_pixels))
         self._cell_pixels = cell_pixels
         self.margin = round(outside * self._work[0] / cell_pixels)
-        self.visible = visible_mask(*self._work, ignore, scale)
+        self._not_ignored = visible_mask(*self._work, ignore, scale)
+        self.hide(np.empty((0, 4)))
+
+    def hide(self, covered: npt.NDArray[np.float64]) -> None:
+        """Ignore rectangles `(K, 4)` of the image, too, instead of those before."""
+        self.visible = self._not_ignored.copy()
+        for left, top, right, bottom in np.rint(covered * self.work_scale).astype(int).tolist():
+            self.visible[top:bottom, left:right] = 0
         self.weight: Plane = (self.cell_shares(self.visible) > 0.5).astype(np.float32)  # noqa: PLR2004 — half
 
     def resize(self, image: Image) -> Image:

@@ -100,6 +100,7 @@ class BackgroundDetector:
         self._height_model: HeightModel | None = None
         self._height_range: HeightRange | None = None
         self._views = 0
+        self._covered: npt.NDArray[np.float64] = np.empty((0, 4))
         self._turned: npt.NDArray[np.float64] | None = None
         """How the present view, if it is not the first one, was turned; of the working image."""
         self.warming_up = True
@@ -161,6 +162,32 @@ class BackgroundDetector:
         self._height_estimator.observe(mask, grid.visible)
         shadow = segmentation.shadow & grid.visible & ~mask
         return replace(self._scan_mask(segmentation.image, mask, shadow, grid), motion=segmentation.motion)
+
+    def relit(self, image: Image) -> Image:
+        """Return the image of the last frame scanned in the background's light, if it is dark or hazy."""
+        background = self._background
+        return background.relit(image) if isinstance(background, MedianBackground) else image
+
+    @property
+    def flicker(self) -> Mask | None:
+        """Where leaves or screens flicker in the images, `(h, w)` of 255, else 0; None: nowhere."""
+        return self._background.flicker.mask if isinstance(self._background, MedianBackground) else None
+
+    def cover(self, boxes: npt.NDArray[np.float64]) -> None:
+        """Ignore the covered part of the images, rectangles `(K, 4)` in pixels, from the next frame on.
+
+        Instead of what was covered before. What is behind it is remembered.
+        """
+        self._covered = boxes
+        if self._grid is not None:
+            self._hide_covered(self._grid)
+
+    def _hide_covered(self, grid: CellGrid) -> None:
+        grid.hide(self._covered)
+        if self._filter is not None:
+            self._filter.see(grid.weight)
+        if isinstance(self._background, MedianBackground):
+            self._background.hidden = None if not len(self._covered) else ~grid.visible
 
     def learn(self, scan: ForegroundScan, people: npt.NDArray[np.float64]) -> None:
         """Update the background with the frame of a scan where nobody is; `people` `(K, 4)` are in cells."""
@@ -240,6 +267,8 @@ class BackgroundDetector:
             floor = None if floor is None else floor.turned(in_image, self._shape[1])
             self._filter = self._height_model = self._height_range = None
         grid = self._grid = CellGrid(self._shape, settings.work_width, CELL, settings.border_margin, ignore)
+        if len(self._covered):
+            self._hide_covered(grid)
         if floor is not None:
             self._height_estimator = HeightModelEstimator(
                 settings.height_model, self.fps, floor.scaled_by(grid.work_scale), grid.work_height

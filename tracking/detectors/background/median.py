@@ -20,14 +20,16 @@ from tracking.detectors.background.registration import Registration, count_edges
 from tracking.detectors.background.segmentation import (
     Segmentation,
     ShadowSettings,
+    exceeding,
     largest_difference,
     shadow_mask,
+    smoothed,
 )
 from tracking.detectors.background.static_foreground import GhostFinder, StaticForegroundSettings
 from tracking.detectors.background.views.known_views import KnownViews, shows_view
 from tracking.detectors.background.views.turn_finder import TurnFinder
 from tracking.detectors.background.views.view_matching import ViewMatch
-from tracking.detectors.base import Image, Mask, Plane, require_at_least_one, require_positive
+from tracking.detectors.base import Image, Mask, require_at_least_one, require_positive
 from tracking.frame_rate import DEFAULT_FPS, frames_in
 
 
@@ -76,7 +78,7 @@ class MedianBackground:
         self._points_every = self._learn_every * frames_in(_POINTS_EVERY_S, fps / self._learn_every)
         self._relearn_frames = frames_in(settings.relearn_s, fps, _MIN_RELEARN_FRAMES)
         self._static_filter = GhostFinder(static, fps)
-        self._flicker = FlickerFinder(frames_in(static.check_every_s, fps) / fps)
+        self.flicker = FlickerFinder(frames_in(static.check_every_s, fps) / fps)
         self._differing: Mask | None = None
         """Foreground of the last frame, flicker included."""
         self._shadows = shadows
@@ -96,6 +98,8 @@ class MedianBackground:
         """How many times another view was learned."""
         self._last: Image | None = None
         """The last frame, where the background is."""
+        self.hidden: Mask | None = None
+        """`(H, W)`, 255 where frames do not show the scene: the lens is covered; None: nowhere."""
 
     @property
     def turned(self) -> Floats | None:
@@ -152,10 +156,23 @@ class MedianBackground:
             self._invalidate(image, background)
             return None
         # At the background's light, and without noise, people look the same whatever the exposure is.
-        smooth = _smoothed(aligned) if light.noise > _NOISY else aligned
-        self._differing, flicker = segmentation.foreground, self._flicker.mask
+        smooth = smoothed(aligned) if light.noise > _NOISY else aligned
+        self._differing, flicker = segmentation.foreground, self.flicker.mask
         segmentation = replace(segmentation, image=light.remove(smooth))
         return segmentation if flicker is None else segmentation.without(flicker)
+
+    def relit(self, image: Image) -> Image:
+        """Return the last frame, at any size, in the background's light if it has lost contrast to its own.
+
+        Networks hardly know people in the dark or in fog.
+        """
+        light, background = self._light, self._rounded
+        if light is None or background is None:
+            return image
+        contrast = float(np.mean(light.contrast_of(self._cells_of(background))))
+        if contrast >= _DULL:
+            return image
+        return light.remove(smoothed(image) if light.noise > _NOISY * contrast else image)
 
     def learn(self, foreground: Mask, occupied: Mask) -> None:
         """Update the background with the last frame, except where people are.
@@ -164,9 +181,9 @@ class MedianBackground:
             foreground: `(H, W)`, the cleaned foreground of that frame.
             occupied: `(H, W)`, 255 where a person is.
         """
-        self._unlikely = occupied | foreground
-        if 2 * cv2.countNonZero(self._unlikely) > self._unlikely.size:
-            self._unlikely = None
+        occupied = occupied if self.hidden is None else occupied | self.hidden
+        unlikely = occupied | foreground
+        self._unlikely = self.hidden if self._is_mostly(unlikely) else unlikely
         if self._exact is None or self._rounded is None or self._last is None or self._light is None:
             return
         checks_static, updates = self._static_filter.is_due(), self._frames % self._learn_every == 0
@@ -174,7 +191,7 @@ class MedianBackground:
             return
         leveled = self._light.remove(self._last, self._rounded)
         if checks_static and self._differing is not None:
-            self._flicker.check(leveled, self._differing)
+            self.flicker.check(leveled, self._differing)
         static = self._static_filter.find(leveled, self._rounded, foreground) if checks_static else None
         if static is not None:
             self._exact[static > 0] = leveled[static > 0]
@@ -217,7 +234,7 @@ class MedianBackground:
         """Return the segmentation of an aligned image against the background at the image's light."""
         expected, noise = light.apply(background), light.noise
         if noise > _NOISY:
-            image, expected = _smoothed(image), _smoothed(expected)
+            image, expected, noise = smoothed(image), smoothed(expected), _SMOOTHED_NOISE * noise
         difference = largest_difference(image, expected)
         lit = light.apply_local(expected)
         if lit is not None:
@@ -227,7 +244,7 @@ class MedianBackground:
         # In a darker picture people differ by less, and so does what is not there: by the noise at least.
         contrast = np.maximum(light.contrast_of(self._cells_of(background)), _LEAST_CONTRAST)
         thresholds = np.clip(contrast * self._settings.threshold, _NOISES * noise, self._settings.threshold)
-        mask = _exceeding(difference, np.asarray(thresholds, dtype=np.float32))
+        mask = exceeding(difference, np.asarray(thresholds, dtype=np.float32))
         shadow = shadow_mask(image, expected, mask, self._shadows)
         return Segmentation(mask & ~shadow, shadow, image, motion)
 
@@ -273,8 +290,14 @@ class MedianBackground:
 
     def _is_flooded(self, segmentation: Segmentation) -> bool:
         """Return whether so much of a frame is foreground that the background no longer explains it."""
-        differs = cv2.countNonZero(segmentation.foreground | segmentation.shadow)
-        return differs > self._settings.relearn_share * segmentation.foreground.size
+        return self._is_mostly(segmentation.foreground | segmentation.shadow, self._settings.relearn_share)
+
+    def _is_mostly(self, mask: Mask, share: float = 0.5) -> bool:
+        """Return whether a mask `(H, W)` has more than a share of what is not hidden."""
+        if self.hidden is None:
+            return cv2.countNonZero(mask) > share * mask.size
+        shown = ~self.hidden
+        return cv2.countNonZero(mask & shown) > share * cv2.countNonZero(shown)
 
     def _invalidate(self, image: Image, background: Image) -> None:
         """Go back to the background before this one if it explains the frame, or learn another one.
@@ -319,19 +342,7 @@ _BLIND = 0.1
 _LEAST_CONTRAST, _NOISES = 0.4, 4.0
 # Share of the background's edges below which the lens is covered.
 _COVERED = 0.25
-# Noise, in gray levels, from which frames are smoothed.
-_NOISY = 6.0
-
-
-def _exceeding(difference: Mask, thresholds: Plane) -> Mask:
-    """Return where a difference `(H, W)` is above a threshold, `()` or `(h,)` for as many bands of rows."""
-    if not thresholds.ndim:
-        return np.asarray(
-            cv2.threshold(difference, float(thresholds), 255, cv2.THRESH_BINARY)[1], dtype=np.uint8
-        )
-    rows = np.arange(len(difference)) * len(thresholds) // len(difference)
-    return np.asarray(np.where(difference > thresholds[rows][:, None], 255, 0), dtype=np.uint8)
-
-
-def _smoothed(image: Image) -> Image:
-    return np.asarray(cv2.GaussianBlur(image, (5, 5), 0.0), dtype=np.uint8)
+# Noise, in gray levels, from which frames are smoothed, and the share of it that is left then.
+_NOISY, _SMOOTHED_NOISE = 6.0, 0.3
+# Share of the background's contrast below which a frame is relit.
+_DULL = 0.7

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.detectors.background.motion import STILL, Motion
-from tracking.detectors.base import Image, Mask
+from tracking.detectors.base import Image, Mask, Plane
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +42,21 @@ def largest_difference(image: Image, expected: Image) -> Mask:
     """Return the largest difference of the channels, `(H, W)`."""
     blue, green, red = cv2.split(cv2.absdiff(image, expected))
     return np.asarray(cv2.max(cv2.max(blue, green), red), dtype=np.uint8)
+
+
+def exceeding(difference: Mask, thresholds: Plane) -> Mask:
+    """Return where a difference `(H, W)` is above a threshold, `()` or `(h,)` for as many bands of rows."""
+    if not thresholds.ndim:
+        return np.asarray(
+            cv2.threshold(difference, float(thresholds), 255, cv2.THRESH_BINARY)[1], dtype=np.uint8
+        )
+    rows = np.arange(len(difference)) * len(thresholds) // len(difference)
+    return np.asarray(np.where(difference > thresholds[rows][:, None], 255, 0), dtype=np.uint8)
+
+
+def smoothed(image: Image) -> Image:
+    """Return an image with a third of its noise."""
+    return np.asarray(cv2.GaussianBlur(image, (5, 5), 0.0), dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tracking.boxes import Floats, heights, iou
 from tracking.detectors.background.detector import BackgroundDetector, ForegroundScan
 from tracking.detectors.background.motion import STILL, Motion
-from tracking.detectors.base import Image
+from tracking.detectors.base import Image, Mask
 from tracking.detectors.fused.carried_boxes import CarriedBoxes
 from tracking.detectors.fused.explanation import (
     FusedHypotheses,
@@ -116,6 +116,15 @@ class FusedDetector:
         self._schedule.stretch(factor)
         self._run_s = self._schedule.every / self._background.fps
 
+    def cover(self, boxes: Floats) -> None:
+        """Ignore the covered part of the images, as :meth:`BackgroundDetector.cover`."""
+        self._background.cover(boxes)
+
+    @property
+    def flicker(self) -> Mask | None:
+        """Where the images flicker, as :attr:`BackgroundDetector.flicker`."""
+        return self._background.flicker
+
     @property
     def camera_motion(self) -> Floats | None:
         """How the picture has moved, as :attr:`BackgroundDetector.camera_motion`."""
@@ -156,7 +165,7 @@ class FusedDetector:
         scan = self._background.scan(work_image)
         runs = self._schedule.is_due(self._frame, needed=self._is_needed)
         if runs:
-            found = self.network.find(image)
+            found = self.network.find(self._background.relit(image))
             in_work = self._background.grid.image_to_work(found.boxes)
             self._carried.renew(work_image, replace(found, boxes=in_work))
         else:

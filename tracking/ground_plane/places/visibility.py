@@ -14,6 +14,8 @@ from tracking.ground_plane.places.measurements import Measurements
 _FREE_SHARE, _HIDDEN_SHARE = 0.3, 0.9
 """Shares of a box that others hide, up to which nothing and from which nearly everything is lost."""
 _HIDDEN_FACTOR = 0.15
+_UNCOVERED, _COVERED = 0.2, 0.7
+"""Shares of a box behind a cover up to which the person is detected as elsewhere, and from which never."""
 _NEARER = 0.02
 """Box heights by which a foot must be lower to be of somebody nearer to the camera."""
 _MAX_CUT = 0.7
@@ -45,7 +47,9 @@ def detection_probabilities(
         of_camera = measurements.camera == index
         hidden = _hidden_shares(boxes, measurements.boxes[of_camera], own[:, of_camera])
         lost = np.clip((hidden - _FREE_SHARE) / (_HIDDEN_SHARE - _FREE_SHARE), 0.0, 1.0 - _HIDDEN_FACTOR)
-        found[:, index] = np.where(in_picture(boxes, camera), probability * (1.0 - lost), 0.0)
+        covered = (camera.covered_shares(boxes) - _UNCOVERED) / (_COVERED - _UNCOVERED)
+        left = (1.0 - lost) * (1.0 - np.clip(covered, 0.0, 1.0))
+        found[:, index] = np.where(in_picture(boxes, camera), probability * left, 0.0)
     return found
 
 

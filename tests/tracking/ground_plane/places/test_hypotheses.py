@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -105,6 +107,24 @@ def test_a_miss_says_nothing_where_somebody_nearer_hides_the_person() -> None:
     assert hidden < 0.3
     assert free == pytest.approx(0.9)
     assert probabilities[0, 2] == pytest.approx(0.9), "from the other side"
+
+
+def test_a_camera_whose_lens_is_covered_is_not_expected_to_see_what_is_behind() -> None:
+    sizes = [BoxSizes() for _ in CAMERAS]
+    random = np.random.default_rng(0)
+    for frame in detect_walkers(random.uniform(1.0, 9.0, (20, 4, 2)), VIEWS, FloorNoise()):
+        for size, found in zip(sizes, frame.values(), strict=True):
+            size.update(found.boxes)
+    places = np.array([[7.0, 3.0], [3.0, 6.0]])
+    behind, beside = sizes[0].boxes(CAMERAS[0].to_image(places))
+    halves = np.array(
+        [[*behind[:2], behind[2], behind[3] - 40.0], [*behind[:1], behind[3] - 40.0, *behind[2:]]]
+    )
+    covered = [replace(CAMERAS[0], covered=halves), *CAMERAS[1:]]
+    nobody = measurements_of([], FloorNoise())
+    found = detection_probabilities(places, covered, sizes, nobody, np.zeros((2, 0), dtype=bool), 0.9)
+    assert found[0].tolist() == pytest.approx([0.0, 0.9, 0.9])
+    assert found[1, 0] == pytest.approx(0.9), beside
 
 
 def test_a_score_counts_for_less_within_a_better_box() -> None:

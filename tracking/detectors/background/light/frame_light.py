@@ -49,8 +49,12 @@ class FrameLight:
         return None if self.gain is None else relight(expected, self.gain)
 
     def remove(self, image: Image, background: Image | None = None) -> Image:
-        """Return a frame at the background's light; see `ToneCurves.invert`."""
-        unlit = image if self.gain is None else unlight(image, self.gain)
+        """Return a frame, of any size, at the background's light; see `ToneCurves.invert`."""
+        unlit = image
+        if self.gain is not None:
+            size = (image.shape[1], image.shape[0])
+            gain = self.gain if self.gain.shape == image.shape else cv2.resize(self.gain, size)
+            unlit = unlight(image, np.asarray(gain, dtype=np.float32))
         unlit = unlit if self.haze is None else self.haze.remove(unlit)
         return self.curves.invert(unlit, background)
 
