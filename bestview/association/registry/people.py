@@ -179,7 +179,7 @@ class PersonStore:
         for site, population in populations.items():
             self._reidentifier.populations.put(site, population)
         for sighting in sightings:
-            unknown = Person(sighting.person_id, departed=True)
+            unknown = Person(sighting.person_id, departed=True, elsewhere=True)
             self._by_id.setdefault(sighting.person_id, unknown).see_elsewhere(sighting)
 
     @property

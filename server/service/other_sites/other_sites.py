@@ -168,7 +168,8 @@ class OtherSites:
         now, found = self._clock(), {}
         for person in self.elsewhere.by_number.values():
             number = self._people.registry.current(person.number)
-            is_here = self._here.arrived(number) is not None or person.frame <= self._last_seen(number)
+            last = self._people.registry.last_seen.get(number)
+            is_here = self._here.arrived(number) is not None or (last is not None and person.frame <= last)
             if self.sites[person.site].is_there(now) and not is_here:
                 found[number] = replace(person, number=number)
         return [person for _, person in sorted(found.items())]
@@ -181,9 +182,6 @@ class OtherSites:
     @property
     def _pulse(self) -> int:
         return max(self._pulses.newest, self._people.newest)
-
-    def _last_seen(self, number: int) -> int:
-        return self._people.registry.last_seen.get(number, -1)
 
     def _accepts(self, site: LinkedSite, told: SitePeople) -> bool:
         """Return whether a site's numbers fit; log once why not."""

@@ -48,8 +48,8 @@ class LinkedSites:
         """Sites that are cut off from the others."""
         self._epochs: dict[str, int] = {}
 
-    def start(self, name: str, **settings: Any) -> FedService:
-        """Start a site that is linked with all others."""
+    def start(self, name: str, first: int | None = None, **settings: Any) -> FedService:
+        """Start a site that is linked with all others; its first epoch is `first`."""
         index = NAMES.index(name)
         links = {other: {"connect": "tcp/127.0.0.1:1", "url": f"http://{other}/"} for other in NAMES}
         del links[name]
@@ -61,7 +61,7 @@ class LinkedSites:
         service.other_sites._bus = _End(self, name)  # type: ignore[assignment]
         service.connect_cameras(*CAMERAS)
         self.running[name] = service
-        self._epochs[name] = 500 * index
+        self._epochs[name] = 500 * index if first is None else first
         return service
 
     def stop(self, name: str) -> None:

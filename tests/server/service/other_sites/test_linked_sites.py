@@ -43,6 +43,17 @@ async def test_who_walks_from_one_site_into_another_keeps_their_number(sites: Li
     assert sites.elsewhere("yard") == {4: "hall"}
 
 
+async def test_a_site_that_has_just_started_knows_who_left_another_before() -> None:
+    with linked_sites("hall") as sites:
+        sites.walk(6, hall={A: SMALL})
+        sites.walk(4)
+        sites.start("yard", first=0)
+        sites.walk(2)
+        assert sites.elsewhere("yard") == {1: "hall"}
+        sites.walk(3, yard={A: SMALL})
+        assert sites.number("yard", A) == 1
+
+
 async def test_who_returns_has_their_number_at_each_site(sites: LinkedSites) -> None:
     sites.walk(5, hall={A: SMALL})
     sites.walk(3)
