@@ -16,6 +16,7 @@ from server.config.loader import build_config
 from server.config.site_config import Config
 from server.config.yaml_file import dump_yaml_inline
 from server.setup.camera_address import CameraAddress
+from server.setup.own_video import NOT_COMPARED, OwnVideo
 from server.setup.proposal import SiteProposal
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError, reason_of
@@ -36,18 +37,28 @@ site:
 
 cameras:
 """
+_PASSED = "    passthrough: auto  # its own video fits, and is sent on as it is: that spares the encoding\n"
+_PASSED_IF = """\
+    #passthrough: auto  # sends its own video on, which spares the encoding, once the camera is set to:
+    # {wanted}
+"""
+_OWN_PARAMETERS = """
+{off}encode:
+  {off}parameters: own  # cameras of any make pass through; where Apple's players fail, encode all: equal
+"""
 _FILE_LINE = "    password: {file}  # replaces {{password}}; only you can read this file\n"
 
 
 @dataclass(frozen=True, slots=True)
 class NewCamera:
-    """A camera to write: its id, its address, and what it sends, for a comment; the same of its substream."""
+    """A camera to write: its id, its address, and what it sends, for comments; the same of its substream."""
 
     id: str
     address: CameraAddress
     sends: str = ""
     substream: str | None = None
     substream_sends: str = ""
+    own_video: OwnVideo = NOT_COMPARED
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +80,11 @@ def site_text(site: NewSite, path: Path) -> str:
         width=site.proposal.width,
         height=site.proposal.height,
     )
-    return head + "".join(_camera_text(camera, path) for camera in site.cameras)
+    text = head + "".join(_camera_text(camera, path) for camera in site.cameras)
+    own_videos = [camera.own_video for camera in site.cameras]
+    if any(own_video.fits for own_video in own_videos):
+        return text + _OWN_PARAMETERS.format(off="")
+    return text + (_OWN_PARAMETERS.format(off="#") if any(each.wanted for each in own_videos) else "")
 
 
 def write_site(site: NewSite, path: Path) -> Path | None:
@@ -128,6 +143,10 @@ def _camera_text(camera: NewCamera, path: Path) -> str:
         lines += _FILE_LINE.format(file=_scalar(str(password_file(path, camera.id))))
     if address.options:
         lines += f"    options: {dump_yaml_inline(address.options)}\n"
+    if camera.own_video.fits:
+        lines += _PASSED
+    elif camera.own_video.wanted:
+        lines += _PASSED_IF.format(wanted=camera.own_video.wanted)
     return lines
 
 

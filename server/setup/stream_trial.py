@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import time
 from pathlib import Path
 
@@ -10,12 +12,17 @@ import cv2
 import msgspec
 import numpy as np
 from av.video.frame import VideoFrame
+from av.video.stream import VideoStream
 
+from server.camera.passthrough.access_units import parse_packing
 from server.camera.passthrough.compatibility import OR_ENCODE, IncompatibleStreamError, required_format
 from server.camera.passthrough.stream_source import check_stream
 from server.camera.sources.opening import OpenedVideo, open_video
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.config.loader import load_config
+from server.media.h264.codec import H264
+from server.media.h265.codec import H265
+from server.media.nal_units import nal_units
 from server.setup.trial_messages import StreamRequest, StreamTrial
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
@@ -63,9 +70,11 @@ def _watch(opened: OpenedVideo) -> StreamTrial:
     times, arrivals = list[float](), list[float]()
     picture: VideoFrame | None = None
     size_bytes, began = 0, time.monotonic()
+    order = _PictureOrder(opened)
     try:
         for packet in opened.container.demux(opened.stream):
             size_bytes += packet.size or 0
+            order.add(packet)
             try:
                 pictures = [frame for frame in packet.decode() if isinstance(frame, VideoFrame)]
             except av.error.FFmpegError:
@@ -91,10 +100,46 @@ def _watch(opened: OpenedVideo) -> StreamTrial:
         height=height,
         fps=usual_rate(fps) if fps else 0.0,
         codec=opened.stream.codec_context.name,
+        gop=order.gop,
+        reorders=order.reorders,
+        is_upright=not orientation.description,
         kbps=round(8 * size_bytes / span / 1000) if span > 0 else 0.0,
         has_sound=bool(opened.container.streams.audio),
         picture=_jpeg(orientation.image(picture)),
     )
+
+
+class _PictureOrder:
+    """Measures GOPs, and whether pictures are reordered."""
+
+    def __init__(self, opened: OpenedVideo) -> None:
+        name = opened.stream.codec_context.name
+        self._codec = next((codec for codec in (H264, H265) if codec.ffmpeg_name == name), None)
+        self._count, self._keys = 0, list[int]()
+        self._newest: int | None = None
+        self.reorders = False
+
+    def add(self, packet: av.Packet[VideoStream]) -> None:
+        """Add the next access unit."""
+        if not packet.size or self._codec is None:
+            return
+        with contextlib.suppress(ValueError):  # a damaged one
+            packing = parse_packing(packet.stream.codec_context.extradata, self._codec)
+            if self._codec.is_keyframe(nal_units(packing.annex_b(bytes(packet)))):
+                self._keys.append(self._count)
+        self._count += 1
+        if packet.pts is not None:
+            self.reorders |= self._newest is not None and packet.pts < self._newest
+            self._newest = packet.pts
+
+    @property
+    def gop(self) -> int:
+        """Pictures of a GOP, but for the first, which may be cut short for a new client; 0: they differ."""
+        keys = self._keys[1:] if len(self._keys) > 2 else self._keys  # noqa: PLR2004 — one GOP has two
+        lengths = {after - before for before, after in itertools.pairwise(keys)}
+        last = self._count - self._keys[-1] if self._keys else 0
+        length = lengths.pop() if len(lengths) == 1 else 0
+        return length if last <= length else 0
 
 
 def usual_rate(fps: float) -> float:

@@ -52,6 +52,12 @@ class StreamTrial(msgspec.Struct, frozen=True):
     fps: float = 0.0
     """Pictures per second by their time stamps; 0: not known."""
     codec: str = ""
+    gop: int = 0
+    """Pictures from one keyframe to the next; 0: they differ, or are more than were watched."""
+    reorders: bool = False
+    """Whether pictures are decoded in another order than shown."""
+    is_upright: bool = True
+    """Whether pictures are shown as they are stored, with square pixels."""
     kbps: float = 0.0
     has_sound: bool = False
     picture: bytes = b""

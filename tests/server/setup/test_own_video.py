@@ -1,0 +1,66 @@
+"""Set-up proposes to pass a camera's own video through where it fits, and says what is missing elsewhere."""
+
+from __future__ import annotations
+
+import re
+from contextlib import closing
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from fakes.media.h264 import encoded
+from fakes.media.rtsp_camera import RtspCamera
+from server.camera.passthrough.compatibility import required_format
+from server.camera.passthrough.stream_source import check_stream
+from server.config.loader import load_config
+from server.setup.camera_address import parse_addresses
+from server.setup.own_video import NOT_COMPARED, OwnVideo, compare_own_video
+from server.setup.proposal import SiteProposal
+from server.setup.session import SetupSession
+from server.setup.trial_messages import StreamTrial
+
+SITE = SiteProposal(25.0, 1280, 720)
+FITTING = StreamTrial(width=1280, height=720, fps=25.0, codec="h264", gop=10)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({}, OwnVideo(fits=True)),
+        ({"fps": 25.1}, OwnVideo(fits=True)),
+        ({"gop": 50}, OwnVideo(wanted="a fixed GOP (I-frame interval) of 10 frames, not 50")),
+        ({"gop": 0}, OwnVideo(wanted="a fixed GOP (I-frame interval) of 10 frames")),
+        (
+            {"width": 1920, "height": 1080, "fps": 12.5, "reorders": True},
+            OwnVideo(wanted="1280x720 pixels; 25 frames a second; no B frames"),
+        ),
+        ({"codec": "hevc"}, OwnVideo(wanted="H.264")),
+        ({"codec": "mjpeg"}, NOT_COMPARED),
+        ({"is_upright": False}, NOT_COMPARED),
+    ],
+)
+def test_what_a_camera_must_be_set_to_is_named(change: dict[str, object], expected: OwnVideo) -> None:
+    assert compare_own_video(msgspec.structs.replace(FITTING, **change), SITE) == expected
+
+
+@pytest.mark.parametrize(("gop", "fits"), [(10, True), (20, False)])
+async def test_a_camera_whose_video_fits_passes_through_the_site_that_is_written(
+    tmp_path: Path, gop: int, *, fits: bool
+) -> None:
+    session = SetupSession(tmp_path / "site.yaml")
+    units = encoded((64, 48), "superfast", 80, gop=gop)
+    gops = [units[at : at + gop] for at in range(0, 80, gop)]
+    with closing(RtspCamera(gops, 25.0, live=True)) as stream:
+        await session.add(parse_addresses(stream.url), "door")
+        session.write("hall", session.proposal)
+        config, text = load_config(session.path), session.path.read_text()
+        assert (config.camera("door").passthrough == "auto") is fits
+        assert ("#passthrough: auto" in text) is not fits
+        if fits:
+            check_stream(stream.url, config.camera("door").options, required_format(config))
+        else:
+            assert "of 10 frames, not 20\n" in text
+    session.path.write_text(re.sub(r"^( *)#(?=\w)", r"\1", text, flags=re.MULTILINE))
+    config = load_config(session.path)
+    assert (config.camera("door").passthrough, config.encode.parameters) == ("auto", "own")
